@@ -1,0 +1,43 @@
+"""The errors that bellcrank raises on purpose.
+
+Every one derives from `BellcrankError` and from the builtin a caller would
+expect, so that both ``except BellcrankError`` and ``except ValueError`` work.
+A message says which argument, what was expected, what came, and what to do.
+"""
+
+from __future__ import annotations
+
+
+class BellcrankError(Exception):
+    """Root of all errors raised on purpose by bellcrank."""
+
+
+class InvalidProblem(BellcrankError, ValueError):
+    """A lattice, problem or design breaks a rule that everything relies on."""
+
+
+class InvalidFile(BellcrankError, ValueError):
+    """A file cannot be read as what it should be."""
+
+
+class InvalidSettings(BellcrankError, ValueError):
+    """A search, run or command was given settings that make no sense."""
+
+
+class UnknownName(BellcrankError, KeyError):
+    """A registry has no entry of that name."""
+
+    def __str__(self) -> str:  # KeyError would print the repr of the message
+        return str(self.args[0])
+
+
+class OutputExists(BellcrankError, FileExistsError):
+    """Writing would overwrite something and nobody asked for that."""
+
+
+class StorageError(BellcrankError, OSError):
+    """A result could not be written (disk full, folder not writable)."""
+
+
+class CorruptRun(BellcrankError, ValueError):
+    """A run directory does not hold what its own description says."""
