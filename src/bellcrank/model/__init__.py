@@ -1,0 +1,68 @@
+"""Lattices, problems and designs: what there is, what is asked, what is made.
+
+Everything else in bellcrank starts here. A `Problem` is a `Lattice` together
+with what drives, holds and observes it; a `Design` is a problem and a mask of
+the beams that are present. All of them are immutable and check themselves when
+they are built.
+
+Examples
+--------
+>>> from bellcrank.model import find_problem
+>>> problem = find_problem("crane")
+>>> design = problem.full_design()
+>>> design.beam_count, len(problem.designable)
+(352, 203)
+
+A beam is removed by making another design.
+
+>>> mask = design.mask.copy()
+>>> mask[problem.designable[0]] = False
+>>> design.with_mask(mask).beam_count
+351
+
+Problems of one's own are written in TOML (see `bellcrank.model.schema`) and
+read by `read_problem`; designs travel in JSON.
+"""
+
+from bellcrank.model.builtin import builtin
+from bellcrank.model.conditions import Input, Output, Stiffness, Supports
+from bellcrank.model.explicit import problem_to_dict
+from bellcrank.model.files import (
+    find_problem,
+    read_design,
+    read_masks,
+    read_problem,
+    write_design,
+    write_problem,
+)
+from bellcrank.model.human import human_design
+from bellcrank.model.lattice import Lattice
+from bellcrank.model.lattices import lattices
+from bellcrank.model.masks import pack_mask, unpack_mask
+from bellcrank.model.problem import Design, Problem
+from bellcrank.model.regions import regions
+from bellcrank.model.schema import problem_from_dict
+
+__all__ = [
+    "Design",
+    "Input",
+    "Lattice",
+    "Output",
+    "Problem",
+    "Stiffness",
+    "Supports",
+    "builtin",
+    "find_problem",
+    "human_design",
+    "lattices",
+    "pack_mask",
+    "problem_from_dict",
+    "problem_to_dict",
+    "read_design",
+    "read_masks",
+    "read_problem",
+    "regions",
+    "unpack_mask",
+    "write_design",
+    "write_problem",
+]

@@ -1,0 +1,136 @@
+"""Checked, read-only arrays: what every object of the model is made of.
+
+An object that cannot change can be shared between chains, hashed once and
+trusted without looking again. Arrays are therefore copied, cast, made
+contiguous and locked when an object is built, and never afterwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.errors import InvalidProblem
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+    from numpy.typing import ArrayLike, NDArray
+
+
+def locked(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a contiguous copy of `array` that refuses to be written to.
+
+    Examples
+    --------
+    >>> locked(np.zeros(2))[0] = 1.0
+    Traceback (most recent call last):
+        ...
+    ValueError: assignment destination is read-only
+    """
+    copy = np.array(array, order="C", copy=True)
+    copy.flags.writeable = False
+    return copy
+
+
+def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Cast `values` to finite numbers; negative zeros become zeros.
+
+    Raises
+    ------
+    InvalidProblem
+        If they are not numbers, ragged, or not finite; names the first offender.
+    """
+    try:
+        raw = np.asarray(values)
+    except ValueError as error:
+        raise InvalidProblem(f"{name}: expected an array of numbers ({error})") from None
+    if raw.dtype.kind not in "iuf":
+        raise InvalidProblem(f"{name}: expected numbers, got values of type {raw.dtype}")
+    # Adding zero turns -0.0 into 0.0, which would otherwise hash differently.
+    array: NDArray[np.float64] = np.asarray(raw, dtype=np.float64) + 0.0
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        where = "".join(f"[{k}]" for k in bad[0])
+        raise InvalidProblem(f"{name}{where}: expected a finite number, got {array[tuple(bad[0])]}")
+    return array
+
+
+def index_array(name: str, values: ArrayLike) -> NDArray[np.int64]:
+    """Cast `values` to whole numbers without ever rounding one.
+
+    Raises
+    ------
+    InvalidProblem
+        If they are anything but integers.
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise InvalidProblem(f"{name}: expected an array of integers ({error})") from None
+    if array.size == 0:
+        return array.astype(np.int64)
+    if not np.issubdtype(array.dtype, np.integer):
+        raise InvalidProblem(f"{name}: expected integers, got values of type {array.dtype}")
+    return array.astype(np.int64)
+
+
+def id_list(name: str, values: ArrayLike) -> NDArray[np.int64]:
+    """Cast `values` to a flat list of distinct ids, in the order given.
+
+    Raises
+    ------
+    InvalidProblem
+        If they are not a flat list of integers, or one of them comes twice.
+    """
+    ids = index_array(name, values)
+    if ids.ndim != 1:
+        raise InvalidProblem(f"{name}: expected a flat list of ids, got shape {ids.shape}")
+    first_places = np.unique(ids, return_index=True)[1]
+    if len(first_places) < len(ids):
+        repeated = np.setdiff1d(np.arange(len(ids)), first_places)[0]
+        raise InvalidProblem(f"{name}[{repeated}]: {ids[repeated]} is listed twice")
+    return ids
+
+
+def check_ids(name: str, ids: NDArray[np.int64], count: int, kind: str) -> None:
+    """Check that all `ids` name one of `count` things of a `kind`.
+
+    Raises
+    ------
+    InvalidProblem
+        If one does not; names the first offender.
+    """
+    bad = np.flatnonzero((ids < 0) | (ids >= count))
+    if len(bad):
+        raise InvalidProblem(
+            f"{name}[{bad[0]}]: expected a {kind} from 0 to {count - 1}, got {ids[bad[0]]}"
+        )
+
+
+def boolean_mask(name: str, values: ArrayLike, length: int) -> NDArray[np.bool_]:
+    """Cast `values` to a mask with one boolean per beam.
+
+    Raises
+    ------
+    InvalidProblem
+        If it has another shape or holds anything but booleans.
+    """
+    mask = np.asarray(values)
+    if mask.shape != (length,):
+        raise InvalidProblem(
+            f"{name}: expected one boolean per beam, shape ({length},), got shape {mask.shape}"
+        )
+    if mask.dtype != np.bool_:
+        raise InvalidProblem(f"{name}: expected booleans, got values of type {mask.dtype}")
+    return mask
+
+
+def rebuild(instance: DataclassInstance) -> tuple[type, tuple[Any, ...]]:
+    """Pickle and copy `instance` through its constructor (used as ``__reduce__``).
+
+    A frozen dataclass restored field by field would come back with writable
+    arrays, because pickle forgets the read-only flag.
+    """
+    return type(instance), tuple(getattr(instance, field.name) for field in fields(instance))

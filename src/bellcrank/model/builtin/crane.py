@@ -1,0 +1,68 @@
+"""The paper's first actuators: push down on the right, move the left.
+
+`crane` asks for motion at right angles to the push, `anti-parallel` for motion
+against it. Both share one lattice, which stands on three full rows of supports.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bellcrank.model.builtin.registry import builtin
+from bellcrank.model.conditions import Input, Output, Supports
+from bellcrank.model.lattices.triangular import triangular_rows
+from bellcrank.model.problem import Problem
+from bellcrank.model.regions import leftmost, rightmost
+
+ROW_COUNTS = (11, 12, 11, 11, 10, 11, 10, 11, 10, 12, 12, 12)
+ROW_FIRST_X = (0.5, 0.0, 0.5, 0.0, 0.5, 0.0, 0.5, 0.0, 0.5, -1.0, -0.5, -1.0)
+
+
+@builtin.register("crane")
+def crane() -> Problem:
+    """Turn a push downwards into a motion to the left.
+
+    133 nodes, 352 beams, 203 of them designable.
+
+    Examples
+    --------
+    >>> problem = crane()
+    >>> problem.lattice.node_count, problem.lattice.beam_count, len(problem.designable)
+    (133, 352, 203)
+    """
+    return _actuator("crane", towards=(-1.0, 0.0))
+
+
+@builtin.register("anti-parallel")
+def anti_parallel() -> Problem:
+    """Turn a push downwards into a motion upwards, on the lattice of `crane`.
+
+    Examples
+    --------
+    >>> anti_parallel().output.direction[0]
+    array([0., 1.])
+    """
+    return _actuator("anti-parallel", towards=(0.0, 1.0))
+
+
+def _actuator(name: str, towards: tuple[float, float]) -> Problem:
+    lattice = triangular_rows(ROW_COUNTS, ROW_FIRST_X)
+    pushed = ((-1, 3), (-2, 4), (-3, 3))
+    watched = ((-1, 3), (-2, 3), (-3, 3))
+    return Problem(
+        name=name,
+        lattice=lattice,
+        supports=Supports(fixed=np.arange(sum(ROW_COUNTS[:3]))),
+        input=Input(
+            nodes=np.sort(np.concatenate([rightmost(lattice, row, n) for row, n in pushed])),
+            direction=np.array([0.0, -1.0]),
+            drive="displacement",
+            amount=math.sqrt(3.0) / 4.0,
+        ),
+        output=Output(
+            nodes=np.sort(np.concatenate([leftmost(lattice, row, n) for row, n in watched])),
+            direction=np.array(towards),
+        ),
+    )

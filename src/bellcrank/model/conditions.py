@@ -1,0 +1,229 @@
+"""What surrounds a lattice: stiffness, supports, input and output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from bellcrank.errors import InvalidProblem
+from bellcrank.model.arrays import id_list, locked, real_array, rebuild
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Drive = Literal["displacement", "force"]
+SpringKind = Literal["directional", "isotropic"]
+
+
+def _no_nodes() -> NDArray[np.int64]:
+    return np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stiffness:
+    """How hard it is to stretch a beam and to bend a joint.
+
+    Parameters
+    ----------
+    bond
+        k of the energy ``k (r - r0)^2`` of a beam (no factor 1/2).
+    angle
+        lambda of the energy ``lambda (theta - theta0)^2`` of an angular spring.
+
+    Raises
+    ------
+    InvalidProblem
+        Unless both are finite and greater than zero.
+    """
+
+    bond: float = 5.0
+    angle: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("bond", "angle"):
+            value = _positive(f"stiffness.{name}", getattr(self, name))
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Supports:
+    """Nodes that are held in place; on rollers if held in one coordinate only.
+
+    Parameters
+    ----------
+    fixed, fixed_x, fixed_y : int64, node ids
+        Held in both coordinates, in x, in y. They are sorted, and a node held in
+        x and in y is moved to `fixed`, so that equal supports compare equal.
+
+    Raises
+    ------
+    InvalidProblem
+        If they are not flat lists of distinct integers.
+
+    Examples
+    --------
+    >>> supports = Supports(fixed=[4], fixed_x=[1, 2], fixed_y=[3, 2])
+    >>> supports.fixed, supports.fixed_x, supports.fixed_y
+    (array([2, 4]), array([1]), array([3]))
+    """
+
+    fixed: NDArray[np.int64] = field(default_factory=_no_nodes)
+    fixed_x: NDArray[np.int64] = field(default_factory=_no_nodes)
+    fixed_y: NDArray[np.int64] = field(default_factory=_no_nodes)
+
+    def __post_init__(self) -> None:
+        fixed = id_list("supports.fixed", self.fixed)
+        fixed_x = id_list("supports.fixed_x", self.fixed_x)
+        fixed_y = id_list("supports.fixed_y", self.fixed_y)
+        fixed = np.union1d(fixed, np.intersect1d(fixed_x, fixed_y))
+        object.__setattr__(self, "fixed", locked(fixed))
+        object.__setattr__(self, "fixed_x", locked(np.setdiff1d(fixed_x, fixed)))
+        object.__setattr__(self, "fixed_y", locked(np.setdiff1d(fixed_y, fixed)))
+
+    __reduce__ = rebuild
+
+    @property
+    def nodes(self) -> NDArray[np.int64]:
+        """All supported nodes, held in one coordinate or in both, sorted."""
+        return np.unique(np.concatenate([self.fixed, self.fixed_x, self.fixed_y]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Input:
+    """Where, which way and how much the structure is driven.
+
+    Parameters
+    ----------
+    nodes : (n,) int64, node ids
+        The driven nodes.
+    direction : (n, 2) float64, unit vectors
+        One per node; a single vector serves all.
+    drive
+        ``"displacement"``: each node is moved by amount x direction and held
+        there. ``"force"``: amount x direction pulls at each node.
+    amount
+        Length (lattice units) or force (on each node), greater than zero.
+
+    Raises
+    ------
+    InvalidProblem
+        If there is no node, a direction is no unit vector, or the drive or the
+        amount is impossible.
+
+    Examples
+    --------
+    >>> push = Input(nodes=[7, 8], direction=[0, -1], drive="displacement", amount=0.1)
+    >>> push.direction
+    array([[ 0., -1.],
+           [ 0., -1.]])
+    """
+
+    nodes: NDArray[np.int64]
+    direction: NDArray[np.float64]
+    drive: Drive
+    amount: float
+
+    def __post_init__(self) -> None:
+        nodes = _region("input.nodes", self.nodes)
+        if self.drive not in get_args(Drive):
+            raise InvalidProblem(
+                f"input.drive: expected 'displacement' or 'force', got {self.drive!r}"
+            )
+        direction = _unit_vectors("input.direction", self.direction, len(nodes))
+        object.__setattr__(self, "nodes", locked(nodes))
+        object.__setattr__(self, "direction", locked(direction))
+        object.__setattr__(self, "amount", _positive("input.amount", self.amount))
+
+    __reduce__ = rebuild
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Output:
+    """Where and which way the structure is meant to move, and against what.
+
+    Parameters
+    ----------
+    nodes : (n,) int64, node ids
+        The observed nodes.
+    direction : (n, 2) float64, unit vectors
+        One per node; a single vector serves all.
+    spring
+        k_ext of the monitor spring at each node, energy ``1/2 k_ext ...``; none
+        if nothing resists.
+    spring_kind
+        ``"directional"`` resists motion along `direction` (the paper, and the
+        default where a spring is given), ``"isotropic"`` motion anywhere (the
+        published code).
+
+    Raises
+    ------
+    InvalidProblem
+        If there is no node, a direction is no unit vector, or the spring is
+        impossible.
+
+    Examples
+    --------
+    >>> Output(nodes=[3], direction=[-1, 0], spring=0.5).spring_kind
+    'directional'
+    """
+
+    nodes: NDArray[np.int64]
+    direction: NDArray[np.float64]
+    spring: float | None = None
+    spring_kind: SpringKind | None = None
+
+    def __post_init__(self) -> None:
+        nodes = _region("output.nodes", self.nodes)
+        direction = _unit_vectors("output.direction", self.direction, len(nodes))
+        if self.spring_kind is not None and self.spring_kind not in get_args(SpringKind):
+            raise InvalidProblem(
+                "output.spring_kind: expected 'directional' or 'isotropic', "
+                f"got {self.spring_kind!r}"
+            )
+        if self.spring is None and self.spring_kind is not None:
+            raise InvalidProblem("output.spring_kind: given without output.spring")
+        if self.spring is not None:
+            object.__setattr__(self, "spring", _positive("output.spring", self.spring))
+            object.__setattr__(self, "spring_kind", self.spring_kind or "directional")
+        object.__setattr__(self, "nodes", locked(nodes))
+        object.__setattr__(self, "direction", locked(direction))
+
+    __reduce__ = rebuild
+
+
+def _positive(name: str, value: float) -> float:
+    number = real_array(name, value)
+    if number.ndim != 0 or number <= 0.0:
+        raise InvalidProblem(f"{name}: expected a number greater than 0, got {value!r}")
+    return float(number)
+
+
+def _region(name: str, values: NDArray[np.int64]) -> NDArray[np.int64]:
+    nodes = id_list(name, values)
+    if len(nodes) == 0:
+        raise InvalidProblem(f"{name}: expected at least one node, got none")
+    return nodes
+
+
+def _unit_vectors(name: str, values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    vectors = real_array(name, values)
+    if vectors.shape not in {(2,), (count, 2)}:
+        raise InvalidProblem(
+            f"{name}: expected one vector, shape (2,), or one per node, shape ({count}, 2), "
+            f"got shape {vectors.shape}"
+        )
+    vectors = np.broadcast_to(vectors, (count, 2))
+    lengths = np.linalg.norm(vectors, axis=1)
+    bad = np.flatnonzero(np.abs(lengths - 1.0) > 1e-6)
+    if len(bad):
+        raise InvalidProblem(
+            f"{name}: expected unit vectors, got {vectors[bad[0]].tolist()} "
+            f"of length {lengths[bad[0]]:.7g} for node number {bad[0]} of the region"
+        )
+    # Dividing again and again by 1 +- 1e-16 would keep changing the last bit,
+    # and with it the hash of a problem that is merely read and written.
+    rounded = np.abs(lengths - 1.0) <= 1e-15
+    unit: NDArray[np.float64] = np.where(rounded[:, None], vectors, vectors / lengths[:, None])
+    return unit

@@ -1,0 +1,183 @@
+"""From text to checked tables: one error, naming file, key and first offender."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from bellcrank.errors import InvalidFile
+from bellcrank.model.storage import read_text
+
+
+class Table(BaseModel):
+    """A table of a file: no unknown keys, no silent conversions, no NaN."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from pydantic_core import ErrorDetails
+
+AnyTable = TypeVar("AnyTable", bound=Table)
+
+
+def read_json(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a JSON file that holds one object.
+
+    Raises
+    ------
+    InvalidFile
+        If it cannot be read, is no JSON, or gives a key twice.
+    """
+    try:
+        data = json.loads(read_text(path), object_pairs_hook=_unique_keys)
+    except json.JSONDecodeError as error:
+        raise InvalidFile(
+            f"{path}: not valid JSON: {error.msg} (line {error.lineno}, column {error.colno})"
+        ) from None
+    except (_RepeatedKey, RecursionError) as error:
+        raise InvalidFile(f"{path}: not valid JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise InvalidFile(f"{path}: expected a JSON object, got {_kind(data)}")
+    return data
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    InvalidFile
+        If it cannot be read or is no TOML.
+    """
+    try:
+        return tomllib.loads(read_text(path))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InvalidFile(f"{path}: not valid TOML: {error}") from None
+
+
+def read_table(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a TOML or JSON file, by its suffix.
+
+    Raises
+    ------
+    InvalidFile
+        If it is neither, or cannot be read.
+    """
+    readers = {".toml": read_toml, ".json": read_json}
+    suffix = Path(path).suffix.lower()
+    if suffix not in readers:
+        raise InvalidFile(
+            f"{path}: expected a file ending in {' or '.join(readers)}, got {suffix or 'no suffix'}"
+        )
+    return readers[suffix](path)
+
+
+def parse(model: type[AnyTable], data: Mapping[str, Any], source: str) -> AnyTable:
+    """Check `data` against a table's model.
+
+    Parameters
+    ----------
+    model
+        What is expected.
+    data
+        What was read.
+    source
+        What to call it in an error, usually the file.
+
+    Raises
+    ------
+    InvalidFile
+        With one sentence about the first thing that is wrong.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise InvalidFile(f"{source}: {explain(error, model)}") from None
+
+
+def explain(error: ValidationError, model: type[BaseModel]) -> str:
+    """Say in one sentence what is wrong first: key, what was expected, what came.
+
+    Examples
+    --------
+    >>> class Push(Table):
+    ...     amount: float
+    >>> try:
+    ...     Push.model_validate({"amount": "much"})
+    ... except ValidationError as error:
+    ...     print(explain(error, Push))
+    amount: expected a valid number, got 'much'
+    """
+    problem = _worth_telling(error)
+    loc = problem["loc"]
+    key = _key(loc)
+    if problem["type"] == "missing":
+        return f"key {key!r} is missing"
+    if problem["type"] == "extra_forbidden":
+        return f"unknown key {key!r}; known here: {', '.join(_known_keys(model, loc))}"
+    return _sentence(key, problem)
+
+
+def explain_value(error: ValidationError, key: str) -> str:
+    """Say in one sentence what is wrong with the single value that stands at `key`."""
+    problem = error.errors()[0]
+    return _sentence(key + _key(problem["loc"]) if problem["loc"] else key, problem)
+
+
+def _sentence(key: str, problem: ErrorDetails) -> str:
+    expected = problem["msg"].removeprefix("Input should be ")
+    return f"{key}: expected {expected}, got {_short(problem['input'])}"
+
+
+def _worth_telling(error: ValidationError) -> ErrorDetails:
+    """Prefer an unknown key (often a misspelt one) to the key it should have been."""
+    errors = error.errors()
+    unknown = [e for e in errors if e["type"] == "extra_forbidden"]
+    return (unknown or errors)[0]
+
+
+class _RepeatedKey(Exception):
+    pass
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    table: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in table:
+            raise _RepeatedKey(f"key {key!r} is given twice")
+        table[key] = value
+    return table
+
+
+def _key(loc: tuple[int | str, ...]) -> str:
+    text = ""
+    for part in loc:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+    return text.removeprefix(".") or "the file"
+
+
+def _known_keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+    for part in loc[:-1]:
+        field = model.model_fields.get(str(part))
+        inner = field.annotation if field else None
+        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+            break
+        model = inner
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _kind(value: Any) -> str:
+    return {list: "a list", str: "text", type(None): "null"}.get(type(value), repr(value))
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,235 @@
+"""The two nouns that everything else is about: a Problem and a Design for it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from bellcrank.errors import InvalidProblem
+from bellcrank.model.arrays import (
+    boolean_mask,
+    check_ids,
+    id_list,
+    locked,
+    real_array,
+    rebuild,
+)
+from bellcrank.model.conditions import Input, Output, Stiffness, Supports
+from bellcrank.model.explicit import problem_to_dict
+from bellcrank.model.masks import pack_mask
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from bellcrank.model.lattice import Lattice
+
+Aggregate = Literal["mean", "sum"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """A lattice, what drives and holds it, and what it is asked to do.
+
+    Parameters
+    ----------
+    name
+        What to call it.
+    lattice
+        Nodes and all beams that may exist, in the plane.
+    supports, input, output
+        The regions; no node may belong to two of them.
+    stiffness
+        Of beams and joints.
+    initial : (M,) bool
+        The beams present before any search; all by default.
+    designable : (D,) int64, beam indices
+        The beams that a search may remove or add, sorted; by default those that
+        touch no support, input or output node. All others stay as in `initial`.
+    aggregate
+        Whether efficiencies compare means over the nodes of a region (the paper)
+        or totals (the published code's force cases).
+    objective
+        Name of an efficiency; None chooses by the drive.
+
+    Raises
+    ------
+    InvalidProblem
+        If regions overlap or name unknown nodes, no path of beams connects the
+        output to the input, or no beam is designable.
+
+    Examples
+    --------
+    Four beams in a square, two of them to design with.
+
+    >>> from bellcrank.model import Lattice
+    >>> problem = Problem(
+    ...     name="lever",
+    ...     lattice=Lattice([[0, 0], [1, 0], [0, 1], [1, 1]], [[0, 1], [0, 2], [1, 3], [2, 3]]),
+    ...     supports=Supports(fixed=[0]),
+    ...     input=Input(nodes=[1], direction=[0, -1], drive="displacement", amount=0.1),
+    ...     output=Output(nodes=[2], direction=[-1, 0]),
+    ...     designable=[2, 3],
+    ... )
+    >>> problem.full_design().beam_count
+    4
+    """
+
+    name: str
+    lattice: Lattice
+    supports: Supports
+    input: Input
+    output: Output
+    stiffness: Stiffness = Stiffness()  # noqa: RUF009 - frozen, so it is safe to share
+    # None only ever comes in: the constructor replaces it by the default.
+    initial: NDArray[np.bool_] = None  # type: ignore[assignment]
+    designable: NDArray[np.int64] = None  # type: ignore[assignment]
+    aggregate: Aggregate = "mean"
+    objective: str | None = None
+
+    def __post_init__(self) -> None:
+        _check_words(self)
+        if self.lattice.dimension != 2:
+            raise InvalidProblem(
+                "positions: expected a lattice in the plane, shape (N, 2), "
+                f"got shape {self.lattice.positions.shape}"
+            )
+        _check_regions(self)
+        _check_connection(self)
+        beam_count = self.lattice.beam_count
+        initial = np.ones(beam_count, dtype=np.bool_) if self.initial is None else self.initial
+        initial = boolean_mask("initial", initial, beam_count)
+        if self.designable is None:
+            designable = self._default_designable()
+        else:
+            designable = np.sort(id_list("designable", self.designable))
+            check_ids("designable", id_list("designable", self.designable), beam_count, "beam")
+        if len(designable) == 0:
+            raise InvalidProblem(
+                "designable: no beam is left to design; by default these are the beams "
+                "that touch no support, input or output node"
+            )
+        object.__setattr__(self, "initial", locked(initial))
+        object.__setattr__(self, "designable", locked(designable))
+
+    __reduce__ = rebuild
+
+    def _default_designable(self) -> NDArray[np.int64]:
+        taken = np.concatenate([self.supports.nodes, self.input.nodes, self.output.nodes])
+        return np.flatnonzero(~self.lattice.beams_touching(taken))
+
+    def full_design(self) -> Design:
+        """Return the design with all the beams of `initial`."""
+        return Design(problem=self, mask=self.initial)
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the canonical JSON: equal for equal problems, on any machine."""
+        text = json.dumps(problem_to_dict(self), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Design:
+    """A problem and the beams that are present.
+
+    Parameters
+    ----------
+    problem
+        The problem it answers.
+    mask : (M,) bool
+        Which beams of the problem's lattice are present.
+    efficiency
+        As computed by whoever made the design; None if nobody did.
+    provenance
+        Where it comes from: anything that JSON can hold.
+
+    Raises
+    ------
+    InvalidProblem
+        If the mask has not one boolean per beam, or the efficiency is no number.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> design = find_problem("scaling-8").full_design()
+    >>> design.beam_count
+    219
+    >>> design.with_mask(~design.mask).beam_count
+    0
+    """
+
+    problem: Problem
+    mask: NDArray[np.bool_]
+    efficiency: float | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        mask = boolean_mask("mask", self.mask, self.problem.lattice.beam_count)
+        object.__setattr__(self, "mask", locked(mask))
+        if self.efficiency is not None:
+            efficiency = float(real_array("efficiency", self.efficiency))
+            object.__setattr__(self, "efficiency", efficiency)
+        object.__setattr__(self, "provenance", deepcopy(dict(self.provenance)))
+
+    __reduce__ = rebuild
+
+    @property
+    def beam_count(self) -> int:
+        """Number of beams present."""
+        return int(np.count_nonzero(self.mask))
+
+    @property
+    def mask_hex(self) -> str:
+        """The mask as hexadecimal text."""
+        return pack_mask(self.mask)
+
+    def with_mask(self, mask: ArrayLike) -> Design:
+        """Return a design with other beams; its efficiency is not known yet."""
+        return replace(self, mask=np.asarray(mask), efficiency=None)
+
+
+def _check_words(problem: Problem) -> None:
+    if not isinstance(problem.name, str) or not problem.name.strip():
+        raise InvalidProblem(f"name: expected some text, got {problem.name!r}")
+    if problem.aggregate not in get_args(Aggregate):
+        raise InvalidProblem(f"aggregate: expected 'mean' or 'sum', got {problem.aggregate!r}")
+    objective = problem.objective
+    if objective is not None and (not isinstance(objective, str) or not objective.strip()):
+        raise InvalidProblem(f"objective: expected the name of one, got {objective!r}")
+
+
+def _check_regions(problem: Problem) -> None:
+    regions = {
+        "supports.fixed": problem.supports.fixed,
+        "supports.fixed_x": problem.supports.fixed_x,
+        "supports.fixed_y": problem.supports.fixed_y,
+        "input.nodes": problem.input.nodes,
+        "output.nodes": problem.output.nodes,
+    }
+    owner: dict[int, str] = {}
+    for name, nodes in regions.items():
+        check_ids(name, nodes, problem.lattice.node_count, "node")
+        for node in nodes.tolist():
+            if node in owner:
+                raise InvalidProblem(
+                    f"{name}: node {node} is also in {owner[node]}; regions must not overlap"
+                )
+            owner[node] = name
+
+
+def _check_connection(problem: Problem) -> None:
+    # One connected node suffices: discs that rattle about in a jammed packing
+    # have no contacts at all, and may well lie within a region.
+    reached = problem.lattice.reachable(problem.input.nodes)
+    if not reached[problem.output.nodes].any():
+        raise InvalidProblem(
+            f"output.nodes: node {problem.output.nodes[0]}, like all others there, is not "
+            "connected to the input by any path of beams, even in the full lattice"
+        )

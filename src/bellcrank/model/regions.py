@@ -1,0 +1,181 @@
+"""Regions: naming nodes by where they are rather than by number.
+
+In a problem file a region is a small table whose key says which kind it is::
+
+    nodes = [{ row = -1, rightmost = 3 }, { box = [0, 8, 2, 10] }, { ids = [4, 5] }]
+
+A new kind is a function ``(lattice, value, ...) -> node ids`` under
+``@regions.register("key")``; further parameters become further keys.
+
+Examples
+--------
+>>> from bellcrank.model import lattices
+>>> lattice = lattices["triangular-rectangle"](columns=3, rows=4)
+>>> row(lattice, -1, rightmost=2)
+array([12, 13])
+>>> box(lattice, [0.0, 0.0, 1.0, 1.0])
+array([0, 3, 4])
+>>> nearest(lattice, [0.4, 0.1])
+array([0])
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidProblem
+from bellcrank.model.arrays import check_ids, id_list
+from bellcrank.registry import Registry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model.lattice import Lattice
+
+regions: Registry[Callable[..., NDArray[np.int64]]] = Registry("region")
+
+
+def find_rows(lattice: Lattice) -> list[NDArray[np.int64]]:
+    """Sort the nodes into rows of equal y, from the bottom; each from left to right.
+
+    Examples
+    --------
+    >>> from bellcrank.model import lattices
+    >>> find_rows(lattices["triangular-rows"]([2, 1], [0.0, 0.5]))
+    [array([0, 1]), array([2])]
+    """
+    y = lattice.positions[:, 1]
+    order = np.argsort(y, kind="stable")
+    same = 1e-3 * float(np.median(lattice.rest_length))
+    breaks = np.flatnonzero(np.diff(y[order]) > same) + 1
+    return [
+        nodes[np.argsort(lattice.positions[nodes, 0], kind="stable")]
+        for nodes in np.split(order, breaks)
+    ]
+
+
+@regions.register("row")
+def row(
+    lattice: Lattice,
+    row: int,
+    *,
+    leftmost: int | None = None,
+    rightmost: int | None = None,
+) -> NDArray[np.int64]:
+    """Pick the nodes of one row, or the first or last few of it.
+
+    Parameters
+    ----------
+    lattice
+        The lattice.
+    row
+        Its number from the bottom, 0 the lowest; negative counts from the top.
+    leftmost, rightmost
+        How many nodes from the left, or from the right; all if neither is given.
+
+    Raises
+    ------
+    InvalidProblem
+        If there is no such row, it has fewer nodes, or both sides are asked for.
+    """
+    found = find_rows(lattice)
+    if not -len(found) <= row < len(found):
+        raise InvalidProblem(
+            f"row: expected {-len(found)} to {len(found) - 1}, as the lattice has "
+            f"{len(found)} rows, got {row}"
+        )
+    nodes = found[row]
+    if leftmost is not None and rightmost is not None:
+        raise InvalidProblem("row: expected leftmost or rightmost, got both; use two regions")
+    for name, count in (("leftmost", leftmost), ("rightmost", rightmost)):
+        if count is not None and not 1 <= count <= len(nodes):
+            raise InvalidProblem(
+                f"{name}: expected 1 to {len(nodes)} nodes of row {row}, got {count}"
+            )
+    if leftmost is not None:
+        nodes = nodes[:leftmost]
+    if rightmost is not None:
+        nodes = nodes[-rightmost:]
+    return np.sort(nodes)
+
+
+@regions.register("rows")
+def rows(
+    lattice: Lattice,
+    rows: Sequence[int],
+    *,
+    leftmost: int | None = None,
+    rightmost: int | None = None,
+) -> NDArray[np.int64]:
+    """Pick the nodes of several rows, or the first or last few of each.
+
+    Raises
+    ------
+    InvalidProblem
+        If one of the rows does not exist or has fewer nodes.
+    """
+    picked = [row(lattice, k, leftmost=leftmost, rightmost=rightmost) for k in rows]
+    return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *picked]))
+
+
+@regions.register("box")
+def box(lattice: Lattice, box: Sequence[float]) -> NDArray[np.int64]:
+    """Pick the nodes within ``[x_min, y_min, x_max, y_max]``, edges included.
+
+    Raises
+    ------
+    InvalidProblem
+        If these are not four numbers in order.
+    """
+    if len(box) != 4 or not (box[0] <= box[2] and box[1] <= box[3]):
+        raise InvalidProblem(f"box: expected [x_min, y_min, x_max, y_max], got {list(box)}")
+    # Rounding must not throw out a node that lies on an edge.
+    slack = 1e-6 * float(np.median(lattice.rest_length))
+    low, high = np.array(box[:2]) - slack, np.array(box[2:]) + slack
+    plane = lattice.positions[:, :2]
+    return np.flatnonzero(((plane >= low) & (plane <= high)).all(axis=1))
+
+
+@regions.register("nearest")
+def nearest(lattice: Lattice, nearest: Sequence[float], *, count: int = 1) -> NDArray[np.int64]:
+    """Pick the `count` nodes nearest to a point ``[x, y]``.
+
+    Raises
+    ------
+    InvalidProblem
+        If the point is not two numbers or there are not so many nodes.
+    """
+    if len(nearest) != 2:
+        raise InvalidProblem(f"nearest: expected a point [x, y], got {list(nearest)}")
+    if not 1 <= count <= lattice.node_count:
+        raise InvalidProblem(f"count: expected 1 to {lattice.node_count} nodes, got {count}")
+    distance = np.linalg.norm(lattice.positions[:, :2] - np.array(nearest), axis=1)
+    return np.sort(np.argsort(distance, kind="stable")[:count])
+
+
+@regions.register("ids")
+def ids(lattice: Lattice, ids: Sequence[int]) -> NDArray[np.int64]:
+    """Pick nodes by number, in the order given.
+
+    Raises
+    ------
+    InvalidProblem
+        If a node does not exist or comes twice.
+    """
+    nodes = id_list("ids", np.array(ids, dtype=np.int64))
+    check_ids("ids", nodes, lattice.node_count, "node")
+    return nodes
+
+
+def leftmost(lattice: Lattice, in_row: int, count: int) -> NDArray[np.int64]:
+    """Pick the `count` leftmost nodes of a row."""
+    return row(lattice, in_row, leftmost=count)
+
+
+def rightmost(lattice: Lattice, in_row: int, count: int) -> NDArray[np.int64]:
+    """Pick the `count` rightmost nodes of a row."""
+    return row(lattice, in_row, rightmost=count)

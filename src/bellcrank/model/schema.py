@@ -1,0 +1,267 @@
+"""Problem files: what may stand in them, and the problem they describe.
+
+One schema, ``bellcrank/problem/1``, in TOML or JSON. People describe the
+lattice and name regions; programs write everything out. Both forms may mix.
+
+::
+
+    schema = "bellcrank/problem/1"
+    name = "my-gripper"
+    aggregate = "mean"              # or "sum"; optional
+    objective = "displacement"      # optional, by default chosen by the drive
+
+    [lattice]                       # or: positions = [[x, y], ...], beams = [[a, b], ...]
+    kind = "triangular-rows"        # a name in `bellcrank.model.lattices`
+    counts = [5, 6, 5, 6]           # its parameters; `seed` for the disordered ones
+    first_x = [0.5, 0.0, 0.5, 0.0]
+
+    [supports]                      # each a list of regions and node numbers
+    fixed = [{ row = 0 }]           # also fixed_x, fixed_y: on rollers
+
+    [input]
+    nodes = [{ row = -1, rightmost = 2 }]
+    direction = [0, -1]             # one unit vector, or one for each node
+    drive = "displacement"          # or "force"
+    amount = 0.1
+
+    [output]
+    nodes = [{ row = -1, leftmost = 2 }]
+    direction = [-1, 0]
+    spring = 0.5                    # optional
+    spring_kind = "directional"     # or "isotropic"; optional
+
+    [stiffness]                     # optional, as are both keys
+    bond = 5.0
+    angle = 0.1
+
+Regions are described in `bellcrank.model.regions`. Three more keys are
+optional: `initial`, a mask of the beams present at first; `designable`, the
+numbers of the beams that a search may change; or, instead of these, `frozen`, a
+list of regions whose beams it may not change, on top of those at supports,
+input and output.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from bellcrank.errors import BellcrankError, InvalidFile, InvalidProblem
+from bellcrank.model.arrays import check_ids
+from bellcrank.model.calls import call_with_keys
+from bellcrank.model.conditions import Input, Output, Stiffness, Supports
+from bellcrank.model.lattice import Lattice
+from bellcrank.model.lattices import lattices
+from bellcrank.model.masks import unpack_mask
+from bellcrank.model.parsing import Table, parse
+from bellcrank.model.problem import Problem
+from bellcrank.model.regions import regions
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class StiffnessTable(Table):
+    """``[stiffness]``."""
+
+    bond: float = 5.0
+    angle: float = 0.1
+
+
+class SupportsTable(Table):
+    """``[supports]``."""
+
+    fixed: list[Any] = Field(default_factory=list)
+    fixed_x: list[Any] = Field(default_factory=list)
+    fixed_y: list[Any] = Field(default_factory=list)
+
+
+class InputTable(Table):
+    """``[input]``."""
+
+    nodes: list[Any]
+    direction: list[Any]
+    drive: Literal["displacement", "force"]
+    amount: float
+
+
+class OutputTable(Table):
+    """``[output]``."""
+
+    nodes: list[Any]
+    direction: list[Any]
+    spring: float | None = None
+    spring_kind: Literal["directional", "isotropic"] | None = None
+
+
+class ProblemTable(Table):
+    """A whole problem file."""
+
+    schema_: Literal["bellcrank/problem/1"] = Field(alias="schema")
+    name: str
+    lattice: dict[str, Any] | None = None
+    positions: list[list[float]] | None = None
+    beams: list[list[int]] | None = None
+    supports: SupportsTable
+    input: InputTable
+    output: OutputTable
+    stiffness: StiffnessTable = StiffnessTable()
+    initial: str | None = None
+    designable: list[int] | None = None
+    frozen: list[Any] = Field(default_factory=list)
+    aggregate: Literal["mean", "sum"] = "mean"
+    objective: str | None = None
+
+
+def problem_from_dict(data: Mapping[str, Any], source: str = "problem") -> Problem:
+    """Build the problem that a file describes.
+
+    Parameters
+    ----------
+    data
+        The content of the file, as read from TOML or JSON.
+    source
+        What to call it in an error, usually the file.
+
+    Raises
+    ------
+    InvalidFile
+        If keys are unknown, missing, or hold something of the wrong kind.
+    InvalidProblem
+        If the problem they describe is impossible.
+
+    Examples
+    --------
+    >>> problem = problem_from_dict({
+    ...     "schema": "bellcrank/problem/1",
+    ...     "name": "small",
+    ...     "lattice": {"kind": "triangular-rectangle", "columns": 5, "rows": 6},
+    ...     "supports": {"fixed": [{"row": 0}]},
+    ...     "input": {
+    ...         "nodes": [{"row": -1, "rightmost": 2}],
+    ...         "direction": [0, -1],
+    ...         "drive": "displacement",
+    ...         "amount": 0.1,
+    ...     },
+    ...     "output": {"nodes": [{"row": -1, "leftmost": 2}], "direction": [-1, 0]},
+    ... })
+    >>> problem.lattice.node_count, problem.input.nodes
+    (33, array([31, 32]))
+    """
+    table = parse(ProblemTable, data, source)
+    try:
+        return _build(table)
+    except (InvalidFile, InvalidProblem) as error:
+        raise type(error)(f"{source}: {error}") from None
+    except BellcrankError as error:  # an unknown lattice or region
+        raise InvalidFile(f"{source}: {error}") from None
+
+
+def _build(table: ProblemTable) -> Problem:
+    lattice = _lattice(table)
+    supports, push, watch = table.supports, table.input, table.output
+    problem = Problem(
+        name=table.name,
+        lattice=lattice,
+        supports=Supports(
+            fixed=_nodes(lattice, supports.fixed, "supports.fixed"),
+            fixed_x=_nodes(lattice, supports.fixed_x, "supports.fixed_x"),
+            fixed_y=_nodes(lattice, supports.fixed_y, "supports.fixed_y"),
+        ),
+        input=Input(
+            nodes=_nodes(lattice, push.nodes, "input.nodes"),
+            direction=push.direction,  # type: ignore[arg-type]  # checked there
+            drive=push.drive,
+            amount=push.amount,
+        ),
+        output=Output(
+            nodes=_nodes(lattice, watch.nodes, "output.nodes"),
+            direction=watch.direction,  # type: ignore[arg-type]  # checked there
+            spring=watch.spring,
+            spring_kind=watch.spring_kind,
+        ),
+        stiffness=Stiffness(bond=table.stiffness.bond, angle=table.stiffness.angle),
+        initial=_initial(table, lattice),  # type: ignore[arg-type]  # None means all
+        designable=table.designable,  # type: ignore[arg-type]  # checked there
+        aggregate=table.aggregate,
+        objective=table.objective,
+    )
+    return _freeze(problem, table)
+
+
+def _lattice(table: ProblemTable) -> Lattice:
+    if table.lattice is None:
+        if table.positions is None or table.beams is None:
+            missing = "positions" if table.positions is None else "beams"
+            raise InvalidFile(
+                f"key '{missing}' is missing (expected positions and beams, or a lattice)"
+            )
+        return Lattice(
+            positions=table.positions,  # type: ignore[arg-type]  # cast there
+            beams=table.beams,  # type: ignore[arg-type]
+        )
+    if table.positions is not None or table.beams is not None:
+        raise InvalidFile("expected positions and beams or a lattice, got both")
+    parameters = dict(table.lattice)
+    if "kind" not in parameters:
+        raise InvalidFile("key 'lattice.kind' is missing")
+    kind = parameters.pop("kind")
+    if not isinstance(kind, str):
+        raise InvalidFile(f"lattice.kind: expected a name, got {kind!r}")
+    lattice: Lattice = call_with_keys(lattices[kind], parameters, "lattice")
+    return lattice
+
+
+def _nodes(lattice: Lattice, entries: list[Any], key: str) -> np.ndarray:
+    """Gather node numbers and regions, in the order given, overlaps counted once."""
+    found: dict[int, None] = {}
+    for place, entry in enumerate(entries):
+        where = f"{key}[{place}]"
+        if isinstance(entry, int) and not isinstance(entry, bool):
+            if entry in found:
+                raise InvalidProblem(f"{where}: node {entry} is listed twice")
+            found[entry] = None
+        elif isinstance(entry, dict):
+            found.update(dict.fromkeys(_region(lattice, entry, where)))
+        else:
+            raise InvalidFile(f"{where}: expected a node number or a region, got {entry!r}")
+    return np.array(list(found), dtype=np.int64)
+
+
+def _region(lattice: Lattice, entry: dict[str, Any], where: str) -> list[int]:
+    kinds = [name for name in entry if name in regions]
+    if len(kinds) != 1:
+        raise InvalidFile(
+            f"{where}: expected one of the keys {', '.join(regions)}, "
+            f"got {', '.join(entry) or 'none'}"
+        )
+    try:
+        nodes: list[int] = call_with_keys(regions[kinds[0]], entry, where, lattice).tolist()
+    except InvalidProblem as error:
+        raise InvalidProblem(f"{where}.{error}") from None
+    if not nodes:
+        raise InvalidProblem(f"{where}: no node lies in this region")
+    return nodes
+
+
+def _initial(table: ProblemTable, lattice: Lattice) -> np.ndarray | None:
+    if table.initial is None:
+        return None
+    try:
+        return unpack_mask(table.initial, lattice.beam_count)
+    except InvalidFile as error:
+        raise InvalidFile(f"initial: {str(error).removeprefix('mask: ')}") from None
+
+
+def _freeze(problem: Problem, table: ProblemTable) -> Problem:
+    if not table.frozen:
+        return problem
+    if table.designable is not None:
+        raise InvalidFile("expected designable or frozen, got both")
+    nodes = _nodes(problem.lattice, table.frozen, "frozen")
+    check_ids("frozen", nodes, problem.lattice.node_count, "node")
+    touched = problem.lattice.beams_touching(nodes)
+    return replace(problem, designable=problem.designable[~touched[problem.designable]])
