@@ -35,6 +35,7 @@ from bellcrank.model.files import (
     write_design,
     write_problem,
 )
+from bellcrank.model.formats import formats, network_of, read_network, write_network
 from bellcrank.model.human import human_design
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
@@ -53,16 +54,20 @@ __all__ = [
     "Supports",
     "builtin",
     "find_problem",
+    "formats",
     "human_design",
     "lattices",
+    "network_of",
     "pack_mask",
     "problem_from_dict",
     "problem_to_dict",
     "read_design",
     "read_masks",
+    "read_network",
     "read_problem",
     "regions",
     "unpack_mask",
     "write_design",
+    "write_network",
     "write_problem",
 ]

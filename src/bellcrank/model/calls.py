@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ _KINDS: dict[str, TypeAdapter[Any]] = {
     "int": TypeAdapter(int, config=_STRICT),
     "int | None": TypeAdapter(int, config=_STRICT),
     "float": TypeAdapter(float, config=_STRICT),
+    "Path": TypeAdapter(str, config=_STRICT),
     "str": TypeAdapter(str, config=_STRICT),
     "Sequence[int]": TypeAdapter(list[int], config=_STRICT),
     "Sequence[float]": TypeAdapter(list[float], config=_STRICT),
@@ -28,7 +30,11 @@ _KINDS: dict[str, TypeAdapter[Any]] = {
 
 
 def call_with_keys(
-    function: Callable[..., Any], table: Mapping[str, Any], key: str, *leading: Any
+    function: Callable[..., Any],
+    table: Mapping[str, Any],
+    key: str,
+    *leading: Any,
+    folder: Path = Path(),
 ) -> Any:
     """Call `function` with the entries of `table` as its parameters.
 
@@ -42,6 +48,8 @@ def call_with_keys(
         Where the table stands in the file, for errors.
     leading
         Arguments that do not come from the file.
+    folder
+        What a path in the file is relative to.
 
     Raises
     ------
@@ -71,6 +79,8 @@ def call_with_keys(
             arguments[name] = _value(table[name], str(parameter.annotation), f"{key}.{name}")
         elif parameter.default is parameter.empty:
             raise InvalidFile(f"key '{key}.{name}' is missing")
+        if parameter.annotation == "Path" and name in arguments:
+            arguments[name] = folder / arguments[name]
     if takes_rng:
         seed = _value(table.get("seed", 0), "int", f"{key}.seed")
         if seed < 0:

@@ -74,7 +74,7 @@ def read_problem(path: str | os.PathLike[str]) -> Problem:
     InvalidProblem
         If the problem it describes is impossible.
     """
-    return problem_from_dict(read_table(path), source=str(path))
+    return problem_from_dict(read_table(path), source=str(path), folder=Path(path).parent)
 
 
 def write_problem(
@@ -112,7 +112,7 @@ def read_design(path: str | os.PathLike[str]) -> Design:
         If the problem in it is impossible.
     """
     table = parse(DesignTable, read_json(path), str(path))
-    problem = problem_from_dict(table.problem, source=f"{path}: problem")
+    problem = problem_from_dict(table.problem, source=f"{path}: problem", folder=Path(path).parent)
     return Design(
         problem=problem,
         mask=_mask(table.mask, problem, f"{path}: mask"),

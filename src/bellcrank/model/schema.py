@@ -44,6 +44,7 @@ input and output.
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -62,6 +63,8 @@ from bellcrank.model.regions import regions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from numpy.typing import NDArray
 
 
 class StiffnessTable(Table):
@@ -116,7 +119,9 @@ class ProblemTable(Table):
     objective: str | None = None
 
 
-def problem_from_dict(data: Mapping[str, Any], source: str = "problem") -> Problem:
+def problem_from_dict(
+    data: Mapping[str, Any], source: str = "problem", folder: Path = Path()
+) -> Problem:
     """Build the problem that a file describes.
 
     Parameters
@@ -125,6 +130,8 @@ def problem_from_dict(data: Mapping[str, Any], source: str = "problem") -> Probl
         The content of the file, as read from TOML or JSON.
     source
         What to call it in an error, usually the file.
+    folder
+        Where the files lie that it refers to.
 
     Raises
     ------
@@ -153,15 +160,15 @@ def problem_from_dict(data: Mapping[str, Any], source: str = "problem") -> Probl
     """
     table = parse(ProblemTable, data, source)
     try:
-        return _build(table)
+        return _build(table, folder)
     except (InvalidFile, InvalidProblem) as error:
         raise type(error)(f"{source}: {error}") from None
     except BellcrankError as error:  # an unknown lattice or region
         raise InvalidFile(f"{source}: {error}") from None
 
 
-def _build(table: ProblemTable) -> Problem:
-    lattice = _lattice(table)
+def _build(table: ProblemTable, folder: Path) -> Problem:
+    lattice = _lattice(table, folder)
     supports, push, watch = table.supports, table.input, table.output
     problem = Problem(
         name=table.name,
@@ -192,7 +199,7 @@ def _build(table: ProblemTable) -> Problem:
     return _freeze(problem, table)
 
 
-def _lattice(table: ProblemTable) -> Lattice:
+def _lattice(table: ProblemTable, folder: Path) -> Lattice:
     if table.lattice is None:
         if table.positions is None or table.beams is None:
             missing = "positions" if table.positions is None else "beams"
@@ -211,11 +218,11 @@ def _lattice(table: ProblemTable) -> Lattice:
     kind = parameters.pop("kind")
     if not isinstance(kind, str):
         raise InvalidFile(f"lattice.kind: expected a name, got {kind!r}")
-    lattice: Lattice = call_with_keys(lattices[kind], parameters, "lattice")
+    lattice: Lattice = call_with_keys(lattices[kind], parameters, "lattice", folder=folder)
     return lattice
 
 
-def _nodes(lattice: Lattice, entries: list[Any], key: str) -> np.ndarray:
+def _nodes(lattice: Lattice, entries: list[Any], key: str) -> NDArray[np.int64]:
     """Gather node numbers and regions, in the order given, overlaps counted once."""
     found: dict[int, None] = {}
     for place, entry in enumerate(entries):
@@ -247,7 +254,7 @@ def _region(lattice: Lattice, entry: dict[str, Any], where: str) -> list[int]:
     return nodes
 
 
-def _initial(table: ProblemTable, lattice: Lattice) -> np.ndarray | None:
+def _initial(table: ProblemTable, lattice: Lattice) -> NDArray[np.bool_] | None:
     if table.initial is None:
         return None
     try:

@@ -6,7 +6,17 @@ keys of the ``[lattice]`` table in problem files; one that needs random numbers
 takes ``rng``, for which the file says ``seed``.
 """
 
+from bellcrank.model.lattices.delaunay import displaced_delaunay
+from bellcrank.model.lattices.imported import imported
+from bellcrank.model.lattices.jammed import jammed_discs
 from bellcrank.model.lattices.registry import lattices
 from bellcrank.model.lattices.triangular import triangular_rectangle, triangular_rows
 
-__all__ = ["lattices", "triangular_rectangle", "triangular_rows"]
+__all__ = [
+    "displaced_delaunay",
+    "imported",
+    "jammed_discs",
+    "lattices",
+    "triangular_rectangle",
+    "triangular_rows",
+]

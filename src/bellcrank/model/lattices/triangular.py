@@ -14,6 +14,8 @@ from bellcrank.model.lattices.registry import lattices
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
 
 @lattices.register("triangular-rows")
 def triangular_rows(
@@ -105,7 +107,11 @@ def triangular_rectangle(columns: int, rows: int, spacing: float = 1.0) -> Latti
 
 
 def _between(
-    lower: np.ndarray, upper: np.ndarray, spacing: float, first_lower: int, first_upper: int
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    spacing: float,
+    first_lower: int,
+    first_upper: int,
 ) -> list[tuple[int, int]]:
     """Join each node of a row to those half a spacing to its left and right above."""
     shift = np.abs(upper[None, :, 0] - lower[:, None, 0])

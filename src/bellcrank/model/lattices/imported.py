@@ -1,0 +1,31 @@
+"""Lattices made elsewhere."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bellcrank.model.formats import read_network
+from bellcrank.model.lattices.registry import lattices
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bellcrank.model.lattice import Lattice
+
+
+@lattices.register("imported")
+def imported(path: Path) -> Lattice:
+    """Read the lattice from a file in one of the exchange formats.
+
+    Parameters
+    ----------
+    path
+        The file, relative to the problem file that names it. Its suffix says
+        the format (see `bellcrank.model.formats`).
+
+    Raises
+    ------
+    InvalidFile, InvalidProblem, UnknownName
+        If there is no lattice to be read.
+    """
+    return read_network(path).lattice
