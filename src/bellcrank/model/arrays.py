@@ -42,10 +42,7 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     InvalidProblem
         If they are not numbers, ragged, or not finite; names the first offender.
     """
-    try:
-        raw = np.asarray(values)
-    except ValueError as error:
-        raise InvalidProblem(f"{name}: expected an array of numbers ({error})") from None
+    raw = _as_array(name, values)
     if raw.dtype.kind not in "iuf":
         raise InvalidProblem(f"{name}: expected numbers, got values of type {raw.dtype}")
     # Adding zero turns -0.0 into 0.0, which would otherwise hash differently.
@@ -65,10 +62,7 @@ def index_array(name: str, values: ArrayLike) -> NDArray[np.int64]:
     InvalidProblem
         If they are anything but integers.
     """
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise InvalidProblem(f"{name}: expected an array of integers ({error})") from None
+    array = _as_array(name, values)
     if array.size == 0:
         return array.astype(np.int64)
     if not np.issubdtype(array.dtype, np.integer):
@@ -107,6 +101,19 @@ def check_ids(name: str, ids: NDArray[np.int64], count: int, kind: str) -> None:
         raise InvalidProblem(
             f"{name}[{bad[0]}]: expected a {kind} from 0 to {count - 1}, got {ids[bad[0]]}"
         )
+
+
+def _as_array(name: str, values: ArrayLike) -> NDArray[Any]:
+    """Make an array, or name the first row that is longer or shorter than the others."""
+    try:
+        return np.asarray(values)
+    except ValueError:
+        rows = list(values)  # type: ignore[arg-type]  # only sequences can be ragged
+        sizes = [len(row) if isinstance(row, list | tuple) else None for row in rows]
+        odd = next((k for k, size in enumerate(sizes) if size != sizes[0]), 0)
+        raise InvalidProblem(
+            f"{name}[{odd}]: expected {sizes[0]} numbers as in {name}[0], got {rows[odd]!r}"
+        ) from None
 
 
 def boolean_mask(name: str, values: ArrayLike, length: int) -> NDArray[np.bool_]:

@@ -134,6 +134,8 @@ def explain_value(error: ValidationError, key: str) -> str:
 
 def _sentence(key: str, problem: ErrorDetails) -> str:
     expected = problem["msg"].removeprefix("Input should be ")
+    if problem["type"] == "model_type":  # which would name our Python classes
+        expected = "a table"
     return f"{key}: expected {expected}, got {_short(problem['input'])}"
 
 

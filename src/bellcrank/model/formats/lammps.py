@@ -111,7 +111,8 @@ def from_text(text: str, source: str) -> Network:
         missing = "Atoms" if "Atoms" not in sections else "Bonds"
         raise InvalidFile(f"{source}: expected a LAMMPS data file with a section {missing!r}")
     style, atoms = _rows(source, sections["Atoms"])
-    columns = _STYLES.get(style) or _STYLES.get(_STYLE_BY_COLUMNS.get(atoms.shape[1], ""))
+    # A style that is named is believed: others have the same number of columns.
+    columns = _STYLES.get(style or _STYLE_BY_COLUMNS.get(atoms.shape[1], ""))
     if columns is None or atoms.shape[1] - len(columns) not in {3, 6}:
         raise InvalidFile(
             f"{source}: Atoms: expected a style among {', '.join(_STYLES)}, "

@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidFile, UnknownName
+from bellcrank.model import builtin, find_problem, human_design, read_problem, write_problem
+from bellcrank.model import human as human_module
+
+# Committed designs rely on this numbering.
+INPUT = [106, 107, 108, 117, 118, 119, 120, 130, 131, 132]
+OUTPUT = [97, 98, 99, 109, 110, 111, 121, 122, 123]
+
+
+def directions(region, place):
+    return {
+        place[node]: tuple(direction)
+        for node, direction in zip(region.nodes, region.direction, strict=True)
+    }
+
+
+def geometry(problem):
+    """Say what a problem is without node numbers or an origin."""
+    lattice = problem.lattice
+    half_steps = (lattice.positions - lattice.positions.min(axis=0)) * [2.0, 2.0 / np.sqrt(3.0)]
+    place = [tuple(p) for p in np.rint(half_steps).astype(int).tolist()]
+    assert np.abs(half_steps - np.rint(half_steps)).max() < 1e-3
+    beams = [frozenset((place[a], place[b])) for a, b in lattice.beams]
+    return {
+        "nodes": set(place),
+        "beams": set(beams),
+        "designable": {beams[m] for m in problem.designable},
+        "supports": {place[n] for n in problem.supports.fixed},
+        "rollers": {place[n] for n in (*problem.supports.fixed_x, *problem.supports.fixed_y)},
+        "input": {
+            place[n]: tuple(d)
+            for n, d in zip(problem.input.nodes, problem.input.direction, strict=True)
+        },
+        "output": {
+            place[n]: tuple(d)
+            for n, d in zip(problem.output.nodes, problem.output.direction, strict=True)
+        },
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("crane", "crane"),
+        ("scaling-8", "scaling8"),
+        ("scaling-12", "scaling12"),
+        ("scaling-16", "scaling16"),
+        ("scaling-20", "scaling20"),
+    ],
+)
+def test_generated_problems_are_the_reference_ones_up_to_numbering(reference, name, file):
+    ours, theirs = builtin[name](), read_problem(reference / f"{file}.problem.json")
+    assert geometry(ours) == geometry(theirs)
+    assert ours.input.amount == pytest.approx(theirs.input.amount, rel=1e-6)
+    assert ours.input.drive == theirs.input.drive
+    assert ours.aggregate == theirs.aggregate
+    assert (ours.stiffness.bond, ours.stiffness.angle) == (5.0, 0.1)
+
+
+def test_crane_has_the_size_the_paper_gives():
+    crane = builtin["crane"]()
+    assert crane.lattice.node_count == 133
+    assert crane.lattice.beam_count == 352
+    assert len(crane.designable) == 203
+    assert crane.supports.fixed.tolist() == list(range(34))
+    assert crane.input.nodes.tolist() == INPUT
+    assert crane.output.nodes.tolist() == OUTPUT
+
+
+def test_anti_parallel_differs_from_crane_in_the_output_direction_only():
+    crane, anti_parallel = geometry(builtin["crane"]()), geometry(builtin["anti-parallel"]())
+    assert set(crane.pop("output").values()) == {(-1.0, 0.0)}
+    assert set(anti_parallel.pop("output").values()) == {(0.0, 1.0)}
+    assert crane == anti_parallel
+
+
+def test_scaling_problems_come_in_all_sizes_from_8_to_20():
+    counts = [builtin[f"scaling-{n}"]().lattice.beam_count for n in range(8, 21)]
+    assert counts == sorted(counts)
+    assert (counts[0], counts[-1]) == (219, 1269)
+
+
+@pytest.mark.parametrize("name", builtin.names())
+def test_every_builtin_problem_carries_its_name_and_is_made_anew_identically(name):
+    problem = builtin[name]()
+    assert problem.name == name
+    assert builtin[name]().hash == problem.hash
+
+
+@pytest.mark.parametrize("name", builtin.names())
+def test_nodes_are_numbered_from_the_bottom_and_beams_sorted(name):
+    lattice = builtin[name]().lattice
+    assert (np.diff(lattice.positions[:, 1]) >= 0.0).all()
+    assert lattice.beams.tolist() == sorted(lattice.beams.tolist())
+
+
+def test_discs_are_the_same_on_every_machine():
+    # Pinned so that designs made for this lattice stay valid; the generator
+    # uses only exactly defined operations.
+    discs = builtin["discs"]()
+    assert (discs.lattice.node_count, discs.lattice.beam_count) == (96, 196)
+    assert len(discs.designable) == 160
+    assert discs.hash.startswith("3b59d860c86c169a")
+
+
+def test_pliers_close_on_rollers_around_one_pivot():
+    pliers = builtin["pliers"]()
+    on_line = np.flatnonzero(pliers.lattice.positions[:, 1] == 0.0)
+    assert len(pliers.supports.fixed) == 1
+    assert pliers.supports.nodes.tolist() == on_line.tolist()
+    assert pliers.output.spring == 10.0
+    assert 300 <= len(pliers.designable) <= 500
+
+
+def test_unknown_problems_list_the_known_ones_and_say_there_is_no_such_file():
+    with pytest.raises(UnknownName, match=r"'nope'; known: crane.*; and there is no such file"):
+        find_problem("nope")
+
+
+def test_a_file_is_found_by_its_path(tmp_path):
+    path = tmp_path / "problem.json"
+    write_problem(builtin["scaling-8"](), path)
+    assert find_problem(path).name == "scaling-8"
+    assert find_problem(str(path)).hash == builtin["scaling-8"]().hash
+
+
+def test_human_designs_leave_alone_what_is_not_designable():
+    for design in filter(None, map(human_design, builtin)):
+        kept = np.setdiff1d(np.arange(len(design.mask)), design.problem.designable)
+        assert (design.mask[kept] == design.problem.initial[kept]).all()
+        assert design.provenance["kind"] == "human"
+        assert design.provenance["mechanism"]
+
+
+def test_a_human_design_is_read_from_its_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(human_module, "FOLDER", tmp_path)
+    assert human_design("scaling-8") is None
+    mask = builtin["scaling-8"]().full_design().mask_hex
+    text = '{"schema": "bellcrank/human/1", "problem": "%s", "mechanism": "none", "mask": "%s"}'
+    (tmp_path / "scaling-8.json").write_text(text % ("scaling-8", mask))
+    design = human_design("scaling-8")
+    assert design is not None
+    assert design.mask_hex == mask
+    (tmp_path / "scaling-8.json").write_text(text % ("crane", mask))
+    with pytest.raises(InvalidFile, match=r"scaling-8.json: problem: expected 'scaling-8'"):
+        human_design("scaling-8")

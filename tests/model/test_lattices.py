@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidProblem, UnknownName
+from bellcrank.model import lattices
+
+EXAMPLES = {
+    "triangular-rows": {"counts": [4, 5, 4], "first_x": [0.5, 0.0, 0.5]},
+    "triangular-rectangle": {"columns": 6, "rows": 7},
+    "displaced-delaunay": {"columns": 6, "rows": 7},
+    "jammed-discs": {"discs": 60},
+}
+RANDOM = ("displaced-delaunay", "jammed-discs")
+
+
+def make(kind, seed=0, **changes):
+    rng = {"rng": np.random.default_rng(seed)} if kind in RANDOM else {}
+    return lattices[kind](**(EXAMPLES[kind] | changes), **rng)
+
+
+def test_every_generator_is_tried_here():
+    assert set(EXAMPLES) | {"imported"} == set(lattices)
+
+
+@pytest.mark.parametrize("kind", EXAMPLES)
+def test_lattices_hang_together_and_have_no_dead_ends(kind):
+    lattice = make(kind)
+    assert lattice.reachable(np.array([0])).all()
+    assert np.bincount(lattice.beams.ravel()).min() >= 2
+
+
+@pytest.mark.parametrize("kind", EXAMPLES)
+def test_beams_are_sorted_with_the_lower_node_first(kind):
+    beams = make(kind).beams.tolist()
+    assert beams == sorted(beams)
+    assert all(a < b for a, b in beams)
+
+
+@pytest.mark.parametrize("kind", EXAMPLES)
+def test_no_two_beams_cross(kind):
+    lattice = make(kind)
+    a, b = lattice.positions[lattice.beams].transpose(1, 0, 2)
+
+    def side(p, q, r):
+        return np.sign((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
+
+    for m in range(lattice.beam_count):
+        for n in range(m):
+            if not set(lattice.beams[m]) & set(lattice.beams[n]):
+                across = side(a[m], b[m], a[n]) * side(a[m], b[m], b[n])
+                along = side(a[n], b[n], a[m]) * side(a[n], b[n], b[m])
+                assert across >= 0 or along >= 0
+
+
+@pytest.mark.parametrize("kind", RANDOM)
+def test_a_seed_names_one_lattice(kind):
+    assert (make(kind, seed=3).positions == make(kind, seed=3).positions).all()
+    assert make(kind, seed=3).positions[0, 0] != make(kind, seed=4).positions[0, 0]
+
+
+def test_triangular_beams_all_have_the_length_of_the_spacing():
+    lattice = make("triangular-rectangle", spacing=2.5)
+    assert lattice.rest_length == pytest.approx(2.5, abs=1e-12)
+
+
+def test_interior_nodes_of_a_triangular_lattice_have_six_neighbours():
+    lattice = make("triangular-rectangle")
+    x, y = lattice.positions.T
+    inside = (x > 0.6) & (x < 5.4) & (y > 0.1) & (y < 5.1)
+    assert set(np.bincount(lattice.beams.ravel())[inside]) == {6}
+
+
+def test_delaunay_without_displacement_is_the_triangular_rectangle():
+    regular = make("triangular-rectangle")
+    assert make("displaced-delaunay", displacement=0.0).beams.tolist() == regular.beams.tolist()
+
+
+def test_delaunay_leaves_no_slivers_at_the_hull():
+    for seed in range(10):
+        lattice = make("displaced-delaunay", seed=seed, displacement=0.3)
+        assert lattice.rest_length.max() < 2.1
+
+
+def test_discs_are_jammed_so_that_the_inner_network_is_stiff():
+    # Maxwell: without friction, at least 4 contacts per disc in the mean.
+    lattice = make("jammed-discs", discs=200)
+    low, high = lattice.positions.min(axis=0) + 2.0, lattice.positions.max(axis=0) - 2.0
+    inside = ((lattice.positions > low) & (lattice.positions < high)).all(axis=1)
+    assert np.bincount(lattice.beams.ravel())[inside].mean() > 4.0
+
+
+def test_contacts_have_only_the_three_lengths_that_two_sizes_allow():
+    length = make("jammed-discs", discs=200, packing_fraction=0.85).rest_length
+    relative = length / length.max()
+    allowed = np.array([2.0, 2.4, 2.8]) / 2.8
+    assert np.abs(relative[:, None] - allowed).min(axis=1).max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "message"),
+    [
+        ("triangular-rows", {"counts": [3, 0, 3]}, r"lattice.counts\[1\]: expected at least 1"),
+        ("triangular-rows", {"counts": [3]}, "expected as many counts as first_x"),
+        ("triangular-rows", {"counts": [], "first_x": []}, "at least one of each"),
+        ("triangular-rows", {"spacing": 0.0}, "lattice.spacing: expected a number greater than 0"),
+        (
+            "triangular-rows",
+            {"first_x": [0.0, 0.25, 0.5]},
+            r"lattice.first_x\[1\]: .* shifted by half a spacing .* got a shift of 0.25",
+        ),
+        ("triangular-rectangle", {"rows": 1}, "at least 1 column and 2 rows"),
+        ("displaced-delaunay", {"displacement": 0.5}, "lattice.displacement: expected 0 or more"),
+        ("jammed-discs", {"discs": 19}, "lattice.discs: expected at least 20, got 19"),
+        ("jammed-discs", {"packing_fraction": 0.5}, "lattice.packing_fraction: expected 0.85"),
+    ],
+)
+def test_impossible_parameters_are_refused(kind, changes, message):
+    with pytest.raises(InvalidProblem, match=message):
+        make(kind, **changes)
+
+
+def test_unknown_lattices_list_the_known_ones():
+    with pytest.raises(UnknownName, match=r"unknown lattice 'square'; known: .*triangular-rows"):
+        lattices["square"]
