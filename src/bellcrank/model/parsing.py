@@ -12,18 +12,18 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from bellcrank.errors import InvalidFile
 from bellcrank.model.storage import read_text
 
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from pydantic_core import ErrorDetails
+
 
 class Table(BaseModel):
     """A table of a file: no unknown keys, no silent conversions, no NaN."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
-
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Mapping
-
-    from pydantic_core import ErrorDetails
 
 AnyTable = TypeVar("AnyTable", bound=Table)
 
