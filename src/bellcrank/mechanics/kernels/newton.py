@@ -1,0 +1,165 @@
+"""Newton's method at a fixed load, and a descent for what Newton cannot do.
+
+Near the solution the last factor is used again (chord steps): a gradient and a
+substitution cost a third of a new stiffness and its factorisation.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bellcrank.mechanics.kernels._compile import kernel
+from bellcrank.mechanics.kernels.arrays import (
+    CONVERGED,
+    UNCONVERGED,
+    Floats,
+    Scratch,
+    Structure,
+    System,
+)
+from bellcrank.mechanics.kernels.cholesky import factorise, solve
+from bellcrank.mechanics.kernels.energy import (
+    elastic_energy,
+    find_gradient,
+    find_stiffness,
+    measure_held_beams,
+    work_of_load,
+)
+from bellcrank.mechanics.kernels.fields import copy, largest_component
+
+MOST_ITERATIONS = 25
+CHORD_STEP = 2e-3
+"""Below this step the stiffness is good enough to be used once more."""
+CHORD_RATIO = 0.05
+"""Unless steps no longer shrink by this factor."""
+LARGEST_RATIO = 2.0
+"""Of a step to the one before, beyond which the iteration is lost."""
+
+
+@kernel
+def find_step(system: System, structure: Structure, scratch: Scratch) -> float:
+    """Solve K step = -gradient with the factor at hand; return the largest component."""
+    for node in range(len(system.block)):
+        block = system.block[node]
+        if block >= 0:
+            scratch.step[block, 0] = -scratch.gradient[node, 0]
+            scratch.step[block, 1] = -scratch.gradient[node, 1]
+    solve(structure, scratch)
+    return largest_component(scratch.step)
+
+
+@kernel
+def take_step(system: System, scale: float, u: Floats, scratch: Scratch) -> None:
+    """Add `scale` times the step to the displacement of the free nodes."""
+    for node in range(len(system.block)):
+        block = system.block[node]
+        if block >= 0:
+            u[node, 0] += scale * scratch.step[block, 0]
+            u[node, 1] += scale * scratch.step[block, 1]
+
+
+@kernel
+def newton(
+    system: System,
+    structure: Structure,
+    fraction: float,
+    u: Floats,
+    scratch: Scratch,
+    longest_step: float,
+    daring: bool,
+) -> int:
+    """Move `u` to the stable equilibrium next to it at `fraction` of the load.
+
+    Gives up (UNCONVERGED) when the stiffness on the way is not positive definite,
+    when a step is longer than `longest_step`, or when steps grow: the caller then
+    comes from nearer by. If `daring`, it shortens long steps and walks on over
+    indefinite ground instead. Either way the equilibrium it ends at is stable.
+    """
+    measure_held_beams(system, structure, u, scratch)
+    size = before = math.inf
+    renew = True
+    for _ in range(MOST_ITERATIONS):
+        find_gradient(system, structure, fraction, u, scratch)
+        settled = True
+        if renew:
+            find_stiffness(system, structure, False, scratch)
+            if not factorise(structure, scratch):
+                settled = False
+                find_stiffness(system, structure, True, scratch)
+                if not (daring and factorise(structure, scratch)):
+                    return UNCONVERGED
+        before = size
+        size = find_step(system, structure, scratch)
+        if not (size <= longest_step or (daring and size < math.inf)):
+            return UNCONVERGED
+        take_step(system, min(1.0, longest_step / size), u, scratch)
+        ratio = size / before if before < math.inf else 1.0
+        left = 0.1 * size * min(1.0, ratio) if renew else size
+        if settled and left <= 0.1 * system.tolerance:
+            return CONVERGED
+        if ratio > LARGEST_RATIO and not daring:
+            return UNCONVERGED
+        renew = size > CHORD_STEP or not settled or (ratio > CHORD_RATIO and before < math.inf)
+    return UNCONVERGED
+
+
+@kernel
+def shift_until_definite(
+    structure: Structure, scratch: Scratch, shift: float
+) -> float:
+    """Factorise the stiffness, adding to its diagonal until it is positive definite."""
+    added = 0.0
+    while True:
+        if factorise(structure, scratch):
+            return added
+        more = max(shift, 2.0 * added)
+        for block in range(len(scratch.diagonal)):
+            scratch.diagonal[block, 0] += more - added
+            scratch.diagonal[block, 3] += more - added
+        added = more
+
+
+@kernel
+def descend(
+    system: System, structure: Structure, fraction: float, u: Floats, scratch: Scratch
+) -> int:
+    """Slide down in energy to some stable equilibrium, from anywhere.
+
+    Newton steps, shortened until the energy falls, with a shifted stiffness where
+    it is not positive definite; at an unstable equilibrium a fixed small push
+    decides the side. Used after a loss of stability, when no neighbouring
+    equilibrium exists.
+    """
+    measure_held_beams(system, structure, u, scratch)
+    trial = scratch.vectors[7]
+    energy = elastic_energy(system, structure, u, scratch) - work_of_load(system, fraction, u)
+    for _ in range(500):
+        find_gradient(system, structure, fraction, u, scratch)
+        find_stiffness(system, structure, False, scratch)
+        shift = shift_until_definite(structure, scratch, 1e-3 * system.angle)
+        size = find_step(system, structure, scratch)
+        if size <= 1e-9:
+            if shift == 0.0:
+                return newton(system, structure, fraction, u, scratch, 1e-3, False)
+            for node in range(len(system.block)):
+                if system.block[node] >= 0 and structure.active[node]:
+                    u[node, 0] += 1e-4 * math.sin(1.0 + node)
+                    u[node, 1] += 1e-4 * math.cos(1.0 + 2.0 * node)
+            energy = np.inf
+            continue
+        scale = min(1.0, 0.3 / size)
+        while scale > 1e-12:
+            copy(u, trial)
+            take_step(system, scale, trial, scratch)
+            lower = elastic_energy(system, structure, trial, scratch)
+            lower -= work_of_load(system, fraction, trial)
+            if lower < energy:
+                break
+            scale *= 0.5
+        if scale <= 1e-12:
+            return newton(system, structure, fraction, u, scratch, 1e-3, False)
+        copy(trial, u)
+        energy = lower
+    return UNCONVERGED

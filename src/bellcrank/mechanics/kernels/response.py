@@ -1,0 +1,204 @@
+"""The efficiency of a design: from rest, or from the equilibrium of a neighbour."""
+
+from __future__ import annotations
+
+import math
+
+from bellcrank.mechanics.kernels._compile import entry, inlined, kernel
+from bellcrank.mechanics.kernels.arrays import (
+    CONVERGED,
+    MECHANISM,
+    Bytes,
+    Floats,
+    Known,
+    Scratch,
+    Structure,
+    System,
+)
+from bellcrank.mechanics.kernels.energy import beam_rotation
+from bellcrank.mechanics.kernels.fields import clear, copy, pair
+from bellcrank.mechanics.kernels.loading import (
+    LONGEST_STEP,
+    follow_path,
+    move_held_nodes,
+    place_hanging_pieces,
+)
+from bellcrank.mechanics.kernels.newton import newton
+from bellcrank.mechanics.kernels.structure import ACTIVE, build_structure, other_end
+
+
+@kernel
+def output_motion(system: System, u: Floats) -> float:
+    """Sum over output nodes of |u| (2 cos(gamma/2)^n - 1), gamma the angle to the wanted direction.
+
+    For n = 2 this is the projection t_out . u (Bonfanti et al. 2020, eqs. 1 and 2).
+    """
+    total = 0.0
+    for index in range(len(system.output_nodes)):
+        x, y = pair(u, system.output_nodes[index])
+        along = x * system.output_direction[index, 0] + y * system.output_direction[index, 1]
+        if system.exponent == 2.0:
+            total += along
+        else:
+            size = math.sqrt(x * x + y * y)
+            if size > 0.0:
+                half = max(0.0, 0.5 * (1.0 + along / size))
+                total += size * (2.0 * half ** (0.5 * system.exponent) - 1.0)
+    return total
+
+
+@kernel
+def input_motion(system: System, u: Floats) -> float:
+    """Sum over input nodes of t_in . u."""
+    total = 0.0
+    for index in range(len(system.input_nodes)):
+        node = system.input_nodes[index]
+        total += (
+            u[node, 0] * system.input_direction[index, 0]
+            + u[node, 1] * system.input_direction[index, 1]
+        )
+    return total
+
+
+@kernel
+def efficiency_of(system: System, u: Floats) -> float:
+    """Efficiency at displacement `u`."""
+    denominator = system.denominator
+    if math.isnan(denominator):
+        denominator = system.denominator_scale * input_motion(system, u)
+    return system.numerator_scale * output_motion(system, u) / denominator
+
+
+@inlined
+def find_from_rest(
+    system: System,
+    mask: Bytes,
+    core: bool,
+    finest: float,
+    structure: Structure,
+    u: Floats,
+    scratch: Scratch,
+) -> tuple[int, float]:
+    """Load the design `mask` from rest; fill `structure` and `u`, return status and efficiency."""
+    clear(u, len(u))
+    status = build_structure(system, mask, core, structure)
+    efficiency = math.nan
+    if status != MECHANISM:
+        status = follow_path(system, structure, u, scratch, finest)
+        place_hanging_pieces(system, structure, u)
+        efficiency = efficiency_of(system, u)
+    return status, efficiency
+
+
+@entry
+def respond_from_rest(
+    system: System,
+    mask: Bytes,
+    core: bool,
+    finest: float,
+    structure: Structure,
+    u: Floats,
+    scratch: Scratch,
+) -> tuple[int, float]:
+    """Response of the design `mask`, followed from rest in increments up to `finest`.
+
+    Fills `structure` and the displacement `u`; returns status and efficiency.
+    """
+    return find_from_rest(system, mask, core, finest, structure, u, scratch)
+
+
+@kernel
+def rotation_at(system: System, known: Known, node: int) -> float:
+    """Rotation of some beam at a node of the known equilibrium."""
+    for slot in range(system.ring_start[node], system.ring_start[node + 1]):
+        beam = system.ring_beam[slot]
+        if known.present[beam]:
+            return beam_rotation(system, known.u, beam)
+    return 0.0
+
+
+@kernel
+def guess_from_neighbour(
+    system: System,
+    known: Known,
+    structure: Structure,
+    u: Floats,
+    scratch: Scratch,
+) -> None:
+    """Start from the known equilibrium; pieces that were loose follow where they attach.
+
+    A node that moved neither before nor is held takes the displacement of its parent
+    plus the turn of its offset by the parent's rotation.
+    """
+    rotation = scratch.vectors[7, :, 0]
+    for node in range(len(u)):
+        active = structure.active[node] == ACTIVE
+        for axis in range(2):
+            u[node, axis] = known.u[node, axis] if active else 0.0
+    move_held_nodes(system, structure, 1.0, u)
+    for index in range(structure.sizes[0]):
+        node = structure.order[index]
+        parent = structure.parent[node]
+        if known.active[node] == ACTIVE or parent < 0 or system.block[node] < 0:
+            continue
+        if known.active[parent] == ACTIVE:
+            angle = rotation_at(system, known, parent)
+        else:
+            angle = rotation[parent]
+        rotation[node] = angle
+        x = system.positions[node, 0] - system.positions[parent, 0]
+        y = system.positions[node, 1] - system.positions[parent, 1]
+        u[node, 0] = u[parent, 0] + x * (math.cos(angle) - 1.0) - y * math.sin(angle)
+        u[node, 1] = u[parent, 1] + x * math.sin(angle) + y * (math.cos(angle) - 1.0)
+
+
+@kernel
+def remember(structure: Structure, u: Floats, known: Known) -> None:
+    """Keep an equilibrium as the one to start from."""
+    copy(u, known.u)
+    for beam in range(len(known.present)):
+        known.present[beam] = structure.present[beam]
+    for node in range(len(known.active)):
+        known.active[node] = structure.active[node]
+
+
+@inlined
+def find_from_neighbour(
+    system: System,
+    mask: Bytes,
+    core: bool,
+    known: Known,
+    structure: Structure,
+    u: Floats,
+    scratch: Scratch,
+) -> tuple[int, float]:
+    """As `find_from_rest`, but start from the equilibrium of a similar design.
+
+    Only an accelerator: where the way is not short and stable, the design is loaded
+    from rest after all.
+    """
+    clear(u, len(u))
+    status = build_structure(system, mask, core, structure)
+    efficiency = math.nan
+    if status != MECHANISM:
+        guess_from_neighbour(system, known, structure, u, scratch)
+        status = newton(system, structure, 1.0, u, scratch, LONGEST_STEP, True)
+        if status != CONVERGED:
+            status = follow_path(system, structure, u, scratch, 1.0)
+        place_hanging_pieces(system, structure, u)
+        efficiency = efficiency_of(system, u)
+    return status, efficiency
+
+
+@entry
+def respond_from_neighbour(
+    system: System,
+    mask: Bytes,
+    core: bool,
+    known: Known,
+    structure: Structure,
+    u: Floats,
+    scratch: Scratch,
+) -> tuple[int, float]:
+    """Response of `mask` as `respond_from_rest` gives it, found from a known equilibrium."""
+    return find_from_neighbour(system, mask, core, known, structure, u, scratch)

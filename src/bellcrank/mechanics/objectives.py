@@ -1,0 +1,131 @@
+"""What is called efficiency: a registry of objectives.
+
+Every objective is a ratio
+
+    efficiency = numerator_scale * sum over output nodes of |u| f_n(gamma) / denominator
+
+with f_n(gamma) = 2 cos(gamma/2)^n - 1 and gamma the angle between the displacement
+u of an output node and its wanted direction; n = 2 gives the projection t_out . u
+(Bonfanti et al. 2020, eqs. 1 to 3). To add one, write a function from a problem to
+an `Objective` and register it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.model import Problem
+from bellcrank.registry import Registry
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """The numbers that make an efficiency out of displacements.
+
+    Parameters
+    ----------
+    numerator_scale
+        Factor of the sum over the output nodes.
+    exponent
+        n >= 2 in f_n; larger n punishes motion off the wanted direction more.
+    denominator
+        A constant, or None for the motion of the input, scaled.
+    denominator_scale
+        Factor of the sum of t_in . u over the input nodes, if that is the denominator.
+    """
+
+    numerator_scale: float
+    exponent: float = 2.0
+    denominator: float | None = None
+    denominator_scale: float = 1.0
+
+
+objectives: Registry[Callable[..., Objective]] = Registry("objective")
+
+
+def _share(problem: Problem, count: int) -> float:
+    """Weight of one node: a mean over `count` nodes, or a plain sum."""
+    return 1.0 / count if problem.aggregate == "mean" else 1.0
+
+
+@objectives.register("displacement")
+def displacement(problem: Problem) -> Objective:
+    """Output motion over input motion, both along their wanted directions (eq. 1)."""
+    return directional(problem, 2.0)
+
+
+@objectives.register("directional")
+def directional(problem: Problem, exponent: float = 4.0) -> Objective:
+    """Output motion over input motion; motion off the direction counts less (eq. 2)."""
+    inputs, outputs = problem.input, problem.output
+    scale = _share(problem, len(inputs.nodes))
+    known = inputs.drive == "displacement"
+    return Objective(
+        numerator_scale=_share(problem, len(outputs.nodes)),
+        exponent=exponent,
+        denominator=scale * len(inputs.nodes) * inputs.amount if known else None,
+        denominator_scale=scale,
+    )
+
+
+@objectives.register("force")
+def force(problem: Problem, exponent: float = 2.0) -> Objective:
+    """Force in the output springs over input force (eq. 3).
+
+    Raises
+    ------
+    InvalidSettings
+        If the problem is not driven by a force, or has no output spring.
+    """
+    inputs, outputs = problem.input, problem.output
+    if inputs.drive != "force" or outputs.spring is None:
+        raise InvalidSettings(
+            f"objective 'force' needs a problem with drive = 'force' and an output spring; "
+            f"{problem.name!r} has drive = {inputs.drive!r} and spring = {outputs.spring!r}"
+        )
+    return Objective(
+        numerator_scale=outputs.spring * _share(problem, len(outputs.nodes)),
+        exponent=exponent,
+        denominator=inputs.amount * _share(problem, len(inputs.nodes)) * len(inputs.nodes),
+    )
+
+
+def objective_of(problem: Problem, name: str | None = None) -> Objective:
+    """Return the objective `name` of a problem; by default the problem's own.
+
+    A problem that names none is judged by displacement, or by force if it is driven
+    by forces against output springs. ``directional:6`` sets the exponent.
+
+    Raises
+    ------
+    UnknownName, InvalidSettings
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> objective_of(find_problem("crane"), "directional:3").exponent
+    3.0
+    """
+    name = name or problem.objective or _usual_objective(problem)
+    name, _, parameter = name.partition(":")
+    make = objectives[name]
+    if not parameter:
+        return make(problem)
+    try:
+        exponent = float(parameter)
+    except ValueError:
+        exponent = math.nan
+    if name == "displacement" or not 2.0 <= exponent < math.inf:
+        raise InvalidSettings(
+            f"objective {name}:{parameter}: the part after the colon is the exponent n >= 2 "
+            "of 'directional' or 'force'"
+        )
+    return make(problem, exponent)
+
+
+def _usual_objective(problem: Problem) -> str:
+    loaded = problem.input.drive == "force" and problem.output.spring is not None
+    return "force" if loaded else "displacement"

@@ -1,0 +1,180 @@
+"""From a problem to the arrays the kernels work on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bellcrank.errors import InvalidProblem
+from bellcrank.mechanics.kernels.arrays import (
+    HELD,
+    HELD_X,
+    HELD_Y,
+    Bytes,
+    Floats,
+    Ints,
+    Known,
+    Scratch,
+    Structure,
+    System,
+)
+from bellcrank.mechanics.objectives import Objective
+from bellcrank.mechanics.ordering import elimination_order, factor_capacity
+from bellcrank.model import Problem
+
+EFFICIENCY_TOLERANCE = 1e-9
+"""Error in efficiency at which an equilibrium counts as settled."""
+
+
+def rings(positions: Floats, beams: Ints) -> tuple[Ints, Ints]:
+    """List the beams around each node, counter-clockwise at rest.
+
+    Returns
+    -------
+    start : (N + 1,) int64
+    beam : (2 M,) int64
+        The beams of node c are ``beam[start[c]:start[c + 1]]``.
+    """
+    node = beams.T.ravel()
+    beam = np.tile(np.arange(len(beams)), 2)
+    offset = positions[beams[:, 1]] - positions[beams[:, 0]]
+    offset = np.concatenate([offset, -offset])
+    order = np.lexsort((np.arctan2(offset[:, 1], offset[:, 0]), node))
+    start = np.searchsorted(node[order], np.arange(len(positions) + 1))
+    return start.astype(np.int64), beam[order].astype(np.int64)
+
+
+def _held_coordinates(problem: Problem) -> Bytes:
+    held = np.zeros(problem.lattice.node_count, dtype=np.uint8)
+    held[problem.supports.fixed] = HELD
+    held[problem.supports.fixed_x] |= HELD_X
+    held[problem.supports.fixed_y] |= HELD_Y
+    if problem.input.drive == "displacement":
+        held[problem.input.nodes] = HELD
+    return held
+
+
+def _output_springs(problem: Problem) -> Floats:
+    """(N, 3) components xx, xy, yy of the stiffness of the springs on the output nodes."""
+    ground = np.zeros((problem.lattice.node_count, 3))
+    output = problem.output
+    if output.spring:
+        x, y = output.direction.T
+        if output.spring_kind == "isotropic":
+            stiffness = np.tile([1.0, 0.0, 1.0], (len(output.nodes), 1))
+        else:
+            stiffness = np.stack([x * x, x * y, y * y], axis=1)
+        ground[output.nodes] = output.spring * stiffness
+    return ground
+
+
+def build_system(problem: Problem, objective: Objective) -> System:
+    """Translate a problem into arrays.
+
+    Raises
+    ------
+    InvalidProblem
+        If the lattice is not planar: the equations are written for two dimensions.
+    """
+    lattice = problem.lattice
+    if lattice.positions.shape[1] != 2:
+        raise InvalidProblem(
+            f"problem {problem.name!r}: mechanics needs planar positions (N, 2), "
+            f"got {lattice.positions.shape}"
+        )
+    beams = lattice.beams.astype(np.int64)
+    positions = np.array(lattice.positions)
+    ring_start, ring_beam = rings(positions, beams)
+    held = _held_coordinates(problem)
+    protected = (held != 0).astype(np.uint8)
+    protected[problem.input.nodes] = 1
+    protected[problem.output.nodes] = 1
+    motion = np.zeros_like(positions)
+    motion[problem.input.nodes] = problem.input.amount * problem.input.direction
+    driven = problem.input.drive == "displacement"
+    scale = objective.numerator_scale / (objective.denominator or problem.input.amount)
+    sensitivity = abs(scale) * len(problem.output.nodes) * max(1.0, objective.exponent - 1.0)
+    return System(
+        positions=positions,
+        beams=beams,
+        rest_vector=positions[beams[:, 1]] - positions[beams[:, 0]],
+        rest_length=np.array(lattice.rest_length),
+        movable=(held[beams] != HELD).any(axis=1).astype(np.uint8),
+        ring_start=ring_start,
+        ring_beam=ring_beam,
+        held=held,
+        protected=protected,
+        block=elimination_order(beams, ring_start, ring_beam, held == HELD),
+        drive=motion if driven else np.zeros_like(motion),
+        load=np.zeros_like(motion) if driven else motion,
+        ground=_output_springs(problem),
+        bond=float(problem.stiffness.bond),
+        angle=float(problem.stiffness.angle),
+        input_nodes=np.array(problem.input.nodes),
+        input_direction=np.array(problem.input.direction),
+        output_nodes=np.array(problem.output.nodes),
+        output_direction=np.array(problem.output.direction),
+        numerator_scale=float(objective.numerator_scale),
+        exponent=float(objective.exponent),
+        denominator=math.nan if objective.denominator is None else float(objective.denominator),
+        denominator_scale=float(objective.denominator_scale),
+        tolerance=float(np.clip(EFFICIENCY_TOLERANCE / sensitivity, 1e-12, 1e-8)),
+    )
+
+
+def allocate_structure(system: System) -> Structure:
+    """Room for the load-bearing graph of any design of a system."""
+    nodes, beams = len(system.positions), len(system.beams)
+    blocks = int(system.block.max(initial=-1)) + 1
+    words = blocks // 64 + 1
+    return Structure(
+        present=np.zeros(beams, np.uint8),
+        active=np.zeros(nodes, np.uint8),
+        order=np.zeros(nodes, np.int64),
+        parent=np.full(nodes, -1),
+        around=np.zeros(int(np.diff(system.ring_start).max(initial=0)), np.int64),
+        beam=np.zeros(beams, np.int64),
+        beam_entry=np.full(beams, -1),
+        spring_beams=np.zeros((2 * beams, 2), np.int64),
+        spring_node=np.zeros(2 * beams, np.int64),
+        spring_weight=np.zeros(2 * beams),
+        spring_entry=np.full(2 * beams, -1),
+        column_bits=np.zeros((blocks, words), np.uint64),
+        word_start=np.zeros((blocks, words), np.int64),
+        column_start=np.zeros(blocks + 1, np.int64),
+        row=np.zeros(factor_capacity(system), np.int64),
+        sizes=np.zeros(5, np.int64),
+    )
+
+
+def allocate_known(system: System) -> Known:
+    """Room for an equilibrium to start from."""
+    return Known(
+        present=np.zeros(len(system.beams), np.uint8),
+        active=np.zeros(len(system.positions), np.uint8),
+        u=np.zeros((len(system.positions), 2)),
+    )
+
+
+def allocate_scratch(system: System, structure: Structure) -> Scratch:
+    """Working memory for one thread."""
+    nodes, beams = len(system.positions), len(system.beams)
+    blocks, entries = len(structure.column_bits), len(structure.row)
+    return Scratch(
+        length=np.ones(beams),
+        rotation=np.zeros(beams),
+        axis=np.zeros((beams, 2)),
+        turn=np.zeros((beams, 2)),
+        torque=np.zeros(beams),
+        turn_weight=np.zeros(beams),
+        gradient=np.zeros((nodes, 2)),
+        diagonal=np.zeros((blocks, 4)),
+        off_diagonal=np.zeros((entries, 4)),
+        factor_diagonal=np.zeros((blocks, 4)),
+        factor=np.zeros((entries, 4)),
+        column=np.zeros((blocks, 4)),
+        link=np.zeros((blocks, 3), np.int64),
+        step=np.zeros((blocks, 2)),
+        vectors=np.zeros((8, nodes, 2)),
+    )
