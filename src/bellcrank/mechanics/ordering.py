@@ -28,9 +28,7 @@ def _coupled_nodes(
     return csc_matrix(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count)))
 
 
-def elimination_order(
-    beams: Ints, ring_start: Ints, ring_beam: Ints, fully_held: Bytes
-) -> Ints:
+def elimination_order(beams: Ints, ring_start: Ints, ring_beam: Ints, fully_held: Bytes) -> Ints:
     """Number the free nodes so that their factor stays sparse (multiple minimum degree).
 
     The order is found once, on the full lattice, and serves all designs: a design's

@@ -119,8 +119,15 @@ def add_loads(
 
 @kernel
 def add_to_off_diagonal(
-    system: System, row: int, column: int, entry: int,
-    xx: float, xy: float, yx: float, yy: float, scratch: Scratch,
+    system: System,
+    row: int,
+    column: int,
+    entry: int,
+    xx: float,
+    xy: float,
+    yx: float,
+    yy: float,
+    scratch: Scratch,
 ) -> None:
     """Add a block whose rows belong to node `row`; the lower triangle is what is stored."""
     target = scratch.off_diagonal
@@ -201,9 +208,7 @@ def add_spring_stiffness(
 
 
 @kernel
-def find_stiffness(
-    system: System, structure: Structure, definite: bool, scratch: Scratch
-) -> None:
+def find_stiffness(system: System, structure: Structure, definite: bool, scratch: Scratch) -> None:
     """Assemble the second derivative of the energy; call `find_gradient` first.
 
     With `definite`, leave out what can make it indefinite, the softening by compression

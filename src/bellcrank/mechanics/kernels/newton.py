@@ -106,9 +106,7 @@ def newton(
 
 
 @kernel
-def shift_until_definite(
-    structure: Structure, scratch: Scratch, shift: float
-) -> float:
+def shift_until_definite(structure: Structure, scratch: Scratch, shift: float) -> float:
     """Factorise the stiffness, adding to its diagonal until it is positive definite."""
     added = 0.0
     while True:

@@ -20,7 +20,7 @@ from bellcrank.mechanics.kernels.arrays import (
 from bellcrank.mechanics.kernels.energy import find_gradient, measure_held_beams
 from bellcrank.mechanics.kernels.fields import clear, copy, dot, largest_component, move
 
-MOST_EVALUATIONS = 400_000
+MOST_EVALUATIONS = 2_000_000
 
 
 @kernel

@@ -18,14 +18,13 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
-from bellcrank.mechanics.kernels.cholesky import factorise
-from bellcrank.mechanics.kernels.energy import (
-    find_gradient,
-    find_stiffness,
-    measure_held_beams,
-)
+from bellcrank.mechanics.kernels.energy import elastic_energy
 from bellcrank.mechanics.kernels.fields import clear, copy, largest_difference, move
-from bellcrank.mechanics.kernels.loading import move_held_nodes, place_hanging_pieces
+from bellcrank.mechanics.kernels.loading import (
+    move_held_nodes,
+    place_hanging_pieces,
+    stiffness_is_definite,
+)
 from bellcrank.mechanics.kernels.relaxation import conjugate_gradient, fire
 from bellcrank.mechanics.kernels.response import efficiency_of, guess_from_neighbour
 from bellcrank.mechanics.kernels.structure import build_structure
@@ -51,17 +50,6 @@ def relax(
     else:
         status = conjugate_gradient(system, structure, fraction, u, scratch, force_tolerance)
     return status
-
-
-@kernel
-def is_stable(
-    system: System, structure: Structure, fraction: float, u: Floats, scratch: Scratch
-) -> bool:
-    """Whether the stiffness at `u` is positive definite."""
-    measure_held_beams(system, structure, u, scratch)
-    find_gradient(system, structure, fraction, u, scratch)
-    find_stiffness(system, structure, False, scratch)
-    return factorise(structure, scratch)
 
 
 @kernel
@@ -96,7 +84,7 @@ def relax_path(
             return UNCONVERGED
         before = movement
         movement = largest_difference(u, current)
-        stable = is_stable(system, structure, fraction, u, scratch)
+        stable = stiffness_is_definite(system, structure, fraction, u, scratch)
         if movement > LARGEST_GROWTH * before or not stable:
             status = SNAPPED
     return status if stable else UNCONVERGED
@@ -112,15 +100,16 @@ def relax_from_rest(
     structure: Structure,
     u: Floats,
     scratch: Scratch,
-) -> tuple[int, float]:
+) -> tuple[int, float, float]:
     """As `response.respond_from_rest`, with conjugate gradients or FIRE."""
     clear(u, len(u))
     status = build_structure(system, mask, core, structure)
     if status == MECHANISM:
-        return status, math.nan
+        return status, math.nan, math.nan
     status = relax_path(system, structure, minimiser, u, scratch, force_tolerance)
     place_hanging_pieces(system, structure, u)
-    return status, efficiency_of(system, u)
+    energy = elastic_energy(system, structure, u, scratch)
+    return status, efficiency_of(system, u), energy
 
 
 @entry
@@ -142,7 +131,7 @@ def relax_from_neighbour(
         return status, math.nan
     guess_from_neighbour(system, known, structure, u, scratch)
     status = relax(system, structure, minimiser, 1.0, u, scratch, force_tolerance)
-    if status != CONVERGED or not is_stable(system, structure, 1.0, u, scratch):
+    if status != CONVERGED or not stiffness_is_definite(system, structure, 1.0, u, scratch):
         status = relax_path(system, structure, minimiser, u, scratch, force_tolerance)
     place_hanging_pieces(system, structure, u)
     return status, efficiency_of(system, u)

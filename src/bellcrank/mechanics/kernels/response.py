@@ -15,7 +15,7 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
-from bellcrank.mechanics.kernels.energy import beam_rotation
+from bellcrank.mechanics.kernels.energy import beam_rotation, elastic_energy
 from bellcrank.mechanics.kernels.fields import clear, copy, pair
 from bellcrank.mechanics.kernels.loading import (
     LONGEST_STEP,
@@ -99,12 +99,17 @@ def respond_from_rest(
     structure: Structure,
     u: Floats,
     scratch: Scratch,
-) -> tuple[int, float]:
+) -> tuple[int, float, float]:
     """Response of the design `mask`, followed from rest in increments up to `finest`.
 
-    Fills `structure` and the displacement `u`; returns status and efficiency.
+    Fills `structure` and the displacement `u`; returns status, efficiency and elastic
+    energy.
     """
-    return find_from_rest(system, mask, core, finest, structure, u, scratch)
+    status, efficiency = find_from_rest(system, mask, core, finest, structure, u, scratch)
+    energy = math.nan
+    if status != MECHANISM:
+        energy = elastic_energy(system, structure, u, scratch)
+    return status, efficiency, energy
 
 
 @kernel

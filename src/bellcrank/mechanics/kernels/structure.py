@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bellcrank.mechanics.kernels._compile import kernel
+from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
     HELD,
@@ -86,7 +86,9 @@ def discover(system: System, structure: Structure, start: int, count: int) -> in
 
 
 @kernel
-def rigid_motions_are_prevented(system: System, structure: Structure, first: int, last: int) -> bool:
+def rigid_motions_are_prevented(
+    system: System, structure: Structure, first: int, last: int
+) -> bool:
     """Whether supports, drive and output springs hold a piece against its three rigid motions.
 
     The rows that constrain translation in x, in y and rotation are gathered in a
@@ -109,7 +111,9 @@ def rigid_motions_are_prevented(system: System, structure: Structure, first: int
                 row[0] = 1.0
                 if not held & HELD_X:
                     row[1] = xy / xx
-            elif axis == 1 and (held & HELD_Y or (yy > 0.0 and xx * yy - xy * xy > 1e-12 * yy * yy)):
+            elif axis == 1 and (
+                held & HELD_Y or (yy > 0.0 and xx * yy - xy * xy > 1e-12 * yy * yy)
+            ):
                 row[1] = 1.0
             elif axis == 1 and yy > 0.0 and xx == 0.0:
                 row[1] = 1.0
@@ -318,3 +322,11 @@ def build_structure(system: System, mask: Bytes, core: bool, structure: Structur
         list_springs(system, structure)
         find_pattern(system, structure)
     return status
+
+
+@entry
+def build_structure_from_python(
+    system: System, mask: Bytes, core: bool, structure: Structure
+) -> int:
+    """As `build_structure`, for calls from Python."""
+    return build_structure(system, mask, core, structure)

@@ -89,14 +89,10 @@ def advance(
         bit = 128 >> (beam & 7)
         mask[beam] ^= 1
         packed[beam >> 3] ^= bit
-        status, efficiency = find_from_neighbour(
-            system, mask, core, known, structure, u, scratch
-        )
+        status, efficiency = find_from_neighbour(system, mask, core, known, structure, u, scratch)
         cost = cost_of(cost_code, efficiency)
         temperature = temperatures[min(int(state[2]), len(temperatures) - 1)]
-        accepted = status == CONVERGED and accepts(
-            state[1], cost, temperature, uniforms[step, 1]
-        )
+        accepted = status == CONVERGED and accepts(state[1], cost, temperature, uniforms[step, 1])
         for byte in range(len(packed)):
             records.mask[step, byte] = packed[byte]
         records.efficiency[step] = efficiency

@@ -1,0 +1,33 @@
+"""Energy, equilibrium, efficiency and sensitivity of a design.
+
+The work flow, in four lines:
+
+>>> from bellcrank.mechanics import Evaluator
+>>> from bellcrank.model import find_problem
+>>> evaluator = Evaluator(find_problem("anti-parallel"))
+>>> round(evaluator.respond(evaluator.problem.initial).efficiency, 7)
+0.0420422
+"""
+
+from bellcrank.mechanics.evaluator import (
+    Dangling,
+    Evaluator,
+    Response,
+    Status,
+    load_bearing_core,
+)
+from bellcrank.mechanics.minimisers import Minimiser, minimisers
+from bellcrank.mechanics.objectives import Objective, objective_of, objectives
+
+__all__ = [
+    "Dangling",
+    "Evaluator",
+    "Minimiser",
+    "Objective",
+    "Response",
+    "Status",
+    "load_bearing_core",
+    "minimisers",
+    "objective_of",
+    "objectives",
+]

@@ -1,0 +1,228 @@
+"""The response of designs: the public face of the mechanics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bellcrank.errors import InvalidProblem, InvalidSettings
+from bellcrank.mechanics.kernels.arrays import (
+    CONVERGED,
+    MECHANISM,
+    SNAPPED,
+    UNCONVERGED,
+    Known,
+    Structure,
+    System,
+)
+from bellcrank.mechanics.minimisers import minimisers
+from bellcrank.mechanics.objectives import objective_of
+from bellcrank.mechanics.system import (
+    allocate_known,
+    allocate_scratch,
+    allocate_structure,
+    build_system,
+)
+from bellcrank.model import Design, Problem
+
+Dangling = Literal["counted", "ignored"]
+
+
+class Status(IntEnum):
+    """How the search for an equilibrium ended."""
+
+    CONVERGED = CONVERGED
+    SNAPPED = SNAPPED
+    MECHANISM = MECHANISM
+    UNCONVERGED = UNCONVERGED
+
+    @property
+    def label(self) -> str:
+        """The status as it is written in files."""
+        return self.name.lower()
+
+    @property
+    def message(self) -> str:
+        """What it means, as a sentence."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Status.CONVERGED: "a stable equilibrium was reached from rest along a stable path",
+    Status.SNAPPED: (
+        "the structure loses its stability along the stroke, or comes so near to it that a "
+        "small disturbance decides which way it goes; the response is that of one branch"
+    ),
+    Status.MECHANISM: "a driven piece is not held against moving as a rigid body",
+    Status.UNCONVERGED: "no stable equilibrium was found at full load",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
+    """What a design does at full load.
+
+    Parameters
+    ----------
+    status
+        Whether it can be relied on; only CONVERGED responses are unique.
+    efficiency
+        As the objective defines it; nan for a mechanism.
+    energy
+        Elastic energy of beams, angular springs and output springs; nan if not computed.
+    displacement : (N, 2)
+        Of each node, in lattice units. Loose pieces are at rest.
+    """
+
+    status: Status
+    efficiency: float
+    energy: float
+    displacement: NDArray[np.float64]
+
+
+class Evaluator:
+    """Computes responses of designs of one problem; one instance for each thread.
+
+    Parameters
+    ----------
+    problem
+        What is driven, held and measured.
+    objective
+        Name of an efficiency (see `bellcrank.mechanics.objectives`); the problem's own
+        by default.
+    dangling
+        ``"counted"``: the literal model. ``"ignored"``: the load-bearing core, without
+        dead-end beams, whose splitting of angular springs no real part has.
+    minimiser
+        ``"newton"``, ``"cg"`` or ``"fire"``.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> crane = find_problem("crane")
+    >>> response = Evaluator(crane).respond(crane.initial)
+    >>> response.status.label, round(response.efficiency, 7)
+    ('converged', -0.0640858)
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        objective: str | None = None,
+        dangling: Dangling = "counted",
+        minimiser: str = "newton",
+    ) -> None:
+        if dangling not in get_args(Dangling):
+            raise InvalidSettings(
+                f"dangling must be one of {', '.join(get_args(Dangling))}; got {dangling!r}"
+            )
+        self.problem = problem
+        self.core = dangling == "ignored"
+        self.minimiser = minimisers[minimiser]()
+        self.system: System = build_system(problem, objective_of(problem, objective))
+        self.structure: Structure = allocate_structure(self.system)
+        self.scratch = allocate_scratch(self.system, self.structure)
+        self.known: Known = allocate_known(self.system)
+        self.displacement = np.zeros_like(self.system.positions)
+
+    def _checked(self, mask: ArrayLike) -> NDArray[np.uint8]:
+        given = np.asarray(mask)
+        if given.shape != (len(self.system.beams),):
+            raise InvalidProblem(
+                f"mask: expected shape ({len(self.system.beams)},), one entry for each beam, "
+                f"got {given.shape}"
+            )
+        return given.astype(bool).astype(np.uint8)
+
+    def respond(self, mask: ArrayLike, largest_increment: float = 1.0) -> Response:
+        """Load the design `mask` from rest to the full stroke.
+
+        Parameters
+        ----------
+        mask : (M,) bool
+            Which beams are present.
+        largest_increment
+            Upper bound on the load increments, as a fraction of the full load; smaller
+            values follow the path more finely than the step control asks for.
+
+        Raises
+        ------
+        InvalidProblem
+            If the mask has the wrong length.
+        """
+        status, efficiency, energy = self.minimiser.from_rest(
+            self.system, self._checked(mask), self.core, largest_increment,
+            self.structure, self.displacement, self.scratch,
+        )  # fmt: skip
+        return Response(Status(status), efficiency, energy, self.displacement.copy())
+
+    def remember(self) -> None:
+        """Keep the equilibrium computed last, for `respond_nearby` to start from."""
+        self.known.present[:] = self.structure.present
+        self.known.active[:] = self.structure.active
+        self.known.u[:] = self.displacement
+
+    def respond_nearby(self, mask: ArrayLike) -> Response:
+        """As `respond`, started from the remembered equilibrium of a similar design.
+
+        Only faster: the response is the same to within the tolerance. The energy is not
+        computed.
+        """
+        status, efficiency = self.minimiser.from_neighbour(
+            self.system, self._checked(mask), self.core, self.known,
+            self.structure, self.displacement, self.scratch,
+        )  # fmt: skip
+        return Response(Status(status), efficiency, np.nan, self.displacement.copy())
+
+    def sensitivity(self, mask: ArrayLike) -> NDArray[np.float64]:
+        """First-order change of the efficiency by flipping each beam, from one adjoint solve.
+
+        Returns
+        -------
+        (M,)
+            For a present beam, the change on removing it; for an absent one, on adding
+            it. Zero for flips that no load can feel.
+
+        Raises
+        ------
+        InvalidSettings
+            If the design has no stable equilibrium to differentiate at.
+        """
+        from bellcrank.mechanics.kernels.sensitivity import find_sensitivity
+
+        response = self.respond(mask)
+        sensitivity = np.zeros(len(self.system.beams))
+        found = response.status in (Status.CONVERGED, Status.SNAPPED) and find_sensitivity(
+            self.system, self._checked(mask), self.core,
+            self.structure, self.displacement, self.scratch, sensitivity,
+        )  # fmt: skip
+        if not found:
+            raise InvalidSettings(f"no sensitivity: {response.status.message}")
+        return sensitivity
+
+
+def load_bearing_core(design: Design) -> NDArray[np.bool_]:
+    """Return the mask of the beams that can carry load: no loose pieces, no dead ends.
+
+    What remains when pieces that the drive cannot reach and, repeatedly, beams that end
+    in a free node of degree one are left out. Supports, input and output nodes are not
+    free in this sense.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> crane = find_problem("crane").full_design()
+    >>> bool(load_bearing_core(crane).all())
+    True
+    """
+    from bellcrank.mechanics.kernels.structure import build_structure_from_python
+
+    evaluator = Evaluator(design.problem, "displacement")
+    structure = evaluator.structure
+    build_structure_from_python(evaluator.system, design.mask.astype(np.uint8), True, structure)
+    ends_move = structure.active[evaluator.system.beams].astype(bool).any(axis=1)
+    return (structure.present != 0) & ends_move
