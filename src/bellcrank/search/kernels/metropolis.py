@@ -8,6 +8,7 @@ from typing import NamedTuple
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
+    HELD,
     Bytes,
     Floats,
     Ints,
@@ -18,11 +19,43 @@ from bellcrank.mechanics.kernels.arrays import (
 )
 from bellcrank.mechanics.kernels.response import (
     find_from_neighbour,
+    find_from_rest,
     remember,
 )
 
 EXPONENTIAL = 0
 NEGATIVE = 1
+
+FORBIDDEN = 4
+"""Status of a proposal that breaks a rule on designs and is refused unevaluated."""
+
+
+RECORD_MARGIN = 0.01
+
+
+class Rules(NamedTuple):
+    """What the search is told, as plain numbers."""
+
+    cost: int
+    core: bool
+    minimum_degree: int
+    patience: int
+    """Rejections in a row after which the chain ends."""
+    refuse_snapping: bool
+
+
+class Chain(NamedTuple):
+    """Where a chain stands; updated in place."""
+
+    mask: Bytes
+    """(M,) the current design."""
+    packed: Bytes
+    """The same as bits."""
+    value: Floats
+    """(4,) efficiency and cost of the current design; the best efficiency so far, and the
+    best whose path from rest was checked."""
+    count: Ints
+    """(2,) accepted steps, rejections in a row."""
 
 
 class Records(NamedTuple):
@@ -52,24 +85,51 @@ def accepts(old_cost: float, new_cost: float, temperature: float, uniform: float
     return new_cost <= old_cost or uniform < math.exp((old_cost - new_cost) / temperature)
 
 
+@kernel
+def is_record(efficiency: float, checked: float) -> bool:
+    """Whether a design is so much better than the best checked one that it must be checked."""
+    return efficiency > checked + RECORD_MARGIN * abs(checked)
+
+
+@kernel
+def flip(chain: Chain, beam: int) -> None:
+    """Remove a present beam, add an absent one."""
+    chain.mask[beam] ^= 1
+    chain.packed[beam >> 3] ^= 128 >> (beam & 7)
+
+
+@kernel
+def is_forbidden(system: System, minimum_degree: int, mask: Bytes, beam: int) -> bool:
+    """Whether removing `beam` has left a free end with too few beams."""
+    if minimum_degree > 0 and not mask[beam]:
+        for end in range(2):
+            node = system.beams[beam, end]
+            degree = 0
+            for slot in range(system.ring_start[node], system.ring_start[node + 1]):
+                degree += mask[system.ring_beam[slot]]
+            if degree < minimum_degree and system.held[node] != HELD:
+                return True
+    return False
+
+
 @entry
 def advance(
     system: System,
     designable: Ints,
-    core: bool,
-    cost_code: int,
+    rules: Rules,
     temperatures: Floats,
     uniforms: Floats,
-    mask: Bytes,
-    packed: Bytes,
-    state: Floats,
+    chain: Chain,
     known: Known,
     structure: Structure,
     u: Floats,
     scratch: Scratch,
     records: Records,
-) -> None:
-    """Make one proposal for each row of `uniforms`.
+) -> int:
+    """Make one proposal for each row of `uniforms`; return how many were made.
+
+    A proposal that beats the best checked design of the chain by a margin is loaded again
+    from rest along its whole path, and refused if it snaps.
 
     Parameters
     ----------
@@ -77,34 +137,47 @@ def advance(
         Temperature after 0, 1, 2, ... accepted steps; the last one holds for ever.
     uniforms
         (n, 2) random numbers in [0, 1): which beam, and whether uphill.
-    mask, packed
-        The current design, as bytes and as bits; updated.
-    state
-        Current efficiency, current cost, number of accepted steps; updated.
     known
         Equilibrium of the current design; updated.
     """
     for step in range(len(uniforms)):
+        if chain.count[1] >= rules.patience:
+            return step
         beam = designable[int(uniforms[step, 0] * len(designable))]
-        bit = 128 >> (beam & 7)
-        mask[beam] ^= 1
-        packed[beam >> 3] ^= bit
-        status, efficiency = find_from_neighbour(system, mask, core, known, structure, u, scratch)
-        cost = cost_of(cost_code, efficiency)
-        temperature = temperatures[min(int(state[2]), len(temperatures) - 1)]
-        accepted = status == CONVERGED and accepts(state[1], cost, temperature, uniforms[step, 1])
-        for byte in range(len(packed)):
-            records.mask[step, byte] = packed[byte]
+        flip(chain, beam)
+        temperature = temperatures[min(chain.count[0], len(temperatures) - 1)]
+        status, efficiency = FORBIDDEN, math.nan
+        if not is_forbidden(system, rules.minimum_degree, chain.mask, beam):
+            status, efficiency = find_from_neighbour(
+                system, chain.mask, rules.core, known, structure, u, scratch
+            )
+        cost = cost_of(rules.cost, efficiency)
+        accepted = status == CONVERGED and accepts(
+            chain.value[1], cost, temperature, uniforms[step, 1]
+        )
+        if accepted and rules.refuse_snapping and is_record(efficiency, chain.value[3]):
+            status, efficiency = find_from_rest(
+                system, chain.mask, rules.core, 1.0, structure, u, scratch
+            )
+            cost = cost_of(rules.cost, efficiency)
+            accepted = status == CONVERGED
+            if accepted:
+                chain.value[3] = efficiency
+        for byte in range(len(chain.packed)):
+            records.mask[step, byte] = chain.packed[byte]
         records.efficiency[step] = efficiency
         records.cost[step] = cost
         records.temperature[step] = temperature
         records.accepted[step] = accepted
         records.status[step] = status
         if accepted:
-            state[0] = efficiency
-            state[1] = cost
-            state[2] += 1.0
+            chain.value[0] = efficiency
+            chain.value[1] = cost
+            chain.value[2] = max(efficiency, chain.value[2])
+            chain.count[0] += 1
+            chain.count[1] = 0
             remember(structure, u, known)
         else:
-            mask[beam] ^= 1
-            packed[beam >> 3] ^= bit
+            chain.count[1] += 1
+            flip(chain, beam)
+    return len(uniforms)
