@@ -1,0 +1,236 @@
+"""A chain is a pure function of its state: compiled or not, in one go or in pieces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidSettings, UnknownName
+from bellcrank.mechanics import Evaluator, Response, Status
+from bellcrank.model import Problem, find_problem, unpack_mask
+from bellcrank.runs import Proposals
+from bellcrank.search import (
+    BLOCK,
+    ChainState,
+    MetropolisSettings,
+    advance_chain,
+    advance_in_python,
+    chain_blocks,
+    costs,
+    is_done,
+    schedules,
+    start_chain,
+)
+from bellcrank.search import chain as chain_module
+
+
+@pytest.fixture(scope="module")
+def small() -> Problem:
+    return find_problem("scaling-8")
+
+
+def same(first: Proposals, second: Proposals) -> bool:
+    return all(
+        np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+        for a, b in zip(first, second, strict=True)
+    )
+
+
+def whole(
+    problem: Problem, settings: MetropolisSettings, chain: int = 0
+) -> tuple[ChainState, Proposals]:
+    evaluator = Evaluator(problem, settings.objective, settings.dangling, settings.minimiser)
+    blocks = list(chain_blocks(evaluator, settings, chain))
+    joined = (np.concatenate(column) for column in zip(*(b for _, b in blocks), strict=True))
+    return blocks[-1][0], Proposals(*joined)
+
+
+def degrees(problem: Problem, mask: np.ndarray) -> np.ndarray:
+    ends = problem.lattice.beams[mask].ravel()
+    return np.bincount(ends, minlength=problem.lattice.node_count)
+
+
+VARIANTS = [
+    {},
+    {"cost": "negative", "schedule": "geometric"},
+    {"minimum_degree": 3},
+    {"dangling": "ignored"},
+    {"patience": 7},
+    {"objective": "directional:4"},
+]
+
+
+@pytest.mark.parametrize("variant", VARIANTS, ids=str)
+def test_the_compiled_block_equals_the_python_loop(small: Problem, variant: dict) -> None:
+    settings = MetropolisSettings(steps=2 * BLOCK, **variant)
+    evaluator = Evaluator(small, settings.objective, settings.dangling)
+    state = start_chain(evaluator, settings)
+    for block in range(2):
+        if is_done(state, settings):
+            break
+        uniforms = chain_module.draw_uniforms(settings.seed, 0, block, BLOCK)
+        compiled, rows = advance_chain(evaluator, settings, 0, state)
+        plain, plain_rows = advance_in_python(evaluator, settings, state, uniforms)
+        assert compiled == plain
+        assert same(rows, plain_rows)
+        state = compiled
+
+
+def test_a_chain_resumed_from_plain_data_is_the_same_to_the_last_bit(small: Problem) -> None:
+    settings = MetropolisSettings(steps=1000)
+    end, proposals = whole(small, settings)
+    first = next(chain_blocks(Evaluator(small), settings, 0))
+    resumed = ChainState(**first[0].to_dict())
+    rest = list(chain_blocks(Evaluator(small), settings, 0, resumed))
+    joined = Proposals(
+        *(np.concatenate(c) for c in zip(first[1], *(p for _, p in rest), strict=True))
+    )
+    assert rest[-1][0] == end
+    assert same(joined, proposals)
+
+
+def test_recorded_masks_differ_from_the_current_design_by_one_beam(small: Problem) -> None:
+    _, proposals = whole(small, MetropolisSettings(steps=500))
+    current = small.initial
+    bits = np.unpackbits(proposals.mask, axis=1)[:, : len(current)].astype(bool)
+    for row, accepted in zip(bits, proposals.accepted, strict=True):
+        flipped = np.flatnonzero(row != current)
+        assert len(flipped) == 1
+        assert flipped[0] in small.designable
+        if accepted:
+            current = row
+
+
+def test_the_recorded_efficiency_is_that_of_the_proposal(small: Problem) -> None:
+    _, proposals = whole(small, MetropolisSettings(steps=500))
+    evaluator = Evaluator(small)
+    for step in range(0, 500, 50):
+        mask = unpack_mask(proposals.mask[step].tobytes().hex(), small.lattice.beam_count)
+        assert proposals.efficiency[step] == pytest.approx(
+            evaluator.respond(mask).efficiency, abs=1e-8
+        )
+
+
+def test_temperature_falls_with_accepted_steps(small: Problem) -> None:
+    settings = MetropolisSettings(steps=1000, annealing=40)
+    _, proposals = whole(small, settings)
+    accepted_before = np.concatenate([[0], np.cumsum(proposals.accepted)[:-1]])
+    expected = settings.temperatures[np.minimum(accepted_before, 40)]
+    assert np.array_equal(proposals.temperature, expected)
+    assert proposals.temperature[-1] == settings.cold
+
+
+def test_chains_and_seeds_differ(small: Problem) -> None:
+    runs = [
+        whole(small, MetropolisSettings(steps=250, seed=seed), chain)[1].efficiency
+        for seed, chain in [(0, 0), (0, 1), (1, 0)]
+    ]
+    assert not np.array_equal(runs[0], runs[1])
+    assert not np.array_equal(runs[0], runs[2])
+
+
+def test_minimum_degree_holds_along_the_chain(small: Problem) -> None:
+    _, proposals = whole(small, MetropolisSettings(steps=1000, minimum_degree=3))
+    bits = np.unpackbits(proposals.mask, axis=1)[:, : small.lattice.beam_count].astype(bool)
+    at_first = degrees(small, small.initial)
+    for mask in bits[proposals.accepted]:
+        degree = degrees(small, mask)
+        assert ((degree >= 3) | (degree == at_first)).all()
+    assert (proposals.status == 4).any()
+    assert np.isnan(proposals.efficiency[proposals.status == 4]).all()
+
+
+def test_patience_ends_a_chain(small: Problem) -> None:
+    settings = MetropolisSettings(steps=5000, patience=5)
+    end, proposals = whole(small, settings)
+    assert end.step < 5000
+    assert not proposals.accepted[-5:].any()
+    assert len(proposals.accepted) == end.step
+
+
+class Snapping:
+    """A responder that finds every design of more than a hundred beams unstable from rest."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self._inner = Evaluator(problem)
+        self.paths = 0
+
+    def respond(self, mask: np.ndarray) -> Response:
+        response = self._inner.respond(mask)
+        self.paths += 1
+        return replace(response, status=Status.SNAPPED) if self.paths > 2 else response
+
+    def respond_nearby(self, mask: np.ndarray) -> Response:
+        return self._inner.respond_nearby(mask)
+
+    def remember(self) -> None:
+        self._inner.remember()
+
+
+def test_a_record_that_snaps_is_refused(small: Problem) -> None:
+    settings = MetropolisSettings(steps=BLOCK)
+    responder = Snapping(small)
+    state = start_chain(responder, settings)
+    after, proposals = advance_chain(responder, settings, 0, state)
+    snapped = proposals.status == Status.SNAPPED
+    assert snapped.any()
+    assert not proposals.accepted[snapped].any()
+    assert after.checked == state.checked
+
+
+def test_a_search_cannot_start_from_a_design_without_response(small: Problem) -> None:
+    class Broken(Snapping):
+        def respond(self, mask: np.ndarray) -> Response:
+            return replace(super().respond(mask), status=Status.MECHANISM)
+
+    with pytest.raises(InvalidSettings, match="cannot start"):
+        start_chain(Broken(small), MetropolisSettings())
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"steps": 0}, "steps: expected a whole number of at least 1, got 0"),
+        ({"chains": 0}, "chains"),
+        ({"seed": -1}, "seed"),
+        ({"hot": float("nan")}, "hot"),
+        ({"cold": 0.0}, "cold"),
+        ({"patience": 0}, "patience"),
+        ({"minimum_degree": -1}, "minimum_degree"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(wrong: dict, message: str) -> None:
+    with pytest.raises(InvalidSettings, match=message):
+        MetropolisSettings(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"cost": "x"}, {"schedule": "x"}, {"minimiser": "x"}])
+def test_unknown_names_list_the_known_ones(wrong: dict) -> None:
+    with pytest.raises(UnknownName, match="known: "):
+        MetropolisSettings(**wrong)
+
+
+def test_settings_survive_plain_data() -> None:
+    settings = MetropolisSettings(steps=7, cost="negative", patience=3)
+    assert MetropolisSettings.from_dict(settings.to_dict()) == settings
+    with pytest.raises(InvalidSettings, match="unknown key 'color'"):
+        MetropolisSettings.from_dict({"color": 1})
+
+
+@pytest.mark.parametrize("name", list(costs))
+def test_every_cost_falls_with_efficiency_and_its_code_agrees(name: str, small: Problem) -> None:
+    cost = costs[name]
+    assert cost.of(1.0) < cost.of(0.5) < cost.of(-1.0)
+    _, proposals = whole(small, MetropolisSettings(steps=250, cost=name))
+    assert proposals.cost == pytest.approx([cost.of(eta) for eta in proposals.efficiency])
+
+
+@pytest.mark.parametrize("name", list(schedules))
+def test_every_schedule_is_positive_and_never_rises(name: str) -> None:
+    table = schedules[name](0.06, 1e-3, 100)
+    assert (table > 0).all()
+    assert (np.diff(table) <= 0).all()
+    assert table[-1] == pytest.approx(1e-3)

@@ -1,0 +1,96 @@
+"""From what chains accepted to a design that can be built."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.mechanics import Evaluator, Status, load_bearing_core
+from bellcrank.model import Problem, find_problem
+from bellcrank.search import Candidate, candidates_of, pieces, plateaus, select
+
+
+@pytest.fixture(scope="module")
+def small() -> Problem:
+    return find_problem("scaling-8")
+
+
+def candidate(mask: np.ndarray, efficiency: float, step: int = 0) -> Candidate:
+    return Candidate(efficiency, 0, step, 5, np.packbits(mask).tobytes())
+
+
+def test_a_plateau_needs_several_unmoved_changes() -> None:
+    efficiency = np.array([1.0, 2.0, 2.0, 2.0, 2.0, 2.001, 3.0, 3.0, 3.0])
+    assert plateaus(efficiency, tolerance=0.005, length=4) == [(1, 6)]
+    assert plateaus(efficiency, tolerance=0.005, length=2) == [(1, 6), (6, 9)]
+    assert plateaus(np.array([])) == []
+
+
+def test_a_plateau_does_not_drift() -> None:
+    efficiency = 1.0 + 0.003 * np.arange(50)
+    assert all(
+        efficiency[last - 1] - efficiency[first] <= 0.005 * efficiency[first]
+        for first, last in plateaus(efficiency, length=1)
+    )
+
+
+def test_candidates_are_the_ends_of_the_best_plateaus_best_first() -> None:
+    efficiency = np.repeat([1.0, 3.0, 2.0], 6)
+    mask = np.arange(18, dtype=np.uint8)[:, None]
+    chosen = candidates_of(4, np.arange(18) * 10, mask, efficiency, count=2)
+    assert [(c.efficiency, c.chain, c.step, c.mask) for c in chosen] == [
+        (3.0, 4, 110, b"\x0b"),
+        (2.0, 4, 170, b"\x11"),
+    ]
+
+
+def test_a_chain_without_plateaus_offers_its_best() -> None:
+    efficiency = np.array([0.1, 0.4, 0.2])
+    chosen = candidates_of(0, np.arange(3), np.zeros((3, 1), np.uint8), efficiency, count=1)
+    assert [c.step for c in chosen] == [1]
+
+
+def test_the_selected_design_is_cleaned_and_reported_before_and_after(small: Problem) -> None:
+    rng = np.random.default_rng(3)
+    evaluator = Evaluator(small)
+    while True:
+        mask = small.initial.copy()
+        mask[rng.choice(small.designable, 80, replace=False)] = False
+        core = load_bearing_core(small.full_design().with_mask(mask))
+        response = evaluator.respond(core)
+        if (core != mask).any() and response.status is Status.CONVERGED and response.efficiency:
+            break
+    selection = select(small, [candidate(mask, 1.0)])
+    assert np.array_equal(selection.design.mask, core)
+    assert selection.efficiency_before == pytest.approx(evaluator.respond(mask).efficiency)
+    assert selection.efficiency_after == pytest.approx(response.efficiency, abs=1e-8)
+    assert pieces(small, selection.design.mask) == 1
+
+
+def test_the_best_after_cleaning_wins_whatever_was_claimed(small: Problem) -> None:
+    evaluator = Evaluator(small)
+    masks = []
+    for beam in small.designable[:6]:
+        mask = small.initial.copy()
+        mask[beam] = False
+        masks.append(mask)
+    efficiencies = [evaluator.respond(mask).efficiency for mask in masks]
+    claims = [candidate(mask, -value) for mask, value in zip(masks, efficiencies, strict=True)]
+    assert select(small, claims).efficiency_after == pytest.approx(max(efficiencies), abs=1e-8)
+
+
+def test_no_acceptable_candidate_is_an_error(small: Problem) -> None:
+    with pytest.raises(InvalidSettings, match="none of 0 accepted designs"):
+        select(small, [])
+
+
+def test_pieces_are_counted(small: Problem) -> None:
+    assert pieces(small, small.initial) == 1
+    mask = np.zeros(small.lattice.beam_count, bool)
+    first = small.lattice.beams[0]
+    apart = next(
+        beam for beam, ends in enumerate(small.lattice.beams) if not set(ends) & set(first)
+    )
+    mask[[0, apart]] = True
+    assert pieces(small, mask) == 2
