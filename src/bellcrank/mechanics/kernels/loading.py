@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from bellcrank.mechanics.kernels._compile import kernel
+from bellcrank.mechanics.kernels._compile import inlined, kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
     HELD_X,
@@ -100,7 +100,7 @@ def place_hanging_piece(
         u[node, 1] = shift_y + x * math.sin(angle) + y * (math.cos(angle) - 1.0)
 
 
-@kernel
+@inlined
 def predict(
     system: System,
     structure: Structure,
@@ -155,7 +155,7 @@ def is_near(previous: float, now: float) -> bool:
     return now > LARGEST_SOFTENING * previous and previous > LARGEST_SOFTENING * now
 
 
-@kernel
+@inlined
 def has_second_equilibrium(
     system: System, structure: Structure, u: Floats, mode: Floats, turned: Floats, scratch: Scratch
 ) -> bool:
@@ -179,7 +179,7 @@ def has_second_equilibrium(
     return largest_difference(other, u) > DISTINCT
 
 
-@kernel
+@inlined
 def advance_load(
     system: System,
     structure: Structure,
