@@ -120,15 +120,19 @@ def test_visits_of_the_python_loop_match_too(
     assert deviations(problem, exact, steps=1500).max() < LARGEST_DEVIATION
 
 
-@pytest.mark.parametrize(
-    "wrong_rule",
-    [
-        lambda old, new, temperature, uniform: uniform < np.exp((old - new) / (2 * temperature)),
-        lambda old, new, temperature, uniform: new <= old or uniform < 0.5,
-        lambda old, new, temperature, uniform: uniform < 0.5 * old / (old + new),
-    ],
-    ids=["doubled temperature", "uphill by a coin", "ratio of costs"],
-)
+def doubled_temperature(old: float, new: float, temperature: float, uniform: float) -> bool:
+    return uniform < np.exp((old - new) / (2 * temperature))
+
+
+def uphill_by_a_coin(old: float, new: float, _temperature: float, uniform: float) -> bool:
+    return new <= old or uniform < 0.5
+
+
+def ratio_of_costs(old: float, new: float, _temperature: float, uniform: float) -> bool:
+    return uniform < 0.5 * old / (old + new)
+
+
+@pytest.mark.parametrize("wrong_rule", [doubled_temperature, uphill_by_a_coin, ratio_of_costs])
 def test_a_wrong_acceptance_rule_is_noticed(
     problem: Problem,
     exact: tuple[np.ndarray, np.ndarray],

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.mechanics.kernels.arrays import (
@@ -27,7 +26,11 @@ from bellcrank.mechanics.system import (
     allocate_structure,
     build_system,
 )
-from bellcrank.model import Design, Problem
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from bellcrank.model import Design, Problem
 
 Dangling = Literal["counted", "ignored"]
 
@@ -225,4 +228,5 @@ def load_bearing_core(design: Design) -> NDArray[np.bool_]:
     structure = evaluator.structure
     build_structure_from_python(evaluator.system, design.mask.astype(np.uint8), True, structure)
     ends_move = structure.active[evaluator.system.beams].astype(bool).any(axis=1)
-    return (structure.present != 0) & ends_move
+    core: NDArray[np.bool_] = (structure.present != 0) & ends_move
+    return core

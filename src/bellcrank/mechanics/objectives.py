@@ -13,12 +13,16 @@ an `Objective` and register it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.model import Problem
 from bellcrank.registry import Registry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bellcrank.model import Problem
 
 
 @dataclass(frozen=True, slots=True)

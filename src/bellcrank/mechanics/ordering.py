@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.linalg import splu
 
-from bellcrank.mechanics.kernels.arrays import Bytes, Ints, System
+if TYPE_CHECKING:
+    from bellcrank.mechanics.kernels.arrays import Bytes, Ints, System
 
 
 def _coupled_nodes(beams: Ints, start: Ints, ring: Ints, block: Ints) -> csc_matrix:
@@ -28,7 +31,7 @@ def _coupled_nodes(beams: Ints, start: Ints, ring: Ints, block: Ints) -> csc_mat
 
 
 def elimination_order(beams: Ints, ring_start: Ints, ring_beam: Ints, held: Bytes) -> Ints:
-    """Number the free nodes so that their factor stays sparse (multiple minimum degree).
+    """Order the free nodes so that their factor stays sparse (multiple minimum degree).
 
     The order is found once for each problem, on the pattern that covers all designs.
     Ordering for the full lattice alone would let the factors of late designs, which

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +20,11 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
-from bellcrank.mechanics.objectives import Objective
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
-from bellcrank.model import Problem
+
+if TYPE_CHECKING:
+    from bellcrank.mechanics.objectives import Objective
+    from bellcrank.model import Problem
 
 EFFICIENCY_TOLERANCE = 1e-9
 """Error in efficiency at which an equilibrium counts as settled."""

@@ -26,7 +26,7 @@ from bellcrank.search.selection import (
     plateaus,
     select,
 )
-from bellcrank.search.settings import MetropolisSettings
+from bellcrank.search.settings import MetropolisSettings, searches
 
 __all__ = [
     "BLOCK",
@@ -49,6 +49,7 @@ __all__ = [
     "run_chain",
     "run_chains",
     "schedules",
+    "searches",
     "select",
     "start_chain",
 ]

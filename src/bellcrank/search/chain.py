@@ -9,12 +9,10 @@ a handful of plain numbers, and a chain resumed from it is the same to the last 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Evaluator, Response, Status
@@ -22,6 +20,11 @@ from bellcrank.model import Problem, pack_mask, unpack_mask
 from bellcrank.runs import Proposals
 from bellcrank.search.costs import costs
 from bellcrank.search.settings import NO_LIMIT, MetropolisSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
 
 BLOCK = 250
 """Steps between two states at which a chain can be stopped and resumed."""
@@ -173,7 +176,7 @@ def _advance_compiled(
         mask=mask.astype(np.uint8),
         packed=np.packbits(mask),
         value=np.array([state.efficiency, state.cost, state.best, state.checked]),
-        count=np.array([state.accepted, state.rejections]),
+        counts=np.array([state.accepted, state.rejections]),
     )
     steps = len(uniforms)
     records = Records(
@@ -197,7 +200,7 @@ def _advance_compiled(
         records,
     )  # fmt: skip
     efficiency, cost, best, checked = chain.value.tolist()
-    accepted, rejections = chain.count.tolist()
+    accepted, rejections = chain.counts.tolist()
     after = ChainState(
         state.step + made, chain.packed.tobytes().hex(), efficiency, cost, best,
         checked, accepted, rejections,

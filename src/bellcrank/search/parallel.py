@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.mechanics import Evaluator
 from bellcrank.runs import Proposals, RunFolder
 from bellcrank.search.chain import ChainState, advance_chain, is_done, start_chain
-from bellcrank.search.settings import MetropolisSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bellcrank.search.settings import MetropolisSettings
 
 SHARD = 4000
 """Steps that are kept in memory before they are written: what a kill can cost in time."""

@@ -8,15 +8,19 @@ else. So candidates from all chains are cleaned first and compared after.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Evaluator, Response, Status, load_bearing_core
 from bellcrank.model import Design, Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from numpy.typing import NDArray
 
 PLATEAU_TOLERANCE = 0.005
 """Relative change of the efficiency up to which an accepted step leaves it unmoved."""

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, fields
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Dangling, minimisers
+from bellcrank.registry import Registry
 from bellcrank.search.costs import costs
 from bellcrank.search.schedules import schedules
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 NO_LIMIT = 2**62
 
 
+searches: Registry[type[MetropolisSettings]] = Registry("search")
+"""Ways to search, by the settings they take."""
+
+
+@searches.register("paper")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetropolisSettings:
     """Settings of the paper's search; the defaults are the paper's.
@@ -105,6 +112,7 @@ class MetropolisSettings:
         InvalidSettings
             If a key is unknown.
         """
+        searches[str(data.get("search", "paper"))]
         known = {field.name for field in fields(cls)}
         given = {key: value for key, value in data.items() if key != "search"}
         if unknown := sorted(set(given) - known):

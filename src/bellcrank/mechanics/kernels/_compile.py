@@ -16,11 +16,13 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
 
 from bellcrank import __version__
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 KEPT_CACHES = 4
 
@@ -70,21 +72,23 @@ def _forget_old_caches(current: Path) -> None:
 CACHE_FOLDER = _cache_folder()
 
 
-def _compile(function: Callable[..., Any], **options: Any) -> Any:
+def _compile(function: F, **options: Any) -> F:
     """Compile with numba: cached on disk, without the interpreter lock.
 
     Strict floating point (no re-association, no contraction), so that the same
     machine always gives the same bits; divisions follow IEEE 754 instead of raising.
     """
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE_FOLDER)
+    config: Any = numba.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(CACHE_FOLDER)
     try:
-        return numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+        compiler = numba.njit(cache=True, nogil=True, error_model="numpy", **options)
+        return cast("F", compiler(function))
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before
 
 
-def kernel(function: Callable[..., Any]) -> Any:
+def kernel(function: F) -> F:
     """Compile a function that only other kernels call.
 
     It gets no wrapper for calls from Python: unpacking sixty arrays a call would
@@ -93,7 +97,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
-def inlined(function: Callable[..., Any]) -> Any:
+def inlined(function: F) -> F:
     """Compile a function as part of each kernel that calls it, not by itself.
 
     For outer layers: numba optimises everything below a kernel again at each level.
@@ -101,7 +105,7 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _compile(function, inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
-def entry(function: Callable[..., Any]) -> Any:
+def entry(function: F) -> F:
     """Compile a function that Python calls."""
     return _compile(function, no_cfunc_wrapper=True)
 

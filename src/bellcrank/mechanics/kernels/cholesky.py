@@ -11,9 +11,12 @@ unstable equilibrium is recognised.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from bellcrank.mechanics.kernels._compile import kernel
-from bellcrank.mechanics.kernels.arrays import Scratch, Structure
+
+if TYPE_CHECKING:
+    from bellcrank.mechanics.kernels.arrays import Scratch, Structure
 
 SMALLEST_PIVOT = 1e-13
 """Relative to the diagonal: below it a stiffness counts as singular."""

@@ -6,12 +6,18 @@ error messages into each place that does, which costs seconds of compilation.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from bellcrank.mechanics.kernels._compile import kernel
-from bellcrank.mechanics.kernels.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics.kernels.arrays import Floats
 
 
 @kernel
-def pair(array: Ints, index: int) -> tuple[int, int]:
+def pair(array: NDArray[Any], index: int) -> tuple[Any, Any]:
     """Return the two entries of a row."""
     return array[index, 0], array[index, 1]
 
@@ -23,7 +29,7 @@ def triple(array: Floats, index: int) -> tuple[float, float, float]:
 
 
 @kernel
-def clear(field: Floats, rows: int) -> None:
+def clear(field: NDArray[Any], rows: int) -> None:
     """Set the first rows of a two-dimensional array to zero."""
     for row in range(rows):
         for column in range(field.shape[1]):

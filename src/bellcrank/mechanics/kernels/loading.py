@@ -49,7 +49,7 @@ LONGEST_STEP = 0.5
 
 
 @kernel
-def move_held_nodes(system: System, structure: Structure, fraction: float, u: Floats) -> None:
+def move_held_nodes(system: System, fraction: float, u: Floats) -> None:
     """Put held coordinates where supports and drive want them at `fraction` of the load."""
     for node in range(len(system.held)):
         if system.held[node] & HELD_X:
@@ -114,12 +114,12 @@ def predict(
     The factor at hand must be that of the equilibrium `u` at `fraction`. The change
     of the gradient with the load is a difference over a very small increment.
     """
-    move_held_nodes(system, structure, fraction + PROBE, u)
+    move_held_nodes(system, fraction + PROBE, u)
     measure_held_beams(system, structure, u, scratch)
     find_gradient(system, structure, fraction + PROBE, u, scratch)
     size = find_step(system, structure, scratch) * increment / PROBE
     take_step(system, increment / PROBE, u, scratch)
-    move_held_nodes(system, structure, fraction + increment, u)
+    move_held_nodes(system, fraction + increment, u)
     return size
 
 
@@ -173,7 +173,7 @@ def has_second_equilibrium(
         for axis in range(2):
             along += (u[node, axis] - turned[node, axis]) * mode[node, axis]
     move(other, -2.0 * along / size, mode)
-    move_held_nodes(system, structure, 1.0, other)
+    move_held_nodes(system, 1.0, other)
     if descend(system, structure, 1.0, other, scratch) != CONVERGED:
         return False
     return largest_difference(other, u) > DISTINCT
@@ -266,7 +266,7 @@ def follow_path(
         ):
             return SNAPPED
         return CONVERGED
-    move_held_nodes(system, structure, 1.0, u)
+    move_held_nodes(system, 1.0, u)
     if descend(system, structure, 1.0, u, scratch) == CONVERGED:
         return SNAPPED
     return UNCONVERGED

@@ -78,7 +78,7 @@ def relax_path(
         if number > 1:
             move(u, 1.0, current)
             move(u, -1.0, previous)
-        move_held_nodes(system, structure, fraction, u)
+        move_held_nodes(system, fraction, u)
         tolerance = force_tolerance if number == INCREMENTS else 1e3 * force_tolerance
         if relax(system, structure, minimiser, fraction, u, scratch, tolerance) != CONVERGED:
             return UNCONVERGED

@@ -24,7 +24,7 @@ from bellcrank.mechanics.kernels.loading import (
     place_hanging_pieces,
 )
 from bellcrank.mechanics.kernels.newton import newton
-from bellcrank.mechanics.kernels.structure import ACTIVE, build_structure, other_end
+from bellcrank.mechanics.kernels.structure import ACTIVE, build_structure
 
 
 @kernel
@@ -140,7 +140,7 @@ def guess_from_neighbour(
         active = structure.active[node] == ACTIVE
         for axis in range(2):
             u[node, axis] = known.u[node, axis] if active else 0.0
-    move_held_nodes(system, structure, 1.0, u)
+    move_held_nodes(system, 1.0, u)
     for index in range(structure.sizes[0]):
         node = structure.order[index]
         parent = structure.parent[node]

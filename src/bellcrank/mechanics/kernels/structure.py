@@ -111,11 +111,9 @@ def rigid_motions_are_prevented(
                 row[0] = 1.0
                 if not held & HELD_X:
                     row[1] = xy / xx
-            elif axis == 1 and (
-                held & HELD_Y or (yy > 0.0 and xx * yy - xy * xy > 1e-12 * yy * yy)
-            ):
-                row[1] = 1.0
-            elif axis == 1 and yy > 0.0 and xx == 0.0:
+            elif (
+                axis == 1 and (held & HELD_Y or (yy > 0.0 and xx * yy - xy * xy > 1e-12 * yy * yy))
+            ) or (axis == 1 and yy > 0.0 and xx == 0.0):
                 row[1] = 1.0
             else:
                 continue
@@ -173,14 +171,13 @@ def list_beams(system: System, structure: Structure) -> None:
     """List active beams: those with a free end from the front, the others from the back."""
     front, back = 0, len(structure.beam)
     for beam in range(len(structure.present)):
-        if structure.present[beam]:
-            if structure.active[system.beams[beam, 0]] == ACTIVE:
-                if system.movable[beam]:
-                    structure.beam[front] = beam
-                    front += 1
-                else:
-                    back -= 1
-                    structure.beam[back] = beam
+        if structure.present[beam] and structure.active[system.beams[beam, 0]] == ACTIVE:
+            if system.movable[beam]:
+                structure.beam[front] = beam
+                front += 1
+            else:
+                back -= 1
+                structure.beam[back] = beam
     structure.sizes[1] = front
     structure.sizes[2] = back
 
@@ -246,7 +243,7 @@ def entry_of(structure: Structure, first: int, second: int) -> int:
     high = max(first, second)
     word = structure.column_bits[low, high >> 6]
     below = word & ((ONE << np.uint64(high & 63)) - ONE)
-    return structure.word_start[low, high >> 6] + np.int64(popcount(below))
+    return structure.word_start[low, high >> 6] + popcount(below)
 
 
 @kernel
@@ -262,7 +259,7 @@ def fill_in(structure: Structure) -> None:
             rest = bits[column, word]
             structure.word_start[column, word] = count
             while rest:
-                row = (word << 6) + np.int64(trailing_zeros(rest))
+                row = (word << 6) + trailing_zeros(rest)
                 rest &= rest - ONE
                 if parent < 0:
                     parent = row

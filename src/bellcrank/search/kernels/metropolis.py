@@ -54,7 +54,7 @@ class Chain(NamedTuple):
     value: Floats
     """(4,) efficiency and cost of the current design; the best efficiency so far, and the
     best whose path from rest was checked."""
-    count: Ints
+    counts: Ints
     """(2,) accepted steps, rejections in a row."""
 
 
@@ -141,11 +141,11 @@ def advance(
         Equilibrium of the current design; updated.
     """
     for step in range(len(uniforms)):
-        if chain.count[1] >= rules.patience:
+        if chain.counts[1] >= rules.patience:
             return step
         beam = designable[int(uniforms[step, 0] * len(designable))]
         flip(chain, beam)
-        temperature = temperatures[min(chain.count[0], len(temperatures) - 1)]
+        temperature = temperatures[min(chain.counts[0], len(temperatures) - 1)]
         status, efficiency = FORBIDDEN, math.nan
         if not is_forbidden(system, rules.minimum_degree, chain.mask, beam):
             status, efficiency = find_from_neighbour(
@@ -174,10 +174,10 @@ def advance(
             chain.value[0] = efficiency
             chain.value[1] = cost
             chain.value[2] = max(efficiency, chain.value[2])
-            chain.count[0] += 1
-            chain.count[1] = 0
+            chain.counts[0] += 1
+            chain.counts[1] = 0
             remember(structure, u, known)
         else:
-            chain.count[1] += 1
+            chain.counts[1] += 1
             flip(chain, beam)
     return len(uniforms)

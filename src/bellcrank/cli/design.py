@@ -1,0 +1,152 @@
+"""`bellcrank design`: the main job."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from bellcrank.cli.app import INTERRUPTED, app
+from bellcrank.cli.console import announce_compilation, notes, results
+from bellcrank.errors import InvalidSettings
+
+if TYPE_CHECKING:
+    from bellcrank.search import MetropolisSettings, Progress
+    from bellcrank.workflows import DesignReport
+
+
+@app.command()
+def design(
+    problem: Annotated[
+        str | None, typer.Argument(help="A built-in problem or a problem file.")
+    ] = None,
+    steps: Annotated[int, typer.Option(help="Proposals of each chain.")] = 20_000,
+    chains: Annotated[int, typer.Option(help="Independent chains.")] = 8,
+    seed: Annotated[int, typer.Option(help="Determines everything, with the chain's number.")] = 0,
+    objective: Annotated[
+        str | None,
+        typer.Option(help="displacement, directional:N or force; default: by the drive."),
+    ] = None,
+    search: Annotated[str, typer.Option(help="Which search; 'paper' is Bonfanti et al. 2020.")] = (
+        "paper"
+    ),
+    dangling: Annotated[
+        str, typer.Option(help="counted (the literal model) or ignored (load-bearing core).")
+    ] = "counted",
+    minimiser: Annotated[str, typer.Option(help="newton, cg or fire.")] = "newton",
+    cost: Annotated[str, typer.Option(help="exponential (the paper) or negative.")] = "exponential",
+    schedule: Annotated[str, typer.Option(help="linear (the paper), geometric, constant.")] = (
+        "linear"
+    ),
+    minimum_degree: Annotated[int, typer.Option(help="Least number of beams at a free node.")] = 0,
+    patience: Annotated[
+        int | None, typer.Option(help="End a chain after so many rejections in a row.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Chains at the same time; changes no result.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Result folder; default: the name.")] = None,
+    resume: Annotated[Path | None, typer.Option(help="Go on with the run in this folder.")] = None,
+) -> None:
+    """Design an actuator: search, clean up, verify, and see what was designed."""
+    from bellcrank.search import MetropolisSettings, searches
+    from bellcrank.workflows import continue_design, start_design
+
+    if (problem is None) == (resume is None):
+        raise InvalidSettings("give either a problem to design for or --resume DIR")
+    if workers is not None and workers < 1:
+        raise InvalidSettings(f"workers: expected at least 1, got {workers}")
+    with stopping_on_interrupt() as stop:
+        if resume is not None:
+            from bellcrank.runs import RunFolder
+
+            settings = MetropolisSettings.from_dict(RunFolder.open(resume).settings)
+            report = _run(
+                settings,
+                lambda tell: continue_design(resume, workers=workers, tell=tell, stop=stop),
+            )
+            folder = resume
+        else:
+            from bellcrank.model import find_problem
+
+            assert problem is not None
+            searches[search]
+            settings = MetropolisSettings(
+                steps=steps, chains=chains, seed=seed, objective=objective, cost=cost,
+                schedule=schedule, dangling=dangling, minimiser=minimiser,  # type: ignore[arg-type]
+                minimum_degree=minimum_degree, patience=patience,
+            )  # fmt: skip
+            task = find_problem(problem)
+            folder = out or Path(task.name)
+            report = _run(
+                settings,
+                lambda tell: start_design(
+                    task, settings, folder, workers=workers, tell=tell, stop=stop
+                ),
+            )
+    if report is None:
+        notes.print(
+            f"Stopped; what is done is kept. Go on with: bellcrank design --resume {folder}"
+        )
+        sys.exit(INTERRUPTED)
+    _print_report(report)
+
+
+def _run(
+    settings: MetropolisSettings,
+    job: Callable[[Callable[[Progress], None]], DesignReport | None],
+) -> DesignReport | None:
+    """Run a job under a progress display."""
+    from bellcrank.cli.progress import SearchProgress
+
+    announce_compilation()
+    with SearchProgress(settings) as progress:
+        return job(progress)
+
+
+@contextmanager
+def stopping_on_interrupt() -> Iterator[threading.Event]:
+    """Turn the first Ctrl-C, or a polite kill, into a request to stop; the second insists."""
+    stop = threading.Event()
+
+    def ask(number: int, _frame: FrameType | None) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+        notes.print("Stopping after the steps at hand ...")
+        signal.signal(number, signal.default_int_handler)
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _print_report(report: DesignReport) -> None:
+    """Say what was designed, in a few lines."""
+    selection = report.selection
+    table = Table.grid(padding=(0, 2))
+    table.add_row("efficiency", f"[bold]{selection.efficiency_after:.4f}[/]")
+    table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
+    if report.human_response is not None:
+        table.add_row("human design", f"{report.human_response.efficiency:.4f}")
+    table.add_row("beams", f"{selection.design.beam_count}")
+    table.add_row(
+        "verified",
+        f"from rest by {' and '.join(report.checks)}, which differ by {report.agreement:.0e}",
+    )
+    table.add_row("designs looked at", f"{report.proposals}")
+    table.add_row("results", f"{report.folder}/")
+    results.print(table)
+    if not report.verified:
+        notes.print("[bold yellow]warning:[/] the minimisers disagree; treat the design with care.")

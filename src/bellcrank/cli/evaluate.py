@@ -1,0 +1,71 @@
+"""`bellcrank evaluate`: the responses of given designs."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Table
+
+from bellcrank.cli.app import app
+from bellcrank.cli.console import announce_compilation, print_json, results
+
+if TYPE_CHECKING:
+    from bellcrank.mechanics import Response
+
+
+@app.command()
+def evaluate(
+    problem: Annotated[str, typer.Argument(help="A built-in problem, a problem or a design file.")],
+    designs: Annotated[
+        Path | None,
+        typer.Option(help="JSON with results\\[].mask or masks; default: the initial design."),
+    ] = None,
+    minimiser: Annotated[str, typer.Option(help="newton, cg or fire.")] = "newton",
+    objective: Annotated[
+        str | None, typer.Option(help="displacement, directional:N or force.")
+    ] = None,
+    dangling: Annotated[
+        str, typer.Option(help="counted (the literal model) or ignored (load-bearing core).")
+    ] = "counted",
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Compute the response of designs, each from rest to the full stroke."""
+    from bellcrank.mechanics import Evaluator
+    from bellcrank.model import pack_mask, read_masks
+    from bellcrank.workflows import find_design
+
+    design = find_design(problem)
+    masks = read_masks(designs, design.problem) if designs else [design.mask]
+    evaluator = Evaluator(design.problem, objective, dangling, minimiser)  # type: ignore[arg-type]
+    announce_compilation()
+    rows = []
+    for mask in masks:
+        row = {"mask": pack_mask(mask), **_row(evaluator.respond(mask))}
+        rows.append({**row, "beams": int(mask.sum())})
+    if as_json:
+        print_json(json.dumps({"results": rows}, indent=1))
+        return
+    table = Table("design", "beams", "efficiency", "energy", "status")
+    for number, row in enumerate(rows):
+        table.add_row(
+            str(number), str(row["beams"]), _figure(row["efficiency"]), _figure(row["energy"]),
+            row["status"],
+        )  # fmt: skip
+    results.print(table)
+
+
+def _row(response: Response) -> dict[str, Any]:
+    """Write a response as plain data; what is not a number becomes null."""
+    figures = {"efficiency": response.efficiency, "energy": response.energy}
+    return {
+        **{name: value if math.isfinite(value) else None for name, value in figures.items()},
+        "status": response.status.label,
+    }
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.7f}"

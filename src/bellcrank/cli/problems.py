@@ -1,0 +1,38 @@
+"""`bellcrank problems`: what can be designed out of the box."""
+
+from __future__ import annotations
+
+from rich.table import Table
+
+from bellcrank.cli.app import app
+from bellcrank.cli.console import results
+
+
+@app.command()
+def problems() -> None:
+    """List the built-in problems."""
+    from bellcrank.model import builtin, find_problem, human_design
+
+    table = Table("problem", "beams", "designable", "drive", "input", "output", "human design")
+    for name in builtin:
+        problem = find_problem(name)
+        table.add_row(
+            name,
+            str(problem.lattice.beam_count),
+            str(len(problem.designable)),
+            f"{problem.input.drive} {problem.input.amount:.4g}",
+            _direction(problem.input.direction.tolist()),
+            _direction(problem.output.direction.tolist()),
+            "yes" if human_design(name) else "",
+        )
+    results.print(table)
+
+
+def _direction(vectors: list[list[float]]) -> str:
+    """Name a direction that all nodes share, along an axis if it is one."""
+    first = vectors[0]
+    if any(vector != first for vector in vectors):
+        return "several"
+    axes = {(1.0, 0.0): "+x", (-1.0, 0.0): "-x", (0.0, 1.0): "+y", (0.0, -1.0): "-y"}
+    x, y = (round(value, 6) + 0.0 for value in first)
+    return axes.get((x, y), f"({x:.3g}, {y:.3g})")

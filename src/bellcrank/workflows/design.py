@@ -1,0 +1,228 @@
+"""The main job: search, choose, clean, verify, compare, and leave it all in a folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.errors import BellcrankError
+from bellcrank.mechanics import Evaluator, Response
+from bellcrank.model import Design, Problem, human_design, write_design
+from bellcrank.provenance import provenance
+from bellcrank.runs import RunFolder
+from bellcrank.search import (
+    Candidate,
+    MetropolisSettings,
+    Progress,
+    Selection,
+    candidates_of,
+    run_chains,
+    select,
+)
+
+if TYPE_CHECKING:
+    import threading
+    from collections.abc import Callable
+    from pathlib import Path
+
+AGREEMENT = 1e-6
+"""Largest difference in efficiency between two minimisers that verify each other."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DesignReport:
+    """What came out of a design job.
+
+    Parameters
+    ----------
+    folder
+        Where everything was written.
+    settings
+        Of the search.
+    selection
+        The design, and where it comes from.
+    checks
+        Efficiency of the design from rest by each minimiser that verified it.
+    human
+        The human-designed counterpart, if there is one.
+    human_response
+        Its response, under the same objective.
+    proposals, best_by_chain
+        How many designs were looked at; the best each chain accepted.
+    """
+
+    folder: Path
+    settings: MetropolisSettings
+    selection: Selection
+    checks: dict[str, float]
+    human: Design | None
+    human_response: Response | None
+    proposals: int
+    best_by_chain: list[float]
+
+    @property
+    def agreement(self) -> float:
+        """Largest difference between the minimisers."""
+        return max(self.checks.values()) - min(self.checks.values())
+
+    @property
+    def verified(self) -> bool:
+        """Whether the minimisers agree."""
+        return self.agreement <= AGREEMENT
+
+
+def start_design(
+    problem: Problem,
+    settings: MetropolisSettings,
+    out: Path,
+    *,
+    workers: int | None = None,
+    tell: Callable[[Progress], None] = lambda _progress: None,
+    stop: threading.Event | None = None,
+) -> DesignReport | None:
+    """Design an actuator for `problem` and leave everything in the new folder `out`.
+
+    Parameters
+    ----------
+    workers
+        Chains that run at the same time; all cores by default. Changes nothing in the
+        results.
+    tell
+        Called with the progress of a chain, from its own thread.
+    stop
+        Set it to end the search after the steps at hand; what is done is kept.
+
+    Returns
+    -------
+    DesignReport or None
+        None if the search was stopped before its end.
+
+    Raises
+    ------
+    OutputExists
+        If the folder holds something already.
+    StorageError
+        If it cannot be written.
+    """
+    evaluator = Evaluator(problem, settings.objective, settings.dangling, settings.minimiser)
+    evaluator.respond(problem.initial)  # compiles, and refuses what has no response
+    folder = RunFolder.create(out, problem, settings.to_dict())
+    return _complete(folder, settings, workers, tell, stop)
+
+
+def continue_design(
+    out: Path,
+    *,
+    workers: int | None = None,
+    tell: Callable[[Progress], None] = lambda _progress: None,
+    stop: threading.Event | None = None,
+) -> DesignReport | None:
+    """Go on with a design job that was stopped or killed, as if nothing had happened.
+
+    Raises
+    ------
+    InvalidFile, CorruptRun
+        If the folder is not that of a run, or is damaged.
+    """
+    folder = RunFolder.open(out)
+    settings = MetropolisSettings.from_dict(folder.settings)
+    return _complete(folder, settings, workers, tell, stop)
+
+
+def _complete(
+    folder: RunFolder,
+    settings: MetropolisSettings,
+    workers: int | None,
+    tell: Callable[[Progress], None],
+    stop: threading.Event | None,
+) -> DesignReport | None:
+    """Run what is left of the search; conclude if it ends, else mark the run as stopped."""
+    folder.status = "running"
+    try:
+        done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
+    except BaseException:
+        _try_to_mark_stopped(folder)
+        raise
+    if not done:
+        folder.status = "stopped"
+        return None
+    report = conclude(folder, settings)
+    folder.finish()
+    return report
+
+
+def _try_to_mark_stopped(folder: RunFolder) -> None:
+    """Note that a run stopped; the reason it did may keep even that from being written."""
+    try:
+        folder.status = "stopped"
+    except (BellcrankError, OSError):
+        return
+
+
+def accepted_candidates(folder: RunFolder, chains: int) -> tuple[list[Candidate], int, list[float]]:
+    """Gather candidates from all chains, the number of proposals and each chain's best."""
+    candidates: list[Candidate] = []
+    proposals = 0
+    best: list[float] = []
+    for chain in range(chains):
+        records = folder.read(chain, ["step", "mask", "efficiency", "accepted"])
+        taken = np.flatnonzero(records["accepted"])
+        proposals += len(records["accepted"])
+        efficiency = records["efficiency"][taken]
+        best.append(float(efficiency.max(initial=-np.inf)))
+        candidates += candidates_of(
+            chain, records["step"][taken], records["mask"][taken], efficiency
+        )
+    return candidates, proposals, best
+
+
+def verify(design: Design, objective: str | None, response: Response) -> dict[str, float]:
+    """Compute the efficiency of a design from rest by a second minimiser."""
+    second = Evaluator(design.problem, objective, minimiser="cg").respond(design.mask)
+    return {"newton": response.efficiency, "cg": second.efficiency}
+
+
+def conclude(folder: RunFolder, settings: MetropolisSettings) -> DesignReport:
+    """Choose, clean, verify and compare, and write the result files."""
+    from bellcrank.workflows.report import write_report
+
+    problem = folder.problem
+    candidates, proposals, best = accepted_candidates(folder, settings.chains)
+    selection = select(problem, candidates, settings.objective)
+    human = human_design(problem.name)
+    human_response = None
+    if human is not None:
+        human_response = Evaluator(problem, settings.objective).respond(human.mask)
+    report = DesignReport(
+        folder=folder.path,
+        settings=settings,
+        selection=selection,
+        checks=verify(selection.design, settings.objective, selection.response),
+        human=human,
+        human_response=human_response,
+        proposals=proposals,
+        best_by_chain=best,
+    )
+    design = replace(
+        selection.design,
+        efficiency=selection.efficiency_after,
+        provenance=provenance(**_origin(report)),
+    )
+    write_design(design, folder.path / "design.json", overwrite=True)
+    write_report(report, folder)
+    return report
+
+
+def _origin(report: DesignReport) -> dict[str, Any]:
+    """How a design came about, for its provenance."""
+    return {
+        "kind": "machine",
+        "settings": report.settings.to_dict(),
+        "chain": report.selection.found.chain,
+        "step": report.selection.found.step,
+        "efficiency_before_cleaning": report.selection.efficiency_before,
+        "checks": report.checks,
+        "status": report.selection.response.status.label,
+    }

@@ -1,0 +1,83 @@
+"""The result folder for people: pictures and a summary."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from bellcrank.model.storage import write_text
+
+if TYPE_CHECKING:
+    from bellcrank.runs import RunFolder
+    from bellcrank.workflows.design import DesignReport
+
+
+def summary_data(report: DesignReport) -> dict[str, Any]:
+    """Return the figures of a report as plain data (``summary.json``)."""
+    selection = report.selection
+    human = report.human_response
+    return {
+        "schema": "bellcrank/summary/1",
+        "problem": selection.design.problem.name,
+        "efficiency": selection.efficiency_after,
+        "efficiency_before_cleaning": selection.efficiency_before,
+        "status": selection.response.status.label,
+        "beams": selection.design.beam_count,
+        "mask": selection.design.mask_hex,
+        "checks": report.checks,
+        "verified": report.verified,
+        "human_efficiency": human.efficiency if human else None,
+        "found": {
+            "chain": selection.found.chain,
+            "step": selection.found.step,
+            "plateau": selection.found.plateau,
+        },
+        "refused_candidates": selection.refused,
+        "proposals": report.proposals,
+        "best_by_chain": report.best_by_chain,
+        "settings": report.settings.to_dict(),
+    }
+
+
+def summary_text(report: DesignReport) -> str:
+    """Return the summary as Markdown (``summary.md``)."""
+    selection = report.selection
+    rows = [
+        ("efficiency of the design", f"{selection.efficiency_after:.6f}"),
+        ("the same before cleaning", f"{selection.efficiency_before:.6f}"),
+        *((f"from rest by {name}", f"{value:.9f}") for name, value in report.checks.items()),
+        ("beams", str(selection.design.beam_count)),
+        ("found by chain, at step", f"{selection.found.chain}, {selection.found.step}"),
+        ("designs looked at", str(report.proposals)),
+    ]
+    if report.human_response is not None:
+        rows.insert(2, ("human-designed counterpart", f"{report.human_response.efficiency:.6f}"))
+    table = "\n".join(f"| {name} | {value} |" for name, value in rows)
+    refused = "".join(
+        f"\n{count} candidates that looked better were refused: {reason}."
+        for reason, count in selection.refused.items()
+    )
+    return f"""# {selection.design.problem.name}
+
+| | |
+|---|---|
+{table}
+
+Cleaning leaves out what no load can reach: loose pieces and dead-end beams. A dead end
+softens the joint it sits at in the model but not in a real part, so the efficiency after
+cleaning is the one to expect.
+{refused}
+![the design at rest and moved](motion.png)
+
+![efficiency along the chains](efficiency.png)
+"""
+
+
+def write_report(report: DesignReport, folder: RunFolder) -> None:
+    """Write summary and pictures into the result folder."""
+    from bellcrank.workflows.pictures import draw_report
+
+    path = folder.path
+    draw_report(report, folder)
+    write_text(path / "summary.json", json.dumps(summary_data(report), indent=1), overwrite=True)
+    write_text(path / "summary.md", summary_text(report), overwrite=True)

@@ -1,0 +1,34 @@
+"""Imports point downward, and light things stay light."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def imported_by(statement: str) -> set[str]:
+    """Top-level modules that a fresh interpreter holds after a statement."""
+    code = f"{statement}\nimport sys\nprint(' '.join({{m.split('.')[0] for m in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_imports_point_downward_only() -> None:
+    command = Path(sys.executable).with_name("lint-imports")
+    done = subprocess.run([command], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    loaded = imported_by("import bellcrank")
+    assert not loaded & {"numpy", "numba", "scipy", "matplotlib", "pyarrow", "torch", "pydantic"}
+
+
+@pytest.mark.parametrize("module", ["bellcrank.cli", "bellcrank.model", "bellcrank.runs"])
+def test_light_layers_leave_compiler_and_plotting_alone(module: str) -> None:
+    assert not imported_by(f"import {module}") & {"numba", "matplotlib", "scipy", "torch"}
