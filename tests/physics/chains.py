@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import Evaluator
 from bellcrank.search import schedules
 from bellcrank.search.kernels.metropolis import Chain, Records, Rules, advance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from bellcrank.mechanics import Evaluator
 
 NEVER = 2**62
 
