@@ -1,0 +1,101 @@
+"""What lies where in the folder of a run, and what of it is ours.
+
+::
+
+    run.json                      problem, settings, provenance, status
+    chains/003/00004000.parquet   proposals of chain 3 from step 4000 on, until finished
+    history.parquet               all proposals, once finished
+
+Everything else in the folder belongs to somebody else and is never touched.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from typing import TYPE_CHECKING
+
+from bellcrank.runs.files import remove_temporaries, storage_error, target_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+DESCRIPTION = "run.json"
+HISTORY = "history.parquet"
+CHAINS = "chains"
+SHARD_NAME = re.compile(r"\d{8,}\.parquet")
+CHAIN_NAME = re.compile(r"\d{3,}")
+TOP_NAME = re.compile(re.escape(DESCRIPTION) + "|" + re.escape(HISTORY))
+
+
+def chain_folder(folder: Path, chain: int) -> Path:
+    """Return where the shards of a chain lie."""
+    return folder / CHAINS / f"{chain:03d}"
+
+
+def shard_path(chain_folder: Path, first_step: int) -> Path:
+    """Return the name of the shard that begins with `first_step`."""
+    return chain_folder / f"{first_step:08d}.parquet"
+
+
+def chain_numbers(folder: Path) -> list[int]:
+    """Return the numbers of the chains that have shards in the folder of a run."""
+    root = folder / CHAINS
+    names = [path.name for path in root.iterdir()] if root.is_dir() else []
+    numbers = sorted(int(name) for name in names if CHAIN_NAME.fullmatch(name))
+    return [number for number in numbers if shard_files(chain_folder(folder, number))]
+
+
+def shard_files(chain_folder: Path) -> list[tuple[int, Path]]:
+    """Return first step and path of each shard of a chain, in order."""
+    found = chain_folder.iterdir() if chain_folder.is_dir() else ()
+    return sorted((int(path.stem), path) for path in found if SHARD_NAME.fullmatch(path.name))
+
+
+def content(folder: Path) -> list[str]:
+    """Return the names in a folder, but for what a kill at the very beginning leaves."""
+    try:
+        names = sorted(path.name for path in folder.iterdir())
+    except OSError as error:
+        raise storage_error(folder, error) from error
+    return [name for name in names if not TOP_NAME.fullmatch(target_of(name) or "")]
+
+
+def delete_run(folder: Path) -> None:
+    """Delete a run, its description first: what is left is then taken for no run.
+
+    Raises
+    ------
+    StorageError
+    """
+    remove_temporaries(folder, TOP_NAME)
+    try:
+        (folder / DESCRIPTION).unlink(missing_ok=True)
+        (folder / HISTORY).unlink(missing_ok=True)
+    except OSError as error:
+        raise storage_error(folder, error) from error
+    delete_shards(folder)
+
+
+def delete_shards(folder: Path) -> None:
+    """Delete the shards of all chains, and the folders that are empty then.
+
+    Raises
+    ------
+    StorageError
+    """
+    root = folder / CHAINS
+    places = list(root.iterdir()) if root.is_dir() else []
+    for place in places:
+        if not CHAIN_NAME.fullmatch(place.name):
+            continue
+        remove_temporaries(place, SHARD_NAME)
+        try:
+            for _, path in shard_files(place):
+                path.unlink(missing_ok=True)
+        except OSError as error:
+            raise storage_error(folder, error) from error
+        with contextlib.suppress(OSError):
+            place.rmdir()
+    with contextlib.suppress(OSError):
+        root.rmdir()

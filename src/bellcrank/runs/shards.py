@@ -1,0 +1,233 @@
+"""Shards: some thousand consecutive proposals of one chain in one write-once file.
+
+The footer of a shard says which run, chain and steps it belongs to and carries the state
+to go on from. Rows and state thus take effect in the same instant, when the file takes
+its name, and the listing of a folder is all there is to know about a chain.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.errors import CorruptRun
+from bellcrank.runs.files import whole_file
+from bellcrank.runs.layout import shard_files, shard_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from bellcrank.runs.records import Proposals
+
+SHARD_SCHEMA = "bellcrank/shard/1"
+METADATA_KEY = "bellcrank"
+DAMAGED_SHARD = (
+    "delete it and the later ones in its folder and resume: their steps are computed again"
+)
+
+# Masks change by a bit or two from row to row: byte by byte, each column of bytes is
+# nearly constant. Efficiencies share their leading bytes only. Statistics serve to find
+# the rows of a chain; of the other columns they would only take room.
+WRITER_OPTIONS: dict[str, Any] = {
+    "compression": "zstd",
+    "compression_level": 3,
+    "use_dictionary": ["chain", "temperature", "status"],
+    "column_encoding": {
+        "step": "DELTA_BINARY_PACKED",
+        "mask": "BYTE_STREAM_SPLIT",
+        "efficiency": "BYTE_STREAM_SPLIT",
+        "cost": "BYTE_STREAM_SPLIT",
+    },
+    "write_statistics": ["chain", "step"],
+    "store_schema": False,
+    "write_page_checksum": True,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Shard:
+    """The footer of a shard.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    first_step, last_step
+        Of its rows, both included.
+    state
+        Of the chain after its last row.
+    """
+
+    path: Path
+    first_step: int
+    last_step: int
+    state: dict[str, Any]
+
+
+def write_shard(
+    path: Path, spec: str, chain: int, first_step: int, rows: Proposals, state: Mapping[str, Any]
+) -> None:
+    """Write one shard, whole or not at all.
+
+    Raises
+    ------
+    OutputExists, StorageError
+    """
+    header = {
+        "schema": SHARD_SCHEMA,
+        "spec": spec,
+        "chain": chain,
+        "first_step": first_step,
+        "last_step": first_step + len(rows.efficiency) - 1,
+        "state": state,
+    }
+    table = table_of(first_step, rows)
+    with whole_file(path) as file, parquet_writer(file, table.schema, header) as writer:
+        writer.write_table(table)
+
+
+@contextlib.contextmanager
+def parquet_writer(file: IO[bytes], schema: Any, header: Mapping[str, Any]) -> Iterator[Any]:
+    """Open a Parquet writer on a file, with our `header` in its footer."""
+    import pyarrow.parquet as pq
+
+    with pq.ParquetWriter(file, schema, **WRITER_OPTIONS) as writer:
+        writer.add_key_value_metadata({METADATA_KEY: json.dumps(header)})
+        yield writer
+
+
+@contextlib.contextmanager
+def parquet_file(path: Path, what_to_do: str) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Open a Parquet file of ours; yield it and the header in its footer.
+
+    Raises
+    ------
+    CorruptRun
+        If it is damaged, here or while it is being read; `what_to_do` ends the message.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            header = json.loads((file.metadata.metadata or {})[METADATA_KEY.encode()])
+            yield file, header
+    except CorruptRun:
+        raise
+    except (OSError, pa.ArrowException, ValueError, KeyError) as error:
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else repr(error)
+        raise CorruptRun(f"{path}: damaged ({reason}); {what_to_do}") from error
+
+
+def read_shards(chain_folder: Path, spec: str, chain: int) -> list[Shard]:
+    """Read the footers of a chain's shards and check that they follow on one another.
+
+    Raises
+    ------
+    CorruptRun
+        If a shard is damaged, belongs elsewhere or is missing.
+    """
+    shards: list[Shard] = []
+    next_step = 0
+    for first_step, path in shard_files(chain_folder):
+        if first_step != next_step:
+            raise CorruptRun(
+                f"{chain_folder}: expected a shard that begins with step {next_step}, the next "
+                f"is {path.name}; restore {shard_path(chain_folder, next_step).name}, or delete "
+                f"the later ones and resume: their steps are computed again"
+            )
+        shard = read_footer(path, spec, chain)
+        shards.append(shard)
+        next_step = shard.last_step + 1
+    return shards
+
+
+def read_footer(path: Path, spec: str, chain: int) -> Shard:
+    """Read what a shard says about itself, and check it.
+
+    Raises
+    ------
+    CorruptRun
+    """
+    with parquet_file(path, DAMAGED_SHARD) as (file, header):
+        rows = file.metadata.num_rows
+        if header["spec"] != spec:
+            raise CorruptRun(f"{path}: was made for another problem or with other settings")
+        shard = Shard(path, int(header["first_step"]), int(header["last_step"]), header["state"])
+        said = (header["chain"], shard_path(path.parent, shard.first_step).name)
+        if said != (chain, path.name) or shard.last_step - shard.first_step + 1 != rows or not rows:
+            raise CorruptRun(
+                f"{path}: says it holds steps {shard.first_step} to {shard.last_step} of chain "
+                f"{header['chain']}, and has {rows} rows; {DAMAGED_SHARD}"
+            )
+    return shard
+
+
+def last_step(chain_folder: Path, spec: str, chain: int) -> int:
+    """Return the last step that is stored of a chain; -1 before the first.
+
+    Raises
+    ------
+    CorruptRun
+    """
+    stored = shard_files(chain_folder)
+    return read_footer(stored[-1][1], spec, chain).last_step if stored else -1
+
+
+def read_shard(path: Path, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Read columns of a shard.
+
+    Raises
+    ------
+    CorruptRun
+    """
+    with parquet_file(path, DAMAGED_SHARD) as (file, _):
+        return arrays_of(file.read(columns=list(columns), use_threads=False), columns)
+
+
+def table_of(first_step: int, rows: Proposals) -> Any:
+    """Return proposals as an Arrow table."""
+    import pyarrow as pa
+
+    count, width = rows.mask.shape
+    masks = pa.Array.from_buffers(pa.binary(width), count, [None, pa.py_buffer(rows.mask)])
+    return pa.table(
+        {
+            "step": np.arange(first_step, first_step + count, dtype=np.int64),
+            "mask": masks,
+            "efficiency": rows.efficiency,
+            "cost": rows.cost,
+            "temperature": rows.temperature,
+            "accepted": rows.accepted,
+            "status": rows.status,
+        }
+    )
+
+
+def arrays_of(table: Any, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Return columns of an Arrow table as arrays; masks as rows of bytes."""
+    return {name: _array_of(table.column(name)) for name in columns}
+
+
+def _array_of(column: Any) -> NDArray[Any]:
+    import pyarrow as pa
+
+    if not pa.types.is_fixed_size_binary(column.type):
+        array: NDArray[Any] = column.to_numpy()
+        return array
+    width = column.type.byte_width
+    parts = [
+        np.frombuffer(chunk.buffers()[1], dtype=np.uint8)[
+            chunk.offset * width : (chunk.offset + len(chunk)) * width
+        ].reshape(-1, width)
+        for chunk in column.chunks
+        if len(chunk)
+    ]
+    return np.concatenate(parts) if parts else np.empty((0, width), dtype=np.uint8)
