@@ -38,6 +38,18 @@ def frame(
     )
 
 
+def arm_on(**supports: list[int]) -> Problem:
+    """A horizontal chain of three beams, its right end pulled upwards by a force."""
+    return frame(
+        [(0, 0), (1, 0), (2, 0), (3, 0)],
+        [(0, 1), (1, 2), (2, 3)],
+        drive=(3, (0.0, 1.0), 1e-3),
+        watch=(2, (0.0, 1.0)),
+        force=True,
+        **{"fixed": [], **supports},
+    )
+
+
 def patch(*, force: bool = False, kind: str = "directional") -> Problem:
     """A triangular patch of 18 nodes on four supports, pushed on the right, watched on the left."""
     lattice = lattices["triangular-rows"](counts=[4, 5, 4, 5], first_x=[0.5, 0.0, 0.5, 0.0])

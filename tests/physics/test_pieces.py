@@ -12,7 +12,7 @@ from bellcrank.mechanics import Evaluator, Status
 from bellcrank.mechanics.kernels.structure import build_structure_from_python
 from bellcrank.model import Problem, find_problem
 
-from .problems import frame, patch, random_masks
+from .problems import arm_on, frame, patch, random_masks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -177,18 +177,6 @@ def test_a_forced_piece_without_support_is_a_mechanism() -> None:
     assert evaluator.respond(problem.initial).status is Status.CONVERGED
     evaluator.remember()
     assert evaluator.respond_nearby(loose).status is Status.MECHANISM
-
-
-def arm_on(**supports: list[int]) -> Problem:
-    """A horizontal chain of three beams, its right end pulled upwards by a force."""
-    return frame(
-        [(0, 0), (1, 0), (2, 0), (3, 0)],
-        [(0, 1), (1, 2), (2, 3)],
-        drive=(3, (0.0, 1.0), 1e-3),
-        watch=(2, (0.0, 1.0)),
-        force=True,
-        **{"fixed": [], **supports},
-    )
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,102 @@
+"""The load-bearing core: what remains without loose pieces and dead ends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from bellcrank.mechanics import Evaluator, Status, load_bearing_core
+from bellcrank.model import Design, Problem, find_problem
+
+from .problems import random_masks
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def obvious_core(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Strip beam after beam until nothing changes, then drop what hangs on no input."""
+    beams, core = problem.lattice.beams, mask.copy()
+    bound = {*problem.supports.nodes, *problem.input.nodes, *problem.output.nodes}
+    while True:
+        degree = np.bincount(beams[core].ravel(), minlength=problem.lattice.node_count)
+        loose = [
+            beam
+            for beam in np.flatnonzero(core)
+            if any(degree[node] == 1 and int(node) not in bound for node in beams[beam])
+        ]
+        if not loose:
+            break
+        core[loose] = False
+    reached = set(problem.input.nodes.tolist())
+    for _ in range(len(beams)):
+        for a, b in beams[core].tolist():
+            if a in reached or b in reached:
+                reached |= {a, b}
+    return core & np.isin(beams[:, 0], list(reached))
+
+
+def core_of(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return load_bearing_core(Design(problem, mask))
+
+
+@pytest.fixture(scope="module", params=["crane", "scaling-8", "discs"])
+def problem(request: pytest.FixtureRequest) -> Problem:
+    return find_problem(request.param)
+
+
+@pytest.mark.parametrize("share", [0.45, 0.6, 0.8])
+def test_the_core_is_what_stripping_beam_after_beam_leaves(problem: Problem, share: float) -> None:
+    for mask in random_masks(problem, share, 2):
+        assert (core_of(problem, mask) == obvious_core(problem, mask)).all()
+
+
+def test_a_core_is_its_own_core(problem: Problem) -> None:
+    for mask in random_masks(problem, 0.5, 4):
+        core = core_of(problem, mask)
+        assert (core_of(problem, core) == core).all()
+
+
+def test_ignoring_dead_ends_is_counting_those_of_the_core(problem: Problem) -> None:
+    ignored, counted = Evaluator(problem, dangling="ignored"), Evaluator(problem)
+    for mask in random_masks(problem, 0.55, 6):
+        first, second = ignored.respond(mask), counted.respond(core_of(problem, mask))
+        assert first.status is second.status
+        assert first.efficiency == pytest.approx(second.efficiency, abs=1e-9, nan_ok=True)
+        assert first.energy == pytest.approx(second.energy, abs=1e-12, nan_ok=True)
+
+
+def with_other_dead_ends(
+    problem: Problem, core: NDArray[np.bool_], rng: np.random.Generator
+) -> NDArray[np.bool_]:
+    """The core with as many beams added as leave it the core, tried in random order."""
+    mask = core.copy()
+    for beam in rng.permutation(problem.designable)[:60]:
+        tried = mask.copy()
+        tried[beam] = True
+        if (core_of(problem, tried) == core).all():
+            mask = tried
+    return mask
+
+
+def test_all_designs_with_one_core_respond_the_same(problem: Problem) -> None:
+    evaluator = Evaluator(problem, dangling="ignored")
+    rng = np.random.default_rng(7)
+    for mask in random_masks(problem, 0.55, 3):
+        core = core_of(problem, mask)
+        other = with_other_dead_ends(problem, core, rng)
+        assert (other != core).any()
+        first, second = evaluator.respond(core), evaluator.respond(other)
+        assert first.status is second.status
+        np.testing.assert_array_equal(first.efficiency, second.efficiency)
+        np.testing.assert_array_equal(first.displacement, second.displacement)
+
+
+def test_counted_dead_ends_do_matter() -> None:
+    problem = find_problem("crane")
+    mask = random_masks(problem, 0.6, 1)[0]
+    counted, ignored = Evaluator(problem), Evaluator(problem, dangling="ignored")
+    assert counted.respond(mask).status is Status.CONVERGED
+    assert abs(counted.respond(mask).efficiency - ignored.respond(mask).efficiency) > 1e-6
