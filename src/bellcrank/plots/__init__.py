@@ -1,0 +1,24 @@
+"""Figures: designs at rest and moved, and the way of the efficiency along chains.
+
+Draws plain arrays and records, whoever made them, with matplotlib's Agg through its
+object interface: nothing global is read or changed, and pictures can be made in any
+thread. The suffix of a path (png, svg, pdf) chooses the format.
+
+- `draw_motion`, `draw_comparison`, `draw_design` draw designs, given as `Motion` or Design;
+- `draw_paths` draws efficiency against accepted steps, given as `ChainPath`.
+"""
+
+from bellcrank.plots.chains import ChainPath, PathsStyle
+from bellcrank.plots.motion import draw_comparison, draw_design, draw_motion
+from bellcrank.plots.paths import draw_paths
+from bellcrank.plots.scene import Motion
+
+__all__ = [
+    "ChainPath",
+    "Motion",
+    "PathsStyle",
+    "draw_comparison",
+    "draw_design",
+    "draw_motion",
+    "draw_paths",
+]

@@ -1,0 +1,210 @@
+"""Marks on a drawing: struts, supports, regions, arrows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.patches import FancyArrow, Polygon
+
+from bellcrank.plots import style
+from bellcrank.plots.scene import Arrow, arrow_length, outline_around, spacing, support_groups
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+
+STRUT = 0.13
+"""Width of a drawn strut, as a fraction of the distance between nodes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """Axes to draw a lattice on, true to scale.
+
+    Parameters
+    ----------
+    axes
+        Without frame; one lattice unit is equally long both ways.
+    problem
+        What is drawn.
+    points
+        Points (1/72 inch) per lattice unit, so that line widths can be true to scale.
+    """
+
+    axes: Axes
+    problem: Problem
+    points: float
+
+    @property
+    def strut(self) -> float:
+        """Width of a strut in points."""
+        return max(STRUT * spacing(self.problem) * self.points, 0.6)
+
+
+def add_panel(
+    figure: Figure,
+    problem: Problem,
+    corner: tuple[float, float],
+    scale: float,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> Panel:
+    """Lay a panel on a figure.
+
+    Parameters
+    ----------
+    corner
+        Its lower left corner, inches.
+    scale
+        Inches per lattice unit.
+    low, high : (2,) lattice units
+        The part of the plane to show.
+    """
+    across, up = scale * (high - low)
+    width, height = figure.get_size_inches()
+    axes = figure.add_axes(
+        (corner[0] / width, corner[1] / height, float(across / width), float(up / height))
+    )
+    axes.set_xlim(float(low[0]), float(high[0]))
+    axes.set_ylim(float(low[1]), float(high[1]))
+    axes.set_axis_off()
+    return Panel(axes, problem, 72.0 * scale)
+
+
+def put_struts(
+    panel: Panel,
+    positions: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    colour: str,
+    *,
+    width: float = 1.0,
+    level: float = 2.0,
+) -> None:
+    """Draw beams as struts with round ends.
+
+    Parameters
+    ----------
+    positions : (N, 2) lattice units
+    beams : (n,) int64
+        Indices of the beams to draw.
+    width
+        In widths of a strut.
+    level
+        What lies higher covers what lies lower.
+    """
+    if len(beams):
+        panel.axes.add_collection(
+            LineCollection(
+                list(positions[panel.problem.lattice.beams[beams]]),
+                colors=colour,
+                linewidths=width * panel.strut,
+                capstyle="round",
+                zorder=level,
+            ),
+            autolim=False,
+        )
+
+
+def put_nodes(
+    panel: Panel, places: NDArray[np.float64], colour: str, *, hollow: bool = False
+) -> None:
+    """Mark nodes of a region by dots."""
+    panel.axes.plot(
+        places[:, 0],
+        places[:, 1],
+        linestyle="none",
+        marker="o",
+        markersize=float(np.clip(1.75 * panel.strut, 3.0, 9.0)),
+        markerfacecolor="white" if hollow else colour,
+        markeredgecolor=colour if hollow else "white",
+        markeredgewidth=float(np.clip(0.25 * panel.strut, 0.5, 1.2)),
+        zorder=5 if hollow else 6,
+        clip_on=False,
+    )
+
+
+def put_supports(panel: Panel) -> None:
+    """Mark the ground: hatched where nodes are held fast, wheels where they may roll."""
+    problem = panel.problem
+    positions, step = problem.lattice.positions, spacing(problem)
+    for group in support_groups(problem):
+        panel.axes.add_patch(
+            Polygon(
+                outline_around(positions[group], (0.3 if len(group) > 1 else 0.45) * step),
+                facecolor=style.GROUND_FILL,
+                edgecolor=style.GROUND,
+                linewidth=1.0,
+                hatch="////",
+                zorder=0.5,
+            )
+        )
+    for nodes, offset in (
+        (problem.supports.fixed_y, np.array([0.0, -0.26])),
+        (problem.supports.fixed_x, np.array([-0.26, 0.0])),
+    ):
+        _put_wheels(panel, positions[nodes], offset * step)
+
+
+def _put_wheels(panel: Panel, places: NDArray[np.float64], offset: NDArray[np.float64]) -> None:
+    """Draw wheels beside nodes, and the rail that they roll on."""
+    if len(places) == 0:
+        return
+    radius = float(np.hypot(*offset)) / 2.0
+    centres = places + offset
+    panel.axes.plot(
+        *centres.T,
+        linestyle="none",
+        marker="o",
+        markersize=2.0 * radius * panel.points,
+        markerfacecolor="white",
+        markeredgecolor=style.NOTE,
+        markeredgewidth=0.9,
+        zorder=1.5,
+        clip_on=False,
+    )
+    along = 1.6 * radius * np.array([abs(offset[1]), abs(offset[0])]) / np.hypot(*offset)
+    rails = centres + offset / 2.0
+    panel.axes.add_collection(
+        LineCollection(
+            list(np.stack([rails - along, rails + along], axis=1)),
+            colors=style.NOTE,
+            linewidths=0.9,
+            zorder=1.5,
+            clip_on=False,
+        ),
+        autolim=False,
+    )
+
+
+def put_arrows(
+    panel: Panel, arrows: list[Arrow], colour: str, *, bold: bool = False, level: float = 7.0
+) -> None:
+    """Draw arrows; bold ones name a region, thin ones a motion."""
+    step = spacing(panel.problem)
+    body = 0.13 * arrow_length(panel.problem) if bold else 0.055 * step
+    for arrow in arrows:
+        dx, dy = np.subtract(arrow.tip, arrow.tail)
+        length = float(np.hypot(dx, dy))
+        head = min(3.2 * body if bold else 4.5 * body, 0.6 * length)
+        panel.axes.add_patch(
+            FancyArrow(
+                *arrow.tail,
+                dx,
+                dy,
+                width=body,
+                length_includes_head=True,
+                head_width=(2.9 if bold else 3.6) * body,
+                head_length=head,
+                facecolor=colour,
+                edgecolor="white",
+                linewidth=0.7 if bold else 0.4,
+                zorder=level,
+                clip_on=False,
+            )
+        )

@@ -1,0 +1,252 @@
+"""What is to be drawn, as plain geometry: kinds of beams, arrows, extent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidProblem, InvalidSettings
+from bellcrank.mechanics import load_bearing_core
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Design, Problem
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """A design and where its nodes go.
+
+    Parameters
+    ----------
+    design
+        The problem and the beams that are present.
+    displacement : (N, 2) float64, lattice units
+        Of each node; not finite where it is not known, which is drawn as at rest.
+    efficiency
+        To be written under the title; None or nan if it is not known.
+    name
+        What to call it where two are drawn side by side.
+    note
+        More to be written after the efficiency, for example a status.
+    magnify
+        How many times its size the motion is drawn; said in the caption unless 1.
+
+    Raises
+    ------
+    InvalidProblem
+        If the displacement has not one row per node.
+    InvalidSettings
+        If it is to be magnified by something that is not a positive number.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> crane = find_problem("crane").full_design()
+    >>> Motion(crane, np.zeros((133, 2)), efficiency=0.5).caption
+    'efficiency 0.500 · 352 beams'
+    """
+
+    design: Design
+    displacement: NDArray[np.float64]
+    efficiency: float | None = None
+    name: str = ""
+    note: str = ""
+    magnify: float = 1.0
+
+    def __post_init__(self) -> None:
+        expected = (self.design.problem.lattice.node_count, 2)
+        given = np.array(self.displacement, dtype=np.float64)
+        if given.shape != expected:
+            raise InvalidProblem(
+                f"displacement: expected shape {expected}, one row for each node, got {given.shape}"
+            )
+        if not 0.0 < self.magnify < np.inf:
+            raise InvalidSettings(f"magnify: expected a number above 0, got {self.magnify!r}")
+        given[~np.isfinite(given).all(axis=1)] = 0.0
+        given.flags.writeable = False
+        object.__setattr__(self, "displacement", given)
+
+    @property
+    def moved(self) -> NDArray[np.float64]:
+        """(N, 2) positions of the nodes after the motion, as drawn, lattice units."""
+        return self.design.problem.lattice.positions + self.magnify * self.displacement
+
+    @property
+    def caption(self) -> str:
+        """Efficiency, number of beams and note, in a line."""
+        known = self.efficiency is not None and np.isfinite(self.efficiency)
+        efficiency = f"efficiency {self.efficiency:.3f}" if known else "no efficiency"
+        magnified = "" if self.magnify == 1.0 else f"motion drawn {self.magnify:g} times its size"
+        parts = [efficiency, f"{self.design.beam_count} beams", self.note, magnified]
+        return " · ".join(part for part in parts if part)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BeamKinds:
+    """The beams of a design by what they do.
+
+    Parameters
+    ----------
+    ground, idle, bearing : (n,) int64, beam indices
+        Between supported nodes; loose or dead-end, so that they carry no load; all others.
+    """
+
+    ground: NDArray[np.int64]
+    idle: NDArray[np.int64]
+    bearing: NDArray[np.int64]
+
+
+def beam_kinds(design: Design) -> BeamKinds:
+    """Sort the beams of a design by what they do."""
+    problem = design.problem
+    held = np.isin(problem.lattice.beams, problem.supports.fixed).all(axis=1)
+    bearing = load_bearing_core(design) & ~held
+    return BeamKinds(
+        ground=np.flatnonzero(design.mask & held),
+        idle=np.flatnonzero(design.mask & ~held & ~bearing),
+        bearing=np.flatnonzero(bearing),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """An arrow in the plane, lattice units."""
+
+    tail: tuple[float, float]
+    tip: tuple[float, float]
+
+
+def spacing(problem: Problem) -> float:
+    """Return the typical distance between neighbouring nodes, lattice units."""
+    return float(np.median(problem.lattice.rest_length))
+
+
+def arrow_length(problem: Problem) -> float:
+    """Length of the arrows at a region: visible at any size of the lattice."""
+    extent = float(np.ptp(problem.lattice.positions, axis=0).max())
+    return max(1.5 * spacing(problem), extent / 9.0)
+
+
+def input_arrows(problem: Problem) -> list[Arrow]:
+    """Return arrows that end where the region begins, pushing on it."""
+    region = problem.input
+    places = problem.lattice.positions[region.nodes]
+    length, gap = arrow_length(problem), 0.45 * spacing(problem)
+    if not _one_direction(region.direction):
+        tips = places - 0.5 * gap * region.direction
+        return [
+            Arrow(_pair(tip - 0.6 * length * t), _pair(tip))
+            for tip, t in zip(tips, region.direction, strict=True)
+        ]
+    direction = region.direction[0]
+    tip = _edge(places, direction, side=-1.0) - gap * direction
+    return [Arrow(_pair(tip - length * direction), _pair(tip))]
+
+
+def wanted_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
+    """Return arrows that start where the region ends, showing where it should go.
+
+    Parameters
+    ----------
+    moved : (N, 2) lattice units
+        Where the nodes go; the arrows stay clear of them.
+    """
+    region = problem.output
+    at_rest = problem.lattice.positions[region.nodes]
+    length, gap = arrow_length(problem), 0.45 * spacing(problem)
+    if not _one_direction(region.direction):
+        return [
+            Arrow(_pair(place), _pair(place + 0.6 * length * t))
+            for place, t in zip(at_rest, region.direction, strict=True)
+        ]
+    direction = region.direction[0]
+    start = _edge(at_rest, direction, side=1.0)
+    reach = max(float((moved[region.nodes] @ direction).max() - start @ direction), 0.0)
+    tail = start + (reach + gap) * direction
+    return [Arrow(_pair(tail), _pair(tail + length * direction))]
+
+
+def motion_arrows(motion: Motion) -> list[Arrow]:
+    """Return an arrow per output node from rest to where it went, if that can be seen."""
+    problem = motion.design.problem
+    nodes = problem.output.nodes
+    pairs = zip(problem.lattice.positions[nodes], motion.moved[nodes], strict=True)
+    least = 0.15 * spacing(problem)
+    return [Arrow(_pair(a), _pair(b)) for a, b in pairs if np.hypot(*(b - a)) > least]
+
+
+def outline_around(points: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """Return the convex outline that keeps `radius` away from all points.
+
+    Parameters
+    ----------
+    points : (n, 2) lattice units, n >= 1
+
+    Returns
+    -------
+    (k, 2) corners, counter-clockwise
+
+    Examples
+    --------
+    >>> outline = outline_around(np.zeros((1, 2)), 0.5)
+    >>> bool(np.allclose(np.hypot(*outline.T), 0.5))
+    True
+    """
+    from scipy.spatial import ConvexHull
+
+    angle = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+    circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    around = (points[:, None, :] + circle).reshape(-1, 2)
+    corners: NDArray[np.float64] = around[ConvexHull(around).vertices]
+    return corners
+
+
+def support_groups(problem: Problem) -> list[NDArray[np.int64]]:
+    """Group fully held nodes that are joined by beams of the lattice."""
+    fixed = problem.supports.fixed
+    beams = problem.lattice.beams
+    owner = {int(node): int(node) for node in fixed}
+
+    def root(node: int) -> int:
+        while owner[node] != node:
+            node = owner[node]
+        return node
+
+    for a, b in beams[np.isin(beams, fixed).all(axis=1)].tolist():
+        owner[root(a)] = root(b)
+    roots = np.array([root(int(node)) for node in fixed], dtype=np.int64)
+    return [fixed[roots == one] for one in np.unique(roots)]
+
+
+def extent(
+    places: list[NDArray[np.float64]], arrows: list[Arrow], margin: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower left and upper right corner, (2,) each, of all that is drawn."""
+    ends = [np.array([arrow.tail, arrow.tip]) for arrow in arrows]
+    points = np.concatenate([*places, *ends])
+    return points.min(axis=0) - margin, points.max(axis=0) + margin
+
+
+def _one_direction(direction: NDArray[np.float64]) -> bool:
+    return bool(np.allclose(direction, direction[0]))
+
+
+def _edge(
+    places: NDArray[np.float64], direction: NDArray[np.float64], side: float
+) -> NDArray[np.float64]:
+    """Middle of the side of a region that lies farthest along ``side * direction``."""
+    across = np.array([-direction[1], direction[0]])
+    sideways = places @ across
+    along = side * (side * places @ direction).max()
+    middle: NDArray[np.float64] = (
+        0.5 * (sideways.min() + sideways.max()) * across + along * direction
+    )
+    return middle
+
+
+def _pair(point: NDArray[np.float64]) -> tuple[float, float]:
+    return float(point[0]), float(point[1])

@@ -1,0 +1,89 @@
+"""What all pictures share: colours, letters, resolution.
+
+The colours are those of Okabe and Ito (2008), which stay apart for colour-blind
+readers and in print, on greys for the structure itself. Everything is passed on
+explicitly: matplotlib's global settings are neither read for looks nor changed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.text import Text
+
+DPI = 200
+FONT = "DejaVu Sans"
+"""Comes with matplotlib, so that pictures look the same everywhere."""
+TITLE_SIZE = 13.0
+LABEL_SIZE = 10.5
+SMALL_SIZE = 9.5
+
+INK = "#1a1d21"
+NOTE = "#5b636c"
+REST = "#d4d8dc"
+IDLE = "#8f98a1"
+IDLE_REST = "#e6e9ec"
+GROUND = "#b4bac1"
+GROUND_FILL = "#f1f3f5"
+KEPT = "#9db4c8"
+INPUT = "#d55e00"
+OUTPUT = "#0072b2"
+WANTED = "#7fc0ea"
+HUMAN = "#d55e00"
+BUILT = "#009e73"
+BEST = "#0072b2"
+SHADE = "#fbf3e0"
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty white figure, `width` by `height` inches, drawn by Agg.
+
+    Examples
+    --------
+    >>> new_figure(4, 3).get_size_inches().tolist()
+    [4.0, 3.0]
+    """
+    figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def write_heading(figure: Figure, title: str, note: str, left: float, top: float) -> list[Text]:
+    """Write a title and a grey note under it.
+
+    Parameters
+    ----------
+    left, top
+        Upper left corner, inches from the left and from the upper edge.
+    """
+    width, height = figure.get_size_inches()
+    texts = []
+    for text, size, colour, weight, drop in (
+        (title, TITLE_SIZE, INK, "bold", 0.0),
+        (note, LABEL_SIZE, NOTE, "normal", 0.27 if title else 0.0),
+    ):
+        if text:
+            texts.append(
+                figure.text(
+                    left / width,
+                    1.0 - (top + drop) / height,
+                    text,
+                    size=size,
+                    color=colour,
+                    weight=weight,
+                    family=FONT,
+                    ha="left",
+                    va="top",
+                    parse_math=False,  # a name with $ in it is just a name
+                )
+            )
+    return texts
+
+
+def heading_height(title: str, note: str) -> float:
+    """Height in inches that `write_heading` needs."""
+    return 0.27 * bool(title) + 0.24 * bool(note)
