@@ -1,0 +1,97 @@
+"""A design's response does not depend on the chain that found it.
+
+Every proposal of real chains is evaluated again from rest, ten thousand and more in all:
+the whole property, not a sample of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.mechanics import Evaluator, Status
+from bellcrank.model import Problem, find_problem, unpack_mask
+from bellcrank.search import MetropolisSettings
+
+from .chains import has_loose_piece, run_chain
+from .problems import random_masks
+
+SAME = 1e-8
+
+PAPER = MetropolisSettings()
+HOT = MetropolisSettings(schedule="constant", cold=10.0)
+"""Accepts nearly everything: the design wanders instead of settling."""
+
+CHAINS = {
+    "crane": (1.0, 6000, PAPER, "counted"),
+    "scaling-8": (1.0, 2000, PAPER, "counted"),
+    "discs": (1.0, 1500, PAPER, "counted"),
+    "crane without dead ends": (0.6, 1000, PAPER, "ignored"),
+    "crane from half its beams": (0.5, 1000, PAPER, "counted"),
+    "scaling-8 wandering": (0.6, 1500, HOT, "counted"),
+}
+"""Share of beams at the start, steps, settings, what counts."""
+
+
+def diluted(problem: Problem, share: float) -> Problem:
+    """The problem with an initial design of a share of its beams that has a response."""
+    for mask in random_masks(problem, share, 20, seed=11):
+        if Evaluator(problem).respond(mask).status is Status.CONVERGED:
+            return replace(problem, initial=mask)
+    raise AssertionError("no diluted design is held")
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_every_proposal_of_a_chain_responds_as_from_rest(name: str) -> None:
+    share, steps, settings, dangling = CHAINS[name]
+    problem = find_problem(name.split()[0])
+    if share < 1.0:
+        problem = diluted(problem, share)
+    masks, proposals = run_chain(Evaluator(problem, dangling=dangling), steps, 1, settings)
+    assert len(masks) == steps
+    evaluator = Evaluator(problem, dangling=dangling)
+    different = []
+    for step, mask in enumerate(masks):
+        rest = evaluator.respond(mask)
+        same = np.isclose(
+            proposals.efficiency[step], rest.efficiency, rtol=0, atol=SAME, equal_nan=True
+        )
+        if proposals.status[step] != rest.status or not same:
+            recorded = Status(proposals.status[step]).label, proposals.efficiency[step]
+            different.append((step, recorded, (rest.status.label, rest.efficiency)))
+    assert different == []
+    # The property means nothing unless pieces really came loose and were joined again.
+    loose = np.array([has_loose_piece(evaluator, mask) for mask in masks])
+    accepted = loose[proposals.accepted]
+    assert loose.mean() > 0.05
+    assert np.abs(np.diff(accepted.astype(int))).sum() > 10
+
+
+def test_the_chains_make_ten_thousand_proposals_and_more() -> None:
+    assert sum(steps for _, steps, _, _ in CHAINS.values()) >= 10_000
+
+
+def test_a_design_near_an_unrelated_one_responds_as_from_rest() -> None:
+    for name in ("crane", "scaling-8", "discs"):
+        evaluator = Evaluator(find_problem(name))
+        masks = random_masks(evaluator.problem, 0.6, 12, seed=5)
+        for before, mask in zip(masks, masks[1:], strict=False):
+            evaluator.respond(before)
+            evaluator.remember()
+            warm, rest = evaluator.respond_nearby(mask), evaluator.respond(mask)
+            assert warm.status is rest.status
+            assert warm.efficiency == pytest.approx(rest.efficiency, abs=SAME, nan_ok=True)
+
+
+def test_nothing_is_remembered_unless_asked() -> None:
+    evaluator = Evaluator(find_problem("scaling-8"))
+    first, second, third = random_masks(evaluator.problem, 0.7, 3)
+    evaluator.respond(first)
+    evaluator.remember()
+    expected = evaluator.respond_nearby(second)
+    evaluator.respond(third)
+    again = evaluator.respond_nearby(second)
+    assert again.efficiency == expected.efficiency
+    assert (again.displacement == expected.displacement).all()
