@@ -6,13 +6,14 @@ the whole property, not a sample of it.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bellcrank.mechanics import Evaluator, Status
-from bellcrank.model import Problem, find_problem, unpack_mask
+from bellcrank.model import Problem, find_problem
 from bellcrank.search import MetropolisSettings
 
 from .chains import has_loose_piece, run_chain
@@ -46,7 +47,7 @@ def diluted(problem: Problem, share: float) -> Problem:
 @pytest.mark.parametrize("name", CHAINS)
 def test_every_proposal_of_a_chain_responds_as_from_rest(name: str) -> None:
     share, steps, settings, dangling = CHAINS[name]
-    problem = find_problem(name.split()[0])
+    problem = find_problem(name.split(maxsplit=1)[0])
     if share < 1.0:
         problem = diluted(problem, share)
     masks, proposals = run_chain(Evaluator(problem, dangling=dangling), steps, 1, settings)
@@ -77,7 +78,7 @@ def test_a_design_near_an_unrelated_one_responds_as_from_rest() -> None:
     for name in ("crane", "scaling-8", "discs"):
         evaluator = Evaluator(find_problem(name))
         masks = random_masks(evaluator.problem, 0.6, 12, seed=5)
-        for before, mask in zip(masks, masks[1:], strict=False):
+        for before, mask in itertools.pairwise(masks):
             evaluator.respond(before)
             evaluator.remember()
             warm, rest = evaluator.respond_nearby(mask), evaluator.respond(mask)

@@ -1,0 +1,143 @@
+"""What every objective and every minimiser promises, whichever the registry holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidProblem, InvalidSettings, UnknownName
+from bellcrank.mechanics import Evaluator, Status, minimisers, objective_of, objectives
+from bellcrank.model import Input, Lattice, Output, Problem, Supports
+
+POSITIONS = [[0, 0], [1, 0], [0.5, 0.9], [1.5, 0.9], [1, 1.8]]
+BEAMS = [[0, 2], [0, 3], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4]]
+
+DRIVES = {
+    "displacement": (Input([4], [0.0, -1.0], "displacement", 0.05), Output([2], [-1.0, 0.0])),
+    "force": (Input([4], [0.0, -1.0], "force", 0.02), Output([2], [-1.0, 0.0], 0.5)),
+}
+
+
+def tiny(drive: str) -> Problem:
+    """Five nodes and seven beams, two of the nodes held."""
+    given, watched = DRIVES[drive]
+    return Problem(
+        name=f"tiny {drive}",
+        lattice=Lattice(POSITIONS, BEAMS),
+        supports=Supports(fixed=[0, 1]),
+        input=given,
+        output=watched,
+        designable=[1, 2, 4],
+    )
+
+
+def suits(objective: str, drive: str) -> bool:
+    try:
+        objective_of(tiny(drive), objective)
+    except InvalidSettings:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("objective", list(objectives))
+def test_every_objective_suits_some_drive(objective: str) -> None:
+    assert any(suits(objective, drive) for drive in DRIVES)
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("objective", list(objectives))
+def test_every_objective_gives_a_number_or_says_why_not(objective: str, drive: str) -> None:
+    problem = tiny(drive)
+    if not suits(objective, drive):
+        with pytest.raises(InvalidSettings, match=objective):
+            Evaluator(problem, objective)
+        return
+    evaluator = Evaluator(problem, objective)
+    response = evaluator.respond(problem.initial)
+    assert response.status is Status.CONVERGED
+    assert np.isfinite(response.efficiency)
+    assert np.isfinite(evaluator.sensitivity(problem.initial)).all()
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("objective", list(objectives))
+def test_every_objective_turns_its_sign_with_the_output(objective: str, drive: str) -> None:
+    if not suits(objective, drive):
+        pytest.skip(f"{objective} does not suit a {drive} drive")
+    problem = tiny(drive)
+    along = objective_of(problem, objective)
+    assert along.numerator_scale > 0.0
+    assert along.exponent >= 2.0
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("minimiser", list(minimisers))
+def test_every_minimiser_finds_the_same_response(minimiser: str, drive: str) -> None:
+    problem = tiny(drive)
+    evaluator, newton = Evaluator(problem, minimiser=minimiser), Evaluator(problem)
+    for removed in ([], [1], [2], [1, 2], [4], [1, 4]):
+        mask = problem.initial.copy()
+        mask[removed] = False
+        found, expected = evaluator.respond(mask), newton.respond(mask)
+        assert found.status is expected.status
+        assert found.efficiency == pytest.approx(expected.efficiency, abs=1e-6, nan_ok=True)
+        evaluator.remember()
+        again = evaluator.respond_nearby(mask)
+        assert again.efficiency == pytest.approx(found.efficiency, abs=1e-6, nan_ok=True)
+
+
+@pytest.mark.parametrize("minimiser", list(minimisers))
+def test_every_minimiser_answers_twice_with_the_same_bits(minimiser: str) -> None:
+    problem = tiny("displacement")
+    first = Evaluator(problem, minimiser=minimiser).respond(problem.initial)
+    second = Evaluator(problem, minimiser=minimiser).respond(problem.initial)
+    assert first.efficiency == second.efficiency
+    assert first.energy == second.energy
+    assert (first.displacement == second.displacement).all()
+
+
+@pytest.mark.parametrize("minimiser", list(minimisers))
+def test_every_minimiser_knows_a_mechanism(minimiser: str) -> None:
+    problem = tiny("force")
+    none = np.zeros(len(BEAMS), dtype=bool)
+    response = Evaluator(problem, minimiser=minimiser).respond(none)
+    assert response.status is Status.MECHANISM
+    assert np.isnan(response.efficiency)
+
+
+@pytest.mark.parametrize("minimiser", list(minimisers))
+def test_every_minimiser_leaves_loose_pieces_at_rest(minimiser: str) -> None:
+    problem = tiny("displacement")
+    cut = np.array([True, True, True, True, True, False, False])
+    response = Evaluator(problem, minimiser=minimiser).respond(cut)
+    assert response.status is Status.CONVERGED
+    assert response.efficiency == 0.0
+    assert (response.displacement[:4] == 0.0).all()
+
+
+@pytest.mark.parametrize("status", list(Status))
+def test_every_status_has_a_word_and_a_sentence(status: Status) -> None:
+    assert status.label == status.name.lower()
+    assert len(status.message.split()) > 5
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"objective": "speed"}, UnknownName),
+        ({"objective": "displacement:3"}, InvalidSettings),
+        ({"objective": "directional:1.5"}, InvalidSettings),
+        ({"objective": "directional:much"}, InvalidSettings),
+        ({"minimiser": "hope"}, UnknownName),
+        ({"dangling": "sometimes"}, InvalidSettings),
+    ],
+)
+def test_what_does_not_exist_is_refused_by_name(options: dict[str, str], error: type) -> None:
+    value = next(iter(options.values()))
+    with pytest.raises(error, match=value.split(":")[0]):
+        Evaluator(tiny("displacement"), **options)
+
+
+def test_a_mask_of_the_wrong_length_is_refused() -> None:
+    with pytest.raises(InvalidProblem, match=r"expected shape \(7,\)"):
+        Evaluator(tiny("displacement")).respond(np.ones(8, dtype=bool))
