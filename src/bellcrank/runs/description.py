@@ -169,9 +169,13 @@ def read_description(folder: Path) -> Description:
         If the file is damaged, or was changed after the run had begun.
     """
     path = folder / DESCRIPTION
-    if not folder.is_dir():
+    try:
+        present, described = folder.is_dir(), path.exists()
+    except OSError as error:
+        raise InvalidFile(f"{folder}: cannot be read ({error.strerror})") from None
+    if not present:
         raise InvalidFile(f"{folder}: no such folder; expected the folder of a run")
-    if not path.exists():
+    if not described:
         raise InvalidFile(
             f"{folder}: not the folder of a run: it has no {DESCRIPTION}; nothing to go on from"
         )

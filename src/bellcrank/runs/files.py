@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import re
 import tempfile
@@ -15,6 +16,7 @@ from bellcrank.model.storage import _sync_folder, _take_name
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+FULL = (errno.ENOSPC, errno.EDQUOT)
 TEMPORARY = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
 """Names that `tempfile.mkstemp` gives to files on their way."""
 
@@ -57,12 +59,12 @@ def whole_file(target: Path) -> Iterator[IO[bytes]]:
 
 
 def storage_error(folder: Path, error: OSError) -> StorageError:
-    """Say that a folder could not be written, and why."""
-    reason = error.strerror or str(error)
-    return StorageError(
-        f"{folder}: cannot be written ({reason}); what was stored before is intact: "
-        f"make room or choose a folder you may write to, and resume"
-    )
+    """Say that a folder could not be written, why, and what to do."""
+    if error.errno in FULL:
+        what_to_do = "make room and resume: what was stored before is intact"
+    else:
+        what_to_do = "make it writable, or choose another folder"
+    return StorageError(f"{folder}: cannot be written ({error.strerror or error}); {what_to_do}")
 
 
 def make_folder(folder: Path) -> None:

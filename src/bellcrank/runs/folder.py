@@ -8,11 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import (
-    CorruptRun,
-    InvalidSettings,
-    OutputExists,
-)
+from bellcrank.errors import CorruptRun, InvalidSettings
 from bellcrank.model import problem_from_dict
 from bellcrank.provenance import provenance
 from bellcrank.runs.description import (
@@ -24,7 +20,7 @@ from bellcrank.runs.description import (
     require_same,
     write_description,
 )
-from bellcrank.runs.files import make_folder, remove_temporaries
+from bellcrank.runs.files import remove_temporaries
 from bellcrank.runs.history import History, read_history, write_history
 from bellcrank.runs.layout import (
     DESCRIPTION,
@@ -32,10 +28,8 @@ from bellcrank.runs.layout import (
     TOP_NAME,
     chain_folder,
     chain_numbers,
-    content,
-    delete_run,
+    claim_folder,
     delete_shards,
-    shard_path,
 )
 from bellcrank.runs.records import (
     ProposalColumns,
@@ -43,13 +37,7 @@ from bellcrank.runs.records import (
     checked_proposals,
     empty_columns,
 )
-from bellcrank.runs.shards import (
-    Shard,
-    last_step,
-    read_shard,
-    read_shards,
-    write_shard,
-)
+from bellcrank.runs.shards import Shard, append_shard, arrays_of, read_shard, read_shards
 
 if TYPE_CHECKING:
     import os
@@ -106,10 +94,6 @@ class RunFolder:
 
         Parameters
         ----------
-        path
-            Of the folder; made if need be.
-        problem
-            What is to be designed.
         settings
             Plain data from which the search can be repeated.
         overwrite
@@ -126,17 +110,7 @@ class RunFolder:
         """
         folder = Path(path)
         description = describe(problem, settings, provenance())
-        if folder.exists() and not folder.is_dir():
-            raise OutputExists(f"{folder}: is a file; choose another folder (--out)")
-        make_folder(folder)
-        if not overwrite and (found := content(folder)):
-            go_on = f", or go on with it (--resume {folder})"
-            hint = go_on if DESCRIPTION in found else ""
-            raise OutputExists(
-                f"{folder}: exists already and is not empty (it holds {found[0]}); "
-                f"choose another folder (--out){hint}"
-            )
-        delete_run(folder)
+        claim_folder(folder, overwrite=overwrite)
         write_description(folder, description)
         return cls(folder, description, problem)
 
@@ -214,10 +188,8 @@ class RunFolder:
 
         Parameters
         ----------
-        chain
-            Its number, from 0.
         first_step
-            Step of the first row; the number of proposals stored before.
+            Of the first row; the number of proposals stored before.
         records
             The columns of `Proposals`, n >= 1 rows.
         state
@@ -240,17 +212,7 @@ class RunFolder:
         kept = plain("state", state)
         if self._history():
             raise CorruptRun(f"{self.path}: is finished; nothing can be added to it")
-        folder = chain_folder(self.path, chain)
-        make_folder(folder)
-        path = shard_path(folder, first_step)
-        if path.exists():
-            raise OutputExists(f"{path}: exists already; is another process at work on this run?")
-        end = last_step(folder, self.spec, chain) + 1
-        if first_step != end:
-            raise CorruptRun(
-                f"{folder}: rows from step {first_step} do not follow on the {end} stored"
-            )
-        write_shard(path, self.spec, chain, first_step, rows, kept)
+        append_shard(chain_folder(self.path, chain), self.spec, chain, first_step, rows, kept)
 
     def progress(self, chain: int) -> tuple[int, dict[str, Any] | None]:
         """Tell where a chain has to go on, and clear away what a kill left of it.
@@ -280,8 +242,6 @@ class RunFolder:
 
         Parameters
         ----------
-        chain
-            Its number; one without proposals yields nothing.
         columns
             Names out of `COLUMNS`; all by default.
 
@@ -302,15 +262,10 @@ class RunFolder:
             yield from history.batches(chain, names)
             return
         for shard in self._shards(chain):
-            yield read_shard(shard.path, names)
+            yield arrays_of(read_shard(shard, names), names)
 
     def read(self, chain: int, columns: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
-        """Return the proposals of a chain at once; see `records`.
-
-        Raises
-        ------
-        CorruptRun, InvalidSettings
-        """
+        """Return the proposals of a chain at once; arguments and errors as for `records`."""
         names = checked_columns(columns)
         parts = list(self.records(chain, names))
         if not parts:
@@ -333,8 +288,9 @@ class RunFolder:
         if self._history() is None:
             found = {chain: self._shards(chain) for chain in self.chains}
             write_history(self.path, self._description, found)
-        self.status = "finished"
+        # The shards go first: on a full disk they make the room that the status needs.
         delete_shards(self.path)
+        self.status = "finished"
 
     def _history(self) -> History | None:
         return read_history(self.path, self.spec)

@@ -14,7 +14,7 @@ import numpy as np
 from bellcrank.errors import CorruptRun
 from bellcrank.runs.files import whole_file
 from bellcrank.runs.layout import HISTORY
-from bellcrank.runs.shards import DAMAGED_SHARD, Shard, arrays_of, parquet_file, parquet_writer
+from bellcrank.runs.shards import Shard, arrays_of, parquet_file, parquet_writer, read_shard
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -146,8 +146,7 @@ def _row_groups(shards: Sequence[Shard]) -> Iterator[Any]:
 
     waiting: list[Any] = []
     for shard in shards:
-        with parquet_file(shard.path, DAMAGED_SHARD) as (file, _):
-            waiting.append(file.read(use_threads=False))
+        waiting.append(read_shard(shard))
         if sum(table.num_rows for table in waiting) >= ROW_GROUP:
             yield pa.concat_tables(waiting)
             waiting = []

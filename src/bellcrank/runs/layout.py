@@ -15,7 +15,8 @@ import contextlib
 import re
 from typing import TYPE_CHECKING
 
-from bellcrank.runs.files import remove_temporaries, storage_error, target_of
+from bellcrank.errors import OutputExists
+from bellcrank.runs.files import make_folder, remove_temporaries, storage_error, target_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,7 +53,33 @@ def shard_files(chain_folder: Path) -> list[tuple[int, Path]]:
     return sorted((int(path.stem), path) for path in found if SHARD_NAME.fullmatch(path.name))
 
 
-def content(folder: Path) -> list[str]:
+def claim_folder(folder: Path, *, overwrite: bool) -> None:
+    """Make the folder of a new run, or clear the one that is there if told to.
+
+    Raises
+    ------
+    OutputExists
+        If something is there already and `overwrite` is not set.
+    StorageError
+        If the folder cannot be made or written.
+    """
+    try:
+        taken = folder.exists() and not folder.is_dir()
+    except OSError as error:
+        raise storage_error(folder, error) from error
+    if taken:
+        raise OutputExists(f"{folder}: is a file; choose another folder (--out)")
+    make_folder(folder)
+    if not overwrite and (found := _content(folder)):
+        go_on = f", or go on with the run in it (--resume {folder})" * (DESCRIPTION in found)
+        raise OutputExists(
+            f"{folder}: exists already and is not empty (it holds {found[0]}); "
+            f"choose another folder (--out){go_on}"
+        )
+    _delete_run(folder)
+
+
+def _content(folder: Path) -> list[str]:
     """Return the names in a folder, but for what a kill at the very beginning leaves."""
     try:
         names = sorted(path.name for path in folder.iterdir())
@@ -61,13 +88,8 @@ def content(folder: Path) -> list[str]:
     return [name for name in names if not TOP_NAME.fullmatch(target_of(name) or "")]
 
 
-def delete_run(folder: Path) -> None:
-    """Delete a run, its description first: what is left is then taken for no run.
-
-    Raises
-    ------
-    StorageError
-    """
+def _delete_run(folder: Path) -> None:
+    """Delete a run, its description first: what is left is then taken for no run."""
     remove_temporaries(folder, TOP_NAME)
     try:
         (folder / DESCRIPTION).unlink(missing_ok=True)

@@ -8,14 +8,15 @@ its name, and the listing of a folder is all there is to know about a chain.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import CorruptRun
-from bellcrank.runs.files import whole_file
+from bellcrank.errors import CorruptRun, OutputExists
+from bellcrank.runs.files import make_folder, whole_file
 from bellcrank.runs.layout import shard_files, shard_path
 
 if TYPE_CHECKING:
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 
 SHARD_SCHEMA = "bellcrank/shard/1"
 METADATA_KEY = "bellcrank"
+DIGEST_KEY = "bellcrank.sha256"
+"""Parquet checks its pages, but not its footer, where the state of the chain is."""
+
 DAMAGED_SHARD = (
     "delete it and the later ones in its folder and resume: their steps are computed again"
 )
@@ -71,15 +75,34 @@ class Shard:
     state: dict[str, Any]
 
 
-def write_shard(
-    path: Path, spec: str, chain: int, first_step: int, rows: Proposals, state: Mapping[str, Any]
+def append_shard(
+    chain_folder: Path,
+    spec: str,
+    chain: int,
+    first_step: int,
+    rows: Proposals,
+    state: Mapping[str, Any],
 ) -> None:
-    """Write one shard, whole or not at all.
+    """Write the next shard of a chain, whole or not at all.
 
     Raises
     ------
-    OutputExists, StorageError
+    OutputExists
+        If it is there already.
+    CorruptRun
+        If it does not follow on the shards that are there.
+    StorageError
     """
+    make_folder(chain_folder)
+    path = shard_path(chain_folder, first_step)
+    if path.exists():
+        raise OutputExists(f"{path}: exists already; is another process at work on this run?")
+    stored = shard_files(chain_folder)
+    end = read_footer(stored[-1][1], spec, chain).last_step + 1 if stored else 0
+    if first_step != end:
+        raise CorruptRun(
+            f"{chain_folder}: rows from step {first_step} do not follow on the {end} stored"
+        )
     header = {
         "schema": SHARD_SCHEMA,
         "spec": spec,
@@ -99,7 +122,8 @@ def parquet_writer(file: IO[bytes], schema: Any, header: Mapping[str, Any]) -> I
     import pyarrow.parquet as pq
 
     with pq.ParquetWriter(file, schema, **WRITER_OPTIONS) as writer:
-        writer.add_key_value_metadata({METADATA_KEY: json.dumps(header)})
+        text = json.dumps(header)
+        writer.add_key_value_metadata({METADATA_KEY: text, DIGEST_KEY: _digest(text.encode())})
         yield writer
 
 
@@ -117,13 +141,24 @@ def parquet_file(path: Path, what_to_do: str) -> Iterator[tuple[Any, dict[str, A
 
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            header = json.loads((file.metadata.metadata or {})[METADATA_KEY.encode()])
-            yield file, header
+            yield file, _header(file.metadata.metadata or {})
     except CorruptRun:
         raise
     except (OSError, pa.ArrowException, ValueError, KeyError) as error:
         reason = str(error).strip().splitlines()[0] if str(error).strip() else repr(error)
         raise CorruptRun(f"{path}: damaged ({reason}); {what_to_do}") from error
+
+
+def _header(metadata: Mapping[bytes, bytes]) -> dict[str, Any]:
+    text = metadata[METADATA_KEY.encode()]
+    if metadata[DIGEST_KEY.encode()] != _digest(text).encode():
+        raise ValueError("its footer was changed")
+    header: dict[str, Any] = json.loads(text)
+    return header
+
+
+def _digest(text: bytes) -> str:
+    return hashlib.sha256(text).hexdigest()
 
 
 def read_shards(chain_folder: Path, spec: str, chain: int) -> list[Shard]:
@@ -170,26 +205,19 @@ def read_footer(path: Path, spec: str, chain: int) -> Shard:
     return shard
 
 
-def last_step(chain_folder: Path, spec: str, chain: int) -> int:
-    """Return the last step that is stored of a chain; -1 before the first.
+def read_shard(shard: Shard, columns: Sequence[str] | None = None) -> Any:
+    """Read a shard, or some of its columns, as an Arrow table.
 
     Raises
     ------
     CorruptRun
     """
-    stored = shard_files(chain_folder)
-    return read_footer(stored[-1][1], spec, chain).last_step if stored else -1
-
-
-def read_shard(path: Path, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """Read columns of a shard.
-
-    Raises
-    ------
-    CorruptRun
-    """
-    with parquet_file(path, DAMAGED_SHARD) as (file, _):
-        return arrays_of(file.read(columns=list(columns), use_threads=False), columns)
+    with parquet_file(shard.path, DAMAGED_SHARD) as (file, _):
+        names = None if columns is None else list(columns)
+        table = file.read(columns=names, use_threads=False)
+    if table.num_rows != shard.last_step - shard.first_step + 1:
+        raise CorruptRun(f"{shard.path}: damaged (rows are missing); {DAMAGED_SHARD}")
+    return table
 
 
 def table_of(first_step: int, rows: Proposals) -> Any:
