@@ -36,12 +36,19 @@ def buckling_shortening(joint: float) -> float:
     return float(brentq(lambda a: K * (1 - a / 2) * (a / 2) - 5 * joint, 0.0, 1.0))
 
 
-@pytest.mark.parametrize("minimiser", ["newton", "cg", "fire"])
 @pytest.mark.parametrize("joint", [0.05, 0.1])
-def test_a_perfect_column_buckles_at_its_critical_load(joint: float, minimiser: str) -> None:
+def test_a_perfect_column_buckles_at_its_critical_load(joint: float) -> None:
     critical = buckling_shortening(joint)
-    assert status(column(0.97 * critical, joint), minimiser) is Status.CONVERGED
-    assert status(column(1.15 * critical, joint), minimiser) is Status.SNAPPED
+    assert status(column(0.97 * critical, joint)) is Status.CONVERGED
+    assert status(column(1.03 * critical, joint)) is Status.SNAPPED
+
+
+@pytest.mark.parametrize("minimiser", ["cg", "fire"])
+def test_a_column_that_stayed_straight_is_not_taken_for_stable(minimiser: str) -> None:
+    # Without a disturbance, a gradient has no component that leads off the axis.
+    critical = buckling_shortening(0.1)
+    assert status(column(0.97 * critical), minimiser) is Status.CONVERGED
+    assert status(column(1.15 * critical), minimiser) is not Status.CONVERGED
 
 
 def status(problem: Problem, minimiser: str = "newton") -> Status:

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from bellcrank.mechanics import Evaluator, Status
-from bellcrank.model import Problem, find_problem
+from bellcrank.model import Problem, find_problem, unpack_mask
 from bellcrank.search import MetropolisSettings
 
 from .chains import has_loose_piece, run_chain
-from .problems import random_masks
+from .problems import frame, random_masks
 
 SAME = 1e-8
 
@@ -26,14 +26,16 @@ HOT = MetropolisSettings(schedule="constant", cold=10.0)
 """Accepts nearly everything: the design wanders instead of settling."""
 
 CHAINS = {
-    "crane": (1.0, 6000, PAPER, "counted"),
-    "scaling-8": (1.0, 2000, PAPER, "counted"),
-    "discs": (1.0, 1500, PAPER, "counted"),
-    "crane without dead ends": (0.6, 1000, PAPER, "ignored"),
-    "crane from half its beams": (0.5, 1000, PAPER, "counted"),
-    "scaling-8 wandering": (0.6, 1500, HOT, "counted"),
+    "crane": (1.0, 6000, PAPER, "counted", 1),
+    "scaling-8": (1.0, 2000, PAPER, "counted", 1),
+    "discs": (1.0, 1500, PAPER, "counted", 1),
+    "crane without dead ends": (0.6, 1000, PAPER, "ignored", 1),
+    "crane from half its beams": (0.5, 1000, PAPER, "counted", 1),
+    "scaling-8 wandering": (0.6, 1500, HOT, "counted", 1),
+    "pliers on rollers": (1.0, 600, PAPER, "counted", 1),
+    "anti-parallel among snapping designs": (1.0, 1200, PAPER, "counted", 201),
 }
-"""Share of beams at the start, steps, settings, what counts."""
+"""Share of beams at the start, steps, settings, what counts, seed."""
 
 
 def diluted(problem: Problem, share: float) -> Problem:
@@ -46,11 +48,11 @@ def diluted(problem: Problem, share: float) -> Problem:
 
 @pytest.mark.parametrize("name", CHAINS)
 def test_every_proposal_of_a_chain_responds_as_from_rest(name: str) -> None:
-    share, steps, settings, dangling = CHAINS[name]
+    share, steps, settings, dangling, seed = CHAINS[name]
     problem = find_problem(name.split(maxsplit=1)[0])
     if share < 1.0:
         problem = diluted(problem, share)
-    masks, proposals = run_chain(Evaluator(problem, dangling=dangling), steps, 1, settings)
+    masks, proposals = run_chain(Evaluator(problem, dangling=dangling), steps, seed, settings)
     assert len(masks) == steps
     evaluator = Evaluator(problem, dangling=dangling)
     different = []
@@ -71,7 +73,7 @@ def test_every_proposal_of_a_chain_responds_as_from_rest(name: str) -> None:
 
 
 def test_the_chains_make_ten_thousand_proposals_and_more() -> None:
-    assert sum(steps for _, steps, _, _ in CHAINS.values()) >= 10_000
+    assert sum(steps for _, steps, *_ in CHAINS.values()) >= 10_000
 
 
 def test_a_design_near_an_unrelated_one_responds_as_from_rest() -> None:
@@ -96,3 +98,53 @@ def test_nothing_is_remembered_unless_asked() -> None:
     again = evaluator.respond_nearby(second)
     assert again.efficiency == expected.efficiency
     assert (again.displacement == expected.displacement).all()
+
+
+def test_a_roller_that_is_joined_again_stays_on_its_line() -> None:
+    # Node 4 rolls along x. Its beam is flipped while the rest of the frame is displaced.
+    problem = frame(
+        [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0)],
+        [(0, 1), (0, 2), (1, 2), (1, 3), (2, 3), (3, 4)],
+        fixed=[0, 1],
+        fixed_y=[4],
+        drive=(2, (0.0, -1.0), 0.2),
+        watch=(3, (-1.0, 0.0)),
+    )
+    evaluator = Evaluator(problem)
+    joined = problem.initial
+    apart = joined.copy()
+    apart[-1] = False
+    evaluator.respond(apart)
+    evaluator.remember()
+    warm, rest = evaluator.respond_nearby(joined), evaluator.respond(joined)
+    assert warm.displacement[4, 1] == 0.0
+    assert warm.efficiency == pytest.approx(rest.efficiency, abs=SAME)
+
+
+TWO_WAYS = {
+    "both ways stable from rest": (
+        "ffffffffffffffffffffffff7c3f86081c19ac8987a756b6a00598c8d9d95fe61237fffa03fffffec6dfffdf",
+        "ffffffffffffffffffffffff7c3f86081c19ac8987a756b6a00598c8d9d95fe61337fffa03fffffec6dfffdf",
+    ),
+    "the way from rest snaps": (
+        "ffffffffffffffffffffffff1134dc111a01abda2006420ca28718790e5a27ee9f3fffba2afffff7ab9fff77",
+        "ffffffffffffffffffffffff1134dc111a01abda2006420ca28618790e5a27ee9f3fffba2afffff7ab9fff77",
+    ),
+    "the way from rest snaps, the other hardly moves": (
+        "ffffffffffffffffffffffff27dc51009539381006f1c33f5deac622a2812fda3c77ffab51fffffb36bfff0f",
+        "ffffffffffffffffffffffff27dc51009539381006f1c33f5ceac622a2812fda3c77ffab51fffffb36bfff0f",
+    ),
+}
+"""Neighbouring designs for `anti-parallel`, met in chains, of which the second has two
+equilibria at full load: one that is reached from rest, one next to that of the first."""
+
+
+@pytest.mark.parametrize("name", TWO_WAYS)
+def test_a_design_with_two_equilibria_takes_the_one_reached_from_rest(name: str) -> None:
+    evaluator = Evaluator(find_problem("anti-parallel"))
+    before, mask = (unpack_mask(text, 352) for text in TWO_WAYS[name])
+    assert evaluator.respond(before).status is Status.CONVERGED
+    evaluator.remember()
+    warm, rest = evaluator.respond_nearby(mask), evaluator.respond(mask)
+    assert warm.status is rest.status
+    assert warm.efficiency == pytest.approx(rest.efficiency, abs=SAME)
