@@ -3,7 +3,7 @@
 Each is a file ``NAME.json`` next to this one, named like its problem::
 
     {"schema": "bellcrank/human/1", "problem": "crane",
-     "mechanism": "how it works, in a sentence or two", "mask": "ffe0..."}
+     "mechanism": "how it works, in a few sentences", "mask": "ffe0..."}
 
 It refers to the built-in problem by name instead of embedding it, so that the
 mask is read in the numbering of the code that ships it.
