@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from pathlib import Path
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 STEPS = 20
-CALLS = ("mkdir", "fsync", "link", "replace", "unlink", "rmdir", "mkstemp")
+CALLS = ("mkdir", "fsync", "link", "replace", "unlink", "rmdir", "open")
 
 
 class Killed(BaseException):
@@ -64,8 +63,7 @@ def killed_at(instant: int, *, before: bool) -> Iterator[list[str]]:
 
     with contextlib.ExitStack() as stack:
         for name in CALLS:
-            place = tempfile if name == "mkstemp" else os
-            stack.enter_context(mock.patch.object(place, name, around(name, getattr(place, name))))
+            stack.enter_context(mock.patch.object(os, name, around(name, getattr(os, name))))
         yield calls
 
 

@@ -52,6 +52,15 @@ def test_one_file_holds_a_shard_named_by_its_first_step(run: RunFolder) -> None:
     assert list(files(run.path)) == [*names, "run.json"]
 
 
+def test_others_may_read_the_files_if_the_user_lets_them(run: RunFolder) -> None:
+    fill(run, chains=1)
+    (run.path / "touched").touch()
+    usual = (run.path / "touched").stat().st_mode
+    assert {path.stat().st_mode for path in (run.path / "chains" / "000").iterdir()} == {usual}
+    run.finish()
+    assert (run.path / "history.parquet").stat().st_mode == usual
+
+
 def test_the_last_shard_may_be_shorter_and_the_chain_goes_on_behind_it(run: RunFolder) -> None:
     fill(run, steps=25)
     fill(run, steps=40)

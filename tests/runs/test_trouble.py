@@ -8,7 +8,6 @@ import itertools
 import json
 import os
 import subprocess
-import tempfile
 from typing import TYPE_CHECKING, Any
 from unittest import mock
 
@@ -44,14 +43,13 @@ def full_from(instant: int) -> Iterator[None]:
         return call
 
     with contextlib.ExitStack() as stack:
-        for name in ("mkdir", "fsync", "link", "replace", "mkstemp"):
-            place = tempfile if name == "mkstemp" else os
-            stack.enter_context(mock.patch.object(place, name, refuse(getattr(place, name))))
+        for name in ("mkdir", "fsync", "link", "replace", "open"):
+            stack.enter_context(mock.patch.object(os, name, refuse(getattr(os, name))))
         yield
 
 
-# Making the folder, the temporary file, its content, its name (by linking or renaming).
-@pytest.mark.parametrize("instant", range(4))
+# Making the folder and syncing it, the temporary file, its content, its name.
+@pytest.mark.parametrize("instant", range(6))
 def test_a_full_disk_at_any_instant_is_one_error_and_touches_nothing(
     run: RunFolder, instant: int
 ) -> None:
@@ -132,7 +130,7 @@ def test_a_folder_that_may_not_be_written_is_one_error(
     def closed(*args: object, **options: object) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    monkeypatch.setattr(tempfile, "mkstemp", closed)
+    monkeypatch.setattr(os, "open", closed)
     with pytest.raises(StorageError, match=r"\(Permission denied\); make it writable, or choose"):
         run.append(0, 0, proposals(run.problem, 0, 0), {})
 

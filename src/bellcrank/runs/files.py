@@ -6,8 +6,7 @@ import contextlib
 import errno
 import os
 import re
-import tempfile
-from pathlib import Path
+import secrets
 from typing import IO, TYPE_CHECKING
 
 from bellcrank.errors import BellcrankError, OutputExists, StorageError
@@ -15,10 +14,11 @@ from bellcrank.model.storage import _sync_folder, _take_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 TEMPORARY = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
-"""Names that `tempfile.mkstemp` gives to files on their way."""
+"""Names of files on their way, from here or from `bellcrank.model.storage`."""
 
 
 @contextlib.contextmanager
@@ -36,8 +36,10 @@ def whole_file(target: Path) -> Iterator[IO[bytes]]:
         If the folder cannot be written or the disk is full.
     """
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        temporary = Path(name)
+        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+        # Not by `tempfile`, whose files are private: only the system can apply the umask
+        # without a race between threads.
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
         try:
             with os.fdopen(handle, "wb") as file:
                 yield file
