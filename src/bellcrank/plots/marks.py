@@ -187,7 +187,7 @@ def put_arrows(
 ) -> None:
     """Draw arrows; bold ones name a region, thin ones a motion."""
     step = spacing(panel.problem)
-    body = 0.13 * arrow_length(panel.problem) if bold else 0.055 * step
+    body = 0.13 * arrow_length(panel.problem) if bold else 0.065 * step
     for arrow in arrows:
         dx, dy = np.subtract(arrow.tip, arrow.tail)
         length = float(np.hypot(dx, dy))

@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Design
 
+    Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
+
 WIDTH = 7.0
 """Inches of a picture with one drawing."""
 WIDE = 11.0
@@ -152,7 +154,7 @@ def draw_design(
 
 def _picture(parts: list[_Part], width: float) -> Figure:
     """Lay out drawings to one scale, with words over them and a legend under all."""
-    frames = [_frame(part) for part in parts]
+    frames = _level(parts)
     sizes = np.array([high - low for low, high in frames])
     room = width - 2 * MARGIN - GAP * (len(parts) - 1)
     scale = float(min(room / sizes[:, 0].sum(), TALLEST / sizes[:, 1].max()))
@@ -173,7 +175,8 @@ def _picture(parts: list[_Part], width: float) -> Figure:
     return figure
 
 
-def _frame(part: _Part) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _frame(part: _Part) -> Frame:
+    """Lower left and upper right corner of what is drawn, lattice units."""
     problem = part.motion.design.problem
     positions, step = problem.lattice.positions, spacing(problem)
     places = [positions, part.motion.moved]
@@ -181,6 +184,18 @@ def _frame(part: _Part) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     if len(held):
         places.append(outline_around(positions[held], 0.35 * step))
     return extent(places, part.arrows, 0.15 * step)
+
+
+def _level(parts: list[_Part]) -> list[Frame]:
+    """Frames of equal height around the lattices' feet, so that drawings stand on one level."""
+    frames = [_frame(part) for part in parts]
+    feet = [float(part.motion.design.problem.lattice.positions[:, 1].min()) for part in parts]
+    below = max(foot - float(low[1]) for foot, (low, _) in zip(feet, frames, strict=True))
+    above = max(float(high[1]) - foot for foot, (_, high) in zip(feet, frames, strict=True))
+    return [
+        (np.array([low[0], foot - below]), np.array([high[0], foot + above]))
+        for foot, (low, high) in zip(feet, frames, strict=True)
+    ]
 
 
 def _fill(panel: Panel, part: _Part) -> None:

@@ -15,7 +15,8 @@ from bellcrank.plots.style import DPI
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Without dates inside, the same picture is the same file.
+# Without dates inside, the same picture is the same file (except for the random ids in SVG,
+# which only a global setting of matplotlib would fix).
 FORMATS: dict[str, dict[str, Any]] = {
     ".png": {},
     ".svg": {"Date": None},
