@@ -14,7 +14,14 @@ import numpy as np
 from bellcrank.errors import CorruptRun
 from bellcrank.runs.files import whole_file
 from bellcrank.runs.layout import HISTORY
-from bellcrank.runs.shards import Shard, arrays_of, parquet_file, parquet_writer, read_shard
+from bellcrank.runs.shards import (
+    Shard,
+    arrays_of,
+    arrow_schema,
+    parquet_file,
+    parquet_writer,
+    read_shard,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -117,18 +124,8 @@ def write_history(
             for chain, shards in chains.items()
         },
     }
-    schema = pa.schema(
-        {
-            "chain": pa.int16(),
-            "step": pa.int64(),
-            "mask": pa.binary(description.mask_bytes),
-            "efficiency": pa.float64(),
-            "cost": pa.float64(),
-            "temperature": pa.float64(),
-            "accepted": pa.bool_(),
-            "status": pa.int8(),
-        }
-    )
+    columns = arrow_schema(pa.binary(description.mask_bytes))
+    schema = columns.insert(0, pa.field("chain", pa.int16()))
     with (
         whole_file(folder / HISTORY) as file,
         parquet_writer(file, schema, header) as writer,

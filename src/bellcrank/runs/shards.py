@@ -213,11 +213,23 @@ def read_shard(shard: Shard, columns: Sequence[str] | None = None) -> Any:
     CorruptRun
     """
     with parquet_file(shard.path, DAMAGED_SHARD) as (file, _):
+        found = file.schema_arrow.remove_metadata()
+        if not found.equals(arrow_schema(found.field("mask").type)):
+            raise ValueError(f"unexpected columns {', '.join(found.names)}")
         names = None if columns is None else list(columns)
         table = file.read(columns=names, use_threads=False)
-    if table.num_rows != shard.last_step - shard.first_step + 1:
-        raise CorruptRun(f"{shard.path}: damaged (rows are missing); {DAMAGED_SHARD}")
+        if table.num_rows != shard.last_step - shard.first_step + 1:
+            raise ValueError("rows are missing")
     return table
+
+
+def arrow_schema(mask_type: Any) -> Any:
+    """Return the columns of a shard, in order, with their Arrow types."""
+    import pyarrow as pa
+
+    floats = dict.fromkeys(("efficiency", "cost", "temperature"), pa.float64())
+    ends = {"accepted": pa.bool_(), "status": pa.int8()}
+    return pa.schema({"step": pa.int64(), "mask": mask_type, **floats, **ends})
 
 
 def table_of(first_step: int, rows: Proposals) -> Any:
