@@ -1,0 +1,1 @@
+"""Timings: `pytest benchmarks` for the parts, `python -m benchmarks.report` for a table."""

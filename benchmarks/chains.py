@@ -1,0 +1,93 @@
+"""Real chains, recorded once and walked again with any minimiser."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import Evaluator
+from bellcrank.model import find_problem
+from bellcrank.search import MetropolisSettings, chain_blocks
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SEED = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What a chain proposed, and how long all of it took.
+
+    Parameters
+    ----------
+    masks : (n, M) bool
+        The proposed designs.
+    accepted : (n,) bool
+    efficiency : (n,) float64
+        Of the proposed designs.
+    seconds
+        Wall time of the whole run: proposals, responses, records.
+    """
+
+    name: str
+    masks: NDArray[np.bool_]
+    accepted: NDArray[np.bool_]
+    efficiency: NDArray[np.float64]
+    seconds: float
+
+    @property
+    def microseconds_per_step(self) -> float:
+        """Mean wall time of one Metropolis step."""
+        return 1e6 * self.seconds / len(self.masks)
+
+    def stretch(self, start: int, length: int) -> Recording:
+        """Part of the chain; its first row is the design that is current at `start`."""
+        current = np.flatnonzero(self.accepted[:start])[-1]
+        rows = np.concatenate([[current], np.arange(start, start + length)])
+        return Recording(
+            self.name, self.masks[rows], self.accepted[rows], self.efficiency[rows], np.nan
+        )
+
+
+@cache
+def record(name: str, steps: int) -> Recording:
+    """Run a chain with the paper's settings, as the program runs it."""
+    evaluator = Evaluator(find_problem(name))
+    settings = MetropolisSettings(steps=steps, seed=SEED)
+    next(chain_blocks(evaluator, MetropolisSettings(steps=20, seed=SEED), 0))  # compiles
+    start = time.perf_counter()
+    blocks = [proposals for _, proposals in chain_blocks(evaluator, settings, 0)]
+    seconds = time.perf_counter() - start
+    beams = evaluator.problem.lattice.beam_count
+    packed = np.concatenate([block.mask for block in blocks])
+    return Recording(
+        name,
+        np.unpackbits(packed, axis=1, count=beams).astype(bool),
+        np.concatenate([block.accepted for block in blocks]).astype(bool),
+        np.concatenate([block.efficiency for block in blocks]),
+        seconds,
+    )
+
+
+def walk(evaluator: Evaluator, stretch: Recording) -> NDArray[np.float64]:
+    """Responses along a stretch, each from the last accepted one; returns the efficiencies."""
+    evaluator.respond(stretch.masks[0])
+    evaluator.remember()
+    return walk_on(evaluator, stretch)
+
+
+def walk_on(evaluator: Evaluator, stretch: Recording) -> NDArray[np.float64]:
+    """As `walk`, from the equilibrium that is already remembered."""
+    efficiency = np.empty(len(stretch.masks) - 1)
+    for step, (mask, accepted) in enumerate(
+        zip(stretch.masks[1:], stretch.accepted[1:], strict=True)
+    ):
+        efficiency[step] = evaluator.respond_nearby(mask).efficiency
+        if accepted:
+            evaluator.remember()
+    return efficiency

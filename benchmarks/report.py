@@ -1,0 +1,157 @@
+"""One Markdown table of what a step costs: ``python -m benchmarks.report [--quick]``.
+
+All figures of a row, and so all ratios, are measured in the same run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import Evaluator
+from bellcrank.model import find_problem
+from benchmarks.chains import Recording, record, walk_on
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+SAME = 1e-8
+"""Largest difference in efficiency at which two minimisers count as equally accurate."""
+TOLERANCES = (1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13)
+"""Largest forces, in units of bond stiffness, at which first-order minimisers may stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much of everything to measure."""
+
+    crane_steps: int
+    scaling_steps: int
+    sizes: tuple[int, ...]
+    stretches: tuple[int, ...]
+    length: int
+
+
+FULL = Effort(20_000, 5_000, tuple(range(8, 21, 2)), (200, 1000, 5000, 12_000, 19_000), 12)
+QUICK = Effort(2_000, 500, (8, 14, 20), (200, 1500), 5)
+"""Of the chain: where stretches begin that all minimisers walk, and how long they are."""
+
+
+@contextmanager
+def force_tolerance(value: float) -> Iterator[None]:
+    """Let the first-order minimisers stop at another force for a while."""
+    module = importlib.import_module("bellcrank.mechanics.minimisers")
+    before = module.FORCE_TOLERANCE
+    module.FORCE_TOLERANCE = value
+    try:
+        yield
+    finally:
+        module.FORCE_TOLERANCE = before
+
+
+def time_walk(name: str, minimiser: str, stretches: list[Recording]) -> tuple[float, np.ndarray]:
+    """Seconds for each response along the stretches, and the efficiencies.
+
+    The equilibrium at the start of each stretch comes from Newton, untimed.
+    """
+    newton, evaluator = (
+        Evaluator(find_problem(name)),
+        Evaluator(find_problem(name), minimiser=minimiser),
+    )
+    seconds, efficiencies = 0.0, []
+    for stretch in stretches:
+        newton.respond(stretch.masks[0])
+        newton.remember()
+        for source, target in zip(newton.known, evaluator.known, strict=True):
+            target[:] = source
+        start = time.perf_counter()
+        efficiencies.append(walk_on(evaluator, stretch))
+        seconds += time.perf_counter() - start
+    found = np.concatenate(efficiencies)
+    return seconds / len(found), found
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A first-order minimiser beside Newton, along the same proposals."""
+
+    minimiser: str
+    seconds: float
+    tolerance: float
+    difference: float
+
+
+def compare(name: str, minimiser: str, stretches: list[Recording], exact: np.ndarray) -> Comparison:
+    """Time a minimiser at the loosest force tolerance that reaches Newton's efficiencies."""
+    for tolerance in TOLERANCES:
+        with force_tolerance(tolerance):
+            seconds, found = time_walk(name, minimiser, stretches)
+        difference = float(np.abs(found - exact).max())
+        if difference <= SAME:
+            break
+    return Comparison(minimiser, seconds, tolerance, difference)
+
+
+def fitted_exponent(beams: list[int], cost: list[float]) -> float:
+    """Slope of log cost against log beams."""
+    return float(np.polyfit(np.log(beams), np.log(cost), 1)[0])
+
+
+def print_steps(effort: Effort) -> Recording:
+    """Print the cost of a Metropolis step; return the recorded crane chain."""
+    print("| problem | beams | steps | accepted | us per step |")
+    print("|---|---|---|---|---|")
+    beams, cost = [], []
+    crane = record("crane", effort.crane_steps)
+    names = [f"scaling-{size}" for size in effort.sizes]
+    for run in [crane, *(record(name, effort.scaling_steps) for name in names)]:
+        steps, count = run.masks.shape
+        share = run.accepted.mean()
+        print(f"| {run.name} | {count} | {steps} | {share:.0%} | {run.microseconds_per_step:.0f} |")
+        if run is not crane:
+            beams.append(count)
+            cost.append(run.microseconds_per_step)
+    exponent = fitted_exponent(beams, cost)
+    print(f"\nCost per step grows as beams^{exponent:.2f} from {names[0]} to {names[-1]}.\n")
+    return crane
+
+
+def print_minimisers(crane: Recording, effort: Effort) -> None:
+    """Print what a response costs with each minimiser, along the same proposals."""
+    stretches = [crane.stretch(start, effort.length) for start in effort.stretches]
+    time_walk("crane", "newton", stretches)
+    newton, exact = time_walk("crane", "newton", stretches)
+    print("| crane, along the same chain | us per response | Newton is faster by | stops at force |"
+          " largest difference in efficiency |")  # fmt: skip
+    print("|---|---|---|---|---|")
+    print(f"| newton | {1e6 * newton:.0f} | 1 | none | |")
+    for name in ("cg", "fire"):
+        found = compare("crane", name, stretches, exact)
+        flag = "" if found.difference <= SAME else " (not as accurate)"
+        print(
+            f"| {name} | {1e6 * found.seconds:.0f} | {found.seconds / newton:.0f} "
+            f"| {found.tolerance:.0e} k | {found.difference:.1e}{flag} |"
+        )
+    steps = 1e-6 * crane.microseconds_per_step
+    print(
+        f"\nA whole Newton step takes {1e6 * steps:.0f} us, a single FIRE response "
+        f"{1e6 * found.seconds:.0f} us: {found.seconds / steps:.0f} times the steps per second."
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="a rough look in a few seconds")
+    effort = QUICK if parser.parse_args().quick else FULL
+    print_minimisers(print_steps(effort), effort)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""Timings of responses and of the whole Metropolis step, per problem and minimiser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from bellcrank.mechanics import Evaluator, minimisers
+from bellcrank.model import find_problem
+from bellcrank.search import MetropolisSettings, advance_chain, chain_blocks
+from benchmarks.chains import record, walk, walk_on
+
+Benchmark = Callable[..., Any]
+
+PROBLEMS = ["crane", *(f"scaling-{size}" for size in range(8, 21, 4))]
+BURN_IN = 500
+
+
+@pytest.mark.parametrize("minimiser", list(minimisers))
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_response_from_rest(benchmark: Benchmark, name: str, minimiser: str) -> None:
+    evaluator = Evaluator(find_problem(name), minimiser=minimiser)
+    mask = record(name, BURN_IN + 250).masks[BURN_IN]
+    evaluator.respond(mask)
+    benchmark.pedantic(evaluator.respond, args=(mask,), rounds=20 if minimiser == "newton" else 1)
+
+
+@pytest.mark.parametrize("minimiser", list(minimisers))
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_ten_responses_along_a_chain(benchmark: Benchmark, name: str, minimiser: str) -> None:
+    evaluator = Evaluator(find_problem(name), minimiser=minimiser)
+    stretch = record(name, BURN_IN + 250).stretch(BURN_IN, 10)
+    if minimiser == "newton":
+        walk(evaluator, stretch)
+    evaluator.respond(stretch.masks[0])
+    evaluator.remember()
+    benchmark.pedantic(
+        walk_on, args=(evaluator, stretch), rounds=20 if minimiser == "newton" else 1
+    )
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_block_of_250_metropolis_steps(benchmark: Benchmark, name: str) -> None:
+    evaluator = Evaluator(find_problem(name))
+    settings = MetropolisSettings(steps=BURN_IN + 250)
+    for state, _ in chain_blocks(evaluator, MetropolisSettings(steps=BURN_IN), 0):
+        after = state
+    benchmark.pedantic(advance_chain, args=(evaluator, settings, 0, after), rounds=5)
