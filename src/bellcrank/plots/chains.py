@@ -93,7 +93,8 @@ class PathsStyle:
     human_efficiency, built_efficiency
         Of the human design and of the cleaned design that was chosen: horizontal lines.
     best
-        Chain and index in it of the design to mark; by default the highest.
+        Chain and index in it of the design that was chosen, to be marked; by default the
+        highest is.
     axis
         ``"accepted"`` changes (the paper) or ``"proposals"``.
     """

@@ -81,7 +81,7 @@ def draw_paths(
     best = _check(chains, shown)
     note = f"{len(chains)} chain{'s' * (len(chains) > 1)}"
     if best is not None:
-        note += f" · best design {chains[best[0]].efficiency[best[1]]:.3f}"
+        note += f" · {_word(shown)} design {chains[best[0]].efficiency[best[1]]:.3f}"
     if shown.human_efficiency is not None:
         note += f" · human design {shown.human_efficiency:.3f}"
     figure = style.new_figure(WIDTH, HEIGHT)
@@ -145,6 +145,11 @@ def _levels(shown: PathsStyle) -> list[tuple[float, Looks, str]]:
     return [(v, looks, words) for v, looks, words in lines if v is not None and np.isfinite(v)]
 
 
+def _word(shown: PathsStyle) -> str:
+    """Return what to call the marked design: a chosen one need not be the highest."""
+    return "best" if shown.best is None else "chosen"
+
+
 def _entries(
     chains: Sequence[ChainPath], shown: PathsStyle, best: tuple[int, int] | None
 ) -> list[tuple[str, Any]]:
@@ -158,7 +163,7 @@ def _entries(
     if best is not None:
         star = _marker_at(0.0, 0.0)
         star.set(**BEST_LINE, linestyle="solid")
-        entries.append(("best chain", star))
+        entries.append((f"{_word(shown)} chain", star))
     return entries + [(words, Line2D([], [], **looks)) for _, looks, words in _levels(shown)]
 
 
