@@ -63,9 +63,7 @@ def exact(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 def visited_states(problem: Problem, chain: int, steps: int) -> np.ndarray:
     """Index of the current design after each step of one chain."""
-    settings = MetropolisSettings(
-        steps=steps, schedule="constant", cold=TEMPERATURE, refuse_snapping=False
-    )
+    settings = MetropolisSettings(steps=steps, schedule="constant", cold=TEMPERATURE)
     powers = 2 ** np.arange(9, -1, -1)
     mask = problem.initial.copy()
     visited = []

@@ -179,5 +179,5 @@ def allocate_scratch(system: System, structure: Structure) -> Scratch:
         column=np.zeros((blocks, 4)),
         link=np.zeros((blocks, 3), np.int64),
         step=np.zeros((blocks, 2)),
-        vectors=np.zeros((8, nodes, 2)),
+        vectors=np.zeros((9, nodes, 2)),
     )

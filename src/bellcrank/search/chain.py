@@ -59,8 +59,6 @@ class ChainState:
         Of the current design.
     best
         Highest efficiency of an accepted design so far.
-    checked
-        Highest efficiency of a design whose whole path from rest was found stable.
     accepted
         Accepted proposals so far.
     rejections
@@ -72,7 +70,6 @@ class ChainState:
     efficiency: float
     cost: float
     best: float
-    checked: float
     accepted: int = 0
     rejections: int = 0
 
@@ -102,7 +99,6 @@ def start_chain(responder: Responder, settings: MetropolisSettings) -> ChainStat
         efficiency=response.efficiency,
         cost=costs[settings.cost].of(response.efficiency),
         best=response.efficiency,
-        checked=response.efficiency,
     )
 
 
@@ -175,7 +171,7 @@ def _advance_compiled(
     chain = Chain(
         mask=mask.astype(np.uint8),
         packed=np.packbits(mask),
-        value=np.array([state.efficiency, state.cost, state.best, state.checked]),
+        value=np.array([state.efficiency, state.cost, state.best]),
         counts=np.array([state.accepted, state.rejections]),
     )
     steps = len(uniforms)
@@ -192,18 +188,17 @@ def _advance_compiled(
         core=evaluator.core,
         minimum_degree=settings.minimum_degree,
         patience=settings.patience or NO_LIMIT,
-        refuse_snapping=settings.refuse_snapping,
     )
     made = advance(
         evaluator.system, evaluator.problem.designable, rules, settings.temperatures, uniforms,
         chain, evaluator.known, evaluator.structure, evaluator.displacement, evaluator.scratch,
         records,
     )  # fmt: skip
-    efficiency, cost, best, checked = chain.value.tolist()
+    efficiency, cost, best = chain.value.tolist()
     accepted, rejections = chain.counts.tolist()
     after = ChainState(
         state.step + made, chain.packed.tobytes().hex(), efficiency, cost, best,
-        checked, accepted, rejections,
+        accepted, rejections,
     )  # fmt: skip
     return after, Proposals(
         records.mask[:made],
@@ -230,7 +225,7 @@ def advance_in_python(
 
     The compiled loop in `bellcrank.search.kernels.metropolis` does the same, faster.
     """
-    from bellcrank.search.kernels.metropolis import FORBIDDEN, RECORD_MARGIN
+    from bellcrank.search.kernels.metropolis import FORBIDDEN
 
     problem = responder.problem
     mask = unpack_mask(state.mask, problem.lattice.beam_count).copy()
@@ -250,13 +245,6 @@ def advance_in_python(
             status, efficiency = int(response.status), response.efficiency
         cost = costs[settings.cost].of(efficiency)
         accepted = status == Status.CONVERGED and accepts(state.cost, cost, temperature, chance)
-        margin = RECORD_MARGIN * abs(state.checked)
-        if accepted and settings.refuse_snapping and efficiency > state.checked + margin:
-            response = responder.respond(mask)
-            status, efficiency = int(response.status), response.efficiency
-            cost = costs[settings.cost].of(efficiency)
-            accepted = status == Status.CONVERGED
-            state = replace(state, checked=efficiency if accepted else state.checked)
         rows.append((np.packbits(mask), efficiency, cost, temperature, accepted, status))
         state = replace(state, step=state.step + 1, rejections=state.rejections + 1)
         if accepted:

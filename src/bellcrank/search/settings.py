@@ -52,8 +52,6 @@ class MetropolisSettings:
         Least number of beams that a removal may leave at a free node; 0 for no rule.
     patience
         Rejections in a row after which a chain ends; None for never.
-    refuse_snapping
-        Refuse designs that would be the best of their chain but snap along their stroke.
 
     Raises
     ------
@@ -78,7 +76,6 @@ class MetropolisSettings:
     minimiser: str = "newton"
     minimum_degree: int = 0
     patience: int | None = None
-    refuse_snapping: bool = True
 
     def __post_init__(self) -> None:
         for name, least in (("steps", 1), ("chains", 1), ("seed", 0), ("annealing", 0)):

@@ -2,5 +2,6 @@
 
 from bellcrank.workflows.design import DesignReport, continue_design, start_design
 from bellcrank.workflows.find import find_design
+from bellcrank.workflows.pictures import draw_run, move
 
-__all__ = ["DesignReport", "continue_design", "find_design", "start_design"]
+__all__ = ["DesignReport", "continue_design", "draw_run", "find_design", "move", "start_design"]

@@ -160,4 +160,4 @@ class Scratch(NamedTuple):
     step: Floats
     """(n, 2) right-hand side and solution."""
     vectors: Floats
-    """(8, N, 2) displacements and directions kept by the minimisers."""
+    """(9, N, 2) displacements and directions kept by the minimisers."""

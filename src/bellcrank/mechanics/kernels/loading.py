@@ -26,6 +26,7 @@ from bellcrank.mechanics.kernels.fields import (
     clear,
     copy,
     dot,
+    largest_component,
     largest_difference,
     move,
     pair,
@@ -33,19 +34,30 @@ from bellcrank.mechanics.kernels.fields import (
 from bellcrank.mechanics.kernels.newton import descend, find_step, newton, take_step
 from bellcrank.mechanics.kernels.structure import ACTIVE, HANGING
 
-LARGEST_INCREMENT = 0.125
-SMALLEST_INCREMENT = 1.0 / 4096.0
+LARGEST_INCREMENT = 0.25
+SMALLEST_INCREMENT = 1.0 / 1024.0
+FINE_INCREMENT = 1.0 / 128.0
 LARGEST_CORRECTION = 0.15
 """Of an increment's prediction: more means that the path bends or jumps, so go slower."""
 LARGEST_SOFTENING = 0.6
-"""Change of the lowest stiffness in one increment, up or down, that calls for smaller ones."""
+"""Change of the lowest stiffness in one increment, up or down, that calls for smaller ones,
+down to `FINE_INCREMENT`."""
 DIP = 0.5
 """A path whose lowest stiffness falls below this part of its values before and after has
 passed near a loss of stability; whether a second equilibrium exists is then looked up."""
 DISTINCT = 1e-3
 """Distance, in lattice units, at which two equilibria are two."""
+LARGEST_NONLINEARITY = 0.6
+"""Departure of a response from the linear one, in parts of the largest displacement, beyond
+which it may belong to another branch than that reached from rest. Of 400 responses on wrong
+branches found along chains on the crane, none was below 0.65."""
 PROBE = 1e-6
+PATH_TOLERANCE = 1e-6
+"""Displacement error of equilibria on the way."""
 LONGEST_STEP = 0.5
+
+# Rows of `scratch.vectors` in use here; `descend` takes the last one.
+PREVIOUS, PREDICTED, MOVED, TANGENT, LAST_TANGENT, MODE, SOFTEST_MODE, TURNED = range(8)
 
 
 @kernel
@@ -100,27 +112,50 @@ def place_hanging_piece(
         u[node, 1] = shift_y + x * math.sin(angle) + y * (math.cos(angle) - 1.0)
 
 
-@inlined
-def predict(
+@kernel
+def find_tangent(
     system: System,
     structure: Structure,
     fraction: float,
-    increment: float,
     u: Floats,
+    tangent: Floats,
     scratch: Scratch,
-) -> float:
-    """Advance `u` along the tangent of the path; return the largest movement.
+) -> None:
+    """Fill `tangent` with the change of the equilibrium `u` per unit of load.
 
-    The factor at hand must be that of the equilibrium `u` at `fraction`. The change
-    of the gradient with the load is a difference over a very small increment.
+    With the factor at hand, which must be that of `u`. The change of the gradient with
+    the load is a difference over a very small increment.
     """
-    move_held_nodes(system, fraction + PROBE, u)
-    measure_held_beams(system, structure, u, scratch)
-    find_gradient(system, structure, fraction + PROBE, u, scratch)
-    size = find_step(system, structure, scratch) * increment / PROBE
-    take_step(system, increment / PROBE, u, scratch)
-    move_held_nodes(system, fraction + increment, u)
-    return size
+    gradient, moved = scratch.gradient, scratch.vectors[MOVED]
+    find_gradient(system, structure, fraction, u, scratch)
+    copy(gradient, tangent)
+    copy(u, moved)
+    move_held_nodes(system, fraction + PROBE, moved)
+    measure_held_beams(system, structure, moved, scratch)
+    find_gradient(system, structure, fraction + PROBE, moved, scratch)
+    move(gradient, -1.0, tangent)
+    find_step(system, structure, scratch)
+    clear(tangent, len(tangent))
+    take_step(system, 1.0 / PROBE, tangent, scratch)
+
+
+@inlined
+def extrapolate(
+    u: Floats, tangent: Floats, last_tangent: Floats, increment: float, last_increment: float
+) -> float:
+    """Advance `u` along the path to second order; return the largest movement.
+
+    The path's curvature comes from the tangents here and one increment ago.
+    """
+    bend = 0.5 * increment * increment / last_increment
+    largest = 0.0
+    for node in range(len(u)):
+        for axis in range(2):
+            curve = tangent[node, axis] - last_tangent[node, axis]
+            step = increment * tangent[node, axis] + bend * curve
+            u[node, axis] += step
+            largest = max(largest, abs(step))
+    return largest
 
 
 @kernel
@@ -165,7 +200,7 @@ def has_second_equilibrium(
     From the final state, what the structure has moved along that mode since is
     reflected, and the energy is followed down from there.
     """
-    other = scratch.vectors[4]
+    other = scratch.vectors[PREVIOUS]
     copy(u, other)
     along = 0.0
     size = dot(mode, mode)
@@ -179,25 +214,24 @@ def has_second_equilibrium(
     return largest_difference(other, u) > DISTINCT
 
 
-@inlined
-def advance_load(
-    system: System,
-    structure: Structure,
-    fraction: float,
-    increment: float,
-    u: Floats,
-    scratch: Scratch,
-) -> bool:
-    """Predict and correct one increment; False if it strays too far from the prediction."""
-    predicted = scratch.vectors[6]
-    size = predict(system, structure, fraction, increment, u, scratch)
-    if not size <= 4.0 * LONGEST_STEP:
-        return False
+@kernel
+def correct(
+    system: System, structure: Structure, fraction: float, size: float, u: Floats, scratch: Scratch
+) -> float:
+    """Bring a prediction to equilibrium; return the correction as a part of its `size`.
+
+    Infinite if the prediction leads to no stable equilibrium nearby.
+    """
+    predicted = scratch.vectors[PREDICTED]
+    move_held_nodes(system, fraction, u)
     copy(u, predicted)
-    status = newton(system, structure, fraction + increment, u, scratch, LONGEST_STEP, False)
+    if not size <= 4.0 * LONGEST_STEP:
+        return math.inf
+    tolerance = system.tolerance if fraction >= 1.0 else PATH_TOLERANCE
+    status = newton(system, structure, fraction, u, scratch, tolerance, LONGEST_STEP, True)
     if status != CONVERGED:
-        return False
-    return largest_difference(u, predicted) <= LARGEST_CORRECTION * size + 1e-6
+        return math.inf
+    return (largest_difference(u, predicted) - 1e-6) / size
 
 
 @kernel
@@ -209,6 +243,25 @@ def stiffness_is_definite(
     find_gradient(system, structure, fraction, u, scratch)
     find_stiffness(system, structure, False, scratch)
     return factorise(structure, scratch)
+
+
+@inlined
+def next_increment(ratio: float) -> float:
+    """Factor that brings the correction, which grows with the square, to what is allowed."""
+    return min(2.0, max(0.2, math.sqrt(0.7 * LARGEST_CORRECTION / max(ratio, 1e-9))))
+
+
+@kernel
+def is_nearly_linear(system: System, structure: Structure, u: Floats, scratch: Scratch) -> bool:
+    """Whether the response at full load is near what the stiffness at rest predicts."""
+    linear, tangent = scratch.vectors[PREVIOUS], scratch.vectors[TANGENT]
+    clear(linear, len(linear))
+    if not stiffness_is_definite(system, structure, 0.0, linear, scratch):
+        return False
+    find_tangent(system, structure, 0.0, linear, tangent, scratch)
+    copy(tangent, linear)
+    move_held_nodes(system, 1.0, linear)
+    return largest_difference(u, linear) <= LARGEST_NONLINEARITY * largest_component(u)
 
 
 @kernel
@@ -228,8 +281,9 @@ def follow_path(
     largest
         Upper bound on the increment (1 for none); small for a slow, fine check.
     """
-    previous, mode = scratch.vectors[5], scratch.vectors[3]
-    softest_mode, turned = scratch.vectors[2], scratch.vectors[1]
+    previous, mode = scratch.vectors[PREVIOUS], scratch.vectors[MODE]
+    tangent, last_tangent = scratch.vectors[TANGENT], scratch.vectors[LAST_TANGENT]
+    softest_mode, turned = scratch.vectors[SOFTEST_MODE], scratch.vectors[TURNED]
     for node in range(len(u)):
         for axis in range(2):
             u[node, axis] = 0.0
@@ -237,29 +291,35 @@ def follow_path(
     if not stiffness_is_definite(system, structure, 0.0, u, scratch):
         return UNCONVERGED
     at_rest = stiffness = softest = lowest_stiffness(system, structure, 12, mode, scratch)
+    find_tangent(system, structure, 0.0, u, tangent, scratch)
+    copy(tangent, last_tangent)
     fraction = 0.0
-    increment = min(LARGEST_INCREMENT, largest)
+    increment = last_increment = min(LARGEST_INCREMENT, largest)
     while fraction < 1.0 and increment >= SMALLEST_INCREMENT:
         increment = min(increment, 1.0 - fraction)
+        end = fraction + increment if increment < 1.0 - fraction else 1.0
         copy(u, previous)
-        advanced = advance_load(system, structure, fraction, increment, u, scratch)
+        size = extrapolate(u, tangent, last_tangent, increment, last_increment)
+        ratio = correct(system, structure, end, size, u, scratch)
         now = 0.0
-        if advanced:
+        if ratio <= LARGEST_CORRECTION and stiffness_is_definite(
+            system, structure, end, u, scratch
+        ):
             now = lowest_stiffness(system, structure, 4, mode, scratch)
-            advanced = is_near(stiffness, now) or increment < 1.0 / 256.0
-        if advanced:
-            fraction = fraction + increment if increment < 1.0 - fraction else 1.0
-            stiffness = now
+        if is_near(stiffness, now) or (now > 0.0 and increment < FINE_INCREMENT):
+            fraction, stiffness, last_increment = end, now, increment
             if now < softest:
                 softest = now
                 copy(mode, softest_mode)
                 copy(u, turned)
-            increment = min(2.0 * increment, LARGEST_INCREMENT, largest)
+            if fraction < 1.0:
+                copy(tangent, last_tangent)
+                find_tangent(system, structure, fraction, u, tangent, scratch)
+            increment *= next_increment(ratio)
+            increment = min(increment, LARGEST_INCREMENT, largest)
         else:
             copy(previous, u)
-            increment *= 0.5
-            if not stiffness_is_definite(system, structure, fraction, u, scratch):
-                break
+            increment *= min(0.5, next_increment(ratio))
     if fraction == 1.0:
         if softest < DIP * min(at_rest, stiffness) and has_second_equilibrium(
             system, structure, u, softest_mode, turned, scratch

@@ -67,12 +67,13 @@ def newton(
     fraction: float,
     u: Floats,
     scratch: Scratch,
+    tolerance: float,
     longest_step: float,
     daring: bool,
 ) -> int:
     """Move `u` to the stable equilibrium next to it at `fraction` of the load.
 
-    Gives up (UNCONVERGED) when the stiffness on the way is not positive definite,
+    Stops when the displacement is settled to within `tolerance`. Gives up (UNCONVERGED) when the stiffness on the way is not positive definite,
     when a step is longer than `longest_step`, or when steps grow: the caller then
     comes from nearer by. If `daring`, it shortens long steps and walks on over
     indefinite ground instead. Either way the equilibrium it ends at is stable.
@@ -97,7 +98,7 @@ def newton(
         take_step(system, min(1.0, longest_step / size), u, scratch)
         ratio = size / before if before < math.inf else 1.0
         left = 0.1 * size * min(1.0, ratio) if renew else size
-        if settled and left <= 0.1 * system.tolerance:
+        if settled and left <= 0.1 * tolerance:
             return CONVERGED
         if ratio > LARGEST_RATIO and not daring:
             return UNCONVERGED
@@ -131,7 +132,7 @@ def descend(
     equilibrium exists.
     """
     measure_held_beams(system, structure, u, scratch)
-    trial = scratch.vectors[7]
+    trial = scratch.vectors[8]
     energy = elastic_energy(system, structure, u, scratch) - work_of_load(system, fraction, u)
     for _ in range(500):
         find_gradient(system, structure, fraction, u, scratch)
@@ -140,7 +141,9 @@ def descend(
         size = find_step(system, structure, scratch)
         if size <= 1e-9:
             if shift == 0.0:
-                return newton(system, structure, fraction, u, scratch, 1e-3, False)
+                return newton(
+                    system, structure, fraction, u, scratch, system.tolerance, 1e-3, False
+                )
             for node in range(len(system.block)):
                 if system.block[node] >= 0 and structure.active[node]:
                     u[node, 0] += 1e-4 * math.sin(1.0 + node)
@@ -157,7 +160,7 @@ def descend(
                 break
             scale *= 0.5
         if scale <= 1e-12:
-            return newton(system, structure, fraction, u, scratch, 1e-3, False)
+            return newton(system, structure, fraction, u, scratch, system.tolerance, 1e-3, False)
         copy(trial, u)
         energy = lower
     return UNCONVERGED

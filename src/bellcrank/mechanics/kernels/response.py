@@ -20,6 +20,7 @@ from bellcrank.mechanics.kernels.fields import clear, copy, pair
 from bellcrank.mechanics.kernels.loading import (
     LONGEST_STEP,
     follow_path,
+    is_nearly_linear,
     move_held_nodes,
     place_hanging_pieces,
 )
@@ -135,7 +136,7 @@ def guess_from_neighbour(
     A node that moved neither before nor is held takes the displacement of its parent
     plus the turn of its offset by the parent's rotation.
     """
-    rotation = scratch.vectors[7, :, 0]
+    rotation = scratch.vectors[8, :, 0]
     for node in range(len(u)):
         active = structure.active[node] == ACTIVE
         for axis in range(2):
@@ -179,16 +180,16 @@ def find_from_neighbour(
 ) -> tuple[int, float]:
     """As `find_from_rest`, but start from the equilibrium of a similar design.
 
-    Only an accelerator: where the way is not short and stable, the design is loaded
-    from rest after all.
+    Only an accelerator: where the way is not short and stable, or the response so
+    nonlinear that there may be others, the design is loaded from rest after all.
     """
     clear(u, len(u))
     status = build_structure(system, mask, core, structure)
     efficiency = math.nan
     if status != MECHANISM:
         guess_from_neighbour(system, known, structure, u, scratch)
-        status = newton(system, structure, 1.0, u, scratch, LONGEST_STEP, True)
-        if status != CONVERGED:
+        status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP, True)
+        if status != CONVERGED or not is_nearly_linear(system, structure, u, scratch):
             status = follow_path(system, structure, u, scratch, 1.0)
         place_hanging_pieces(system, structure, u)
         efficiency = efficiency_of(system, u)

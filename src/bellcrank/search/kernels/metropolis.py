@@ -19,7 +19,6 @@ from bellcrank.mechanics.kernels.arrays import (
 )
 from bellcrank.mechanics.kernels.response import (
     find_from_neighbour,
-    find_from_rest,
     remember,
 )
 
@@ -30,9 +29,6 @@ FORBIDDEN = 4
 """Status of a proposal that breaks a rule on designs and is refused unevaluated."""
 
 
-RECORD_MARGIN = 0.01
-
-
 class Rules(NamedTuple):
     """What the search is told, as plain numbers."""
 
@@ -41,7 +37,6 @@ class Rules(NamedTuple):
     minimum_degree: int
     patience: int
     """Rejections in a row after which the chain ends."""
-    refuse_snapping: bool
 
 
 class Chain(NamedTuple):
@@ -52,8 +47,7 @@ class Chain(NamedTuple):
     packed: Bytes
     """The same as bits."""
     value: Floats
-    """(4,) efficiency and cost of the current design; the best efficiency so far, and the
-    best whose path from rest was checked."""
+    """(3,) efficiency and cost of the current design, best efficiency so far."""
     counts: Ints
     """(2,) accepted steps, rejections in a row."""
 
@@ -83,12 +77,6 @@ def cost_of(code: int, efficiency: float) -> float:
 def accepts(old_cost: float, new_cost: float, temperature: float, uniform: float) -> bool:
     """Metropolis' rule: always downhill, uphill with probability exp(-rise / T)."""
     return new_cost <= old_cost or uniform < math.exp((old_cost - new_cost) / temperature)
-
-
-@kernel
-def is_record(efficiency: float, checked: float) -> bool:
-    """Whether a design is so much better than the best checked one that it must be checked."""
-    return efficiency > checked + RECORD_MARGIN * abs(checked)
 
 
 @kernel
@@ -128,8 +116,8 @@ def advance(
 ) -> int:
     """Make one proposal for each row of `uniforms`; return how many were made.
 
-    A proposal that beats the best checked design of the chain by a margin is loaded again
-    from rest along its whole path, and refused if it snaps.
+    Only a design with a unique, stable response can be accepted: one that snaps along its
+    stroke, or is a mechanism, is refused whatever the temperature.
 
     Parameters
     ----------
@@ -155,14 +143,6 @@ def advance(
         accepted = status == CONVERGED and accepts(
             chain.value[1], cost, temperature, uniforms[step, 1]
         )
-        if accepted and rules.refuse_snapping and is_record(efficiency, chain.value[3]):
-            status, efficiency = find_from_rest(
-                system, chain.mask, rules.core, 1.0, structure, u, scratch
-            )
-            cost = cost_of(rules.cost, efficiency)
-            accepted = status == CONVERGED
-            if accepted:
-                chain.value[3] = efficiency
         for byte in range(len(chain.packed)):
             records.mask[step, byte] = chain.packed[byte]
         records.efficiency[step] = efficiency
