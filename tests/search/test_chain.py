@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bellcrank.runs import Proposals
 
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.mechanics import Evaluator, Response, Status
 from bellcrank.model import Problem, find_problem, unpack_mask
+from bellcrank.runs import Proposals
 from bellcrank.search import (
     BLOCK,
     ChainState,

@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Evaluator, Status, load_bearing_core
+from bellcrank.mechanics import Evaluator, Status
 from bellcrank.model import Problem, find_problem
-from bellcrank.search import Candidate, candidates_of, pieces, plateaus, select
+from bellcrank.search import (
+    Candidate,
+    candidates_of,
+    clean,
+    loaded_beams,
+    pieces,
+    plateaus,
+    select,
+)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +65,7 @@ def test_the_selected_design_is_cleaned_and_reported_before_and_after(small: Pro
     while True:
         mask = small.initial.copy()
         mask[rng.choice(small.designable, 80, replace=False)] = False
-        core = load_bearing_core(small.full_design().with_mask(mask))
+        core = clean(small.full_design().with_mask(mask)).mask
         response = evaluator.respond(core)
         if (core != mask).any() and response.status is Status.CONVERGED and response.efficiency:
             break
@@ -94,3 +102,32 @@ def test_pieces_are_counted(small: Problem) -> None:
     )
     mask[[0, apart]] = True
     assert pieces(small, mask) == 2
+
+
+def kept_by_definition(problem: Problem, mask: np.ndarray) -> np.ndarray:
+    """The same as `loaded_beams`, by taking out each node in turn."""
+    terminals = {*problem.supports.nodes, *problem.input.nodes, *problem.output.nodes}
+    kept = mask.copy()
+    for cut in range(problem.lattice.node_count):
+        reached = {int(node) for node in terminals if node != cut}
+        beams = [tuple(ends) for ends in problem.lattice.beams[mask].tolist() if cut not in ends]
+        growing = True
+        while growing:
+            more = {b for a, b in beams if a in reached} | {a for a, b in beams if b in reached}
+            growing = not more <= reached
+            reached |= more
+        for beam in np.flatnonzero(mask):
+            far = [int(node) for node in problem.lattice.beams[beam] if node != cut]
+            if not set(far) <= reached:
+                kept[beam] = False
+    return kept
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_hangs_by_one_node_carries_no_load(small: Problem, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mask = small.initial.copy()
+    mask[rng.choice(small.designable, 110, replace=False)] = False
+    kept = loaded_beams(small, mask)
+    assert np.array_equal(kept, kept_by_definition(small, mask))
+    assert kept.sum() < mask.sum()

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
         System,
     )
 
-FORCE_TOLERANCE = 1e-11
+FORCE_TOLERANCE = 1e-12
 """Largest force, in units of bond stiffness times lattice spacing, at which the
 first-order minimisers stop."""
 

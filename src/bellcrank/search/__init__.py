@@ -15,6 +15,7 @@ from bellcrank.search.chain import (
     is_done,
     start_chain,
 )
+from bellcrank.search.cleaning import clean, loaded_beams
 from bellcrank.search.costs import Cost, costs
 from bellcrank.search.parallel import Progress, default_workers, run_chain, run_chains
 from bellcrank.search.schedules import schedules
@@ -41,9 +42,11 @@ __all__ = [
     "advance_in_python",
     "candidates_of",
     "chain_blocks",
+    "clean",
     "costs",
     "default_workers",
     "is_done",
+    "loaded_beams",
     "pieces",
     "plateaus",
     "run_chain",

@@ -255,10 +255,14 @@ def advance_in_python(
             responder.remember()
         else:
             mask[beam] ^= True
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    masks, efficiencies, all_costs, temperatures_seen, taken, statuses = zip(*rows, strict=True)
     return replace(state, mask=pack_mask(mask)), Proposals(
-        *columns[:5],
-        columns[5].astype(np.int8),
+        np.array(masks),
+        np.array(efficiencies),
+        np.array(all_costs),
+        np.array(temperatures_seen),
+        np.array(taken),
+        np.array(statuses, dtype=np.int8),
     )
 
 

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Evaluator, Response, Status, load_bearing_core
+from bellcrank.mechanics import Evaluator, Response, Status
 from bellcrank.model import Design, Problem
+from bellcrank.search.cleaning import clean
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -161,16 +162,16 @@ def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:
 def _cleaned(
     problem: Problem, candidates: Iterable[Candidate]
 ) -> Iterator[tuple[Candidate, Design]]:
-    """Yield each candidate with its load-bearing core, each core once."""
+    """Yield each candidate cleaned, each cleaned design once."""
     seen: set[bytes] = set()
     for candidate in candidates:
         bits = np.unpackbits(np.frombuffer(candidate.mask, np.uint8))
         raw = Design(problem, bits[: problem.lattice.beam_count].astype(bool))
-        core = load_bearing_core(raw)
-        key = np.packbits(core).tobytes()
+        cleaned = clean(raw)
+        key = np.packbits(cleaned.mask).tobytes()
         if key not in seen:
             seen.add(key)
-            yield candidate, raw.with_mask(core)
+            yield candidate, cleaned
 
 
 def select(

@@ -8,7 +8,6 @@ import numpy as np
 
 from bellcrank.mechanics import Evaluator, Status
 from bellcrank.plots import ChainPath, Motion, PathsStyle, draw_comparison, draw_motion, draw_paths
-
 from bellcrank.runs import RunFolder
 from bellcrank.search import MetropolisSettings
 

@@ -73,7 +73,8 @@ def newton(
 ) -> int:
     """Move `u` to the stable equilibrium next to it at `fraction` of the load.
 
-    Stops when the displacement is settled to within `tolerance`. Gives up (UNCONVERGED) when the stiffness on the way is not positive definite,
+    Stops when the displacement is settled to within `tolerance`. Gives up (UNCONVERGED)
+    when the stiffness on the way is not positive definite,
     when a step is longer than `longest_step`, or when steps grow: the caller then
     comes from nearer by. If `daring`, it shortens long steps and walks on over
     indefinite ground instead. Either way the equilibrium it ends at is stable.

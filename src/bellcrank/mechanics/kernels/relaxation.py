@@ -105,7 +105,7 @@ def fire(
     clear(velocity, len(u))
     mixing, uphill_free = 0.1, 0
     time_step = 0.1 / math.sqrt(system.bond)
-    longest_time_step = 6.0 * time_step
+    longest_time_step = 4.0 * time_step
     for _ in range(MOST_EVALUATIONS):
         find_gradient(system, structure, fraction, u, scratch)
         if largest_component(scratch.gradient) <= force_tolerance:

@@ -19,8 +19,8 @@ from bellcrank.mechanics.kernels.energy import beam_rotation, elastic_energy
 from bellcrank.mechanics.kernels.fields import clear, copy, pair
 from bellcrank.mechanics.kernels.loading import (
     LONGEST_STEP,
+    agrees_with_tangents,
     follow_path,
-    is_nearly_linear,
     move_held_nodes,
     place_hanging_pieces,
 )
@@ -156,6 +156,7 @@ def guess_from_neighbour(
         y = system.positions[node, 1] - system.positions[parent, 1]
         u[node, 0] = u[parent, 0] + x * (math.cos(angle) - 1.0) - y * math.sin(angle)
         u[node, 1] = u[parent, 1] + x * math.sin(angle) + y * (math.cos(angle) - 1.0)
+    move_held_nodes(system, 1.0, u)
 
 
 @kernel
@@ -189,7 +190,7 @@ def find_from_neighbour(
     if status != MECHANISM:
         guess_from_neighbour(system, known, structure, u, scratch)
         status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP, True)
-        if status != CONVERGED or not is_nearly_linear(system, structure, u, scratch):
+        if status != CONVERGED or not agrees_with_tangents(system, structure, known.u, u, scratch):
             status = follow_path(system, structure, u, scratch, 1.0)
         place_hanging_pieces(system, structure, u)
         efficiency = efficiency_of(system, u)

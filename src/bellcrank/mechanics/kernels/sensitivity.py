@@ -11,8 +11,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import (
+    HELD,
     HELD_X,
     HELD_Y,
     Bytes,
@@ -107,6 +110,23 @@ def neighbours_around(
 
 
 @kernel
+def find_anchored(system: System, structure: Structure) -> Bytes:
+    """Mark the nodes that something holds: moved by the drive, or tied to a support."""
+    anchored = np.zeros(len(system.held), np.uint8)
+    for node in range(len(anchored)):
+        anchored[node] = structure.active[node] == ACTIVE or system.held[node] == HELD
+    spreading = True
+    while spreading:
+        spreading = False
+        for beam in range(len(structure.present)):
+            first, second = system.beams[beam, 0], system.beams[beam, 1]
+            if structure.present[beam] and anchored[first] != anchored[second]:
+                anchored[first] = anchored[second] = 1
+                spreading = True
+    return anchored
+
+
+@kernel
 def spring_share(weight: float, a: int, b: int, rotation: Floats, rate: Floats) -> float:
     """Contribution of one angular spring to a.dg."""
     return 2.0 * weight * (rotation[b] - rotation[a]) * (rate[b] - rate[a])
@@ -117,22 +137,23 @@ def presence_share(
     system: System,
     structure: Structure,
     beam: int,
+    counts: Bytes,
     bond_share: float,
     rotation: Floats,
     rate: Floats,
 ) -> float:
     """a.dg of a beam being there: its bond, and its springs instead of the one they split.
 
-    An end that nothing moves does not count; a beam with such an end is a dead end,
-    unstressed, and turned by half the angle between its neighbours at the other end.
+    A beam with an end that is loose is a dead end: unstressed, and turned by half the
+    angle between its neighbours at the other end.
     """
     first, second = system.beams[beam, 0], system.beams[beam, 1]
-    dead_end = structure.active[first] != ACTIVE or structure.active[second] != ACTIVE
+    dead_end = not (counts[first] and counts[second])
     total = 0.0 if dead_end else bond_share
     for end in range(2):
         node = system.beams[beam, end]
         before, after = neighbours_around(system, structure, beam, node)
-        if structure.active[node] != ACTIVE or before < 0:
+        if not counts[node] or before < 0:
             continue
         if dead_end:
             total -= 0.5 * spring_share(system.angle, before, after, rotation, rate)
@@ -174,15 +195,14 @@ def find_sensitivity(
             sensitivity[beam] += scratch.axis[beam, axis] * stretch
         extension = scratch.length[beam] - system.rest_length[beam]
         sensitivity[beam] *= 2.0 * system.bond * extension
+    counts = find_anchored(system, structure)
     for beam in range(len(mask)):
-        moved = (
-            structure.active[system.beams[beam, 0]] == ACTIVE,
-            structure.active[system.beams[beam, 1]] == ACTIVE,
-        )
-        counts = (moved[0] and moved[1]) or (not core and (moved[0] or moved[1]))
-        if not counts or mask[beam] != structure.present[beam]:
+        first, second = system.beams[beam, 0], system.beams[beam, 1]
+        moved = structure.active[first] == ACTIVE or structure.active[second] == ACTIVE
+        felt = moved and (not core or (counts[first] and counts[second]))
+        if not felt or mask[beam] != structure.present[beam]:
             sensitivity[beam] = 0.0
             continue
-        share = presence_share(system, structure, beam, sensitivity[beam], rotation, rate)
+        share = presence_share(system, structure, beam, counts, sensitivity[beam], rotation, rate)
         sensitivity[beam] = share if mask[beam] else -share
     return True

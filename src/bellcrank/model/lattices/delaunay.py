@@ -69,7 +69,7 @@ def displaced_delaunay(
 
 
 def _triangulate(positions: NDArray[np.float64]) -> NDArray[np.int64]:
-    from scipy.spatial import Delaunay  # noqa: PLC0415 - keeps `import bellcrank.model` fast
+    from scipy.spatial import Delaunay
 
     triangles: NDArray[np.int64] = Delaunay(positions).simplices.astype(np.int64)
     return triangles

@@ -117,7 +117,7 @@ def _close_pairs(
     positions: NDArray[np.float64], radii: NDArray[np.float64], box: float
 ) -> NDArray[np.int64]:
     """List all pairs that may come into contact soon, in a fixed order."""
-    from scipy.spatial import cKDTree  # noqa: PLC0415 - keeps `import bellcrank.model` fast
+    from scipy.spatial import cKDTree
 
     reach = 2.0 * float(radii.max()) + SKIN
     tree = cKDTree(positions % box, boxsize=np.full(2, box))

@@ -1,0 +1,100 @@
+"""What a real part can do without: loose pieces, dead ends, and whatever hangs by one node."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import load_bearing_core
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Design, Problem
+
+
+def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the beams on some way between two nodes that are held, driven or watched.
+
+    A part that hangs by a single node is in equilibrium without any force in that node,
+    whatever its shape: it carries nothing. With one extra node tied to all held, driven
+    and output nodes, what carries load is the biconnected components of that node.
+
+    Parameters
+    ----------
+    mask : (M,) bool
+
+    Returns
+    -------
+    (M,) bool
+        A part of `mask`.
+    """
+    nodes = problem.lattice.node_count
+    terminals = {*problem.supports.nodes, *problem.input.nodes, *problem.output.nodes}
+    links: list[list[tuple[int, int]]] = [[] for _ in range(nodes + 1)]
+    for beam in np.flatnonzero(mask).tolist():
+        first, second = problem.lattice.beams[beam].tolist()
+        links[first].append((second, beam))
+        links[second].append((first, beam))
+    for number, node in enumerate(sorted(int(node) for node in terminals)):
+        tie = -1 - number
+        links[nodes].append((node, tie))
+        links[node].append((nodes, tie))
+    kept = np.zeros(len(mask), dtype=bool)
+    for component in _components_at(links, nodes):
+        kept[[beam for beam in component if beam >= 0]] = True
+    return kept
+
+
+def _components_at(links: list[list[tuple[int, int]]], root: int) -> list[list[int]]:
+    """Biconnected components that contain the root, as lists of edges.
+
+    Depth-first search with low points (Hopcroft and Tarjan, Commun. ACM 16, 372, 1973):
+    a component is complete when a branch below a node reaches no higher than the node.
+    """
+    depth = {root: 0}
+    low = {root: 0}
+    edges: list[int] = []
+    found: list[list[int]] = []
+    stack = [(root, 0, iter(links[root]), 0)]
+    while stack:
+        node, came_by, rest, mark = stack[-1]
+        for far, edge in rest:
+            if far not in depth:
+                depth[far] = low[far] = depth[node] + 1
+                stack.append((far, edge, iter(links[far]), len(edges)))
+                edges.append(edge)
+                break
+            if edge != came_by and depth[far] < depth[node]:
+                edges.append(edge)
+                low[node] = min(low[node], depth[far])
+        else:
+            stack.pop()
+            if stack:
+                parent = stack[-1][0]
+                low[parent] = min(low[parent], low[node])
+                if low[node] >= depth[parent]:
+                    component = edges[mark:]
+                    del edges[mark:]
+                    if parent == root:
+                        found.append(component)
+    return found
+
+
+def clean(design: Design) -> Design:
+    """Leave out of a design what no load can reach.
+
+    First the load-bearing core (no loose pieces, no dead ends), then what hangs by a
+    single node. In the model such parts soften the joint they hang at; in a real part
+    they are idle mass.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> crane = find_problem("crane").full_design()
+    >>> clean(crane).beam_count
+    352
+    """
+    core = load_bearing_core(design)
+    return design.with_mask(loaded_beams(design.problem, core))
