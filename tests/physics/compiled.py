@@ -27,4 +27,4 @@ def assemble_stiffness(system, mask, u, structure, scratch):
     build_structure(system, mask, False, structure)
     measure_held_beams(system, structure, u, scratch)
     find_gradient(system, structure, 0.0, u, scratch)
-    find_stiffness(system, structure, False, scratch)
+    find_stiffness(system, structure, 1.0, scratch)

@@ -20,6 +20,7 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
+from bellcrank.mechanics.kernels.tangents import MOST_KNOTS, ROWS
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
 
 if TYPE_CHECKING:
@@ -179,5 +180,6 @@ def allocate_scratch(system: System, structure: Structure) -> Scratch:
         column=np.zeros((blocks, 4)),
         link=np.zeros((blocks, 3), np.int64),
         step=np.zeros((blocks, 2)),
-        vectors=np.zeros((9, nodes, 2)),
+        vectors=np.zeros((ROWS, nodes, 2)),
+        knots=np.zeros((MOST_KNOTS, 2)),
     )

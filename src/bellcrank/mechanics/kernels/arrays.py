@@ -160,4 +160,6 @@ class Scratch(NamedTuple):
     step: Floats
     """(n, 2) right-hand side and solution."""
     vectors: Floats
-    """(9, N, 2) displacements and directions kept by the minimisers."""
+    """(ROWS, N, 2) displacements and directions kept by the minimisers."""
+    knots: Floats
+    """(MOST_KNOTS, 2) load and lowest stiffness of equilibria between rest and full load."""

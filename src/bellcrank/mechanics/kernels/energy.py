@@ -141,7 +141,7 @@ def add_to_off_diagonal(
 
 @kernel
 def add_beam_stiffness(
-    system: System, structure: Structure, beam: int, definite: bool, scratch: Scratch
+    system: System, structure: Structure, beam: int, softening: float, scratch: Scratch
 ) -> None:
     """Add the block B of one beam: +B on its ends' diagonals, -B between them."""
     first, second = pair(system.beams, beam)
@@ -149,10 +149,8 @@ def add_beam_stiffness(
     x, y = pair(scratch.axis, beam)
     along = 2.0 * system.bond
     tension = along * (1.0 - system.rest_length[beam] / length)
-    skew = scratch.torque[beam] / (length * length)
-    if definite:
-        tension = max(0.0, tension)
-        skew = 0.0
+    tension = max(tension, softening * tension)
+    skew = softening * scratch.torque[beam] / (length * length)
     across = tension + scratch.turn_weight[beam] / (length * length)
     xx = along * x * x + across * y * y + 2.0 * skew * x * y
     yy = along * y * y + across * x * x - 2.0 * skew * x * y
@@ -208,16 +206,21 @@ def add_spring_stiffness(
 
 
 @kernel
-def find_stiffness(system: System, structure: Structure, definite: bool, scratch: Scratch) -> None:
+def find_stiffness(
+    system: System, structure: Structure, softening: float, scratch: Scratch
+) -> None:
     """Assemble the second derivative of the energy; call `find_gradient` first.
 
-    With `definite`, leave out what can make it indefinite, the softening by compression
-    and by moments: a safe slope to walk down on, not the stiffness.
+    Parameters
+    ----------
+    softening
+        1 for the stiffness; 0 to leave out what can make it indefinite, the softening by
+        compression and by moments: a safe slope to walk down on.
     """
     clear(scratch.diagonal, len(scratch.diagonal))
     clear(scratch.off_diagonal, structure.column_start[len(scratch.diagonal)])
     for index in range(structure.sizes[1]):
-        add_beam_stiffness(system, structure, structure.beam[index], definite, scratch)
+        add_beam_stiffness(system, structure, structure.beam[index], softening, scratch)
     for spring in range(structure.sizes[3]):
         add_spring_stiffness(system, structure, spring, scratch)
     rollers = False

@@ -29,13 +29,11 @@ from bellcrank.mechanics.kernels.energy import (
 )
 from bellcrank.mechanics.kernels.fields import copy, largest_component
 
-MOST_ITERATIONS = 25
+MOST_ITERATIONS = 10
 CHORD_STEP = 2e-3
 """Below this step the stiffness is good enough to be used once more."""
 CHORD_RATIO = 0.05
 """Unless steps no longer shrink by this factor."""
-LARGEST_RATIO = 2.0
-"""Of a step to the one before, beyond which the iteration is lost."""
 
 
 @kernel
@@ -69,15 +67,13 @@ def newton(
     scratch: Scratch,
     tolerance: float,
     longest_step: float,
-    daring: bool,
 ) -> int:
     """Move `u` to the stable equilibrium next to it at `fraction` of the load.
 
-    Stops when the displacement is settled to within `tolerance`. Gives up (UNCONVERGED)
-    when the stiffness on the way is not positive definite,
-    when a step is longer than `longest_step`, or when steps grow: the caller then
-    comes from nearer by. If `daring`, it shortens long steps and walks on over
-    indefinite ground instead. Either way the equilibrium it ends at is stable.
+    Stops when the displacement is settled to within `tolerance`. Steps longer than
+    `longest_step` are shortened; where the stiffness is not positive definite, the part of
+    it that always is shows the way. The equilibrium it ends at is stable. UNCONVERGED
+    means that it was not reached: the caller then comes from nearer by.
     """
     measure_held_beams(system, structure, u, scratch)
     size = before = math.inf
@@ -86,23 +82,21 @@ def newton(
         find_gradient(system, structure, fraction, u, scratch)
         settled = True
         if renew:
-            find_stiffness(system, structure, False, scratch)
+            find_stiffness(system, structure, 1.0, scratch)
             if not factorise(structure, scratch):
                 settled = False
-                find_stiffness(system, structure, True, scratch)
-                if not (daring and factorise(structure, scratch)):
+                find_stiffness(system, structure, 0.0, scratch)
+                if not factorise(structure, scratch):
                     return UNCONVERGED
         before = size
         size = find_step(system, structure, scratch)
-        if not (size <= longest_step or (daring and size < math.inf)):
+        if not size < math.inf:
             return UNCONVERGED
         take_step(system, min(1.0, longest_step / size), u, scratch)
         ratio = size / before if before < math.inf else 1.0
         left = 0.1 * size * min(1.0, ratio) if renew else size
         if settled and left <= 0.1 * tolerance:
             return CONVERGED
-        if ratio > LARGEST_RATIO and not daring:
-            return UNCONVERGED
         renew = size > CHORD_STEP or not settled or (ratio > CHORD_RATIO and before < math.inf)
     return UNCONVERGED
 
@@ -137,14 +131,12 @@ def descend(
     energy = elastic_energy(system, structure, u, scratch) - work_of_load(system, fraction, u)
     for _ in range(500):
         find_gradient(system, structure, fraction, u, scratch)
-        find_stiffness(system, structure, False, scratch)
+        find_stiffness(system, structure, 1.0, scratch)
         shift = shift_until_definite(structure, scratch, 1e-3 * system.angle)
         size = find_step(system, structure, scratch)
         if size <= 1e-9:
             if shift == 0.0:
-                return newton(
-                    system, structure, fraction, u, scratch, system.tolerance, 1e-3, False
-                )
+                return newton(system, structure, fraction, u, scratch, system.tolerance, 1e-3)
             for node in range(len(system.block)):
                 if system.block[node] >= 0 and structure.active[node]:
                     u[node, 0] += 1e-4 * math.sin(1.0 + node)
@@ -161,7 +153,7 @@ def descend(
                 break
             scale *= 0.5
         if scale <= 1e-12:
-            return newton(system, structure, fraction, u, scratch, system.tolerance, 1e-3, False)
+            return newton(system, structure, fraction, u, scratch, system.tolerance, 1e-3)
         copy(trial, u)
         energy = lower
     return UNCONVERGED

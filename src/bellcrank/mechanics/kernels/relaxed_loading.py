@@ -20,14 +20,11 @@ from bellcrank.mechanics.kernels.arrays import (
 )
 from bellcrank.mechanics.kernels.energy import elastic_energy
 from bellcrank.mechanics.kernels.fields import clear, copy, largest_difference, move
-from bellcrank.mechanics.kernels.loading import (
-    move_held_nodes,
-    place_hanging_pieces,
-    stiffness_is_definite,
-)
+from bellcrank.mechanics.kernels.loading import place_hanging_pieces
 from bellcrank.mechanics.kernels.relaxation import conjugate_gradient, fire
 from bellcrank.mechanics.kernels.response import efficiency_of, guess_from_neighbour
 from bellcrank.mechanics.kernels.structure import build_structure
+from bellcrank.mechanics.kernels.tangents import move_held_nodes, stiffness_is_definite
 
 INCREMENTS = 8
 LARGEST_GROWTH = 4.0

@@ -8,6 +8,8 @@ from bellcrank.mechanics.kernels._compile import entry, inlined, kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
     MECHANISM,
+    SNAPPED,
+    UNCONVERGED,
     Bytes,
     Floats,
     Known,
@@ -15,17 +17,16 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
+from bellcrank.mechanics.kernels.branch import judge
 from bellcrank.mechanics.kernels.energy import beam_rotation, elastic_energy
-from bellcrank.mechanics.kernels.fields import clear, copy, pair
+from bellcrank.mechanics.kernels.fields import clear, copy, largest_difference, pair
 from bellcrank.mechanics.kernels.loading import (
-    LONGEST_STEP,
-    agrees_with_tangents,
     follow_path,
-    move_held_nodes,
     place_hanging_pieces,
 )
 from bellcrank.mechanics.kernels.newton import newton
 from bellcrank.mechanics.kernels.structure import ACTIVE, build_structure
+from bellcrank.mechanics.kernels.tangents import LONGEST_STEP, move_held_nodes
 
 
 @kernel
@@ -71,6 +72,40 @@ def efficiency_of(system: System, u: Floats) -> float:
 
 
 @inlined
+def find_equilibrium(
+    system: System,
+    structure: Structure,
+    known_u: Floats,
+    u: Floats,
+    status: int,
+    finest: float,
+    scratch: Scratch,
+) -> int:
+    """Judge the equilibrium `u`; if there is none or it fails, load from rest and judge again.
+
+    Parameters
+    ----------
+    known_u
+        Equilibrium of another design that `u` was found from.
+    status
+        CONVERGED if there is a `u` to judge.
+    """
+    loaded = status != CONVERGED
+    while True:
+        if loaded:
+            status = follow_path(system, structure, u, scratch, finest)
+        if status != CONVERGED:
+            return status
+        jump = 0.0 if loaded else largest_difference(u, known_u)
+        status = judge(system, structure, u, jump, scratch)
+        if status != UNCONVERGED:
+            return status
+        if loaded:
+            return SNAPPED
+        loaded = True
+
+
+@inlined
 def find_from_rest(
     system: System,
     mask: Bytes,
@@ -85,7 +120,7 @@ def find_from_rest(
     status = build_structure(system, mask, core, structure)
     efficiency = math.nan
     if status != MECHANISM:
-        status = follow_path(system, structure, u, scratch, finest)
+        status = find_equilibrium(system, structure, u, u, UNCONVERGED, finest, scratch)
         place_hanging_pieces(system, structure, u)
         efficiency = efficiency_of(system, u)
     return status, efficiency
@@ -189,9 +224,8 @@ def find_from_neighbour(
     efficiency = math.nan
     if status != MECHANISM:
         guess_from_neighbour(system, known, structure, u, scratch)
-        status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP, True)
-        if status != CONVERGED or not agrees_with_tangents(system, structure, known.u, u, scratch):
-            status = follow_path(system, structure, u, scratch, 1.0)
+        status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP)
+        status = find_equilibrium(system, structure, known.u, u, status, 1.0, scratch)
         place_hanging_pieces(system, structure, u)
         efficiency = efficiency_of(system, u)
     return status, efficiency

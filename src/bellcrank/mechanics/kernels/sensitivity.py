@@ -27,10 +27,10 @@ from bellcrank.mechanics.kernels.arrays import (
 from bellcrank.mechanics.kernels.cholesky import solve
 from bellcrank.mechanics.kernels.energy import measure_beam
 from bellcrank.mechanics.kernels.fields import clear
-from bellcrank.mechanics.kernels.loading import stiffness_is_definite
 from bellcrank.mechanics.kernels.newton import take_step
 from bellcrank.mechanics.kernels.response import efficiency_of, input_motion
 from bellcrank.mechanics.kernels.structure import ACTIVE
+from bellcrank.mechanics.kernels.tangents import stiffness_is_definite
 
 
 @kernel

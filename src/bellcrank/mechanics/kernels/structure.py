@@ -62,13 +62,14 @@ def strip_dead_ends(system: System, present: Bytes) -> None:
 
 
 @kernel
-def discover(system: System, structure: Structure, start: int, count: int) -> int:
-    """Append all nodes reachable from `start` to the order; return the new count."""
+def discover(system: System, structure: Structure, start: int) -> None:
+    """Append all nodes reachable from `start` to the order."""
     active, order, parent = structure.active, structure.order, structure.parent
+    count = structure.sizes[0]
+    head = count
     active[start] = ACTIVE
     parent[start] = -1
     order[count] = start
-    head = count
     count += 1
     while head < count:
         node = order[head]
@@ -82,7 +83,7 @@ def discover(system: System, structure: Structure, start: int, count: int) -> in
                     parent[far] = node
                     order[count] = far
                     count += 1
-    return count
+    structure.sizes[0] = count
 
 
 @kernel
@@ -156,13 +157,12 @@ def find_pieces(system: System, structure: Structure) -> int:
     for node in range(len(structure.active)):
         structure.active[node] = 0
     status = CONVERGED
-    count = 0
+    structure.sizes[0] = 0
     for start in system.input_nodes:
         if not structure.active[start]:
-            first = count
-            count = discover(system, structure, start, first)
-            status = max(status, judge_piece(system, structure, first, count))
-    structure.sizes[0] = count
+            first = structure.sizes[0]
+            discover(system, structure, start)
+            status = max(status, judge_piece(system, structure, first, structure.sizes[0]))
     return status
 
 
