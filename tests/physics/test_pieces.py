@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from bellcrank.mechanics import Evaluator, Status
-from bellcrank.mechanics.kernels.structure import build_structure_from_python
 from bellcrank.model import Problem, find_problem
 
 from .problems import arm_on, frame, patch, random_masks
@@ -34,7 +33,7 @@ def springs_of(problem: Problem, mask: NDArray[np.bool_]) -> dict[tuple[int, int
     """Weight of each angular spring by node and beams, in units of lambda."""
     evaluator = Evaluator(problem)
     structure = evaluator.structure
-    build_structure_from_python(evaluator.system, mask.astype(np.uint8), False, structure)
+    evaluator.respond(mask)
     front, back = structure.sizes[3:5]
     listed = [*range(front), *range(back, len(structure.spring_node))]
     return {

@@ -157,9 +157,14 @@ class Evaluator:
         InvalidProblem
             If the mask has the wrong length.
         """
-        status, efficiency, energy = self.minimiser.from_rest(
-            self.system, self._checked(mask), self.core, largest_increment,
-            self.structure, self.displacement, self.scratch,
+        return self._respond(mask, self.core, False, largest_increment)
+
+    def _respond(
+        self, mask: ArrayLike, core: bool, nearby: bool, largest_increment: float
+    ) -> Response:
+        status, efficiency, energy = self.minimiser(
+            self.system, self._checked(mask), core, self.known, nearby,
+            largest_increment, self.structure, self.displacement, self.scratch,
         )  # fmt: skip
         return Response(Status(status), efficiency, energy, self.displacement.copy())
 
@@ -172,14 +177,25 @@ class Evaluator:
     def respond_nearby(self, mask: ArrayLike) -> Response:
         """As `respond`, started from the remembered equilibrium of a similar design.
 
-        Only faster: the response is the same to within the tolerance. The energy is not
-        computed.
+        Only faster: the response is the same to within the tolerance.
         """
-        status, efficiency = self.minimiser.from_neighbour(
-            self.system, self._checked(mask), self.core, self.known,
-            self.structure, self.displacement, self.scratch,
-        )  # fmt: skip
-        return Response(Status(status), efficiency, np.nan, self.displacement.copy())
+        return self._respond(mask, self.core, True, 1.0)
+
+    def load_bearing(self, mask: ArrayLike) -> NDArray[np.bool_]:
+        """Return which beams of a design can carry load: no loose pieces, no dead ends.
+
+        What remains when pieces that the drive cannot reach and, repeatedly, beams that
+        end in a free node of degree one are left out. Supports, input and output nodes
+        are not free in this sense.
+
+        Returns
+        -------
+        (M,) bool
+        """
+        self._respond(mask, True, False, 1.0)
+        ends_move = self.structure.active[self.system.beams].astype(bool).any(axis=1)
+        core: NDArray[np.bool_] = (self.structure.present != 0) & ends_move
+        return core
 
     def sensitivity(self, mask: ArrayLike) -> NDArray[np.float64]:
         """First-order change of the efficiency by flipping each beam, from one adjoint solve.
@@ -201,7 +217,8 @@ class Evaluator:
         sensitivity = np.zeros(len(self.system.beams))
         found = response.status in (Status.CONVERGED, Status.SNAPPED) and find_sensitivity(
             self.system, self._checked(mask), self.core,
-            self.structure, self.displacement, self.scratch, sensitivity,
+            self.structure, self.displacement, self.scratch,
+            np.zeros(len(self.displacement), np.uint8), sensitivity,
         )  # fmt: skip
         if not found:
             raise InvalidSettings(f"no sensitivity: {response.status.message}")
@@ -209,11 +226,7 @@ class Evaluator:
 
 
 def load_bearing_core(design: Design) -> NDArray[np.bool_]:
-    """Return the mask of the beams that can carry load: no loose pieces, no dead ends.
-
-    What remains when pieces that the drive cannot reach and, repeatedly, beams that end
-    in a free node of degree one are left out. Supports, input and output nodes are not
-    free in this sense.
+    """Return the mask of the beams that can carry load: see `Evaluator.load_bearing`.
 
     Examples
     --------
@@ -222,11 +235,4 @@ def load_bearing_core(design: Design) -> NDArray[np.bool_]:
     >>> bool(load_bearing_core(crane).all())
     True
     """
-    from bellcrank.mechanics.kernels.structure import build_structure_from_python
-
-    evaluator = Evaluator(design.problem, "displacement")
-    structure = evaluator.structure
-    build_structure_from_python(evaluator.system, design.mask.astype(np.uint8), True, structure)
-    ends_move = structure.active[evaluator.system.beams].astype(bool).any(axis=1)
-    core: NDArray[np.bool_] = (structure.present != 0) & ends_move
-    return core
+    return Evaluator(design.problem, "displacement").load_bearing(design.mask)

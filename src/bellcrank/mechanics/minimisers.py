@@ -1,13 +1,11 @@
 """Ways to find an equilibrium: a registry.
 
-A minimiser answers two calls, from rest and from a neighbouring equilibrium. All
-agree on the response; they differ in cost and in what they need to know.
+All agree on the response of a design; they differ in cost and in what they need to know.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bellcrank.registry import Registry
@@ -26,30 +24,14 @@ FORCE_TOLERANCE = 1e-12
 """Largest force, in units of bond stiffness times lattice spacing, at which the
 first-order minimisers stop."""
 
-FromRest = Callable[
-    ["System", "Bytes", bool, float, "Structure", "Floats", "Scratch"], tuple[int, float, float]
+Minimiser = Callable[
+    ["System", "Bytes", bool, "Known", bool, float, "Structure", "Floats", "Scratch"],
+    tuple[int, float, float],
 ]
-FromNeighbour = Callable[
-    ["System", "Bytes", bool, "Known", "Structure", "Floats", "Scratch"], tuple[int, float]
-]
-
-
-@dataclass(frozen=True, slots=True)
-class Minimiser:
-    """How to bring a design to equilibrium at full load.
-
-    Parameters
-    ----------
-    from_rest
-        ``(system, mask, core, largest_increment, structure, u, scratch)`` to status,
-        efficiency and energy.
-    from_neighbour
-        ``(system, mask, core, known, structure, u, scratch)`` to status and efficiency.
-    """
-
-    from_rest: FromRest
-    from_neighbour: FromNeighbour
-
+"""``(system, mask, core, known, nearby, largest_increment, structure, u, scratch)`` to status,
+efficiency and energy. Brings the design `mask` to equilibrium at full load, in increments of
+at most `largest_increment` from rest or, if `nearby`, from the known equilibrium of a similar
+design; fills `structure` and `u`."""
 
 minimisers: Registry[Callable[[], Minimiser]] = Registry("minimiser")
 
@@ -57,9 +39,9 @@ minimisers: Registry[Callable[[], Minimiser]] = Registry("minimiser")
 @minimisers.register("newton")
 def newton() -> Minimiser:
     """Newton's method along the loading path, with sparse factorisation; the default."""
-    from bellcrank.mechanics.kernels.response import respond_from_neighbour, respond_from_rest
+    from bellcrank.mechanics.kernels.response import respond
 
-    return Minimiser(respond_from_rest, respond_from_neighbour)
+    return respond
 
 
 @minimisers.register("cg")
@@ -76,44 +58,25 @@ def fire() -> Minimiser:
 
 def _first_order(name: str) -> Minimiser:
     from bellcrank.mechanics.kernels import arrays
-    from bellcrank.mechanics.kernels.relaxed_loading import relax_from_neighbour, relax_from_rest
+    from bellcrank.mechanics.kernels.relaxed_loading import respond_by_relaxation
 
     code: int = getattr(arrays, name)
 
-    def from_rest(
+    def respond(
         system: System,
         mask: Bytes,
         core: bool,
+        known: Known,
+        nearby: bool,
         largest_increment: float,  # noqa: ARG001
         structure: Structure,
         u: Floats,
         scratch: Scratch,
     ) -> tuple[int, float, float]:
-        result: tuple[int, float, float] = relax_from_rest(
-            system, mask, core, code, FORCE_TOLERANCE * system.bond, structure, u, scratch
+        tolerance = FORCE_TOLERANCE * system.bond
+        result: tuple[int, float, float] = respond_by_relaxation(
+            system, mask, core, code, tolerance, known, nearby, structure, u, scratch
         )
         return result
 
-    def from_neighbour(
-        system: System,
-        mask: Bytes,
-        core: bool,
-        known: Known,
-        structure: Structure,
-        u: Floats,
-        scratch: Scratch,
-    ) -> tuple[int, float]:
-        result: tuple[int, float] = relax_from_neighbour(
-            system,
-            mask,
-            core,
-            code,
-            FORCE_TOLERANCE * system.bond,
-            known,
-            structure,
-            u,
-            scratch,
-        )
-        return result
-
-    return Minimiser(from_rest, from_neighbour)
+    return respond

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import load_bearing_core
+from bellcrank.mechanics import Evaluator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -82,12 +82,17 @@ def _components_at(links: list[list[tuple[int, int]]], root: int) -> list[list[i
     return found
 
 
-def clean(design: Design) -> Design:
+def clean(design: Design, evaluator: Evaluator | None = None) -> Design:
     """Leave out of a design what no load can reach.
 
     First the load-bearing core (no loose pieces, no dead ends), then what hangs by a
     single node. In the model such parts soften the joint they hang at; in a real part
     they are idle mass.
+
+    Parameters
+    ----------
+    evaluator
+        One of the design's problem, to save building it for each of many designs.
 
     Examples
     --------
@@ -96,5 +101,6 @@ def clean(design: Design) -> Design:
     >>> clean(crane).beam_count
     352
     """
-    core = load_bearing_core(design)
+    evaluator = evaluator or Evaluator(design.problem, "displacement")
+    core = evaluator.load_bearing(design.mask)
     return design.with_mask(loaded_beams(design.problem, core))

@@ -160,14 +160,14 @@ def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:
 
 
 def _cleaned(
-    problem: Problem, candidates: Iterable[Candidate]
+    problem: Problem, candidates: Iterable[Candidate], evaluator: Evaluator
 ) -> Iterator[tuple[Candidate, Design]]:
     """Yield each candidate cleaned, each cleaned design once."""
     seen: set[bytes] = set()
     for candidate in candidates:
         bits = np.unpackbits(np.frombuffer(candidate.mask, np.uint8))
         raw = Design(problem, bits[: problem.lattice.beam_count].astype(bool))
-        cleaned = clean(raw)
+        cleaned = clean(raw, evaluator)
         key = np.packbits(cleaned.mask).tobytes()
         if key not in seen:
             seen.add(key)
@@ -190,7 +190,7 @@ def select(
     evaluator = Evaluator(problem, objective)
     best: tuple[Candidate, Design, Response] | None = None
     refused: list[tuple[float, str]] = []
-    for candidate, design in _cleaned(problem, candidates):
+    for candidate, design in _cleaned(problem, candidates, evaluator):
         response = evaluator.respond(design.mask, largest_increment=1 / 32)
         if response.status is not Status.CONVERGED:
             refused.append((response.efficiency, response.status.label))

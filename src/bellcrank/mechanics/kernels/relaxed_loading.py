@@ -88,47 +88,29 @@ def relax_path(
 
 
 @entry
-def relax_from_rest(
-    system: System,
-    mask: Bytes,
-    core: bool,
-    minimiser: int,
-    force_tolerance: float,
-    structure: Structure,
-    u: Floats,
-    scratch: Scratch,
-) -> tuple[int, float, float]:
-    """As `response.respond_from_rest`, with conjugate gradients or FIRE."""
-    clear(u, len(u))
-    status = build_structure(system, mask, core, structure)
-    if status == MECHANISM:
-        return status, math.nan, math.nan
-    status = relax_path(system, structure, minimiser, u, scratch, force_tolerance)
-    place_hanging_pieces(system, structure, u)
-    energy = elastic_energy(system, structure, u, scratch)
-    return status, efficiency_of(system, u), energy
-
-
-@entry
-def relax_from_neighbour(
+def respond_by_relaxation(
     system: System,
     mask: Bytes,
     core: bool,
     minimiser: int,
     force_tolerance: float,
     known: Known,
+    nearby: bool,
     structure: Structure,
     u: Floats,
     scratch: Scratch,
-) -> tuple[int, float]:
-    """As `response.respond_from_neighbour`, with conjugate gradients or FIRE."""
+) -> tuple[int, float, float]:
+    """As `response.respond`, with conjugate gradients or FIRE."""
     clear(u, len(u))
     status = build_structure(system, mask, core, structure)
     if status == MECHANISM:
-        return status, math.nan
-    guess_from_neighbour(system, known, structure, u, scratch)
-    status = relax(system, structure, minimiser, 1.0, u, scratch, force_tolerance)
+        return status, math.nan, math.nan
+    status = UNCONVERGED
+    if nearby:
+        guess_from_neighbour(system, known, structure, u, scratch)
+        status = relax(system, structure, minimiser, 1.0, u, scratch, force_tolerance)
     if status != CONVERGED or not stiffness_is_definite(system, structure, 1.0, u, scratch):
         status = relax_path(system, structure, minimiser, u, scratch, force_tolerance)
     place_hanging_pieces(system, structure, u)
-    return status, efficiency_of(system, u)
+    energy = elastic_energy(system, structure, u, scratch)
+    return status, efficiency_of(system, u), energy

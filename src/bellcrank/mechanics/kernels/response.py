@@ -71,83 +71,6 @@ def efficiency_of(system: System, u: Floats) -> float:
     return system.numerator_scale * output_motion(system, u) / denominator
 
 
-@inlined
-def find_equilibrium(
-    system: System,
-    structure: Structure,
-    known_u: Floats,
-    u: Floats,
-    status: int,
-    finest: float,
-    scratch: Scratch,
-) -> int:
-    """Judge the equilibrium `u`; if there is none or it fails, load from rest and judge again.
-
-    Parameters
-    ----------
-    known_u
-        Equilibrium of another design that `u` was found from.
-    status
-        CONVERGED if there is a `u` to judge.
-    """
-    loaded = status != CONVERGED
-    while True:
-        if loaded:
-            status = follow_path(system, structure, u, scratch, finest)
-        if status != CONVERGED:
-            return status
-        jump = 0.0 if loaded else largest_difference(u, known_u)
-        status = judge(system, structure, u, jump, scratch)
-        if status != UNCONVERGED:
-            return status
-        if loaded:
-            return SNAPPED
-        loaded = True
-
-
-@inlined
-def find_from_rest(
-    system: System,
-    mask: Bytes,
-    core: bool,
-    finest: float,
-    structure: Structure,
-    u: Floats,
-    scratch: Scratch,
-) -> tuple[int, float]:
-    """Load the design `mask` from rest; fill `structure` and `u`, return status and efficiency."""
-    clear(u, len(u))
-    status = build_structure(system, mask, core, structure)
-    efficiency = math.nan
-    if status != MECHANISM:
-        status = find_equilibrium(system, structure, u, u, UNCONVERGED, finest, scratch)
-        place_hanging_pieces(system, structure, u)
-        efficiency = efficiency_of(system, u)
-    return status, efficiency
-
-
-@entry
-def respond_from_rest(
-    system: System,
-    mask: Bytes,
-    core: bool,
-    finest: float,
-    structure: Structure,
-    u: Floats,
-    scratch: Scratch,
-) -> tuple[int, float, float]:
-    """Response of the design `mask`, followed from rest in increments up to `finest`.
-
-    Fills `structure` and the displacement `u`; returns status, efficiency and elastic
-    energy.
-    """
-    status, efficiency = find_from_rest(system, mask, core, finest, structure, u, scratch)
-    energy = math.nan
-    if status != MECHANISM:
-        energy = elastic_energy(system, structure, u, scratch)
-    return status, efficiency, energy
-
-
 @kernel
 def rotation_at(system: System, known: Known, node: int) -> float:
     """Rotation of some beam at a node of the known equilibrium."""
@@ -205,41 +128,66 @@ def remember(structure: Structure, u: Floats, known: Known) -> None:
 
 
 @inlined
-def find_from_neighbour(
+def find_response(
     system: System,
     mask: Bytes,
     core: bool,
     known: Known,
+    nearby: bool,
+    largest_increment: float,
     structure: Structure,
     u: Floats,
     scratch: Scratch,
 ) -> tuple[int, float]:
-    """As `find_from_rest`, but start from the equilibrium of a similar design.
+    """Fill `structure` and the displacement `u` of the design `mask`; return status, efficiency.
 
-    Only an accelerator: where the way is not short and stable, or the response so
-    nonlinear that there may be others, the design is loaded from rest after all.
+    With `nearby`, start from the known equilibrium of a similar design. Only an
+    accelerator: an equilibrium found so must be judged to be the one reached from rest,
+    else the design is loaded from rest after all.
     """
     clear(u, len(u))
     status = build_structure(system, mask, core, structure)
-    efficiency = math.nan
-    if status != MECHANISM:
+    if status == MECHANISM:
+        return status, math.nan
+    status = UNCONVERGED
+    if nearby:
         guess_from_neighbour(system, known, structure, u, scratch)
         status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP)
-        status = find_equilibrium(system, structure, known.u, u, status, 1.0, scratch)
-        place_hanging_pieces(system, structure, u)
-        efficiency = efficiency_of(system, u)
-    return status, efficiency
+    loaded = status != CONVERGED
+    while True:
+        if loaded:
+            status = follow_path(system, structure, u, scratch, largest_increment)
+        if status != CONVERGED:
+            break
+        jump = 0.0 if loaded else largest_difference(u, known.u)
+        status = judge(system, structure, u, jump, scratch)
+        if status != UNCONVERGED:
+            break
+        if loaded:
+            status = SNAPPED
+            break
+        loaded = True
+    place_hanging_pieces(system, structure, u)
+    return status, efficiency_of(system, u)
 
 
 @entry
-def respond_from_neighbour(
+def respond(
     system: System,
     mask: Bytes,
     core: bool,
     known: Known,
+    nearby: bool,
+    largest_increment: float,
     structure: Structure,
     u: Floats,
     scratch: Scratch,
-) -> tuple[int, float]:
-    """Response of `mask` as `respond_from_rest` gives it, found from a known equilibrium."""
-    return find_from_neighbour(system, mask, core, known, structure, u, scratch)
+) -> tuple[int, float, float]:
+    """As `find_response`, for calls from Python; returns the elastic energy too."""
+    status, efficiency = find_response(
+        system, mask, core, known, nearby, largest_increment, structure, u, scratch
+    )
+    energy = math.nan
+    if status != MECHANISM:
+        energy = elastic_energy(system, structure, u, scratch)
+    return status, efficiency, energy

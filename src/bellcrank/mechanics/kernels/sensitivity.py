@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import (
     HELD,
@@ -110,9 +108,8 @@ def neighbours_around(
 
 
 @kernel
-def find_anchored(system: System, structure: Structure) -> Bytes:
-    """Mark the nodes that something holds: moved by the drive, or tied to a support."""
-    anchored = np.zeros(len(system.held), np.uint8)
+def find_anchored(system: System, structure: Structure, anchored: Bytes) -> None:
+    """Mark in (N,) the nodes that something holds: moved by the drive, or tied to a support."""
     for node in range(len(anchored)):
         anchored[node] = structure.active[node] == ACTIVE or system.held[node] == HELD
     spreading = True
@@ -123,7 +120,6 @@ def find_anchored(system: System, structure: Structure) -> Bytes:
             if structure.present[beam] and anchored[first] != anchored[second]:
                 anchored[first] = anchored[second] = 1
                 spreading = True
-    return anchored
 
 
 @kernel
@@ -172,12 +168,13 @@ def find_sensitivity(
     structure: Structure,
     u: Floats,
     scratch: Scratch,
+    counts: Bytes,
     sensitivity: Floats,
 ) -> bool:
     """Fill `sensitivity` (M,) with the first-order change of the efficiency by each flip.
 
     `structure` and `u` must be those of the design's equilibrium. False if it is
-    unstable, so that no such change is defined.
+    unstable, so that no such change is defined. `counts` (N,) is working memory.
     """
     if not stiffness_is_definite(system, structure, 1.0, u, scratch):
         return False
@@ -195,7 +192,7 @@ def find_sensitivity(
             sensitivity[beam] += scratch.axis[beam, axis] * stretch
         extension = scratch.length[beam] - system.rest_length[beam]
         sensitivity[beam] *= 2.0 * system.bond * extension
-    counts = find_anchored(system, structure)
+    find_anchored(system, structure, counts)
     for beam in range(len(mask)):
         first, second = system.beams[beam, 0], system.beams[beam, 1]
         moved = structure.active[first] == ACTIVE or structure.active[second] == ACTIVE

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bellcrank.mechanics.kernels._compile import entry, kernel
+from bellcrank.mechanics.kernels._compile import kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
     HELD,
@@ -92,13 +92,12 @@ def rigid_motions_are_prevented(
 ) -> bool:
     """Whether supports, drive and output springs hold a piece against its three rigid motions.
 
-    The rows that constrain translation in x, in y and rotation are gathered in a
-    3 x 3 Gram matrix, which must have full rank.
+    The rows (1, 0, -y) and (0, 1, x) of what is held, or their combination along a spring,
+    are summed as a 3 x 3 Gram matrix, which must have full rank.
     """
     origin_x, origin_y = pair(system.positions, structure.order[first])
     reach = 1e-300
-    gram = np.zeros((3, 3))
-    row = np.zeros(3)
+    g00 = g01 = g11 = g02 = g12 = g22 = 0.0
     for index in range(first, last):
         node = structure.order[index]
         x = system.positions[node, 0] - origin_x
@@ -107,25 +106,26 @@ def rigid_motions_are_prevented(
         xx, xy, yy = triple(system.ground, node)
         held = system.held[node]
         for axis in range(2):
-            row[0] = row[1] = 0.0
+            across = along = 0.0
             if axis == 0 and (held & HELD_X or xx > 0.0):
-                row[0] = 1.0
+                across = 1.0
                 if not held & HELD_X:
-                    row[1] = xy / xx
+                    along = xy / xx
             elif (
                 axis == 1 and (held & HELD_Y or (yy > 0.0 and xx * yy - xy * xy > 1e-12 * yy * yy))
             ) or (axis == 1 and yy > 0.0 and xx == 0.0):
-                row[1] = 1.0
-            else:
-                continue
-            row[2] = row[1] * x - row[0] * y
-            for a in range(3):
-                for b in range(3):
-                    gram[a, b] += row[a] * row[b]
+                along = 1.0
+            turn = along * x - across * y
+            g00 += across * across
+            g01 += across * along
+            g11 += along * along
+            g02 += across * turn
+            g12 += along * turn
+            g22 += turn * turn
     determinant = (
-        gram[0, 0] * (gram[1, 1] * gram[2, 2] - gram[1, 2] * gram[2, 1])
-        - gram[0, 1] * (gram[1, 0] * gram[2, 2] - gram[1, 2] * gram[2, 0])
-        + gram[0, 2] * (gram[1, 0] * gram[2, 1] - gram[1, 1] * gram[2, 0])
+        g00 * (g11 * g22 - g12 * g12)
+        - g01 * (g01 * g22 - g12 * g02)
+        + g02 * (g01 * g12 - g11 * g02)
     )
     return determinant > 1e-9 * reach
 
@@ -319,11 +319,3 @@ def build_structure(system: System, mask: Bytes, core: bool, structure: Structur
         list_springs(system, structure)
         find_pattern(system, structure)
     return status
-
-
-@entry
-def build_structure_from_python(
-    system: System, mask: Bytes, core: bool, structure: Structure
-) -> int:
-    """As `build_structure`, for calls from Python."""
-    return build_structure(system, mask, core, structure)

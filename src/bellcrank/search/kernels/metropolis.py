@@ -18,7 +18,7 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
 )
 from bellcrank.mechanics.kernels.response import (
-    find_from_neighbour,
+    find_response,
     remember,
 )
 
@@ -136,8 +136,8 @@ def advance(
         temperature = temperatures[min(chain.counts[0], len(temperatures) - 1)]
         status, efficiency = FORBIDDEN, math.nan
         if not is_forbidden(system, rules.minimum_degree, chain.mask, beam):
-            status, efficiency = find_from_neighbour(
-                system, chain.mask, rules.core, known, structure, u, scratch
+            status, efficiency = find_response(
+                system, chain.mask, rules.core, known, True, 1.0, structure, u, scratch
             )
         cost = cost_of(rules.cost, efficiency)
         accepted = status == CONVERGED and accepts(
