@@ -7,6 +7,7 @@ from bellcrank.mechanics.kernels.energy import (
     elastic_energy,
     find_gradient,
     find_stiffness,
+    find_tension,
     measure_held_beams,
 )
 from bellcrank.mechanics.kernels.structure import build_structure
@@ -27,4 +28,5 @@ def assemble_stiffness(system, mask, u, structure, scratch):
     build_structure(system, mask, False, structure)
     measure_held_beams(system, structure, u, scratch)
     find_gradient(system, structure, 0.0, u, scratch)
+    find_tension(system, structure, scratch)
     find_stiffness(system, structure, 1.0, scratch)

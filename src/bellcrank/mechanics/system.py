@@ -170,6 +170,7 @@ def allocate_scratch(system: System, structure: Structure) -> Scratch:
         rotation=np.zeros(beams),
         axis=np.zeros((beams, 2)),
         turn=np.zeros((beams, 2)),
+        tension=np.zeros(beams),
         torque=np.zeros(beams),
         turn_weight=np.zeros(beams),
         gradient=np.zeros((nodes, 2)),

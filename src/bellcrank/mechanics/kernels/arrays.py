@@ -139,6 +139,8 @@ class Scratch(NamedTuple):
     """(M, 2) unit vector along the beam."""
     turn: Floats
     """(M, 2) derivative of omega by the second end."""
+    tension: Floats
+    """(M,) derivative of the energy by the length, as the stiffness is to see it."""
     torque: Floats
     """(M,) derivative of the energy by omega."""
     turn_weight: Floats

@@ -16,6 +16,7 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
+from bellcrank.mechanics.kernels.energy import add_tension_at, clear_tension
 from bellcrank.mechanics.kernels.fields import (
     clear,
     copy,
@@ -163,6 +164,9 @@ def join_to_rest(system: System, structure: Structure, u: Floats, scratch: Scrat
         half = fraction + 0.5 * increment
         interpolate(left, right, left_tangent, right_tangent, increment, middle)
         move_held_nodes(system, half, middle)
+        clear_tension(scratch)
+        add_tension_at(system, structure, left, 0.5, scratch)
+        add_tension_at(system, structure, right, 0.5, scratch)
         status = newton(system, structure, half, middle, scratch, PATH_TOLERANCE, LONGEST_STEP)
         if status != CONVERGED:
             return -1.0

@@ -14,6 +14,7 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
+from bellcrank.mechanics.kernels.energy import add_tension_at, clear_tension
 from bellcrank.mechanics.kernels.fields import copy, pair
 from bellcrank.mechanics.kernels.newton import descend, newton
 from bellcrank.mechanics.kernels.structure import HANGING
@@ -136,6 +137,8 @@ def follow_path(
         copy(u, previous)
         extrapolate(u, tangent, last_tangent, increment, last_increment)
         move_held_nodes(system, end, u)
+        clear_tension(scratch)
+        add_tension_at(system, structure, previous, 1.0, scratch)
         tolerance = system.tolerance if end == 1.0 else PATH_TOLERANCE
         now, departure = 0.0, math.inf
         status = newton(system, structure, end, u, scratch, tolerance, LONGEST_STEP)

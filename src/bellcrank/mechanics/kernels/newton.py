@@ -24,6 +24,8 @@ from bellcrank.mechanics.kernels.energy import (
     elastic_energy,
     find_gradient,
     find_stiffness,
+    find_tension,
+    foresee_tension,
     measure_held_beams,
     work_of_load,
 )
@@ -70,6 +72,7 @@ def newton(
 ) -> int:
     """Move `u` to the stable equilibrium next to it at `fraction` of the load.
 
+    The stiffness of the first step is that with the tensions in `scratch.tension`.
     Stops when the displacement is settled to within `tolerance`. Steps longer than
     `longest_step` are shortened; where the stiffness is not positive definite, the part of
     it that always is shows the way. The equilibrium it ends at is stable. UNCONVERGED
@@ -92,7 +95,9 @@ def newton(
         size = find_step(system, structure, scratch)
         if not size < math.inf:
             return UNCONVERGED
-        take_step(system, min(1.0, longest_step / size), u, scratch)
+        scale = min(1.0, longest_step / size)
+        take_step(system, scale, u, scratch)
+        foresee_tension(system, structure, scale, scratch)
         ratio = size / before if before < math.inf else 1.0
         left = 0.1 * size * min(1.0, ratio) if renew else size
         if settled and left <= 0.1 * tolerance:
@@ -131,6 +136,7 @@ def descend(
     energy = elastic_energy(system, structure, u, scratch) - work_of_load(system, fraction, u)
     for _ in range(500):
         find_gradient(system, structure, fraction, u, scratch)
+        find_tension(system, structure, scratch)
         find_stiffness(system, structure, 1.0, scratch)
         shift = shift_until_definite(structure, scratch, 1e-3 * system.angle)
         size = find_step(system, structure, scratch)

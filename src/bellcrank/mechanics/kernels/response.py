@@ -18,7 +18,12 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
 )
 from bellcrank.mechanics.kernels.branch import judge
-from bellcrank.mechanics.kernels.energy import beam_rotation, elastic_energy
+from bellcrank.mechanics.kernels.energy import (
+    add_tension_at,
+    beam_rotation,
+    clear_tension,
+    elastic_energy,
+)
 from bellcrank.mechanics.kernels.fields import clear, copy, largest_difference, pair
 from bellcrank.mechanics.kernels.loading import (
     follow_path,
@@ -152,6 +157,11 @@ def find_response(
     status = UNCONVERGED
     if nearby:
         guess_from_neighbour(system, known, structure, u, scratch)
+        clear_tension(scratch)
+        add_tension_at(system, structure, known.u, 1.0, scratch)
+        for beam in range(len(mask)):
+            if not known.present[beam]:
+                scratch.tension[beam] = 0.0
         status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP)
     loaded = status != CONVERGED
     while True:

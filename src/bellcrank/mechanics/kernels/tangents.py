@@ -21,6 +21,7 @@ from bellcrank.mechanics.kernels.cholesky import factorise, solve
 from bellcrank.mechanics.kernels.energy import (
     find_gradient,
     find_stiffness,
+    find_tension,
     measure_held_beams,
 )
 from bellcrank.mechanics.kernels.fields import clear, copy, dot, move
@@ -68,6 +69,7 @@ def stiffness_is_definite(
     """Factorise the stiffness at `u`; False if the equilibrium there is unstable."""
     measure_held_beams(system, structure, u, scratch)
     find_gradient(system, structure, fraction, u, scratch)
+    find_tension(system, structure, scratch)
     find_stiffness(system, structure, 1.0, scratch)
     return factorise(structure, scratch)
 
