@@ -9,8 +9,6 @@ from __future__ import annotations
 from bellcrank.mechanics.kernels._compile import inlined, kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
-    SNAPPED,
-    UNCONVERGED,
     Floats,
     Scratch,
     Structure,
@@ -20,89 +18,68 @@ from bellcrank.mechanics.kernels.energy import add_tension_at, clear_tension
 from bellcrank.mechanics.kernels.fields import (
     clear,
     copy,
-    dot,
-    largest_component,
     largest_difference,
-    move,
 )
-from bellcrank.mechanics.kernels.newton import descend, newton
+from bellcrank.mechanics.kernels.newton import newton
 from bellcrank.mechanics.kernels.tangents import (
     FIRST_KNOT,
     LARGEST_INCREMENT,
+    LARGEST_SOFTENING,
     LONGEST_STEP,
     MODE,
     NEXT_TANGENT,
     PATH_TOLERANCE,
     PREVIOUS,
-    SOFTEST_MODE,
     TANGENT,
-    TURNED,
     curvature_left,
     find_tangent,
     is_joined,
+    is_mild,
     lowest_stiffness,
     move_held_nodes,
+    nonlinearity_of,
     stiffness_is_definite,
 )
 
-LARGEST_NONLINEARITY = 0.6
-LARGEST_DETOUR = 0.4
-"""Departures of a response from the tangent at rest, and from the mean of the tangents at
-rest and at full load, in parts of the largest displacement, beyond which it may belong to
-another branch than that reached from rest. Of 543 responses on wrong branches found along a
-chain on the crane among snapping designs, all exceed one of them: those below 0.62 in the
-first were above 0.73 in the second."""
 JUMP = 0.1
 LONG_JUMP = 0.3
 DETOUR_AFTER_JUMP = 0.13
 NONLINEARITY_AFTER_LONG_JUMP = 0.5
 """Stricter where a flip moves some node far. In 14,800 proposals of eight chains the limits
 above alone let two wrong branches through, both after jumps of more than 0.1."""
-DIP = 0.5
-"""A path whose lowest stiffness falls below this part of its values at rest and at full load
-has passed near a loss of stability; whether a second equilibrium exists is then looked up."""
-DISTINCT = 1e-3
-"""Distance, in lattice units, at which two equilibria are two."""
+STIFF = 0.8
+"""Least part of the stiffness at its ends that a path may keep to be sure without following it."""
 
 
 @kernel
-def judge(system: System, structure: Structure, u: Floats, jump: float, scratch: Scratch) -> int:
-    """Judge a stable equilibrium at full load, with the factor of `u` at hand.
+def is_reached_from_rest(
+    system: System, structure: Structure, known_u: Floats, u: Floats, scratch: Scratch
+) -> bool:
+    """Whether an equilibrium at full load is sure to be the one reached from rest.
 
-    Parameters
-    ----------
-    jump
-        Distance from the equilibrium of another design that it was found from; 0 if it
-        was found by loading.
-
-    Returns
-    -------
-    int
-        CONVERGED: it is the one reached from rest, being near what the tangents at rest
-        and at full load predict, or joined to rest by equilibria in between.
-        SNAPPED: it is, but the path came so near to a loss of stability that there is a
-        second equilibrium. UNCONVERGED: it could not be joined to rest.
+    It is if it lies near what the tangents at rest and at full load predict; nearer, if it
+    is far from the known equilibrium of another design that it was found from. If not, it
+    still is if equilibria that keep their stiffness join it to rest. With the factor of `u`
+    at hand.
     """
     rest, first = scratch.vectors[PREVIOUS], scratch.vectors[TANGENT]
     last = scratch.vectors[NEXT_TANGENT]
     find_tangent(system, structure, 1.0, u, last, scratch)
     clear(rest, len(rest))
     if not stiffness_is_definite(system, structure, 0.0, rest, scratch):
-        return UNCONVERGED
+        return False
     find_tangent(system, structure, 0.0, rest, first, scratch)
-    nonlinearity = largest_difference(u, first) / largest_component(u)
+    nonlinearity = nonlinearity_of(u, first)
     detour = curvature_left(rest, u, first, last, 1.0)
-    mild = nonlinearity <= LARGEST_NONLINEARITY and detour <= LARGEST_DETOUR
+    mild = is_mild(nonlinearity, detour)
+    jump = largest_difference(u, known_u)
     far = jump > LONG_JUMP and nonlinearity > NONLINEARITY_AFTER_LONG_JUMP
     far |= jump > JUMP and detour > DETOUR_AFTER_JUMP
     if mild and not far:
-        return CONVERGED
-    lowest = join_to_rest(system, structure, u, scratch)
-    if lowest < 0.0:
-        return UNCONVERGED
-    if lowest < DIP and not mild and has_second_equilibrium(system, structure, u, scratch):
-        return SNAPPED
-    return CONVERGED
+        return True
+    if jump > JUMP and not mild:
+        return False
+    return is_joined_to_rest(system, structure, u, scratch)
 
 
 @kernel
@@ -118,18 +95,11 @@ def interpolate(
 
 
 @inlined
-def join_to_rest(system: System, structure: Structure, u: Floats, scratch: Scratch) -> float:
+def is_joined_to_rest(system: System, structure: Structure, u: Floats, scratch: Scratch) -> bool:
     """Join `u` to rest by equilibria, halving the load between two until they are joined.
 
-    As sure as following the path, since the same test joins two points of it, and
-    cheaper: the points between are interpolated, not extrapolated.
-
-    Returns
-    -------
-    float
-        Lowest stiffness met, as a part of the lesser of those at rest and at full load;
-        negative if `u` could not be joined. Keeps the softest motion and the displacement
-        there in `scratch.vectors`.
+    The points between are interpolated, which is cheaper than following the path. False if
+    the stiffness dips on the way, or a point cannot be found: the path must be followed.
     """
     vectors, knots = scratch.vectors, scratch.knots
     left, left_tangent, mode = vectors[PREVIOUS], vectors[TANGENT], vectors[MODE]
@@ -137,20 +107,19 @@ def join_to_rest(system: System, structure: Structure, u: Floats, scratch: Scrat
         for axis in range(2):
             mode[node, axis] = u[node, axis] - left_tangent[node, axis]
     fraction = 0.0
-    at_rest = softest = stiffness = lowest_stiffness(system, structure, mode, scratch)
+    at_rest = stiffness = lowest_stiffness(system, structure, mode, scratch)
     copy(u, vectors[FIRST_KNOT])
     copy(vectors[NEXT_TANGENT], vectors[FIRST_KNOT + 1])
     if not stiffness_is_definite(system, structure, 1.0, u, scratch):
-        return -1.0
-    at_end = lowest_stiffness(system, structure, mode, scratch)
-    knots[0, 0], knots[0, 1] = 1.0, at_end
+        return False
+    knots[0, 0], knots[0, 1] = 1.0, lowest_stiffness(system, structure, mode, scratch)
     top = 0
     while top >= 0:
         right, right_tangent = vectors[FIRST_KNOT + 2 * top], vectors[FIRST_KNOT + 2 * top + 1]
         increment = knots[top, 0] - fraction
         departure = curvature_left(left, right, left_tangent, right_tangent, increment)
         if increment <= LARGEST_INCREMENT and is_joined(
-            departure, stiffness, knots[top, 1], increment
+            departure, stiffness, knots[top, 1], LARGEST_SOFTENING, increment
         ):
             copy(right, left)
             copy(right_tangent, left_tangent)
@@ -159,7 +128,7 @@ def join_to_rest(system: System, structure: Structure, u: Floats, scratch: Scrat
             continue
         top += 1
         if top == len(knots):
-            return -1.0
+            return False
         middle, tangent = vectors[FIRST_KNOT + 2 * top], vectors[FIRST_KNOT + 2 * top + 1]
         half = fraction + 0.5 * increment
         interpolate(left, right, left_tangent, right_tangent, increment, middle)
@@ -169,36 +138,10 @@ def join_to_rest(system: System, structure: Structure, u: Floats, scratch: Scrat
         add_tension_at(system, structure, right, 0.5, scratch)
         status = newton(system, structure, half, middle, scratch, PATH_TOLERANCE, LONGEST_STEP)
         if status != CONVERGED:
-            return -1.0
+            return False
         find_tangent(system, structure, half, middle, tangent, scratch)
         knots[top, 0] = half
         knots[top, 1] = lowest_stiffness(system, structure, mode, scratch)
-        if knots[top, 1] < softest:
-            softest = knots[top, 1]
-            copy(mode, vectors[SOFTEST_MODE])
-            copy(middle, vectors[TURNED])
-    return softest / min(at_rest, at_end)
-
-
-@inlined
-def has_second_equilibrium(
-    system: System, structure: Structure, u: Floats, scratch: Scratch
-) -> bool:
-    """Whether a design that has nearly lost its stability could have gone the other way.
-
-    What the structure has moved along its softest motion since it was softest is
-    reflected, and the energy is followed down from there.
-    """
-    other, mode = scratch.vectors[PREVIOUS], scratch.vectors[SOFTEST_MODE]
-    turned = scratch.vectors[TURNED]
-    copy(u, other)
-    along = 0.0
-    size = dot(mode, mode)
-    for node in range(len(u)):
-        for axis in range(2):
-            along += (u[node, axis] - turned[node, axis]) * mode[node, axis]
-    move(other, -2.0 * along / size, mode)
-    move_held_nodes(system, 1.0, other)
-    if descend(system, structure, 1.0, other, scratch) != CONVERGED:
-        return False
-    return largest_difference(other, u) > DISTINCT
+        if knots[top, 1] < STIFF * min(at_rest, knots[0, 1]):
+            return False
+    return True

@@ -15,28 +15,42 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
 )
 from bellcrank.mechanics.kernels.energy import add_tension_at, clear_tension
-from bellcrank.mechanics.kernels.fields import copy, pair
+from bellcrank.mechanics.kernels.fields import clear, copy, dot, largest_difference, move, pair
 from bellcrank.mechanics.kernels.newton import descend, newton
 from bellcrank.mechanics.kernels.structure import HANGING
 from bellcrank.mechanics.kernels.tangents import (
+    FINE_INCREMENT,
     LARGEST_DEPARTURE,
     LARGEST_INCREMENT,
+    LARGEST_SOFTENING,
     LAST_TANGENT,
     LONGEST_STEP,
     MODE,
     NEXT_TANGENT,
     PATH_TOLERANCE,
     PREVIOUS,
+    SOFT,
+    SOFTENING_WHERE_SOFT,
+    SOFTEST_MODE,
     TANGENT,
+    TANGENT_AT_REST,
+    TURNED,
     curvature_left,
     find_tangent,
     is_joined,
+    is_mild,
     lowest_stiffness,
     move_held_nodes,
+    nonlinearity_of,
     stiffness_is_definite,
 )
 
 SMALLEST_INCREMENT = 1.0 / 1024.0
+DIP = 0.5
+"""A path whose lowest stiffness falls below this part of its values at rest and at full load
+has passed near a loss of stability; whether a second equilibrium exists is then looked up."""
+DISTINCT = 1e-3
+"""Distance, in lattice units, at which two equilibria are two."""
 
 
 @kernel
@@ -96,9 +110,50 @@ def extrapolate(
 
 
 @inlined
-def next_increment(departure: float) -> float:
-    """Factor that brings what is left of the curvature to what is allowed."""
-    return min(2.0, max(0.25, (0.5 * LARGEST_DEPARTURE / max(departure, 1e-9)) ** (1.0 / 3.0)))
+def next_increment(
+    increment: float, departure: float, before: float, after: float, softening: float
+) -> float:
+    """Increment that brings departure and softening well within what is allowed."""
+    by_departure = (0.5 * LARGEST_DEPARTURE / max(departure, 1e-9)) ** (1.0 / 3.0)
+    change = abs(math.log(max(after, 1e-9 * before) / before))
+    by_softening = -0.8 * math.log(softening) / max(change, 1e-9)
+    followed = max(FINE_INCREMENT, increment * max(0.25, by_softening))
+    return min(increment * min(2.0, max(0.25, by_departure)), followed)
+
+
+@inlined
+def has_second_equilibrium(
+    system: System, structure: Structure, u: Floats, scratch: Scratch
+) -> bool:
+    """Whether a design that has nearly lost its stability could have gone the other way.
+
+    What the structure has moved along its softest motion since it was softest is
+    reflected, and the energy is followed down from there.
+    """
+    other, mode = scratch.vectors[PREVIOUS], scratch.vectors[SOFTEST_MODE]
+    turned = scratch.vectors[TURNED]
+    copy(u, other)
+    along = 0.0
+    size = dot(mode, mode)
+    for node in range(len(u)):
+        for axis in range(2):
+            along += (u[node, axis] - turned[node, axis]) * mode[node, axis]
+    move(other, -2.0 * along / size, mode)
+    move_held_nodes(system, 1.0, other)
+    if descend(system, structure, 1.0, other, scratch) != CONVERGED:
+        return False
+    return largest_difference(other, u) > DISTINCT
+
+
+@inlined
+def could_go_elsewhere(system: System, structure: Structure, u: Floats, scratch: Scratch) -> bool:
+    """Whether a response is far from linear and not the only equilibrium."""
+    rest, at_rest = scratch.vectors[PREVIOUS], scratch.vectors[TANGENT_AT_REST]
+    clear(rest, len(rest))
+    detour = curvature_left(rest, u, at_rest, scratch.vectors[TANGENT], 1.0)
+    return not is_mild(nonlinearity_of(u, at_rest), detour) and has_second_equilibrium(
+        system, structure, u, scratch
+    )
 
 
 @kernel
@@ -108,8 +163,9 @@ def follow_path(
     """Load from rest in increments that stay on one stable path.
 
     An increment counts only if it ends at a stable equilibrium that is joined to the one
-    before; else it is halved. SNAPPED means that even the smallest increment fails; `u` is
-    then one of the equilibria at full load.
+    before; else it is halved. SNAPPED means that even the smallest increment fails, or
+    that the path comes so near to a loss of stability that there is another way to go; `u`
+    is then one of the equilibria at full load.
 
     Parameters
     ----------
@@ -126,9 +182,10 @@ def follow_path(
     if not stiffness_is_definite(system, structure, 0.0, u, scratch):
         return UNCONVERGED
     lowest_stiffness(system, structure, mode, scratch)
-    stiffness = lowest_stiffness(system, structure, mode, scratch)
+    at_rest = softest = stiffness = lowest_stiffness(system, structure, mode, scratch)
     find_tangent(system, structure, 0.0, u, tangent, scratch)
     copy(tangent, last_tangent)
+    copy(tangent, scratch.vectors[TANGENT_AT_REST])
     fraction = 0.0
     increment = last_increment = min(LARGEST_INCREMENT, largest)
     while fraction < 1.0 and increment >= SMALLEST_INCREMENT:
@@ -146,16 +203,26 @@ def follow_path(
             now = lowest_stiffness(system, structure, mode, scratch)
             find_tangent(system, structure, end, u, next_tangent, scratch)
             departure = curvature_left(previous, u, tangent, next_tangent, increment)
-        if is_joined(departure, stiffness, now, increment):
+        soft = min(stiffness, now) < SOFT * at_rest
+        softening = SOFTENING_WHERE_SOFT if soft else LARGEST_SOFTENING
+        following = next_increment(increment, departure, stiffness, now, softening)
+        if is_joined(departure, stiffness, now, softening, increment):
             fraction, stiffness, last_increment = end, now, increment
             copy(tangent, last_tangent)
             copy(next_tangent, tangent)
-            increment *= next_increment(departure)
-            increment = min(increment, LARGEST_INCREMENT, largest)
+            if now < softest:
+                softest = now
+                copy(mode, scratch.vectors[SOFTEST_MODE])
+                copy(u, scratch.vectors[TURNED])
+            increment = min(following, LARGEST_INCREMENT, largest)
         else:
             copy(previous, u)
-            increment *= min(0.5, next_increment(departure))
+            increment = following
     if fraction == 1.0:
+        if softest < DIP * min(at_rest, stiffness) and could_go_elsewhere(
+            system, structure, u, scratch
+        ):
+            return SNAPPED
         return CONVERGED
     move_held_nodes(system, 1.0, u)
     if descend(system, structure, 1.0, u, scratch) == CONVERGED:

@@ -8,7 +8,6 @@ from bellcrank.mechanics.kernels._compile import entry, inlined, kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
     MECHANISM,
-    SNAPPED,
     UNCONVERGED,
     Bytes,
     Floats,
@@ -17,14 +16,14 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
-from bellcrank.mechanics.kernels.branch import judge
+from bellcrank.mechanics.kernels.branch import is_reached_from_rest
 from bellcrank.mechanics.kernels.energy import (
     add_tension_at,
     beam_rotation,
     clear_tension,
     elastic_energy,
 )
-from bellcrank.mechanics.kernels.fields import clear, copy, largest_difference, pair
+from bellcrank.mechanics.kernels.fields import clear, copy, pair
 from bellcrank.mechanics.kernels.loading import (
     follow_path,
     place_hanging_pieces,
@@ -163,20 +162,8 @@ def find_response(
             if not known.present[beam]:
                 scratch.tension[beam] = 0.0
         status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP)
-    loaded = status != CONVERGED
-    while True:
-        if loaded:
-            status = follow_path(system, structure, u, scratch, largest_increment)
-        if status != CONVERGED:
-            break
-        jump = 0.0 if loaded else largest_difference(u, known.u)
-        status = judge(system, structure, u, jump, scratch)
-        if status != UNCONVERGED:
-            break
-        if loaded:
-            status = SNAPPED
-            break
-        loaded = True
+    if status != CONVERGED or not is_reached_from_rest(system, structure, known.u, u, scratch):
+        status = follow_path(system, structure, u, scratch, largest_increment)
     place_hanging_pieces(system, structure, u)
     return status, efficiency_of(system, u)
 

@@ -24,7 +24,14 @@ from bellcrank.mechanics.kernels.energy import (
     find_tension,
     measure_held_beams,
 )
-from bellcrank.mechanics.kernels.fields import clear, copy, dot, move
+from bellcrank.mechanics.kernels.fields import (
+    clear,
+    copy,
+    dot,
+    largest_component,
+    largest_difference,
+    move,
+)
 from bellcrank.mechanics.kernels.newton import find_step, take_step
 from bellcrank.mechanics.kernels.structure import ACTIVE
 
@@ -37,6 +44,17 @@ too much to be followed, or jumps."""
 LARGEST_SOFTENING = 0.7
 """Change of the lowest stiffness in one increment, up or down, that calls for smaller ones,
 down to `FINE_INCREMENT`."""
+SOFT = 0.6
+SOFTENING_WHERE_SOFT = 0.88
+"""The same where the lowest stiffness is below this part of that at rest, so that the depth
+of a dip is known."""
+LARGEST_NONLINEARITY = 0.6
+LARGEST_DETOUR = 0.4
+"""Departures of a response from the tangent at rest, and from the mean of the tangents at
+rest and at full load, in parts of the largest displacement, beyond which it may belong to
+another branch than that reached from rest. Of 543 responses on wrong branches found along a
+chain on the crane among snapping designs, all exceed one of them: those below 0.62 in the
+first were above 0.73 in the second."""
 PATH_TOLERANCE = 1e-6
 """Displacement error of equilibria on the way."""
 LONGEST_STEP = 0.5
@@ -46,7 +64,8 @@ SWEEPS = 4
 
 # Rows of `scratch.vectors` in use on the path; `descend` takes row 8.
 PREVIOUS, MOVED, TANGENT, NEXT_TANGENT, LAST_TANGENT, MODE, SOFTEST_MODE, TURNED = range(8)
-FIRST_KNOT = 9
+TANGENT_AT_REST = 9
+FIRST_KNOT = 10
 """And from here on, an equilibrium and a tangent in turn."""
 MOST_KNOTS = 8
 ROWS = FIRST_KNOT + 2 * MOST_KNOTS
@@ -152,11 +171,32 @@ def curvature_left(
 
 
 @kernel
-def is_joined(departure: float, before: float, after: float, increment: float) -> bool:
+def is_joined(
+    departure: float, before: float, after: float, softening: float, increment: float
+) -> bool:
     """Whether two equilibria an increment of load apart are on one path.
 
     The tangents at both must account for the way between them, and the lowest stiffness
     must change so little that a loss of stability in between would have been seen.
+
+    Parameters
+    ----------
+    before, after
+        Lowest stiffness at both.
+    softening
+        Least ratio of the two.
     """
-    followed = after > LARGEST_SOFTENING * before and before > LARGEST_SOFTENING * after
-    return departure <= LARGEST_DEPARTURE and (followed or increment < FINE_INCREMENT)
+    followed = after > softening * before and before > softening * after
+    return departure <= LARGEST_DEPARTURE and (followed or increment <= FINE_INCREMENT)
+
+
+@kernel
+def nonlinearity_of(u: Floats, at_rest: Floats) -> float:
+    """How far a response departs from its tangent at rest, as a part of the movement."""
+    return largest_difference(u, at_rest) / largest_component(u)
+
+
+@kernel
+def is_mild(nonlinearity: float, detour: float) -> bool:
+    """Whether a response is so near to linear that it can be on no other branch."""
+    return nonlinearity <= LARGEST_NONLINEARITY and detour <= LARGEST_DETOUR
