@@ -29,7 +29,7 @@ def design(
         str | None, typer.Argument(help="A built-in problem or a problem file.")
     ] = None,
     steps: Annotated[int, typer.Option(help="Proposals of each chain.")] = 20_000,
-    chains: Annotated[int, typer.Option(help="Independent chains.")] = 8,
+    chains: Annotated[int, typer.Option(help="Independent chains.")] = 4,
     seed: Annotated[int, typer.Option(help="Determines everything, with the chain's number.")] = 0,
     objective: Annotated[
         str | None,

@@ -64,7 +64,7 @@ class MetropolisSettings:
     """
 
     steps: int = 20_000
-    chains: int = 8
+    chains: int = 4
     seed: int = 0
     objective: str | None = None
     cost: str = "exponential"
