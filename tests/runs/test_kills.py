@@ -198,7 +198,7 @@ def test_chains_can_be_written_by_several_threads(run: RunFolder) -> None:
 def test_only_the_leftovers_of_writers_are_cleared_away(run: RunFolder) -> None:
     fill(run)
     folder = run.path / "chains" / "000"
-    leftovers = [folder / ".00000040.parquet.k3_x9a2q", folder / ".00000010.parquet.abcdefgh"]
+    leftovers = [folder / ".00000040.parquet.5ad0c2e7", folder / ".00000010.parquet.00ff00ff"]
     strangers = [
         folder / "notes.txt", folder / ".00000040.parquet.swp", folder / "copy.parquet",
         run.path / ".hidden", run.path / "design.json", run.path / "chains" / "README",

@@ -54,6 +54,7 @@ def main() -> None:
         notes.print(f"[bold red]error:[/] {_plain(str(error))}")
         sys.exit(FAILED if isinstance(error, (StorageError, CorruptRun)) else BAD_INPUT)
     except KeyboardInterrupt:
+        notes.print("Interrupted.")
         sys.exit(INTERRUPTED)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -19,7 +19,7 @@ from bellcrank.cli.console import announce_compilation, notes, results
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from bellcrank.search import MetropolisSettings, Progress
+    from bellcrank.runs import RunFolder
     from bellcrank.workflows import DesignReport
 
 
@@ -57,59 +57,50 @@ def design(
     resume: Annotated[Path | None, typer.Option(help="Go on with the run in this folder.")] = None,
 ) -> None:
     """Design an actuator: search, clean up, verify, and see what was designed."""
+    from bellcrank.cli.progress import SearchProgress
+    from bellcrank.model import find_problem
     from bellcrank.search import MetropolisSettings, searches
-    from bellcrank.workflows import continue_design, start_design
+    from bellcrank.workflows import complete_design, reopen_design, start_design
 
     if (problem is None) == (resume is None):
         raise InvalidSettings("give either a problem to design for or --resume DIR")
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
-    with stopping_on_interrupt() as stop:
-        if resume is not None:
-            from bellcrank.runs import RunFolder
-
-            settings = MetropolisSettings.from_dict(RunFolder.open(resume).settings)
-            report = _run(
-                settings,
-                lambda tell: continue_design(resume, workers=workers, tell=tell, stop=stop),
-            )
-            folder = resume
-        else:
-            from bellcrank.model import find_problem
-
-            assert problem is not None
-            searches[search]
-            settings = MetropolisSettings(
-                steps=steps, chains=chains, seed=seed, objective=objective, cost=cost,
-                schedule=schedule, dangling=dangling, minimiser=minimiser,  # type: ignore[arg-type]
-                minimum_degree=minimum_degree, patience=patience,
-            )  # fmt: skip
-            task = find_problem(problem)
-            folder = out or Path(task.name)
-            report = _run(
-                settings,
-                lambda tell: start_design(
-                    task, settings, folder, workers=workers, tell=tell, stop=stop
-                ),
-            )
+    if problem is None:
+        assert resume is not None
+        announce_compilation()
+        folder = reopen_design(resume)
+        _warn_of_another_version(folder)
+    else:
+        searches[search]
+        settings = MetropolisSettings(
+            steps=steps, chains=chains, seed=seed, objective=objective, cost=cost,
+            schedule=schedule, dangling=dangling, minimiser=minimiser,  # type: ignore[arg-type]
+            minimum_degree=minimum_degree, patience=patience,
+        )  # fmt: skip
+        task = find_problem(problem)
+        announce_compilation()
+        folder = start_design(task, settings, out or Path(task.name))
+    progress = SearchProgress(MetropolisSettings.from_dict(folder.settings))
+    with stopping_on_interrupt() as stop, progress:
+        report = complete_design(folder, workers=workers, tell=progress, stop=stop)
     if report is None:
         notes.print(
-            f"Stopped; what is done is kept. Go on with: bellcrank design --resume {folder}"
+            f"Stopped; what is done is kept. Go on with: bellcrank design --resume {folder.path}"
         )
         sys.exit(INTERRUPTED)
     _print_report(report)
 
 
-def _run(
-    settings: MetropolisSettings,
-    job: Callable[[Callable[[Progress], None]], DesignReport | None],
-) -> DesignReport | None:
-    """Run a job under a progress display."""
-    from bellcrank.cli.progress import SearchProgress
+def _warn_of_another_version(folder: RunFolder) -> None:
+    """Say that a resumed run may not end as it would have, if it was begun elsewhere."""
+    from bellcrank.workflows import made_by_another_version
 
-    announce_compilation()
-    with SearchProgress(settings) as progress:
-        return job(progress)
+    if version := made_by_another_version(folder):
+        notes.print(
+            f"[yellow]note:[/] this run was begun with another version ({version}); "
+            "what follows may differ from what it would have found."
+        )
 
 
 @contextmanager

@@ -34,7 +34,7 @@ def evaluate(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Compute the response of designs, each from rest to the full stroke."""
-    from bellcrank.mechanics import Evaluator
+    from bellcrank.mechanics import CAREFUL, Evaluator
     from bellcrank.model import pack_mask, read_masks
     from bellcrank.workflows import find_design
 
@@ -44,7 +44,7 @@ def evaluate(
     announce_compilation()
     rows = []
     for mask in masks:
-        row = {"mask": pack_mask(mask), **_row(evaluator.respond(mask))}
+        row = {"mask": pack_mask(mask), **_row(evaluator.respond(mask, CAREFUL))}
         rows.append({**row, "beams": int(mask.sum())})
     if as_json:
         print_json(json.dumps({"results": rows}, indent=1))

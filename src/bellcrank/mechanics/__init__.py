@@ -10,6 +10,7 @@ The work flow, in four lines:
 """
 
 from bellcrank.mechanics.evaluator import (
+    CAREFUL,
     Dangling,
     Evaluator,
     Response,
@@ -20,6 +21,7 @@ from bellcrank.mechanics.minimisers import Minimiser, minimisers
 from bellcrank.mechanics.objectives import Objective, objective_of, objectives
 
 __all__ = [
+    "CAREFUL",
     "Dangling",
     "Evaluator",
     "Minimiser",

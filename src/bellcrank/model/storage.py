@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
+import secrets
 from pathlib import Path
+from typing import BinaryIO
 
 from bellcrank.errors import InvalidFile, OutputExists, StorageError
 
@@ -54,35 +55,51 @@ def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool = Fal
     ...     print(read_text(Path(folder) / "note.txt"))
     twice
     """
+    write_bytes(path, text.encode("utf-8"), overwrite=overwrite)
+
+
+def write_bytes(path: str | os.PathLike[str], content: bytes, *, overwrite: bool = False) -> None:
+    """As `write_text`, with bytes."""
     target = Path(path)
-    # Asked early for a cheap refusal; `_take_name` asks again without a race.
+    # Asked early for a cheap refusal; `take_name` asks again without a race.
     if not overwrite and os.path.lexists(target):
-        raise _exists(target)
+        raise already_exists(target)
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        temporary = Path(name)
+        temporary, file = open_temporary(target)
         try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
+            with file:
+                file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-            temporary.chmod(0o666 & ~_umask())  # mkstemp makes files private
-            _take_name(temporary, target, overwrite=overwrite)
+            take_name(temporary, target, overwrite=overwrite)
         finally:
             with contextlib.suppress(OSError):
                 temporary.unlink()
-        _sync_folder(target.parent)
+        sync_folder(target.parent)
     except FileExistsError:
-        raise _exists(target) from None
+        raise already_exists(target) from None
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({error.strerror or error})") from error
 
 
-def _exists(target: Path) -> OutputExists:
+def open_temporary(target: Path) -> tuple[Path, BinaryIO]:
+    """Open a new file beside `target`, hidden until it takes its name.
+
+    Not by `tempfile`, whose files are private: only the system can apply the user's file
+    permissions without a race between threads.
+    """
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    return temporary, os.fdopen(handle, "wb")
+
+
+def already_exists(target: Path) -> OutputExists:
+    """Make the error that refuses to write over something."""
     return OutputExists(f"{target}: exists already; remove it, or ask for it to be overwritten")
 
 
-def _take_name(temporary: Path, target: Path, *, overwrite: bool) -> None:
+def take_name(temporary: Path, target: Path, *, overwrite: bool) -> None:
+    """Give a finished file its name; FileExistsError if that is taken and not to be replaced."""
     if not overwrite:
         try:
             # Unlike a rename, a link fails if somebody else was faster.
@@ -98,14 +115,7 @@ def _take_name(temporary: Path, target: Path, *, overwrite: bool) -> None:
     temporary.replace(target)
 
 
-def _umask() -> int:
-    """Read the process's file creation mask (which can only be read by setting it)."""
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask
-
-
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Force a new name to disk too, where the system allows it."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)

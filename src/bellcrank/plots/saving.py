@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import secrets
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import InvalidSettings, OutputExists, StorageError
+from bellcrank.errors import InvalidSettings
+from bellcrank.model.storage import already_exists, write_bytes
 from bellcrank.plots.style import DPI
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ def check_target(path: str | os.PathLike[str], *, overwrite: bool = False) -> Pa
     if target.suffix.lower() not in FORMATS:
         raise InvalidSettings(f"{target}: expected a picture name ending in {', '.join(FORMATS)}")
     if not overwrite and os.path.lexists(target):
-        raise _exists(target)
+        raise already_exists(target)
     return target
 
 
@@ -66,42 +65,4 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, overwrite: bool
     suffix = target.suffix.lower()
     content = BytesIO()
     figure.savefig(content, format=suffix[1:], dpi=DPI, metadata=FORMATS[suffix], facecolor="white")
-    try:
-        _write_whole(target, content.getvalue(), overwrite=overwrite)
-    except FileExistsError:
-        raise _exists(target) from None
-    except OSError as error:
-        raise StorageError(f"{target}: cannot be written ({error.strerror or error})") from error
-
-
-def _exists(target: Path) -> OutputExists:
-    return OutputExists(f"{target}: exists already; remove it, or ask for it to be overwritten")
-
-
-def _write_whole(target: Path, content: bytes, *, overwrite: bool) -> None:
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}")
-    try:
-        with temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        if overwrite:
-            temporary.replace(target)
-        else:
-            _rename_unless_taken(temporary, target)
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-
-
-def _rename_unless_taken(temporary: Path, target: Path) -> None:
-    try:
-        # Unlike a rename, a link fails if somebody else was faster.
-        os.link(temporary, target)
-    except FileExistsError:
-        raise
-    except OSError:
-        # Some file systems know no hard links.
-        if os.path.lexists(target):
-            raise FileExistsError from None
-        temporary.replace(target)
+    write_bytes(target, content.getvalue(), overwrite=overwrite)

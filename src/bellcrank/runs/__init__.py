@@ -27,6 +27,7 @@ Examples
 """
 
 from bellcrank.runs.folder import RunFolder
+from bellcrank.runs.layout import check_free
 from bellcrank.runs.records import COLUMNS, ProposalColumns, Proposals
 
-__all__ = ["COLUMNS", "ProposalColumns", "Proposals", "RunFolder"]
+__all__ = ["COLUMNS", "ProposalColumns", "Proposals", "RunFolder", "check_free"]

@@ -6,19 +6,18 @@ import contextlib
 import errno
 import os
 import re
-import secrets
 from typing import IO, TYPE_CHECKING
 
 from bellcrank.errors import BellcrankError, OutputExists, StorageError
-from bellcrank.model.storage import _sync_folder, _take_name
+from bellcrank.model.storage import open_temporary, sync_folder, take_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
-TEMPORARY = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
-"""Names of files on their way, from here or from `bellcrank.model.storage`."""
+TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{8}")
+"""Names of files on their way, as `bellcrank.model.storage` makes them."""
 
 
 @contextlib.contextmanager
@@ -36,20 +35,17 @@ def whole_file(target: Path) -> Iterator[IO[bytes]]:
         If the folder cannot be written or the disk is full.
     """
     try:
-        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-        # Not by `tempfile`, whose files are private: only the system can apply the umask
-        # without a race between threads.
-        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        temporary, file = open_temporary(target)
         try:
-            with os.fdopen(handle, "wb") as file:
+            with file:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
-            _take_name(temporary, target, overwrite=False)
+            take_name(temporary, target, overwrite=False)
         finally:
             with contextlib.suppress(OSError):
                 temporary.unlink()
-        _sync_folder(target.parent)
+        sync_folder(target.parent)
     except BellcrankError:
         raise
     except FileExistsError:
@@ -83,7 +79,7 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise storage_error(folder, error) from error
-    _sync_folder(folder.parent)
+    sync_folder(folder.parent)
 
 
 def target_of(name: str) -> str | None:
@@ -91,7 +87,7 @@ def target_of(name: str) -> str | None:
 
     Examples
     --------
-    >>> target_of(".run.json.k3_x9a2q"), target_of("run.json"), target_of(".hidden")
+    >>> target_of(".run.json.5ad0c2e7"), target_of("run.json"), target_of(".hidden")
     ('run.json', None, None)
     """
     match = TEMPORARY.fullmatch(name)

@@ -53,6 +53,31 @@ def shard_files(chain_folder: Path) -> list[tuple[int, Path]]:
     return sorted((int(path.stem), path) for path in found if SHARD_NAME.fullmatch(path.name))
 
 
+def check_free(folder: Path, *, overwrite: bool = False) -> None:
+    """Refuse a place that a new run cannot take, without making anything there.
+
+    Raises
+    ------
+    OutputExists
+        If it is a file, or a folder that is not empty and `overwrite` is not set.
+    StorageError
+        If it cannot be looked at.
+    """
+    try:
+        is_folder = folder.is_dir()
+        taken = folder.exists() and not is_folder
+    except OSError as error:
+        raise storage_error(folder, error) from error
+    if taken:
+        raise OutputExists(f"{folder}: is a file; choose another folder (--out)")
+    if is_folder and not overwrite and (found := _content(folder)):
+        go_on = f", or go on with the run in it (--resume {folder})" * (DESCRIPTION in found)
+        raise OutputExists(
+            f"{folder}: exists already and is not empty (it holds {found[0]}); "
+            f"choose another folder (--out){go_on}"
+        )
+
+
 def claim_folder(folder: Path, *, overwrite: bool) -> None:
     """Make the folder of a new run, or clear the one that is there if told to.
 
@@ -63,19 +88,9 @@ def claim_folder(folder: Path, *, overwrite: bool) -> None:
     StorageError
         If the folder cannot be made or written.
     """
-    try:
-        taken = folder.exists() and not folder.is_dir()
-    except OSError as error:
-        raise storage_error(folder, error) from error
-    if taken:
-        raise OutputExists(f"{folder}: is a file; choose another folder (--out)")
+    check_free(folder, overwrite=overwrite)
     make_folder(folder)
-    if not overwrite and (found := _content(folder)):
-        go_on = f", or go on with the run in it (--resume {folder})" * (DESCRIPTION in found)
-        raise OutputExists(
-            f"{folder}: exists already and is not empty (it holds {found[0]}); "
-            f"choose another folder (--out){go_on}"
-        )
+    check_free(folder, overwrite=overwrite)
     _delete_run(folder)
 
 

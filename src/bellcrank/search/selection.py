@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Evaluator, Response, Status
+from bellcrank.mechanics import CAREFUL, Evaluator, Response, Status
 from bellcrank.model import Design, Problem
 from bellcrank.search.cleaning import clean
 
@@ -191,7 +191,7 @@ def select(
     best: tuple[Candidate, Design, Response] | None = None
     refused: list[tuple[float, str]] = []
     for candidate, design in _cleaned(problem, candidates, evaluator):
-        response = evaluator.respond(design.mask, largest_increment=1 / 32)
+        response = evaluator.respond(design.mask, largest_increment=CAREFUL)
         if response.status is not Status.CONVERGED:
             refused.append((response.efficiency, response.status.label))
         elif pieces(problem, design.mask) > 1:

@@ -1,7 +1,22 @@
 """Whole jobs that need several layers at once, for every face: command line, web, scripts."""
 
-from bellcrank.workflows.design import DesignReport, continue_design, start_design
+from bellcrank.workflows.design import (
+    DesignReport,
+    complete_design,
+    made_by_another_version,
+    reopen_design,
+    start_design,
+)
 from bellcrank.workflows.find import find_design
 from bellcrank.workflows.pictures import draw_run, move
 
-__all__ = ["DesignReport", "continue_design", "draw_run", "find_design", "move", "start_design"]
+__all__ = [
+    "DesignReport",
+    "complete_design",
+    "draw_run",
+    "find_design",
+    "made_by_another_version",
+    "move",
+    "reopen_design",
+    "start_design",
+]

@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import BellcrankError
-from bellcrank.mechanics import Evaluator, Response
+from bellcrank.mechanics import CAREFUL, Evaluator, Response
 from bellcrank.model import Design, Problem, human_design, write_design
 from bellcrank.provenance import provenance
-from bellcrank.runs import RunFolder
+from bellcrank.runs import RunFolder, check_free
 from bellcrank.search import (
     Candidate,
     MetropolisSettings,
     Progress,
     Selection,
+    advance_chain,
     candidates_of,
     run_chains,
     select,
+    start_chain,
 )
 
 if TYPE_CHECKING:
@@ -73,16 +75,66 @@ class DesignReport:
         return self.agreement <= AGREEMENT
 
 
-def start_design(
-    problem: Problem,
-    settings: MetropolisSettings,
-    out: Path,
+def prepare(problem: Problem, settings: MetropolisSettings) -> None:
+    """Compile what a search needs, and refuse a problem that it cannot start from.
+
+    Raises
+    ------
+    InvalidSettings
+        If the initial design has no unique, stable response.
+    """
+    evaluator = Evaluator(problem, settings.objective, settings.dangling, settings.minimiser)
+    once = replace(settings, steps=1)
+    advance_chain(evaluator, once, 0, start_chain(evaluator, once))
+
+
+def start_design(problem: Problem, settings: MetropolisSettings, out: Path) -> RunFolder:
+    """Prepare a design job for `problem` in the new folder `out`.
+
+    Raises
+    ------
+    OutputExists
+        If the folder holds something already.
+    InvalidSettings
+        If the initial design has no unique, stable response.
+    StorageError
+        If the folder cannot be written.
+    """
+    check_free(out)
+    prepare(problem, settings)
+    return RunFolder.create(out, problem, settings.to_dict())
+
+
+def reopen_design(out: Path) -> RunFolder:
+    """Open the folder of a design job that was stopped or killed, to go on with it.
+
+    Raises
+    ------
+    InvalidFile, CorruptRun
+        If the folder is not that of a run, or is damaged.
+    """
+    folder = RunFolder.open(out)
+    prepare(folder.problem, MetropolisSettings.from_dict(folder.settings))
+    return folder
+
+
+def made_by_another_version(folder: RunFolder) -> str | None:
+    """Return the version that a run was begun with, if it is not this one."""
+    begun, now = folder.provenance, provenance()
+    keys = ("version", "commit")
+    if all(begun.get(key) == now[key] for key in keys):
+        return None
+    return " ".join(str(begun[key]) for key in keys if begun.get(key)) or "unknown"
+
+
+def complete_design(
+    folder: RunFolder,
     *,
     workers: int | None = None,
     tell: Callable[[Progress], None] = lambda _progress: None,
     stop: threading.Event | None = None,
 ) -> DesignReport | None:
-    """Design an actuator for `problem` and leave everything in the new folder `out`.
+    """Make what is left of a design job, and leave the results in its folder.
 
     Parameters
     ----------
@@ -101,44 +153,10 @@ def start_design(
 
     Raises
     ------
-    OutputExists
-        If the folder holds something already.
-    StorageError
-        If it cannot be written.
+    StorageError, CorruptRun
+        If the folder cannot be written, or is damaged.
     """
-    evaluator = Evaluator(problem, settings.objective, settings.dangling, settings.minimiser)
-    evaluator.respond(problem.initial)  # compiles, and refuses what has no response
-    folder = RunFolder.create(out, problem, settings.to_dict())
-    return _complete(folder, settings, workers, tell, stop)
-
-
-def continue_design(
-    out: Path,
-    *,
-    workers: int | None = None,
-    tell: Callable[[Progress], None] = lambda _progress: None,
-    stop: threading.Event | None = None,
-) -> DesignReport | None:
-    """Go on with a design job that was stopped or killed, as if nothing had happened.
-
-    Raises
-    ------
-    InvalidFile, CorruptRun
-        If the folder is not that of a run, or is damaged.
-    """
-    folder = RunFolder.open(out)
     settings = MetropolisSettings.from_dict(folder.settings)
-    return _complete(folder, settings, workers, tell, stop)
-
-
-def _complete(
-    folder: RunFolder,
-    settings: MetropolisSettings,
-    workers: int | None,
-    tell: Callable[[Progress], None],
-    stop: threading.Event | None,
-) -> DesignReport | None:
-    """Run what is left of the search; conclude if it ends, else mark the run as stopped."""
     folder.status = "running"
     try:
         done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
@@ -194,7 +212,7 @@ def conclude(folder: RunFolder, settings: MetropolisSettings) -> DesignReport:
     human = human_design(problem.name)
     human_response = None
     if human is not None:
-        human_response = Evaluator(problem, settings.objective).respond(human.mask)
+        human_response = Evaluator(problem, settings.objective).respond(human.mask, CAREFUL)
     report = DesignReport(
         folder=folder.path,
         settings=settings,

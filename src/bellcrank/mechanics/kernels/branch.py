@@ -1,7 +1,8 @@
-"""Whether an equilibrium at full load is the one reached from rest, and whether that is unique.
+"""Whether an equilibrium found from that of another design is the one reached from rest.
 
-The judgement depends on the equilibrium alone, not on how it was found, so a chain and
-a lone evaluation agree on which designs snap.
+A chain accepts hundreds of designs in a row; one that slips onto another branch takes all
+that follow with it. So whatever is not plainly on the branch reached from rest, is loaded
+from rest.
 """
 
 from __future__ import annotations
@@ -45,8 +46,9 @@ JUMP = 0.1
 LONG_JUMP = 0.3
 DETOUR_AFTER_JUMP = 0.13
 NONLINEARITY_AFTER_LONG_JUMP = 0.5
-"""Stricter where a flip moves some node far. In 14,800 proposals of eight chains the limits
-above alone let two wrong branches through, both after jumps of more than 0.1."""
+"""Limits that a response must keep besides those of `is_mild` where a flip moves some node
+farther than a jump. In 14,800 proposals of eight chains `is_mild` alone let two wrong
+branches through, both after jumps."""
 STIFF = 0.8
 """Least part of the stiffness at its ends that a path may keep to be sure without following it."""
 
@@ -59,8 +61,9 @@ def is_reached_from_rest(
 
     It is if it lies near what the tangents at rest and at full load predict; nearer, if it
     is far from the known equilibrium of another design that it was found from. If not, it
-    still is if equilibria that keep their stiffness join it to rest. With the factor of `u`
-    at hand.
+    still is if equilibria that keep their stiffness join it to rest; but not after a jump,
+    since a strongly bent response can be joined past a bifurcation that lies between the
+    points. With the factor of `u` at hand.
     """
     rest, first = scratch.vectors[PREVIOUS], scratch.vectors[TANGENT]
     last = scratch.vectors[NEXT_TANGENT]

@@ -1,0 +1,88 @@
+"""What the README says can be done, can be done."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from bellcrank.cli import main
+from bellcrank.model import read_design
+
+README = Path(__file__).parents[2] / "README.md"
+START = "pip install . && bellcrank design crane"
+TEST = "pip install '.[test]' && pytest"
+
+
+def blocks(language: str) -> list[str]:
+    """Code blocks of the README in one language."""
+    text = README.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+
+
+def run(command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
+    """Run a command line in this process; return what it printed."""
+    monkeypatch.setattr(sys, "argv", shlex.split(command))
+    with pytest.raises(SystemExit) as left:
+        main()
+    printed = capsys.readouterr()
+    assert left.value.code in (0, None), printed.err
+    return printed.out
+
+
+def test_the_two_commands_stand_by_themselves() -> None:
+    assert [block.strip() for block in blocks("")[:2]] == [START, TEST]
+
+
+def test_the_commands_do_what_the_readme_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run(START.partition(" && ")[2], monkeypatch, capsys)
+    table = "".join(re.findall(r"^\| `.*$", README.read_text(encoding="utf-8"), re.MULTILINE))
+    promised = set(re.findall(r"`([\w-]+\.\w+)`", table))
+    assert promised == {path.name for path in Path("crane").iterdir()}
+    design = read_design("crane/design.json")
+    human = json.loads(Path("crane/summary.json").read_text())["human_efficiency"]
+    assert design.efficiency is not None
+    assert design.efficiency > 2.0 * human
+    Path("masks.json").write_text(json.dumps({"masks": [design.mask_hex]}))
+
+    commands = blocks("")[2].strip().splitlines()
+    printed = {command: run(command, monkeypatch, capsys) for command in commands}
+    assert len(commands) == 6
+    assert "anti-parallel" in printed["bellcrank problems"]
+    assert f"{design.efficiency:.7f}" in printed["bellcrank evaluate crane/design.json"]
+    [result] = json.loads(next(out for call, out in printed.items() if "--json" in call))["results"]
+    assert result["efficiency"] == pytest.approx(design.efficiency, abs=1e-6)
+    assert Path("cranes.png").stat().st_size > 50_000
+    assert Path("up/design.json").exists()
+
+
+def test_a_task_of_ones_own_is_designed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    [task] = blocks("toml")
+    Path("lift.toml").write_text(task)
+    run("bellcrank design lift.toml --chains 2 --steps 3000", monkeypatch, capsys)
+    efficiency = read_design("lift/design.json").efficiency
+    assert efficiency is not None
+    assert efficiency > 0.3
+
+
+def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    [example] = blocks("python")
+    exec(compile(example, "README.md", "exec"), {})
+    assert float(capsys.readouterr().out) == pytest.approx(-0.0641, abs=5e-5)
+
+
+def test_the_pictures_are_there() -> None:
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", README.read_text(encoding="utf-8"), re.DOTALL)
+    assert pictures
+    for picture in pictures:
+        assert (README.parent / picture).stat().st_size > 10_000, picture
