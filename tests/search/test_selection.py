@@ -105,20 +105,30 @@ def test_pieces_are_counted(small: Problem) -> None:
 
 
 def kept_by_definition(problem: Problem, mask: np.ndarray) -> np.ndarray:
-    """The same as `loaded_beams`, by taking out each node in turn."""
+    """The same as `loaded_beams`, by taking out each node, and the ground, in turn.
+
+    A beam carries load if, whatever single node is taken out, both its ends still hang
+    together with something driven, watched or held.
+    """
+    ground = -1
+    fixed = set(problem.supports.fixed.tolist())
+    grounded = [
+        tuple(ground if node in fixed else node for node in ends)
+        for ends in problem.lattice.beams.tolist()
+    ]
     terminals = {*problem.supports.nodes, *problem.input.nodes, *problem.output.nodes}
+    anchors = {ground if int(node) in fixed else int(node) for node in terminals}
     kept = mask.copy()
-    for cut in range(problem.lattice.node_count):
-        reached = {int(node) for node in terminals if node != cut}
-        beams = [tuple(ends) for ends in problem.lattice.beams[mask].tolist() if cut not in ends]
+    for cut in range(ground, problem.lattice.node_count):
+        reached = anchors - {cut}
+        beams = [grounded[beam] for beam in np.flatnonzero(mask) if cut not in grounded[beam]]
         growing = True
         while growing:
             more = {b for a, b in beams if a in reached} | {a for a, b in beams if b in reached}
             growing = not more <= reached
             reached |= more
         for beam in np.flatnonzero(mask):
-            far = [int(node) for node in problem.lattice.beams[beam] if node != cut]
-            if not set(far) <= reached:
+            if not {node for node in grounded[beam] if node != cut} <= reached:
                 kept[beam] = False
     return kept
 
@@ -131,3 +141,10 @@ def test_what_hangs_by_one_node_carries_no_load(small: Problem, seed: int) -> No
     kept = loaded_beams(small, mask)
     assert np.array_equal(kept, kept_by_definition(small, mask))
     assert kept.sum() < mask.sum()
+
+
+def test_what_stands_on_supports_alone_carries_no_load(small: Problem) -> None:
+    fixed = np.isin(small.lattice.beams, small.supports.fixed).sum(axis=1)
+    mask = fixed >= 1  # the bottom row and the teeth that stand on it
+    kept = loaded_beams(small, mask)
+    assert np.array_equal(kept, fixed == 2)

@@ -51,7 +51,7 @@ def main() -> None:
     try:
         app()
     except BellcrankError as error:
-        notes.print(f"[bold red]error:[/] {_plain(str(error))}")
+        notes.print(f"[bold red]error:[/] {_plain(str(error))}", soft_wrap=True)
         sys.exit(FAILED if isinstance(error, (StorageError, CorruptRun)) else BAD_INPUT)
     except KeyboardInterrupt:
         notes.print("Interrupted.")
@@ -60,7 +60,7 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(FAILED)
     except OSError as error:
-        notes.print(f"[bold red]error:[/] {_plain(str(error))}")
+        notes.print(f"[bold red]error:[/] {_plain(str(error))}", soft_wrap=True)
         sys.exit(FAILED)
 
 

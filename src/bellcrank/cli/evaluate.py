@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
@@ -49,7 +50,7 @@ def evaluate(
     if as_json:
         print_json(json.dumps({"results": rows}, indent=1))
         return
-    table = Table("design", "beams", "efficiency", "energy", "status")
+    table = Table("design", "beams", "efficiency", "energy", "status", box=SIMPLE)
     for number, row in enumerate(rows):
         table.add_row(
             str(number), str(row["beams"]), _figure(row["efficiency"]), _figure(row["energy"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
@@ -13,14 +14,18 @@ def problems() -> None:
     """List the built-in problems."""
     from bellcrank.model import builtin, find_problem, human_design
 
-    table = Table("problem", "beams", "designable", "drive", "input", "output", "human design")
+    table = Table(box=SIMPLE)
+    for name in ("problem", "beams", "designable", "drive", "amount", "input", "output", "human"):
+        figure = name in ("beams", "designable", "amount")
+        table.add_column(name, no_wrap=True, justify="right" if figure else "left")
     for name in builtin:
         problem = find_problem(name)
         table.add_row(
             name,
             str(problem.lattice.beam_count),
             str(len(problem.designable)),
-            f"{problem.input.drive} {problem.input.amount:.4g}",
+            problem.input.drive,
+            f"{problem.input.amount:.4f}",
             _direction(problem.input.direction.tolist()),
             _direction(problem.output.direction.tolist()),
             "yes" if human_design(name) else "",

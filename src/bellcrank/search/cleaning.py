@@ -1,4 +1,4 @@
-"""What a real part can do without: loose pieces, dead ends, and whatever hangs by one node."""
+"""What a real part can do without: loose pieces, dead ends, whatever no force goes through."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ if TYPE_CHECKING:
 
 
 def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the beams on some way between two nodes that are held, driven or watched.
+    """Return the beams on some way between two nodes that are driven, watched or held.
 
     A part that hangs by a single node is in equilibrium without any force in that node,
-    whatever its shape: it carries nothing. With one extra node tied to all held, driven
-    and output nodes, what carries load is the biconnected components of that node.
+    whatever its shape: it carries nothing. Nor does what stands on fixed supports alone.
+    With all fixed supports as one node, to which driven, watched and rolling nodes are
+    tied, what carries load is the biconnected components of that node that hold a tie.
+    Beams between two fixed supports stay: they make one piece of the part.
 
     Parameters
     ----------
@@ -30,20 +32,26 @@ def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]
     (M,) bool
         A part of `mask`.
     """
-    nodes = problem.lattice.node_count
-    terminals = {*problem.supports.nodes, *problem.input.nodes, *problem.output.nodes}
-    links: list[list[tuple[int, int]]] = [[] for _ in range(nodes + 1)]
-    for beam in np.flatnonzero(mask).tolist():
-        first, second = problem.lattice.beams[beam].tolist()
-        links[first].append((second, beam))
-        links[second].append((first, beam))
-    for number, node in enumerate(sorted(int(node) for node in terminals)):
-        tie = -1 - number
-        links[nodes].append((node, tie))
-        links[node].append((nodes, tie))
+    root = problem.lattice.node_count
+    place = np.arange(root)
+    place[problem.supports.fixed] = root
+    links: list[list[tuple[int, int]]] = [[] for _ in range(root + 1)]
     kept = np.zeros(len(mask), dtype=bool)
-    for component in _components_at(links, nodes):
-        kept[[beam for beam in component if beam >= 0]] = True
+    for beam in np.flatnonzero(mask).tolist():
+        first, second = place[problem.lattice.beams[beam]].tolist()
+        if first == second:
+            kept[beam] = True
+        else:
+            links[first].append((second, beam))
+            links[second].append((first, beam))
+    terminals = {*problem.supports.nodes, *problem.input.nodes, *problem.output.nodes}
+    for number, node in enumerate(sorted(set(place[list(terminals)].tolist()) - {root})):
+        tie = -1 - number
+        links[root].append((node, tie))
+        links[node].append((root, tie))
+    for component in _components_at(links, root):
+        if min(component) < 0:
+            kept[[beam for beam in component if beam >= 0]] = True
     return kept
 
 
@@ -86,8 +94,8 @@ def clean(design: Design, evaluator: Evaluator | None = None) -> Design:
     """Leave out of a design what no load can reach.
 
     First the load-bearing core (no loose pieces, no dead ends), then what hangs by a
-    single node. In the model such parts soften the joint they hang at; in a real part
-    they are idle mass.
+    single node or stands on supports alone. In the model the former soften the joint they
+    hang at; in a real part all are idle mass.
 
     Parameters
     ----------

@@ -63,9 +63,9 @@ def summary_text(report: DesignReport) -> str:
 |---|---|
 {table}
 
-Cleaning leaves out what no load can reach: loose pieces and dead-end beams. A dead end
-softens the joint it sits at in the model but not in a real part, so the efficiency after
-cleaning is the one to expect.
+Cleaning leaves out what no load can reach: loose pieces, dead-end beams, and parts that hang
+by a single node or stand on supports alone. A dead end softens the joint it sits at in the
+model but not in a real part, so the efficiency after cleaning is the one to expect.
 {refused}
 ![the design at rest and moved](motion.png)
 
