@@ -14,16 +14,15 @@ def problems() -> None:
     """List the built-in problems."""
     from bellcrank.model import builtin, find_problem, human_design
 
-    table = Table(box=SIMPLE)
-    for name in ("problem", "beams", "designable", "drive", "amount", "input", "output", "human"):
-        figure = name in ("beams", "designable", "amount")
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
+    for name in ("problem", "designable beams", "drive", "amount", "input", "output", "human"):
+        figure = name in ("designable beams", "amount")
         table.add_column(name, no_wrap=True, justify="right" if figure else "left")
     for name in builtin:
         problem = find_problem(name)
         table.add_row(
             name,
-            str(problem.lattice.beam_count),
-            str(len(problem.designable)),
+            f"{len(problem.designable)} of {problem.lattice.beam_count}",
             problem.input.drive,
             f"{problem.input.amount:.4f}",
             _direction(problem.input.direction.tolist()),
