@@ -16,8 +16,6 @@ from bellcrank.search import MetropolisSettings, chain_blocks
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-SEED = 1
-
 
 @dataclass(frozen=True, slots=True)
 class Recording:
@@ -55,11 +53,11 @@ class Recording:
 
 
 @cache
-def record(name: str, steps: int) -> Recording:
+def record(name: str, steps: int, seed: int = 0) -> Recording:
     """Run a chain with the paper's settings, as the program runs it."""
     evaluator = Evaluator(find_problem(name))
-    settings = MetropolisSettings(steps=steps, seed=SEED)
-    next(chain_blocks(evaluator, MetropolisSettings(steps=20, seed=SEED), 0))  # compiles
+    settings = MetropolisSettings(steps=steps, seed=seed)
+    next(chain_blocks(evaluator, MetropolisSettings(steps=20), 0))  # compiles
     start = time.perf_counter()
     blocks = [proposals for _, proposals in chain_blocks(evaluator, settings, 0)]
     seconds = time.perf_counter() - start

@@ -34,14 +34,15 @@ class Effort:
     """How much of everything to measure."""
 
     crane_steps: int
+    crane_seeds: int
     scaling_steps: int
     sizes: tuple[int, ...]
     stretches: tuple[int, ...]
     length: int
 
 
-FULL = Effort(20_000, 5_000, tuple(range(8, 21, 2)), (200, 1000, 5000, 12_000, 19_000), 10)
-QUICK = Effort(2_000, 500, (8, 14, 20), (200, 1500), 5)
+FULL = Effort(20_000, 8, 5_000, tuple(range(8, 21, 2)), (200, 1000, 5000, 12_000, 19_000), 10)
+QUICK = Effort(2_000, 2, 500, (8, 14, 20), (200, 1500), 5)
 """Of the chain: where stretches begin that all minimisers walk, and how long they are."""
 
 
@@ -105,23 +106,34 @@ def fitted_exponent(beams: list[int], cost: list[float]) -> float:
     return float(np.polyfit(np.log(beams), np.log(cost), 1)[0])
 
 
+def print_run(run: Recording, seed: int) -> None:
+    """Print one row of the table of steps."""
+    steps, beams = run.masks.shape
+    best = run.efficiency[run.accepted].max()
+    print(
+        f"| {run.name} | {seed} | {beams} | {steps} | {run.accepted.mean():.0%} | {best:.3f} "
+        f"| {run.microseconds_per_step:.0f} |"
+    )
+
+
 def print_steps(effort: Effort) -> Recording:
     """Print the cost of a Metropolis step; return the recorded crane chain."""
-    print("| problem | beams | steps | accepted | us per step |")
-    print("|---|---|---|---|---|")
+    print("| problem | seed | beams | steps | accepted | best | us per step |")
+    print("|---|---|---|---|---|---|---|")
+    cranes = [record("crane", effort.crane_steps, seed) for seed in range(effort.crane_seeds)]
+    for seed, run in enumerate(cranes):
+        print_run(run, seed)
     beams, cost = [], []
-    crane = record("crane", effort.crane_steps)
     names = [f"scaling-{size}" for size in effort.sizes]
-    for run in [crane, *(record(name, effort.scaling_steps) for name in names)]:
-        steps, count = run.masks.shape
-        share = run.accepted.mean()
-        print(f"| {run.name} | {count} | {steps} | {share:.0%} | {run.microseconds_per_step:.0f} |")
-        if run is not crane:
-            beams.append(count)
-            cost.append(run.microseconds_per_step)
+    for run in (record(name, effort.scaling_steps) for name in names):
+        print_run(run, 0)
+        beams.append(run.masks.shape[1])
+        cost.append(run.microseconds_per_step)
+    middle = np.median([run.microseconds_per_step for run in cranes])
+    print(f"\nHalf of the runs on the crane take at most {middle:.0f} us per step.")
     exponent = fitted_exponent(beams, cost)
-    print(f"\nCost per step grows as beams^{exponent:.2f} from {names[0]} to {names[-1]}.\n")
-    return crane
+    print(f"Cost per step grows as beams^{exponent:.2f} from {names[0]} to {names[-1]}.\n")
+    return cranes[0]
 
 
 def print_minimisers(crane: Recording, effort: Effort) -> None:

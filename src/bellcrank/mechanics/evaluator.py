@@ -174,7 +174,7 @@ class Evaluator:
         return Response(Status(status), efficiency, energy, self.displacement.copy())
 
     def remember(self) -> None:
-        """Keep the equilibrium computed last, for `respond_nearby` to start from."""
+        """Keep the equilibrium computed last, which must have converged, for `respond_nearby`."""
         self.known.present[:] = self.structure.present
         self.known.active[:] = self.structure.active
         self.known.u[:] = self.displacement

@@ -30,7 +30,7 @@ from bellcrank.mechanics.kernels.loading import (
 )
 from bellcrank.mechanics.kernels.newton import newton
 from bellcrank.mechanics.kernels.structure import ACTIVE, build_structure
-from bellcrank.mechanics.kernels.tangents import LONGEST_STEP, move_held_nodes
+from bellcrank.mechanics.kernels.tangents import GUESS, LONGEST_STEP, move_held_nodes
 
 
 @kernel
@@ -154,15 +154,17 @@ def find_response(
     if status == MECHANISM:
         return status, math.nan
     status = UNCONVERGED
+    guess = scratch.vectors[GUESS]
     if nearby:
         guess_from_neighbour(system, known, structure, u, scratch)
+        copy(u, guess)
         clear_tension(scratch)
         add_tension_at(system, structure, known.u, 1.0, scratch)
         for beam in range(len(mask)):
             if not known.present[beam]:
                 scratch.tension[beam] = 0.0
         status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP)
-    if status != CONVERGED or not is_reached_from_rest(system, structure, known.u, u, scratch):
+    if status != CONVERGED or not is_reached_from_rest(system, structure, guess, u, scratch):
         status = follow_path(system, structure, u, scratch, largest_increment)
     place_hanging_pieces(system, structure, u)
     return status, efficiency_of(system, u)

@@ -65,6 +65,7 @@ SWEEPS = 4
 # Rows of `scratch.vectors` in use on the path; `descend` takes row 8.
 PREVIOUS, MOVED, TANGENT, NEXT_TANGENT, LAST_TANGENT, MODE, SOFTEST_MODE, TURNED = range(8)
 TANGENT_AT_REST = 9
+GUESS = LAST_TANGENT
 FIRST_KNOT = 10
 """And from here on, an equilibrium and a tangent in turn."""
 MOST_KNOTS = 8

@@ -1,0 +1,161 @@
+"""What `bellcrank problems` and `bellcrank evaluate` say, and where they say it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from bellcrank import __version__
+from bellcrank.model import builtin, find_problem, human_design
+
+from .helpers import SMALL, Outcome, call, files, table, write
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FULL = {"crane": -0.0640859, "anti-parallel": 0.0420422}
+"""Efficiencies of the full lattices."""
+
+
+def results_of(outcome: Outcome) -> list[dict[str, Any]]:
+    assert outcome.code == 0, outcome.err
+    assert outcome.err == ""
+    assert list(outcome.data) == ["results"]
+    results: list[dict[str, Any]] = outcome.data["results"]
+    return results
+
+
+def test_the_version_is_told() -> None:
+    outcome = call("--version")
+    assert (outcome.code, outcome.out, outcome.err) == (0, f"bellcrank {__version__}\n", "")
+
+
+@pytest.mark.parametrize("command", [(), ("design",), ("evaluate",), ("plot",), ("problems",)])
+def test_help_is_a_result(command: tuple[str, ...]) -> None:
+    outcome = call(*command, "--help")
+    assert outcome.code == 0
+    assert outcome.err == ""
+    assert "Usage: bellcrank" in outcome.out
+
+
+def test_all_built_in_problems_are_listed_with_their_numbers_of_beams() -> None:
+    outcome = call("problems")
+    assert outcome.code == 0
+    assert outcome.err == ""
+    for name in builtin:
+        problem = find_problem(name)
+        (line,) = (line for line in outcome.out.splitlines() if f" {name} " in line)
+        assert f" {problem.lattice.beam_count} " in line
+        assert f" {len(problem.designable)} " in line
+        assert (" yes " in line) == (human_design(name) is not None)
+
+
+@pytest.mark.parametrize("minimiser", ["newton", "cg", "fire"])
+@pytest.mark.parametrize("problem", FULL)
+@pytest.mark.usefixtures("here")
+def test_full_lattices_have_the_known_efficiencies(problem: str, minimiser: str) -> None:
+    (result,) = results_of(call("evaluate", problem, "--minimiser", minimiser, "--json"))
+    assert result["efficiency"] == pytest.approx(FULL[problem], abs=1e-6)
+    assert result["status"] == "converged"
+    assert result["beams"] == find_problem(problem).lattice.beam_count
+
+
+@pytest.mark.usefixtures("here")
+def test_a_human_design_moves_as_far_as_published() -> None:
+    (result,) = results_of(call("evaluate", "human:crane", "--json"))
+    assert result["efficiency"] == pytest.approx(1.0104575, abs=1e-6)
+
+
+def masks_of(whole: Path) -> list[str]:
+    """Return some designs a chain went through, out of order, one of them twice."""
+    columns = table(whole)
+    taken = [
+        mask
+        for mask, accepted in zip(columns["mask"], columns["accepted"], strict=True)
+        if accepted
+    ]
+    return [taken[k].hex() for k in (90, 3, 40, 3)]
+
+
+@pytest.mark.parametrize("form", ["masks", "results"])
+def test_designs_are_evaluated_in_the_order_they_are_given(
+    here: Path, whole: Path, form: str
+) -> None:
+    masks = masks_of(whole)
+    assert len(set(masks)) == 3
+    content = {"masks": masks} if form == "masks" else {"results": [{"mask": m} for m in masks]}
+    write(here / "masks.json", content)
+    results = results_of(call("evaluate", "scaling-8", "--designs", "masks.json", "--json"))
+    assert [result["mask"] for result in results] == masks
+    columns = table(whole)
+    recorded = dict(
+        zip((mask.hex() for mask in columns["mask"]), columns["efficiency"], strict=True)
+    )
+    for result in results:
+        assert result["status"] == "converged"
+        told = float.fromhex(recorded[result["mask"]])
+        assert result["efficiency"] == pytest.approx(told, abs=1e-6)
+
+
+def test_all_minimisers_agree_about_the_designs_of_a_chain(here: Path, whole: Path) -> None:
+    write(here / "masks.json", {"masks": masks_of(whole)})
+    found = {}
+    for minimiser in ("newton", "cg", "fire"):
+        words = ("scaling-8", "--designs", "masks.json", "--minimiser", minimiser, "--json")
+        found[minimiser] = [r["efficiency"] for r in results_of(call("evaluate", *words))]
+    assert found["cg"] == pytest.approx(found["newton"], abs=1e-6)
+    assert found["fire"] == pytest.approx(found["newton"], abs=1e-6)
+    assert found["newton"][1] == found["newton"][3]
+    assert found["newton"][0] != found["newton"][1]
+
+
+def test_results_can_be_given_back_as_designs(here: Path, small: str) -> None:
+    write(here / "masks.json", {"masks": ["ff", "e7"]})
+    first = call("evaluate", small, "--designs", "masks.json", "--json")
+    write(here / "again.json", first.out)
+    assert call("evaluate", small, "--designs", "again.json", "--json") == first
+    assert [result["beams"] for result in results_of(first)] == [8, 6]
+
+
+def test_a_design_that_carries_nothing_has_no_efficiency_to_speak_of(
+    here: Path, small: str
+) -> None:
+    write(here / "masks.json", {"masks": ["00"]})
+    (result,) = results_of(call("evaluate", small, "--designs", "masks.json", "--json"))
+    assert (result["efficiency"], result["beams"]) == (0.0, 0)
+
+
+def test_no_designs_give_no_results(here: Path, small: str) -> None:
+    write(here / "masks.json", {"masks": []})
+    assert results_of(call("evaluate", small, "--designs", "masks.json", "--json")) == []
+
+
+def test_a_table_is_printed_for_people(here: Path, small: str) -> None:
+    (result,) = results_of(call("evaluate", small, "--json"))
+    outcome = call("evaluate", small)
+    assert outcome.err == ""
+    (row,) = (line for line in outcome.out.splitlines() if "converged" in line)
+    assert f" {result['efficiency']:.7f} " in row
+    assert sorted(files(here)) == [small]
+
+
+def test_the_objective_changes_the_efficiency(small: str) -> None:
+    plain, strict = (
+        results_of(call("evaluate", small, "--objective", name, "--json"))[0]["efficiency"]
+        for name in ("displacement", "directional:6")
+    )
+    assert plain != strict
+
+
+def test_a_process_of_its_own_keeps_results_and_messages_apart(here: Path) -> None:
+    write(here / "small.json", SMALL)
+    words = [sys.executable, "-m", "bellcrank", "evaluate"]
+    good = subprocess.run([*words, "small.json", "--json"], capture_output=True, check=False)
+    assert results_of(Outcome(good.returncode, good.stdout.decode(), good.stderr.decode()))
+    bad = subprocess.run([*words, "gone.json", "--json"], capture_output=True, check=False)
+    assert (bad.returncode, bad.stdout) == (2, b"")
+    assert bad.stderr.startswith(b"error: ")
+    assert b"Traceback" not in bad.stderr
