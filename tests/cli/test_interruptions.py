@@ -17,10 +17,14 @@ from unittest import mock
 
 import pytest
 
+from bellcrank import __version__
+from bellcrank.provenance import provenance
 from bellcrank.search import BLOCK, parallel
+from bellcrank.workflows import design
 
 from .helpers import (
     BLOCKS,
+    OTHER_VERSION,
     PROBLEM,
     SETTINGS,
     assert_same_run,
@@ -34,6 +38,8 @@ from .helpers import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
+
+    from .helpers import Outcome
 
 GATED = f"""
 import os
@@ -114,7 +120,7 @@ def test_a_search_stops_on_request_says_how_to_go_on_and_ends_the_same(
         assert running.wait(DEADLINE) == 130
     said = log.read_text()
     assert said.startswith("Stopping after the steps at hand ...\n")
-    assert f"bellcrank design --resume {folder}" in " ".join(said.split())
+    assert f"bellcrank design --resume {folder}" in said
     assert "Traceback" not in said
     assert json.loads((folder / "run.json").read_text())["status"] == "stopped"
     assert 3 <= shards(folder) < BLOCKS
@@ -184,12 +190,13 @@ def go_on(folder: Path) -> None:
     assert outcome.code == 0, outcome.err
 
 
-def assert_one_line(code: int, out: str, err: str, message: str) -> None:
-    assert code == 1
-    assert out == ""
-    assert err.startswith("error: ")
-    assert message in err
-    assert err.count("\n") == 1
+def assert_failed(outcome: Outcome, message: str) -> None:
+    """Check that a job ended with one line."""
+    assert outcome.code == 1
+    assert outcome.out == ""
+    assert outcome.complaints.startswith("error: ")
+    assert message in outcome.complaints
+    assert outcome.complaints.count("\n") == 1
 
 
 # Two calls for each file: its content and its name. The description; six shards; ...
@@ -201,7 +208,7 @@ def test_a_job_goes_on_after_a_full_disk(tmp_path: Path, whole: Path, instant: i
         failing_from("fsync", instant, errno.ENOSPC),
     ):
         outcome = call("design", PROBLEM, *SETTINGS, "--out", folder)
-    assert_one_line(outcome.code, outcome.out, outcome.err, "(No space left on device)")
+    assert_failed(outcome, "(No space left on device)")
     assert not (folder / "history.parquet").exists()
     assert not [name for name in files(folder) if "/." in f"/{name}"]
     go_on(folder)
@@ -226,7 +233,7 @@ def test_a_job_goes_on_where_the_system_refused_to_write(
     folder = tmp_path / "run"
     with no_file_larger_than((whole / name).stat().st_size // 2):
         outcome = call("design", PROBLEM, *SETTINGS, "--out", folder)
-    assert_one_line(outcome.code, outcome.out, outcome.err, "(File too large)")
+    assert_failed(outcome, "(File too large)")
     assert not (folder / name).exists()
     go_on(folder)
     assert_same_run(folder, whole)
@@ -235,7 +242,7 @@ def test_a_job_goes_on_where_the_system_refused_to_write(
 def test_results_survive_a_full_disk_while_they_are_written_again(copy: Path, whole: Path) -> None:
     with failing_from("fsync", 0, errno.ENOSPC):
         outcome = call("design", "--resume", copy)
-    assert_one_line(outcome.code, outcome.out, outcome.err, "(No space left on device)")
+    assert_failed(outcome, "(No space left on device)")
     assert table(copy) == table(whole)
     assert design_of(copy) == design_of(whole)
     go_on(copy)
@@ -263,8 +270,20 @@ def test_another_seed_changes_the_search(tmp_path: Path, whole: Path) -> None:
 def test_resuming_a_finished_job_gives_the_same_again(copy: Path, whole: Path) -> None:
     outcome = call("design", "--resume", copy)
     assert outcome.code == 0, outcome.err
-    assert outcome.err == ""
+    assert outcome.complaints == ""
     assert "efficiency" in outcome.out
+    assert_same_run(copy, whole)
+
+
+def test_a_job_resumed_with_another_version_says_so(copy: Path, whole: Path) -> None:
+    def of_tomorrow(**more: object) -> dict[str, object]:
+        return provenance(**more) | {"version": "9.9"}
+
+    with mock.patch.object(design, "provenance", of_tomorrow):
+        outcome = call("design", "--resume", copy)
+    assert outcome.code == 0
+    assert outcome.err.startswith(f"{OTHER_VERSION}{__version__}")
+    assert outcome.err.count("\n") == 1
     assert_same_run(copy, whole)
 
 

@@ -32,6 +32,12 @@ def test_a_missing_problem_file_is_named(command: str) -> None:
     assert line.endswith("; and there is no such file")
 
 
+@pytest.mark.parametrize("name", ["a[b]", "a[/b]", "[bold]", "a\\[b]"])
+def test_what_was_typed_comes_back_as_it_was(name: str) -> None:
+    line = refusal("design", PROBLEM, "--search", name)
+    assert line == f"error: unknown search {name!r}; known: paper"
+
+
 @pytest.mark.parametrize("command", ["design", "evaluate", "plot"])
 @pytest.mark.parametrize(
     ("file", "text", "message"),
@@ -282,11 +288,11 @@ def test_a_damaged_shard_is_named_and_left_as_it_is(
     outcome = call("design", "--resume", half, "--workers", 1)
     assert outcome.code == 1
     assert outcome.out == ""
-    assert outcome.err.startswith(f"error: {path}: damaged (")
-    assert outcome.err.endswith(
+    assert outcome.complaints.startswith(f"error: {path}: damaged (")
+    assert outcome.complaints.endswith(
         "delete it and the later ones in its folder and resume: their steps are computed again\n"
     )
-    assert outcome.err.count("\n") == 1
+    assert outcome.complaints.count("\n") == 1
     assert path.read_bytes() == before
     assert not (half / "design.json").exists()
 
@@ -299,8 +305,8 @@ def test_a_flipped_bit_in_a_shard_is_noticed_before_anything_is_concluded(half: 
     outcome = call("design", "--resume", half)
     assert outcome.code == 1
     assert outcome.out == ""
-    assert outcome.err.startswith(f"error: {path}: damaged (")
-    assert outcome.err.count("\n") == 1
+    assert outcome.complaints.startswith(f"error: {path}: damaged (")
+    assert outcome.complaints.count("\n") == 1
     assert path.read_bytes() == data
     assert not (half / "design.json").exists()
     assert not (half / "history.parquet").exists()

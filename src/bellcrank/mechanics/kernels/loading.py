@@ -122,6 +122,29 @@ def next_increment(
 
 
 @inlined
+def arrive(
+    system: System, structure: Structure, increment: float, end: float, u: Floats, scratch: Scratch
+) -> tuple[float, float]:
+    """Bring an extrapolated `u` to the equilibrium at the end of an increment.
+
+    Returns the lowest stiffness there, and how far the increment departs from the tangents
+    at both ends; 0 and infinity if there is no equilibrium.
+    """
+    previous, tangent = scratch.vectors[PREVIOUS], scratch.vectors[TANGENT]
+    next_tangent = scratch.vectors[NEXT_TANGENT]
+    move_held_nodes(system, end, u)
+    clear_tension(scratch)
+    add_tension_at(system, structure, previous, 1.0, scratch)
+    tolerance = system.tolerance if end == 1.0 else PATH_TOLERANCE
+    now, departure = 0.0, math.inf
+    if newton(system, structure, end, u, scratch, tolerance, LONGEST_STEP) == CONVERGED:
+        now = lowest_stiffness(system, structure, scratch.vectors[MODE], scratch)
+        find_tangent(system, structure, end, u, next_tangent, scratch)
+        departure = curvature_left(previous, u, tangent, next_tangent, increment)
+    return now, departure
+
+
+@inlined
 def has_second_equilibrium(
     system: System, structure: Structure, u: Floats, scratch: Scratch
 ) -> bool:
@@ -174,7 +197,6 @@ def follow_path(
     """
     previous, mode = scratch.vectors[PREVIOUS], scratch.vectors[MODE]
     tangent, last_tangent = scratch.vectors[TANGENT], scratch.vectors[LAST_TANGENT]
-    next_tangent = scratch.vectors[NEXT_TANGENT]
     for node in range(len(u)):
         for axis in range(2):
             u[node, axis] = 0.0
@@ -193,23 +215,14 @@ def follow_path(
         end = fraction + increment if increment < 1.0 - fraction else 1.0
         copy(u, previous)
         extrapolate(u, tangent, last_tangent, increment, last_increment)
-        move_held_nodes(system, end, u)
-        clear_tension(scratch)
-        add_tension_at(system, structure, previous, 1.0, scratch)
-        tolerance = system.tolerance if end == 1.0 else PATH_TOLERANCE
-        now, departure = 0.0, math.inf
-        status = newton(system, structure, end, u, scratch, tolerance, LONGEST_STEP)
-        if status == CONVERGED:
-            now = lowest_stiffness(system, structure, mode, scratch)
-            find_tangent(system, structure, end, u, next_tangent, scratch)
-            departure = curvature_left(previous, u, tangent, next_tangent, increment)
+        now, departure = arrive(system, structure, increment, end, u, scratch)
         soft = min(stiffness, now) < SOFT * at_rest
         softening = SOFTENING_WHERE_SOFT if soft else LARGEST_SOFTENING
         following = next_increment(increment, departure, stiffness, now, softening)
         if is_joined(departure, stiffness, now, softening, increment):
             fraction, stiffness, last_increment = end, now, increment
             copy(tangent, last_tangent)
-            copy(next_tangent, tangent)
+            copy(scratch.vectors[NEXT_TANGENT], tangent)
             if now < softest:
                 softest = now
                 copy(mode, scratch.vectors[SOFTEST_MODE])
