@@ -85,16 +85,16 @@ class Outcome:
         return json.loads(self.out)
 
 
-def call(*words: object) -> Outcome:
-    """Run `bellcrank` with these words in this process, in 80 columns."""
+def call(*words: object, width: int = 10_000) -> Outcome:
+    """Run `bellcrank` with these words in this process, on a terminal of some width."""
     out, err = io.StringIO(), io.StringIO()
     code = 0
     with (
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
         mock.patch("sys.argv", ["bellcrank", *map(str, words)]),
-        mock.patch.object(console.notes, "_width", 80),
-        mock.patch.object(console.results, "_width", 80),
+        mock.patch.object(console.notes, "_width", width),
+        mock.patch.object(console.results, "_width", width),
     ):
         try:
             main()
@@ -115,7 +115,7 @@ def refusal(*words: object, code: int = 2, folder: Path | None = None) -> str:
     """Run a command that must be refused in one line and write nothing; return that line."""
     folder = folder or Path.cwd()
     before = files(folder)
-    outcome = call(*words)
+    outcome = call(*words, width=80)
     assert outcome.out == ""
     assert outcome.err.startswith("error: "), outcome.err
     assert outcome.err.count("\n") == 1, outcome.err

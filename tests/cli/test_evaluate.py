@@ -42,7 +42,7 @@ def test_help_is_a_result(command: tuple[str, ...]) -> None:
 
 
 def test_all_built_in_problems_are_listed_with_their_numbers_of_beams() -> None:
-    outcome = call("problems")
+    outcome = call("problems", width=80)
     assert outcome.code == 0
     assert outcome.err == ""
     for name in builtin:

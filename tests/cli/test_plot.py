@@ -129,7 +129,7 @@ def test_an_unknown_second_design_is_refused(small: str) -> None:
 
 
 def test_a_problem_without_a_human_design_has_none_to_draw() -> None:
-    assert "unknown problem 'human:discs'" in refusal("plot", "human:discs")
+    assert "no human design for 'discs'" in refusal("plot", "human:discs")
 
 
 def test_paths_are_those_of_a_run_only(here: Path, small: str) -> None:

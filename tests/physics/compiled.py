@@ -7,10 +7,10 @@ from bellcrank.mechanics.kernels.energy import (
     elastic_energy,
     find_gradient,
     find_stiffness,
-    find_tension,
     measure_held_beams,
 )
 from bellcrank.mechanics.kernels.structure import build_structure
+from bellcrank.mechanics.kernels.tension import find_tension
 
 
 @entry

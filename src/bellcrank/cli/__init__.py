@@ -1,5 +1,5 @@
 """The command line: parse, call, render. No physics here."""
 
-from bellcrank.cli.app import main
+from bellcrank.cli.main import main
 
 __all__ = ["main"]

@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 
 from rich.console import Console
+from rich.markup import escape
 
-results = Console(highlight=False, soft_wrap=True)
-notes = Console(stderr=True, highlight=False)
+results = Console(highlight=False, soft_wrap=True, emoji=False)
+notes = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
 def announce_compilation() -> None:
@@ -16,6 +17,11 @@ def announce_compilation() -> None:
 
     if not kernels_are_compiled():
         notes.print("Compiling the kernels for this machine, once; this takes about half a minute.")
+
+
+def plain(text: object) -> str:
+    """Keep square brackets in a name or message from being read as markup."""
+    return escape(str(text))
 
 
 def print_json(text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import signal
 import sys
 import threading
@@ -15,7 +16,7 @@ import typer
 from rich.table import Table
 
 from bellcrank.cli.app import INTERRUPTED, app
-from bellcrank.cli.console import announce_compilation, notes, results
+from bellcrank.cli.console import announce_compilation, notes, plain, results
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
@@ -86,7 +87,8 @@ def design(
         report = complete_design(folder, workers=workers, tell=progress, stop=stop)
     if report is None:
         notes.print(
-            f"Stopped; what is done is kept. Go on with: bellcrank design --resume {folder.path}"
+            "Stopped; what is done is kept. Go on with: "
+            f"bellcrank design --resume {plain(shlex.quote(str(folder.path)))}"
         )
         sys.exit(INTERRUPTED)
     _print_report(report)
@@ -98,7 +100,7 @@ def _warn_of_another_version(folder: RunFolder) -> None:
 
     if version := made_by_another_version(folder):
         notes.print(
-            f"[yellow]note:[/] this run was begun with another version ({version}); "
+            f"[yellow]note:[/] this run was begun with another version ({plain(version)}); "
             "what follows may differ from what it would have found."
         )
 
@@ -137,7 +139,12 @@ def _print_report(report: DesignReport) -> None:
         f"from rest by {' and '.join(report.checks)}, which differ by {report.agreement:.0e}",
     )
     table.add_row("designs looked at", f"{report.proposals}")
-    table.add_row("results", f"{report.folder}/")
+    table.add_row("results", plain(f"{report.folder}/"))
     results.print(table)
+    if selection.efficiency_after <= 0.0:
+        notes.print(
+            "[bold yellow]warning:[/] no design was found that moves the output the wanted way; "
+            "search longer (--steps) or from another initial design."
+        )
     if not report.verified:
         notes.print("[bold yellow]warning:[/] the minimisers disagree; treat the design with care.")

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from bellcrank.cli.app import app
-from bellcrank.cli.console import announce_compilation, notes
+from bellcrank.cli.console import announce_compilation, notes, plain
+from bellcrank.errors import InvalidSettings
 
 
 @app.command()
@@ -36,6 +37,10 @@ def plot(
     from bellcrank.plots import draw_comparison, draw_design, draw_motion
     from bellcrank.workflows import draw_run, find_design, move
 
+    if beside is not None and (paths or rest):
+        raise InvalidSettings("--beside compares motions; leave out --rest and --paths")
+    if rest and paths:
+        raise InvalidSettings("give either --rest or --paths")
     if paths:
         folder = Path(what)
         target = out or folder / "paths.png"
@@ -58,4 +63,4 @@ def plot(
                     target,
                     overwrite=overwrite,
                 )
-    notes.print(f"wrote {target}")
+    notes.print(f"wrote {plain(target)}")

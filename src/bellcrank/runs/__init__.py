@@ -26,8 +26,16 @@ Examples
 >>> scratch.cleanup()
 """
 
+from bellcrank.runs.files import remove_temporaries
 from bellcrank.runs.folder import RunFolder
 from bellcrank.runs.layout import check_free
 from bellcrank.runs.records import COLUMNS, ProposalColumns, Proposals
 
-__all__ = ["COLUMNS", "ProposalColumns", "Proposals", "RunFolder", "check_free"]
+__all__ = [
+    "COLUMNS",
+    "ProposalColumns",
+    "Proposals",
+    "RunFolder",
+    "check_free",
+    "remove_temporaries",
+]

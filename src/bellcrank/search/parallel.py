@@ -128,4 +128,5 @@ def run_chains(
         except BaseException:
             stop.set()
             raise
-    return all(future.result() for future in futures)
+    done = [future.result() for future in futures]  # all of them: one may hold an error
+    return all(done)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NO_LIMIT = 2**62
+MOST_CHAINS = 2**15
+"""What the column of a run's history holds."""
 
 
 searches: Registry[type[MetropolisSettings]] = Registry("search")
@@ -78,8 +80,9 @@ class MetropolisSettings:
     patience: int | None = None
 
     def __post_init__(self) -> None:
-        for name, least in (("steps", 1), ("chains", 1), ("seed", 0), ("annealing", 0)):
+        for name, least in (("steps", 1), ("seed", 0), ("annealing", 0)):
             _check_whole(name, getattr(self, name), least)
+        _check_whole("chains", self.chains, 1, MOST_CHAINS)
         _check_whole("minimum_degree", self.minimum_degree, 0)
         if self.patience is not None:
             _check_whole("patience", self.patience, 1)
@@ -119,6 +122,8 @@ class MetropolisSettings:
         return cls(**given)
 
 
-def _check_whole(name: str, value: object, least: int) -> None:
+def _check_whole(name: str, value: object, least: int, most: int = NO_LIMIT) -> None:
     if not isinstance(value, int) or isinstance(value, bool) or value < least:
         raise InvalidSettings(f"{name}: expected a whole number of at least {least}, got {value!r}")
+    if value > most:
+        raise InvalidSettings(f"{name}: expected a whole number of at most {most}, got {value!r}")

@@ -1,13 +1,13 @@
 """Whole jobs that need several layers at once, for every face: command line, web, scripts."""
 
 from bellcrank.workflows.design import (
-    DesignReport,
     complete_design,
     made_by_another_version,
     reopen_design,
     start_design,
 )
 from bellcrank.workflows.find import find_design
+from bellcrank.workflows.outcome import DesignReport
 from bellcrank.workflows.pictures import draw_run, move
 
 __all__ = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,68 +11,24 @@ from bellcrank.errors import BellcrankError
 from bellcrank.mechanics import CAREFUL, Evaluator, Response
 from bellcrank.model import Design, Problem, human_design, write_design
 from bellcrank.provenance import provenance
-from bellcrank.runs import RunFolder, check_free
+from bellcrank.runs import RunFolder, check_free, remove_temporaries
 from bellcrank.search import (
     Candidate,
     MetropolisSettings,
     Progress,
-    Selection,
     advance_chain,
     candidates_of,
     run_chains,
     select,
     start_chain,
 )
+from bellcrank.workflows.outcome import DesignReport
+from bellcrank.workflows.report import RESULTS, write_report
 
 if TYPE_CHECKING:
     import threading
     from collections.abc import Callable
     from pathlib import Path
-
-AGREEMENT = 1e-6
-"""Largest difference in efficiency between two minimisers that verify each other."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DesignReport:
-    """What came out of a design job.
-
-    Parameters
-    ----------
-    folder
-        Where everything was written.
-    settings
-        Of the search.
-    selection
-        The design, and where it comes from.
-    checks
-        Efficiency of the design from rest by each minimiser that verified it.
-    human
-        The human-designed counterpart, if there is one.
-    human_response
-        Its response, under the same objective.
-    proposals, best_by_chain
-        How many designs were looked at; the best each chain accepted.
-    """
-
-    folder: Path
-    settings: MetropolisSettings
-    selection: Selection
-    checks: dict[str, float]
-    human: Design | None
-    human_response: Response | None
-    proposals: int
-    best_by_chain: list[float]
-
-    @property
-    def agreement(self) -> float:
-        """Largest difference between the minimisers."""
-        return max(self.checks.values()) - min(self.checks.values())
-
-    @property
-    def verified(self) -> bool:
-        """Whether the minimisers agree."""
-        return self.agreement <= AGREEMENT
 
 
 def prepare(problem: Problem, settings: MetropolisSettings) -> None:
@@ -204,8 +160,7 @@ def verify(design: Design, objective: str | None, response: Response) -> dict[st
 
 def conclude(folder: RunFolder, settings: MetropolisSettings) -> DesignReport:
     """Choose, clean, verify and compare, and write the result files."""
-    from bellcrank.workflows.report import write_report
-
+    remove_temporaries(folder.path, RESULTS)
     problem = folder.problem
     candidates, proposals, best = accepted_candidates(folder, settings.chains)
     selection = select(problem, candidates, settings.objective)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from bellcrank.model import Design, find_problem, human_design, read_design
+from bellcrank.errors import UnknownName
+from bellcrank.model import Design, builtin, find_problem, human_design, read_design
 
 
 def find_design(name_or_path: str) -> Design:
@@ -14,9 +15,10 @@ def find_design(name_or_path: str) -> Design:
     Parameters
     ----------
     name_or_path
-        A design file; a result folder with a ``design.json``; ``human:NAME`` for the
-        human counterpart of a built-in problem; or a problem, built in or in a file,
-        whose initial design is meant.
+        A problem, built in or in a file, whose initial design is meant; a design file; a
+        result folder with a ``design.json``; or ``human:NAME`` for the human counterpart of
+        a built-in problem. The name of a built-in problem means the problem even where there
+        is a folder of that name: ``crane/`` is the folder.
 
     Raises
     ------
@@ -27,14 +29,20 @@ def find_design(name_or_path: str) -> Design:
     >>> find_design("crane").beam_count
     352
     """
+    kind, _, name = name_or_path.partition(":")
+    if kind == "human":
+        human = human_design(name)
+        if human is None:
+            there = ", ".join(known for known in builtin if human_design(known))
+            raise UnknownName(f"no human design for {name!r}; there are some for: {there}")
+        return human
     path = Path(name_or_path)
+    if name_or_path in builtin:
+        return find_problem(name_or_path).full_design()
     if path.is_dir() and (path / "design.json").exists():
         return read_design(path / "design.json")
     if path.suffix == ".json" and path.is_file() and _is_design(path):
         return read_design(path)
-    kind, _, name = name_or_path.partition(":")
-    if kind == "human" and name and (human := human_design(name)):
-        return human
     return find_problem(name_or_path).full_design()
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.model import Design
-    from bellcrank.workflows.design import DesignReport
+    from bellcrank.workflows.outcome import DesignReport
 
 
 def chain_paths(folder: RunFolder, chains: int) -> list[ChainPath]:

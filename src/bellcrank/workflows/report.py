@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.model.storage import write_text
 
 if TYPE_CHECKING:
     from bellcrank.runs import RunFolder
-    from bellcrank.workflows.design import DesignReport
+    from bellcrank.workflows.outcome import DesignReport
+
+
+RESULTS = re.compile(r"design\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png")
+"""Names of the files that conclude a design job."""
 
 
 def summary_data(report: DesignReport) -> dict[str, Any]:

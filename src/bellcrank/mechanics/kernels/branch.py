@@ -15,7 +15,6 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
-from bellcrank.mechanics.kernels.energy import add_tension_at, clear_tension
 from bellcrank.mechanics.kernels.fields import (
     clear,
     copy,
@@ -41,6 +40,7 @@ from bellcrank.mechanics.kernels.tangents import (
     nonlinearity_of,
     stiffness_is_definite,
 )
+from bellcrank.mechanics.kernels.tension import add_tension_at, clear_tension
 
 STILL = 1e-6
 """Movement by which a flip is known to have changed nothing but idle beams; a quarter to a

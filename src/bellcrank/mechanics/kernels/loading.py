@@ -14,7 +14,6 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
-from bellcrank.mechanics.kernels.energy import add_tension_at, clear_tension
 from bellcrank.mechanics.kernels.fields import clear, copy, dot, largest_difference, move, pair
 from bellcrank.mechanics.kernels.newton import descend, newton
 from bellcrank.mechanics.kernels.structure import HANGING
@@ -44,6 +43,7 @@ from bellcrank.mechanics.kernels.tangents import (
     nonlinearity_of,
     stiffness_is_definite,
 )
+from bellcrank.mechanics.kernels.tension import add_tension_at, clear_tension
 
 SMALLEST_INCREMENT = 1.0 / 1024.0
 DIP = 0.5

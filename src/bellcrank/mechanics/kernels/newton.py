@@ -24,12 +24,11 @@ from bellcrank.mechanics.kernels.energy import (
     elastic_energy,
     find_gradient,
     find_stiffness,
-    find_tension,
-    foresee_tension,
     measure_held_beams,
     work_of_load,
 )
 from bellcrank.mechanics.kernels.fields import copy, largest_component
+from bellcrank.mechanics.kernels.tension import find_tension, foresee_tension
 
 MOST_ITERATIONS = 10
 CHORD_STEP = 2e-3

@@ -17,12 +17,7 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
 )
 from bellcrank.mechanics.kernels.branch import is_reached_from_rest
-from bellcrank.mechanics.kernels.energy import (
-    add_tension_at,
-    beam_rotation,
-    clear_tension,
-    elastic_energy,
-)
+from bellcrank.mechanics.kernels.energy import beam_rotation, elastic_energy
 from bellcrank.mechanics.kernels.fields import clear, copy, pair
 from bellcrank.mechanics.kernels.loading import (
     follow_path,
@@ -31,6 +26,7 @@ from bellcrank.mechanics.kernels.loading import (
 from bellcrank.mechanics.kernels.newton import newton
 from bellcrank.mechanics.kernels.structure import ACTIVE, build_structure
 from bellcrank.mechanics.kernels.tangents import GUESS, LONGEST_STEP, move_held_nodes
+from bellcrank.mechanics.kernels.tension import add_tension_at, clear_tension
 
 
 @kernel

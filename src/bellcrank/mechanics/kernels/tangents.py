@@ -18,12 +18,7 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
 )
 from bellcrank.mechanics.kernels.cholesky import factorise, solve
-from bellcrank.mechanics.kernels.energy import (
-    find_gradient,
-    find_stiffness,
-    find_tension,
-    measure_held_beams,
-)
+from bellcrank.mechanics.kernels.energy import find_gradient, find_stiffness, measure_held_beams
 from bellcrank.mechanics.kernels.fields import (
     clear,
     copy,
@@ -34,6 +29,7 @@ from bellcrank.mechanics.kernels.fields import (
 )
 from bellcrank.mechanics.kernels.newton import find_step, take_step
 from bellcrank.mechanics.kernels.structure import ACTIVE
+from bellcrank.mechanics.kernels.tension import find_tension
 
 LARGEST_INCREMENT = 0.5
 """Of the load, between two points that are to be joined."""

@@ -1,0 +1,48 @@
+"""Where the command line starts, and how its errors end."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import NoReturn, cast
+
+import typer
+
+from bellcrank.cli import design, evaluate, plot, problems
+from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, app
+from bellcrank.cli.console import notes, plain
+from bellcrank.errors import BellcrankError, CorruptRun, StorageError
+
+COMMANDS = (design, evaluate, plot, problems)
+"""Modules that register a command."""
+
+
+UsageError = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
+"""What typer raises for a command line that it cannot read; it exports only this child."""
+
+
+def main() -> None:
+    """Run the command line; a known error becomes one line and an exit code."""
+    try:
+        code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
+        if code == INTERRUPTED:
+            notes.print("Interrupted.")
+        sys.exit(code or 0)
+    except UsageError as error:
+        _refuse(f"{error.format_message().rstrip('.')}; see bellcrank --help", BAD_INPUT)
+    except BellcrankError as error:
+        _refuse(str(error), FAILED if isinstance(error, (StorageError, CorruptRun)) else BAD_INPUT)
+    except KeyboardInterrupt:
+        notes.print("Interrupted.")
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(FAILED)
+    except OSError as error:
+        _refuse(str(error), FAILED)
+
+
+def _refuse(message: str, code: int) -> NoReturn:
+    """Say what is wrong in one line, and leave."""
+    notes.print(f"[bold red]error:[/] {plain(message)}")
+    sys.exit(code)

@@ -1,0 +1,58 @@
+"""What comes out of a design job."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bellcrank.mechanics import Response
+    from bellcrank.model import Design
+    from bellcrank.search import MetropolisSettings, Selection
+
+AGREEMENT = 1e-6
+"""Largest difference in efficiency between two minimisers that verify each other."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DesignReport:
+    """What came out of a design job.
+
+    Parameters
+    ----------
+    folder
+        Where everything was written.
+    settings
+        Of the search.
+    selection
+        The design, and where it comes from.
+    checks
+        Efficiency of the design from rest by each minimiser that verified it.
+    human
+        The human-designed counterpart, if there is one.
+    human_response
+        Its response, under the same objective.
+    proposals, best_by_chain
+        How many designs were looked at; the best each chain accepted.
+    """
+
+    folder: Path
+    settings: MetropolisSettings
+    selection: Selection
+    checks: dict[str, float]
+    human: Design | None
+    human_response: Response | None
+    proposals: int
+    best_by_chain: list[float]
+
+    @property
+    def agreement(self) -> float:
+        """Largest difference between the minimisers."""
+        return max(self.checks.values()) - min(self.checks.values())
+
+    @property
+    def verified(self) -> bool:
+        """Whether the minimisers agree."""
+        return self.agreement <= AGREEMENT

@@ -1,0 +1,88 @@
+"""Ways in which the command line once failed its users."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from typing import TYPE_CHECKING, Any
+from unittest import mock
+
+import pytest
+
+from bellcrank.search import parallel
+
+from .helpers import PROBLEM, call, refusal
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.mark.parametrize("name", ["a[/b]", "b[red]x", "c:warning:x"])
+def test_a_folder_of_any_name_is_named_as_it_is(here: Path, name: str) -> None:
+    outcome = call("design", PROBLEM, "--steps", "10", "--chains", "1", "--out", name)
+    assert outcome.code == 0
+    assert f"{name}/" in outcome.out
+    assert (here / name / "design.json").exists()
+
+
+@pytest.mark.parametrize("name", [":warning:x", "a\\[b]", "[red]x"])
+def test_an_unknown_name_is_repeated_as_it_was_typed(here: Path, name: str) -> None:
+    assert name in refusal("evaluate", name).replace("\\\\", "\\")
+    assert not list(here.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("design", PROBLEM, "--steps", "many"), "--steps"),
+        (("design", PROBLEM, "--frob"), "--frob"),
+        (("design", PROBLEM, "--patience", "9" * 20), "patience: expected a whole number of at"),
+        (("design", PROBLEM, "--minimum-degree", "9" * 20), "minimum_degree: expected a whole"),
+        (("design", PROBLEM, "--chains", "32769"), "chains: expected a whole number of at most"),
+        (("frobnicate",), "frobnicate"),
+        (("evaluate",), "problem"),
+        (("plot", PROBLEM, "--rest", "--beside", "nowhere"), "--beside"),
+        (("plot", PROBLEM, "--rest", "--paths"), "--rest or --paths"),
+    ],
+)
+def test_a_command_that_cannot_be_followed_is_refused_in_one_line(
+    here: Path, words: tuple[str, ...], said: str
+) -> None:
+    assert said in refusal(*words)
+    assert not list(here.iterdir())
+
+
+def test_a_result_folder_does_not_hide_the_problem_of_its_name(here: Path, whole: Path) -> None:
+    shutil.copytree(whole, here / PROBLEM)
+    problem, design = (
+        call("evaluate", name, "--json").data["results"][0] for name in (PROBLEM, f"{PROBLEM}/")
+    )
+    assert problem["beams"] == 219
+    assert design["beams"] < 219
+
+
+def test_an_error_in_one_chain_is_told_though_another_was_stopped_by_it(half: Path) -> None:
+    (half / "chains/001/00000000.parquet").write_bytes(b"")
+    failed = threading.Event()
+    real = parallel.run_chain
+
+    def run_chain(folder: Any, settings: Any, chain: int, stop: threading.Event, tell: Any) -> bool:
+        if chain == 0:
+            failed.wait(10.0)
+            stop.wait(10.0)
+        try:
+            return real(folder, settings, chain, stop, tell)
+        finally:
+            failed.set()
+
+    with mock.patch.object(parallel, "run_chain", run_chain):
+        outcome = call("design", "--resume", half, "--workers", "2")
+    assert outcome.code == 1
+    assert "error:" in outcome.err
+
+
+def test_ctrl_c_outside_a_search_says_so(here: Path) -> None:
+    with mock.patch("bellcrank.workflows.find_design", side_effect=KeyboardInterrupt):
+        outcome = call("evaluate", PROBLEM)
+    assert (outcome.code, outcome.err.strip()) == (130, "Interrupted.")
+    assert not list(here.iterdir())
