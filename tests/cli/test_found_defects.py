@@ -11,7 +11,7 @@ import pytest
 
 from bellcrank.search import parallel
 
-from .helpers import PROBLEM, call, refusal
+from .helpers import PROBLEM, SMALL, call, refusal, write
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -86,3 +86,14 @@ def test_ctrl_c_outside_a_search_says_so(here: Path) -> None:
         outcome = call("evaluate", PROBLEM)
     assert (outcome.code, outcome.err.strip()) == (130, "Interrupted.")
     assert not list(here.iterdir())
+
+
+def test_a_file_nested_too_deeply_is_refused(here: Path) -> None:
+    (here / "deep.json").write_text("[" * 50_000 + "]" * 50_000)
+    assert "deep.json: not valid JSON" in refusal("evaluate", "deep.json")
+
+
+def test_a_push_beyond_all_measure_ends_unconverged(here: Path) -> None:
+    huge = {**SMALL, "input": {**SMALL["input"], "amount": 1e300}}
+    write(here / "huge.json", huge)
+    assert call("evaluate", "huge.json", "--json").data["results"][0]["status"] == "unconverged"

@@ -81,7 +81,7 @@ def design(
         )  # fmt: skip
         task = find_problem(problem)
         announce_compilation()
-        folder = start_design(task, settings, out or Path(task.name))
+        folder = start_design(task, settings, out or Path(Path(task.name).name))
     progress = SearchProgress(MetropolisSettings.from_dict(folder.settings))
     with stopping_on_interrupt() as stop, progress:
         report = complete_design(folder, workers=workers, tell=progress, stop=stop)

@@ -49,6 +49,6 @@ def find_design(name_or_path: str) -> Design:
 def _is_design(path: Path) -> bool:
     try:
         data = json.loads(path.read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return False
     return isinstance(data, dict) and str(data.get("schema", "")).startswith("bellcrank/design/")

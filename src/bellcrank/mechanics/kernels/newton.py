@@ -31,6 +31,7 @@ from bellcrank.mechanics.kernels.fields import copy, largest_component
 from bellcrank.mechanics.kernels.tension import find_tension, foresee_tension
 
 MOST_ITERATIONS = 10
+HOPELESS = 1e30
 CHORD_STEP = 2e-3
 """Below this step the stiffness is good enough to be used once more."""
 CHORD_RATIO = 0.05
@@ -107,9 +108,12 @@ def newton(
 
 @kernel
 def shift_until_definite(structure: Structure, scratch: Scratch, shift: float) -> float:
-    """Factorise the stiffness, adding to its diagonal until it is positive definite."""
+    """Factorise the stiffness, adding to its diagonal until it is positive definite.
+
+    Returns what was added; infinity if nothing helps, as where the stiffness is not finite.
+    """
     added = 0.0
-    while True:
+    while added < HOPELESS:
         if factorise(structure, scratch):
             return added
         more = max(shift, 2.0 * added)
@@ -117,6 +121,7 @@ def shift_until_definite(structure: Structure, scratch: Scratch, shift: float) -
             scratch.diagonal[block, 0] += more - added
             scratch.diagonal[block, 3] += more - added
         added = more
+    return math.inf
 
 
 @kernel
@@ -138,6 +143,8 @@ def descend(
         find_tension(system, structure, scratch)
         find_stiffness(system, structure, 1.0, scratch)
         shift = shift_until_definite(structure, scratch, 1e-3 * system.angle)
+        if shift == math.inf:
+            return UNCONVERGED
         size = find_step(system, structure, scratch)
         if size <= 1e-9:
             if shift == 0.0:
