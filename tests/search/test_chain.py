@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings, UnknownName
-from bellcrank.mechanics import Evaluator, Response, Status
+from bellcrank.mechanics import Evaluator, Response, Screening, Status
 from bellcrank.model import Problem, find_problem, unpack_mask
 from bellcrank.runs import Proposals
 from bellcrank.search import (
@@ -16,14 +16,14 @@ from bellcrank.search import (
     ChainState,
     MetropolisSettings,
     advance_chain,
-    advance_in_python,
     chain_blocks,
     costs,
     is_done,
     schedules,
     start_chain,
 )
-from bellcrank.search import chain as chain_module
+from bellcrank.search.blocks import random_numbers
+from bellcrank.search.metropolis import advance_in_python
 
 
 @pytest.fixture(scope="module")
@@ -70,9 +70,9 @@ def test_the_compiled_block_equals_the_python_loop(small: Problem, variant: dict
     for block in range(2):
         if is_done(state, settings):
             break
-        uniforms = chain_module.draw_uniforms(settings.seed, 0, block, BLOCK)
+        rng = random_numbers(settings.seed, 0, block)
         compiled, rows = advance_chain(evaluator, settings, 0, state)
-        plain, plain_rows = advance_in_python(evaluator, settings, state, uniforms)
+        plain, plain_rows = advance_in_python(evaluator, settings, state, rng)
         assert compiled == plain
         assert same(rows, plain_rows)
         state = compiled
@@ -158,10 +158,13 @@ class Snapping:
         self._inner = Evaluator(problem)
         self._asked = 0
 
-    def respond(self, mask: np.ndarray) -> Response:
-        return self._inner.respond(mask)
+    def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
+        return self._inner.respond(mask, largest_increment)
 
-    def respond_nearby(self, mask: np.ndarray) -> Response:
+    def screen(self, mask: np.ndarray) -> Screening | None:
+        return self._inner.screen(mask)
+
+    def respond_nearby(self, mask: np.ndarray, least: float = -np.inf) -> Response:  # noqa: ARG002
         self._asked += 1
         response = self._inner.respond_nearby(mask)
         return replace(response, status=Status.SNAPPED) if self._asked % 2 else response
@@ -182,8 +185,8 @@ def test_designs_that_snap_are_recorded_and_refused(small: Problem) -> None:
 
 def test_a_search_cannot_start_from_a_design_without_response(small: Problem) -> None:
     class Broken(Snapping):
-        def respond(self, mask: np.ndarray) -> Response:
-            return replace(super().respond(mask), status=Status.MECHANISM)
+        def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
+            return replace(super().respond(mask, largest_increment), status=Status.MECHANISM)
 
     with pytest.raises(InvalidSettings, match="cannot start"):
         start_chain(Broken(small), MetropolisSettings())
@@ -215,7 +218,7 @@ def test_unknown_names_list_the_known_ones(wrong: dict) -> None:
 def test_settings_survive_plain_data() -> None:
     settings = MetropolisSettings(steps=7, cost="negative", patience=3)
     assert MetropolisSettings.from_dict(settings.to_dict()) == settings
-    with pytest.raises(InvalidSettings, match="unknown key 'color'"):
+    with pytest.raises(InvalidSettings, match="no setting 'color'"):
         MetropolisSettings.from_dict({"color": 1})
 
 

@@ -25,7 +25,7 @@ def small() -> Problem:
 
 
 def candidate(mask: np.ndarray, efficiency: float, step: int = 0) -> Candidate:
-    return Candidate(efficiency, 0, step, 5, np.packbits(mask).tobytes())
+    return Candidate(efficiency, 0, step, np.packbits(mask).tobytes())
 
 
 def test_a_plateau_needs_several_unmoved_changes() -> None:

@@ -1,142 +1,193 @@
-"""The chain visits designs as often as the Boltzmann distribution says.
+"""Chains visit designs as often as the Boltzmann distribution says.
 
-Ten designable beams make 1024 designs, all of which are evaluated. At fixed temperature
-T the chain must visit each with probability exp(-exp(-efficiency) / T) / Z. Observables
-are averaged over independent chains, whose scatter gives their standard errors.
+At fixed temperature T a chain must visit each of 1024 designs with probability
+exp(-cost / T) / Z, whatever its moves; and wrong rules must be noticed.
 """
 
 from __future__ import annotations
 
-import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from bellcrank.mechanics import Evaluator
-from bellcrank.model import Input, Output, Problem, Supports, lattices
-from bellcrank.search import MetropolisSettings, chain_blocks
-from bellcrank.search import chain as chain_module
+from bellcrank.model import Problem, unpack_mask
+from bellcrank.search import (
+    MetropolisSettings,
+    TemperingSettings,
+    chain_blocks,
+    metropolis,
+    moves,
+    tempering,
+)
+from bellcrank.search.moves.balanced import Balanced
+from bellcrank.search.moves.delayed import Delayed
+from bellcrank.search.moves.node import Node
 
-TEMPERATURE = 0.05
-CHAINS = 24
-BURN_IN = 250
-LARGEST_DEVIATION = 4.5
-"""In standard errors; for 20 observables, exceeded by chance once in several thousand runs."""
+from .lattice import (
+    CHAINS,
+    LARGEST_DEVIATION,
+    all_efficiencies,
+    boltzmann,
+    deviations,
+    index_of,
+    ten_beams,
+    visited,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+PAPER_TEMPERATURE = 0.05
+TEMPERATURE = 0.03
+"""For cost -efficiency: the most likely design is then a few hundred times likelier than most."""
+
+
+@dataclass(frozen=True)
+class Exact:
+    problem: Problem
+    counted: np.ndarray
+    ignored: np.ndarray
 
 
 @pytest.fixture(scope="module")
-def problem() -> Problem:
-    lattice = lattices["triangular-rows"](counts=[4, 5, 4, 5], first_x=[0.5, 0.0, 0.5, 0.0])
-    bottom, top_left, top_right = [0, 1, 2, 3], [13], [17]
-    free = Problem(
-        name="ten beams",
-        lattice=lattice,
-        supports=Supports(fixed=bottom),
-        input=Input(nodes=top_right, direction=[0.0, -1.0], drive="displacement", amount=0.2),
-        output=Output(nodes=top_left, direction=[-1.0, 0.0]),
-    )
-    chosen = free.designable[:: max(1, len(free.designable) // 10)][:10]
-    assert len(chosen) == 10
-    return Problem(
-        name="ten beams",
-        lattice=lattice,
-        supports=free.supports,
-        input=free.input,
-        output=free.output,
-        designable=chosen,
+def exact() -> Exact:
+    problem = ten_beams()
+    return Exact(
+        problem, all_efficiencies(problem, "counted"), all_efficiencies(problem, "ignored")
     )
 
 
-@pytest.fixture(scope="module")
-def exact(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Efficiency and probability of every design, indexed by its designable bits."""
-    evaluator = Evaluator(problem)
-    efficiency = []
-    for bits in itertools.product([False, True], repeat=10):
-        mask = problem.initial.copy()
-        mask[problem.designable] = bits
-        efficiency.append(evaluator.respond(mask).efficiency)
-    values = np.array(efficiency)
-    weight = np.exp(-np.exp(-values) / TEMPERATURE)
-    return values, weight / weight.sum()
+def deviation_of_the_paper(exact: Exact, steps: int) -> float:
+    settings = MetropolisSettings(steps=steps, schedule="constant", cold=PAPER_TEMPERATURE)
+    samples = [visited(exact.problem, settings, chain) for chain in range(CHAINS)]
+    probability = boltzmann(np.exp(-exact.counted), PAPER_TEMPERATURE)
+    return float(deviations(samples, exact.counted, probability).max())
 
 
-def visited_states(problem: Problem, chain: int, steps: int) -> np.ndarray:
-    """Index of the current design after each step of one chain."""
-    settings = MetropolisSettings(steps=steps, schedule="constant", cold=TEMPERATURE)
-    powers = 2 ** np.arange(9, -1, -1)
-    mask = problem.initial.copy()
-    visited = []
-    for _, proposals in chain_blocks(Evaluator(problem), settings, chain):
-        proposed = np.unpackbits(proposals.mask, axis=1)[:, : len(mask)].astype(bool)
-        for row, accepted in zip(proposed, proposals.accepted, strict=True):
-            if accepted:
-                mask = row
-            visited.append(int(mask[problem.designable] @ powers))
-    return np.array(visited[BURN_IN:])
+def deviation_of_moves(exact: Exact, *names: str, steps: int = 1000) -> float:
+    settings = MetropolisSettings(
+        steps=steps, schedule="constant", cold=TEMPERATURE, cost="negative", moves=names,
+        dangling="ignored",
+    )  # fmt: skip
+    samples = [visited(exact.problem, settings, chain) for chain in range(CHAINS)]
+    probability = boltzmann(-exact.ignored, TEMPERATURE)
+    return float(deviations(samples, exact.ignored, probability).max())
 
 
-def observables(states: np.ndarray, efficiency: np.ndarray) -> np.ndarray:
-    """Marginals of the ten beams, moments of the efficiency, occupation of its quantiles."""
-    bits = (states[:, None] >> np.arange(9, -1, -1)) & 1
-    values = efficiency[states]
-    edges = np.quantile(efficiency, [0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.99])
-    quantile = [(values > edge).astype(float) for edge in edges]
-    return np.column_stack([*bits.T, values, values**2, *quantile])
+def test_the_distributions_are_neither_flat_nor_frozen(exact: Exact) -> None:
+    for probability in (
+        boltzmann(np.exp(-exact.counted), PAPER_TEMPERATURE),
+        boltzmann(-exact.ignored, TEMPERATURE),
+    ):
+        assert probability.max() < 0.2
+        assert probability.max() > 10 * probability.min()
 
 
-def deviations(problem: Problem, exact: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
-    """Distance of each observable from its exact mean, in standard errors."""
-    efficiency, probability = exact
-    means = np.array(
-        [
-            observables(visited_states(problem, chain, steps), efficiency).mean(axis=0)
-            for chain in range(CHAINS)
-        ]
+def test_visits_match_the_enumerated_distribution(exact: Exact) -> None:
+    assert deviation_of_the_paper(exact, steps=8000) < LARGEST_DEVIATION
+
+
+def test_visits_of_the_python_loop_match_too(exact: Exact, monkeypatch: pytest.MonkeyPatch) -> None:
+    plain_loop(monkeypatch)
+    assert deviation_of_the_paper(exact, steps=1500) < LARGEST_DEVIATION
+
+
+@pytest.mark.parametrize("name", list(moves))
+def test_visits_by_every_move_match_the_enumerated_distribution(exact: Exact, name: str) -> None:
+    # A swap alone keeps the number of beams.
+    names = (name, name, "flip") if name == "swap" else (name,)
+    assert deviation_of_moves(exact, *names) < LARGEST_DEVIATION
+
+
+def test_visits_by_a_mixture_of_moves_match_too(exact: Exact) -> None:
+    assert deviation_of_moves(exact, *moves) < LARGEST_DEVIATION
+
+
+def plain_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let chains of flips run in Python."""
+
+    def advance(responder, settings, chain, state):
+        rng = metropolis.random_numbers(settings.seed, chain, state.step // metropolis.BLOCK)
+        return metropolis.advance_in_python(responder, settings, state, rng)
+
+    monkeypatch.setattr(metropolis, "_advance_compiled", None)
+    paper = metropolis.searches["paper"]
+    monkeypatch.setitem(
+        metropolis.searches._entries,
+        "paper",
+        metropolis.Search(paper.settings, paper.state, paper.start, advance, paper.is_done),
     )
-    expected = probability @ observables(np.arange(1024), efficiency)
-    error = means.std(axis=0, ddof=1) / np.sqrt(CHAINS)
-    return np.abs(means.mean(axis=0) - expected) / error
 
 
-def test_the_distribution_is_neither_flat_nor_frozen(exact: tuple[np.ndarray, np.ndarray]) -> None:
-    _, probability = exact
-    assert probability.max() < 0.2
-    assert probability.max() > 10 * probability.min()
+def doubled_temperature(log_ratio: float, uniform: float) -> bool:
+    return uniform < math.exp(min(0.0, log_ratio / 2))
 
 
-def test_visits_match_the_enumerated_distribution(
-    problem: Problem, exact: tuple[np.ndarray, np.ndarray]
-) -> None:
-    assert deviations(problem, exact, steps=8000).max() < LARGEST_DEVIATION
+def uphill_by_a_coin(log_ratio: float, uniform: float) -> bool:
+    return log_ratio >= 0.0 or uniform < 0.5
 
 
-def test_visits_of_the_python_loop_match_too(
-    problem: Problem, exact: tuple[np.ndarray, np.ndarray], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(chain_module, "_advance_compiled", chain_module.advance_in_python)
-    assert deviations(problem, exact, steps=1500).max() < LARGEST_DEVIATION
+def heat_bath_of_a_third(log_ratio: float, uniform: float) -> bool:
+    return uniform < 1.0 / (2.0 + math.exp(-log_ratio))
 
 
-def doubled_temperature(old: float, new: float, temperature: float, uniform: float) -> bool:
-    return uniform < np.exp((old - new) / (2 * temperature))
-
-
-def uphill_by_a_coin(old: float, new: float, _temperature: float, uniform: float) -> bool:
-    return new <= old or uniform < 0.5
-
-
-def ratio_of_costs(old: float, new: float, _temperature: float, uniform: float) -> bool:
-    return uniform < 0.5 * old / (old + new)
-
-
-@pytest.mark.parametrize("wrong_rule", [doubled_temperature, uphill_by_a_coin, ratio_of_costs])
+@pytest.mark.parametrize("rule", [doubled_temperature, uphill_by_a_coin, heat_bath_of_a_third])
 def test_a_wrong_acceptance_rule_is_noticed(
-    problem: Problem,
-    exact: tuple[np.ndarray, np.ndarray],
-    monkeypatch: pytest.MonkeyPatch,
-    wrong_rule: object,
+    exact: Exact, monkeypatch: pytest.MonkeyPatch, rule: Callable[[float, float], bool]
 ) -> None:
-    monkeypatch.setattr(chain_module, "_advance_compiled", chain_module.advance_in_python)
-    monkeypatch.setattr(chain_module, "accepts", wrong_rule)
-    assert deviations(problem, exact, steps=1500).max() > LARGEST_DEVIATION
+    plain_loop(monkeypatch)
+    monkeypatch.setattr(metropolis, "accepts", rule)
+    assert deviation_of_the_paper(exact, steps=1500) > LARGEST_DEVIATION
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("balanced", Balanced), ("delayed", Delayed), ("node", Node)]
+)
+def test_a_move_that_hides_its_preferences_is_noticed(
+    exact: Exact, monkeypatch: pytest.MonkeyPatch, name: str, kind: type
+) -> None:
+    monkeypatch.setattr(kind, "log_chance", lambda _self, _here, _beams: 0.0)
+    assert deviation_of_moves(exact, name) > LARGEST_DEVIATION
+
+
+REPLICAS = TemperingSettings(
+    steps=5000, replicas=2, hot=0.15, cold=TEMPERATURE, moves=("flip", "balanced")
+)
+
+
+def deviation_of_tempering(exact: Exact, monkeypatch: pytest.MonkeyPatch, replica: int) -> float:
+    """Compare the designs of one replica, at the start of each of its turns."""
+    take_turn, seen = tempering._take_turn, []
+
+    def watched(responder, settings, state, turn, *rest):
+        if turn == replica:
+            mask = unpack_mask(state.mask[replica], exact.problem.lattice.beam_count)
+            seen[-1].append(index_of(exact.problem, mask))
+        return take_turn(responder, settings, state, turn, *rest)
+
+    monkeypatch.setattr(tempering, "_take_turn", watched)
+    for chain in range(CHAINS):
+        seen.append([])
+        for _ in chain_blocks(Evaluator(exact.problem, dangling="ignored"), REPLICAS, chain):
+            pass
+    samples = [np.array(states[5:]) for states in seen]
+    probability = boltzmann(-exact.ignored, REPLICAS.temperatures[replica])
+    return float(deviations(samples, exact.ignored, probability).max())
+
+
+@pytest.mark.parametrize("replica", [0, 1])
+def test_every_replica_keeps_its_distribution(
+    exact: Exact, monkeypatch: pytest.MonkeyPatch, replica: int
+) -> None:
+    assert deviation_of_tempering(exact, monkeypatch, replica) < LARGEST_DEVIATION
+
+
+def test_exchanging_whatever_the_cost_is_noticed(
+    exact: Exact, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempering, "accepts", lambda _log_ratio, _uniform: True)
+    assert deviation_of_tempering(exact, monkeypatch, 1) > LARGEST_DEVIATION

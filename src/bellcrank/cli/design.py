@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.table import Table
@@ -29,27 +30,43 @@ def design(
     problem: Annotated[
         str | None, typer.Argument(help="A built-in problem or a problem file.")
     ] = None,
-    steps: Annotated[int, typer.Option(help="Proposals of each chain.")] = 20_000,
-    chains: Annotated[int, typer.Option(help="Independent chains.")] = 4,
-    seed: Annotated[int, typer.Option(help="Determines everything, with the chain's number.")] = 0,
+    steps: Annotated[int | None, typer.Option(help="Proposals of each chain. [20000]")] = None,
+    chains: Annotated[int | None, typer.Option(help="Independent chains. [4]")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Determines everything, with the chain's number. [0]")
+    ] = None,
     objective: Annotated[
         str | None,
         typer.Option(help="displacement, directional:N or force; default: by the drive."),
     ] = None,
-    search: Annotated[str, typer.Option(help="Which search; 'paper' is Bonfanti et al. 2020.")] = (
-        "paper"
-    ),
+    search: Annotated[
+        str,
+        typer.Option(
+            help="basin-hopping, informed, tempering, or paper (Bonfanti et al. 2020).",
+        ),
+    ] = "basin-hopping",
     dangling: Annotated[
-        str, typer.Option(help="counted (the literal model) or ignored (load-bearing core).")
-    ] = "counted",
-    minimiser: Annotated[str, typer.Option(help="newton, cg or fire.")] = "newton",
-    cost: Annotated[str, typer.Option(help="exponential (the paper) or negative.")] = "exponential",
-    schedule: Annotated[str, typer.Option(help="linear (the paper), geometric, constant.")] = (
-        "linear"
-    ),
-    minimum_degree: Annotated[int, typer.Option(help="Least number of beams at a free node.")] = 0,
+        str | None,
+        typer.Option(
+            help="ignored (load-bearing core) or counted (the literal model, as in 'paper')."
+        ),
+    ] = None,
+    minimiser: Annotated[str | None, typer.Option(help="newton, cg or fire. [newton]")] = None,
+    cost: Annotated[
+        str | None, typer.Option(help="exponential (the paper) or negative; for chains.")
+    ] = None,
+    schedule: Annotated[
+        str | None, typer.Option(help="linear (the paper), geometric, constant; for chains.")
+    ] = None,
+    minimum_degree: Annotated[
+        int | None, typer.Option(help="Least number of beams at a free node; for chains.")
+    ] = None,
     patience: Annotated[
         int | None, typer.Option(help="End a chain after so many rejections in a row.")
+    ] = None,
+    more: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE: any other setting of the search; repeatable."),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Chains at the same time; changes no result.")
@@ -60,7 +77,7 @@ def design(
     """Design an actuator: search, clean up, verify, and see what was designed."""
     from bellcrank.cli.progress import SearchProgress
     from bellcrank.model import find_problem
-    from bellcrank.search import MetropolisSettings, searches
+    from bellcrank.search import read_settings
     from bellcrank.workflows import complete_design, reopen_design, start_design
 
     if (problem is None) == (resume is None):
@@ -73,16 +90,17 @@ def design(
         folder = reopen_design(resume)
         _warn_of_another_version(folder)
     else:
-        searches[search]
-        settings = MetropolisSettings(
-            steps=steps, chains=chains, seed=seed, objective=objective, cost=cost,
-            schedule=schedule, dangling=dangling, minimiser=minimiser,  # type: ignore[arg-type]
-            minimum_degree=minimum_degree, patience=patience,
-        )  # fmt: skip
+        given = {
+            "steps": steps, "chains": chains, "seed": seed, "objective": objective,
+            "dangling": dangling, "minimiser": minimiser, "cost": cost, "schedule": schedule,
+            "minimum_degree": minimum_degree, "patience": patience,
+        }  # fmt: skip
+        chosen = {key: value for key, value in given.items() if value is not None}
+        settings = read_settings({"search": search, **chosen, **dict(map(_setting, more or ()))})
         task = find_problem(problem)
         announce_compilation()
         folder = start_design(task, settings, out or Path(Path(task.name).name))
-    progress = SearchProgress(MetropolisSettings.from_dict(folder.settings))
+    progress = SearchProgress(read_settings(folder.settings))
     with stopping_on_interrupt() as stop, progress:
         report = complete_design(folder, workers=workers, tell=progress, stop=stop)
     if report is None:
@@ -92,6 +110,16 @@ def design(
         )
         sys.exit(INTERRUPTED)
     _print_report(report)
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """Read ``key=value``; the value as JSON where it is some, else as text."""
+    key, equals, value = text.partition("=")
+    if not (key and equals):
+        raise InvalidSettings(f"--set {text}: expected KEY=VALUE")
+    with suppress(ValueError):
+        return key, json.loads(value)
+    return key, value
 
 
 def _warn_of_another_version(folder: RunFolder) -> None:

@@ -10,8 +10,8 @@ from typing import Self
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from bellcrank.cli.console import notes
-from bellcrank.search import MetropolisSettings
 from bellcrank.search import Progress as Step
+from bellcrank.search import SearchSettings
 
 QUIET_INTERVAL = 10.0
 """Seconds between lines where there is no terminal."""
@@ -26,14 +26,14 @@ class SearchProgress:
         Of the search, for how much there is to do.
     """
 
-    def __init__(self, settings: MetropolisSettings) -> None:
+    def __init__(self, settings: SearchSettings) -> None:
         self._chains = settings.chains
         self._total = settings.chains * settings.steps
         self._lock = threading.Lock()
         self._best = float("-inf")
         self._done: dict[int, int] = {}
         self._made = self._accepted = 0
-        self._temperature = settings.hot
+        self._temperature = 0.0
         self._start = self._last_line = time.monotonic()
         self._bar = Progress(
             TextColumn("[bold]searching"),
@@ -78,8 +78,9 @@ class SearchProgress:
 
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)
+        temperature = f"T {self._temperature:.4f}  " if self._temperature > 0.0 else ""
         return (
-            f"best {self._best:6.3f}  T {self._temperature:.4f}  "
+            f"best {self._best:6.3f}  {temperature}"
             f"accepted {100.0 * self._accepted / self._made:2.0f} %  {speed:6.0f} steps/s"
         )
 

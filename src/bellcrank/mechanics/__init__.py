@@ -14,6 +14,7 @@ from bellcrank.mechanics.evaluator import (
     Dangling,
     Evaluator,
     Response,
+    Screening,
     Status,
     load_bearing_core,
 )
@@ -27,6 +28,7 @@ __all__ = [
     "Minimiser",
     "Objective",
     "Response",
+    "Screening",
     "Status",
     "load_bearing_core",
     "minimisers",

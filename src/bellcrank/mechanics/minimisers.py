@@ -25,13 +25,14 @@ FORCE_TOLERANCE = 1e-12
 first-order minimisers stop."""
 
 Minimiser = Callable[
-    ["System", "Bytes", bool, "Known", bool, float, "Structure", "Floats", "Scratch"],
+    ["System", "Bytes", bool, "Known", bool, float, float, "Structure", "Floats", "Scratch"],
     tuple[int, float, float],
 ]
-"""``(system, mask, core, known, nearby, largest_increment, structure, u, scratch)`` to status,
-efficiency and energy. Brings the design `mask` to equilibrium at full load, in increments of
-at most `largest_increment` from rest or, if `nearby`, from the known equilibrium of a similar
-design; fills `structure` and `u`."""
+"""``(system, mask, core, known, nearby, least, largest_increment, structure, u, scratch)`` to
+status, efficiency and energy. Brings the design `mask` to equilibrium at full load, in
+increments of at most `largest_increment` from rest or, if `nearby`, from the known equilibrium
+of a similar design; what is then no more efficient than `least` need not be verified. Fills
+`structure` and `u`."""
 
 minimisers: Registry[Callable[[], Minimiser]] = Registry("minimiser")
 
@@ -68,6 +69,7 @@ def _first_order(name: str) -> Minimiser:
         core: bool,
         known: Known,
         nearby: bool,
+        least: float,  # noqa: ARG001
         largest_increment: float,  # noqa: ARG001
         structure: Structure,
         u: Floats,

@@ -20,6 +20,7 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
+from bellcrank.mechanics.kernels.screening import PANEL, RANK, Screen
 from bellcrank.mechanics.kernels.tangents import MOST_KNOTS, ROWS
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
 
@@ -183,4 +184,21 @@ def allocate_scratch(system: System, structure: Structure) -> Scratch:
         step=np.zeros((blocks, 2)),
         vectors=np.zeros((ROWS, nodes, 2)),
         knots=np.zeros((MOST_KNOTS, 2)),
+    )
+
+
+def allocate_screen(system: System, structure: Structure) -> Screen:
+    """Working memory for the prediction of all flips; grows with the square of the nodes."""
+    blocks = len(structure.column_bits)
+    return Screen(
+        inverse=np.zeros((blocks, blocks, 4)),
+        panel=np.zeros((blocks, 2, 2 * PANEL)),
+        counts=np.zeros(len(system.positions), np.uint8),
+        around=np.zeros(RANK, np.int64),
+        ends=np.zeros((RANK, 2), np.int64),
+        vectors=np.zeros((RANK, 2)),
+        change=np.zeros((RANK, RANK)),
+        coupling=np.zeros((RANK, RANK)),
+        matrix=np.zeros((RANK, RANK + 1)),
+        force=np.zeros(RANK),
     )

@@ -97,6 +97,8 @@ class PathsStyle:
         highest is.
     axis
         ``"accepted"`` changes (the paper) or ``"proposals"``.
+    measure
+        What the curves show.
     """
 
     title: str = ""
@@ -105,3 +107,4 @@ class PathsStyle:
     built_efficiency: float | None = None
     best: tuple[int, int] | None = None
     axis: Axis = "accepted"
+    measure: str = "efficiency"

@@ -191,7 +191,7 @@ def _frame(axes: Axes, shown: PathsStyle, longest: float, *, logarithmic: bool) 
         )
     words = {"accepted": "accepted changes", "proposals": "proposals"}
     axes.set_xlabel(words[shown.axis], family=style.FONT, size=style.LABEL_SIZE, color=style.INK)
-    axes.set_ylabel("efficiency", family=style.FONT, size=style.LABEL_SIZE, color=style.INK)
+    axes.set_ylabel(shown.measure, family=style.FONT, size=style.LABEL_SIZE, color=style.INK)
     axes.tick_params(
         which="both", labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT
     )

@@ -1,45 +1,75 @@
 """Search: which beams to keep.
 
-Costs and schedules are registries; a chain is a pure function from one state to the
-next (`advance_chain`) and a generator around it (`chain_blocks`); `run_chains` keeps
-many of them in a run folder; `select` makes of what they found one design to build.
+Searches, moves, costs and schedules are registries. A chain is a pure function from one
+state to the next (`advance_chain`) and a generator around it (`chain_blocks`); `run_chains`
+keeps many of them in a run folder; `select` makes of what they found one design to build.
+
+Examples
+--------
+>>> from bellcrank.model import find_problem
+>>> settings = HoppingSettings(steps=500)
+>>> responder = make_responder(find_problem("scaling-8"), settings)
+>>> *_, (state, proposals) = chain_blocks(responder, settings, chain=0)
+>>> state.step, len(proposals.efficiency)
+(500, 250)
 """
 
-from bellcrank.search.chain import (
-    BLOCK,
-    ChainState,
-    Responder,
-    advance_chain,
-    advance_in_python,
-    chain_blocks,
-    is_done,
-    start_chain,
-)
+from bellcrank.search.blocks import BLOCK, FORBIDDEN, FORESEEN
 from bellcrank.search.cleaning import clean, loaded_beams
 from bellcrank.search.costs import Cost, costs
+from bellcrank.search.hopping import HoppingSettings, HoppingState
+from bellcrank.search.metropolis import ChainState, InformedSettings, MetropolisSettings
+from bellcrank.search.moves import Move, moves
 from bellcrank.search.parallel import Progress, default_workers, run_chain, run_chains
+from bellcrank.search.responder import Responder, make_responder
 from bellcrank.search.schedules import schedules
+from bellcrank.search.searches import (
+    DEFAULT_SEARCH,
+    Search,
+    State,
+    advance_chain,
+    chain_blocks,
+    is_done,
+    read_settings,
+    read_state,
+    searches,
+    start_chain,
+)
 from bellcrank.search.selection import (
     Candidate,
     Selection,
     candidates_of,
+    peaks,
     pieces,
+    plateau_ends,
     plateaus,
     select,
 )
-from bellcrank.search.settings import MetropolisSettings, searches
+from bellcrank.search.settings import SearchSettings
+from bellcrank.search.tempering import TemperingSettings, TemperingState
 
 __all__ = [
     "BLOCK",
+    "DEFAULT_SEARCH",
+    "FORBIDDEN",
+    "FORESEEN",
     "Candidate",
     "ChainState",
     "Cost",
+    "HoppingSettings",
+    "HoppingState",
+    "InformedSettings",
     "MetropolisSettings",
+    "Move",
     "Progress",
     "Responder",
+    "Search",
+    "SearchSettings",
     "Selection",
+    "State",
+    "TemperingSettings",
+    "TemperingState",
     "advance_chain",
-    "advance_in_python",
     "candidates_of",
     "chain_blocks",
     "clean",
@@ -47,8 +77,14 @@ __all__ = [
     "default_workers",
     "is_done",
     "loaded_beams",
+    "make_responder",
+    "moves",
+    "peaks",
     "pieces",
+    "plateau_ends",
     "plateaus",
+    "read_settings",
+    "read_state",
     "run_chain",
     "run_chains",
     "schedules",

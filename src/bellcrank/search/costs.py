@@ -6,10 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,16 +26,27 @@ class Cost:
         Number under which the compiled chain knows it (`search.kernels.metropolis`).
     of
         The same function, for chains that run in Python.
+    rise
+        Its change, from an efficiency and changes of it.
     """
 
     code: int
     of: Callable[[float], float]
+    rise: Callable[[float, NDArray[np.float64]], NDArray[np.float64]]
 
 
 costs: Registry[Cost] = Registry("cost")
 
-costs.register("exponential")(Cost(0, lambda efficiency: math.exp(-efficiency)))
+costs.register("exponential")(
+    Cost(
+        0,
+        lambda efficiency: math.exp(-efficiency),
+        lambda efficiency, change: math.exp(-efficiency) * np.expm1(-change),
+    )
+)
 """exp(-efficiency): the paper's. Gains count less the better the design already is."""
 
-costs.register("negative")(Cost(1, lambda efficiency: -efficiency))
+costs.register("negative")(
+    Cost(1, lambda efficiency: -efficiency, lambda _efficiency, change: -change)
+)
 """-efficiency: the published code's."""

@@ -14,14 +14,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import Evaluator
 from bellcrank.runs import Proposals, RunFolder
-from bellcrank.search.chain import ChainState, advance_chain, is_done, start_chain
+from bellcrank.search.responder import make_responder
+from bellcrank.search.searches import (
+    State,
+    advance_chain,
+    is_done,
+    read_state,
+    start_chain,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bellcrank.search.settings import MetropolisSettings
+    from bellcrank.search.settings import SearchSettings
 
 SHARD = 4000
 """Steps that are kept in memory before they are written: what a kill can cost in time."""
@@ -44,7 +50,7 @@ class Progress:
     """
 
     chain: int
-    state: ChainState
+    state: State
     temperature: float
     steps: int
     accepted: int
@@ -59,7 +65,7 @@ def default_workers() -> int:
 
 def run_chain(
     folder: RunFolder,
-    settings: MetropolisSettings,
+    settings: SearchSettings,
     chain: int,
     stop: threading.Event,
     tell: Callable[[Progress], None],
@@ -70,11 +76,11 @@ def run_chain(
     together with the state to go on from.
     """
     next_step, stored = folder.progress(chain)
-    evaluator = Evaluator(folder.problem, settings.objective, settings.dangling, settings.minimiser)
-    state = ChainState(**stored) if stored else start_chain(evaluator, settings)
+    responder = make_responder(folder.problem, settings)
+    state = read_state(settings, stored) if stored else start_chain(responder, settings, chain)
     pending: list[Proposals] = []
     while not is_done(state, settings) and not stop.is_set():
-        state, proposals = advance_chain(evaluator, settings, chain, state)
+        state, proposals = advance_chain(responder, settings, chain, state)
         pending.append(proposals)
         tell(
             Progress(
@@ -99,7 +105,7 @@ def _joined(parts: list[Proposals]) -> Proposals:
 
 def run_chains(
     folder: RunFolder,
-    settings: MetropolisSettings,
+    settings: SearchSettings,
     *,
     workers: int | None = None,
     tell: Callable[[Progress], None] = lambda _progress: None,

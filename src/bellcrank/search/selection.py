@@ -19,7 +19,7 @@ from bellcrank.model import Design, Problem
 from bellcrank.search.cleaning import clean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -41,8 +41,6 @@ class Candidate:
         As recorded by the chain.
     chain, step
         Where it was found.
-    plateau
-        Accepted changes, in a row around it, that left the efficiency unmoved.
     mask
         Its packed mask.
     """
@@ -50,7 +48,6 @@ class Candidate:
     efficiency: float
     chain: int
     step: int
-    plateau: int
     mask: bytes
 
 
@@ -119,31 +116,54 @@ def plateaus(
     return found
 
 
+def plateau_ends(efficiency: NDArray[np.float64]) -> list[int]:
+    """Return where the plateaus end, what their changes have shed by then having done no work.
+
+    A chain without plateaus offers all its designs.
+
+    Examples
+    --------
+    >>> plateau_ends(np.array([0.1, 0.5, 0.5, 0.501, 0.5, 0.5, 0.9]))
+    [5]
+    """
+    return [last - 1 for _, last in plateaus(efficiency)] or list(range(len(efficiency)))
+
+
+def peaks(efficiency: NDArray[np.float64]) -> list[int]:
+    """Return where the efficiency falls next, or is at its end.
+
+    Examples
+    --------
+    >>> peaks(np.array([0.1, 0.5, 0.4, 0.7, 0.7]))
+    [1, 4]
+    """
+    falls = np.append(efficiency[1:] < efficiency[:-1], True)[: len(efficiency)]
+    return np.flatnonzero(falls).tolist()
+
+
 def candidates_of(
     chain: int,
     step: NDArray[np.int64],
     mask: NDArray[np.uint8],
     efficiency: NDArray[np.float64],
+    offers: Callable[[NDArray[np.float64]], list[int]] = plateau_ends,
     count: int = CANDIDATES,
 ) -> list[Candidate]:
-    """Pick from a chain's accepted designs the ends of its best plateaus, best first.
-
-    The end of a plateau, because what its changes have shed by then did no work. A
-    chain without plateaus offers its best designs.
+    """Pick the most efficient of the designs that a chain offers, best first.
 
     Parameters
     ----------
     step, mask, efficiency
         (n,), (n, bytes) and (n,) of the accepted proposals, in order.
+    offers
+        From the efficiencies to the indices of the designs worth building.
+    count
+        How many at most.
     """
-    ranges = plateaus(efficiency)
-    ranked = [(float(efficiency[last - 1]), last - 1, last - first) for first, last in ranges]
-    if not ranked:
-        ranked = [(float(value), index, 0) for index, value in enumerate(efficiency)]
-    best = heapq.nlargest(count, ranked)
+    ranked = [(float(efficiency[index]), index) for index in offers(efficiency)]
     return [
-        Candidate(value, chain, int(step[index]), size, mask[index].tobytes())
-        for value, index, size in best
+        Candidate(value, chain, int(step[index]), mask[index].tobytes())
+        for value, index in heapq.nlargest(count, ranked)
     ]
 
 

@@ -14,11 +14,14 @@ from bellcrank.provenance import provenance
 from bellcrank.runs import RunFolder, check_free, remove_temporaries
 from bellcrank.search import (
     Candidate,
-    MetropolisSettings,
     Progress,
+    SearchSettings,
     advance_chain,
     candidates_of,
+    make_responder,
+    read_settings,
     run_chains,
+    searches,
     select,
     start_chain,
 )
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def prepare(problem: Problem, settings: MetropolisSettings) -> None:
+def prepare(problem: Problem, settings: SearchSettings) -> None:
     """Compile what a search needs, and refuse a problem that it cannot start from.
 
     Raises
@@ -39,12 +42,12 @@ def prepare(problem: Problem, settings: MetropolisSettings) -> None:
     InvalidSettings
         If the initial design has no unique, stable response.
     """
-    evaluator = Evaluator(problem, settings.objective, settings.dangling, settings.minimiser)
-    once = replace(settings, steps=1)
-    advance_chain(evaluator, once, 0, start_chain(evaluator, once))
+    responder = make_responder(problem, settings)
+    few = replace(settings, steps=2)  # of which one may only ask, the other predict
+    advance_chain(responder, few, 0, start_chain(responder, few))
 
 
-def start_design(problem: Problem, settings: MetropolisSettings, out: Path) -> RunFolder:
+def start_design(problem: Problem, settings: SearchSettings, out: Path) -> RunFolder:
     """Prepare a design job for `problem` in the new folder `out`.
 
     Raises
@@ -70,7 +73,7 @@ def reopen_design(out: Path) -> RunFolder:
         If the folder is not that of a run, or is damaged.
     """
     folder = RunFolder.open(out)
-    prepare(folder.problem, MetropolisSettings.from_dict(folder.settings))
+    prepare(folder.problem, read_settings(folder.settings))
     return folder
 
 
@@ -112,7 +115,7 @@ def complete_design(
     StorageError, CorruptRun
         If the folder cannot be written, or is damaged.
     """
-    settings = MetropolisSettings.from_dict(folder.settings)
+    settings = read_settings(folder.settings)
     folder.status = "running"
     try:
         done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
@@ -135,20 +138,23 @@ def _try_to_mark_stopped(folder: RunFolder) -> None:
         return
 
 
-def accepted_candidates(folder: RunFolder, chains: int) -> tuple[list[Candidate], int, list[float]]:
+def accepted_candidates(
+    folder: RunFolder, settings: SearchSettings
+) -> tuple[list[Candidate], int, list[float]]:
     """Gather candidates from all chains, the number of proposals and each chain's best."""
     candidates: list[Candidate] = []
     proposals = 0
     best: list[float] = []
-    for chain in range(chains):
+    for chain in range(settings.chains):
         records = folder.read(chain, ["step", "mask", "efficiency", "accepted"])
         taken = np.flatnonzero(records["accepted"])
         proposals += len(records["accepted"])
         efficiency = records["efficiency"][taken]
         best.append(float(efficiency.max(initial=-np.inf)))
         candidates += candidates_of(
-            chain, records["step"][taken], records["mask"][taken], efficiency
-        )
+            chain, records["step"][taken], records["mask"][taken], efficiency,
+            searches[settings.name].offers,
+        )  # fmt: skip
     return candidates, proposals, best
 
 
@@ -158,11 +164,11 @@ def verify(design: Design, objective: str | None, response: Response) -> dict[st
     return {"newton": response.efficiency, "cg": second.efficiency}
 
 
-def conclude(folder: RunFolder, settings: MetropolisSettings) -> DesignReport:
+def conclude(folder: RunFolder, settings: SearchSettings) -> DesignReport:
     """Choose, clean, verify and compare, and write the result files."""
     remove_temporaries(folder.path, RESULTS)
     problem = folder.problem
-    candidates, proposals, best = accepted_candidates(folder, settings.chains)
+    candidates, proposals, best = accepted_candidates(folder, settings)
     selection = select(problem, candidates, settings.objective)
     human = human_design(problem.name)
     human_response = None

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import Response
     from bellcrank.model import Design
-    from bellcrank.search import MetropolisSettings, Selection
+    from bellcrank.search import SearchSettings, Selection
 
 AGREEMENT = 1e-6
 """Largest difference in efficiency between two minimisers that verify each other."""
@@ -39,7 +39,7 @@ class DesignReport:
     """
 
     folder: Path
-    settings: MetropolisSettings
+    settings: SearchSettings
     selection: Selection
     checks: dict[str, float]
     human: Design | None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from bellcrank.mechanics import Evaluator, Status
 from bellcrank.plots import ChainPath, Motion, PathsStyle, draw_comparison, draw_motion, draw_paths
 from bellcrank.runs import RunFolder
-from bellcrank.search import MetropolisSettings
+from bellcrank.search import MetropolisSettings, SearchSettings, read_settings, searches
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,14 +19,31 @@ if TYPE_CHECKING:
     from bellcrank.workflows.outcome import DesignReport
 
 
-def chain_paths(folder: RunFolder, chains: int) -> list[ChainPath]:
-    """Read the accepted efficiencies of each chain of a run."""
+def _annealing(settings: SearchSettings) -> int:
+    """Return the accepted steps over which the temperature falls, where there is one."""
+    return settings.annealing if isinstance(settings, MetropolisSettings) else 0
+
+
+def chain_paths(folder: RunFolder, settings: SearchSettings) -> list[ChainPath]:
+    """Read the accepted efficiencies of each chain of a run, or the best of them so far."""
     paths = []
-    for chain in range(chains):
+    for chain in range(settings.chains):
         columns = folder.read(chain, ["step", "efficiency", "accepted"])
         taken = columns["accepted"]
-        paths.append(ChainPath(columns["efficiency"][taken], columns["step"][taken]))
+        efficiency = columns["efficiency"][taken]
+        if searches[settings.name].leaps:
+            efficiency = np.fmax.accumulate(efficiency)
+        paths.append(ChainPath(efficiency, columns["step"][taken]))
     return paths
+
+
+def paths_style(folder: RunFolder, settings: SearchSettings) -> PathsStyle:
+    """How to draw the chains of a run."""
+    if searches[settings.name].leaps:
+        return PathsStyle(
+            title=folder.problem.name, axis="proposals", measure="best efficiency so far"
+        )
+    return PathsStyle(title=folder.problem.name, annealing_steps=_annealing(settings))
 
 
 def draw_run(path: Path, target: Path, *, overwrite: bool = False) -> None:
@@ -37,9 +55,9 @@ def draw_run(path: Path, target: Path, *, overwrite: bool = False) -> None:
         If the folder is not that of a run, or is damaged.
     """
     folder = RunFolder.open(path)
-    settings = MetropolisSettings.from_dict(folder.settings)
-    shown = PathsStyle(title=folder.problem.name, annealing_steps=settings.annealing)
-    draw_paths(chain_paths(folder, settings.chains), target, shown, overwrite=overwrite)
+    settings = read_settings(folder.settings)
+    paths = chain_paths(folder, settings)
+    draw_paths(paths, target, paths_style(folder, settings), overwrite=overwrite)
 
 
 def move(
@@ -56,7 +74,7 @@ def move(
 def draw_report(report: DesignReport, folder: RunFolder) -> None:
     """Draw ``efficiency.png``, ``motion.png`` and, with a human design, ``comparison.png``."""
     selection = report.selection
-    paths = chain_paths(folder, report.settings.chains)
+    paths = chain_paths(folder, report.settings)
     found = selection.found
     steps = paths[found.chain].step
     assert steps is not None
@@ -65,9 +83,8 @@ def draw_report(report: DesignReport, folder: RunFolder) -> None:
     draw_paths(
         paths,
         folder.path / "efficiency.png",
-        PathsStyle(
-            title=selection.design.problem.name,
-            annealing_steps=report.settings.annealing,
+        replace(
+            paths_style(folder, report.settings),
             human_efficiency=human.efficiency if human else None,
             built_efficiency=selection.efficiency_after,
             best=best,

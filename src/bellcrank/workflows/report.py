@@ -35,7 +35,6 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "found": {
             "chain": selection.found.chain,
             "step": selection.found.step,
-            "plateau": selection.found.plateau,
         },
         "refused_candidates": selection.refused,
         "proposals": report.proposals,

@@ -9,6 +9,7 @@ from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
     MECHANISM,
     UNCONVERGED,
+    UNVERIFIED,
     Bytes,
     Floats,
     Known,
@@ -127,6 +128,18 @@ def remember(structure: Structure, u: Floats, known: Known) -> None:
         known.active[node] = structure.active[node]
 
 
+@kernel
+def is_known(system: System, structure: Structure, known: Known) -> bool:
+    """Whether the drive moves the same beams as in the known equilibrium, and no others."""
+    for beam in range(len(structure.present)):
+        node = system.beams[beam, 0]
+        now = structure.present[beam] and structure.active[node] != 0
+        before = known.present[beam] and known.active[node] != 0
+        if now != before:
+            return False
+    return True
+
+
 @inlined
 def find_response(
     system: System,
@@ -134,6 +147,7 @@ def find_response(
     core: bool,
     known: Known,
     nearby: bool,
+    least: float,
     largest_increment: float,
     structure: Structure,
     u: Floats,
@@ -142,13 +156,17 @@ def find_response(
     """Fill `structure` and the displacement `u` of the design `mask`; return status, efficiency.
 
     With `nearby`, start from the known equilibrium of a similar design. Only an
-    accelerator: an equilibrium found so must be judged to be the one reached from rest,
-    else the design is loaded from rest after all.
+    accelerator: if no moving beam differs it is that equilibrium, and one found from there
+    must be judged to be the one reached from rest, else the design is loaded from rest after
+    all. Neither is done for one that is not more efficient than `least`: it is UNVERIFIED.
     """
     clear(u, len(u))
     status = build_structure(system, mask, core, structure)
     if status == MECHANISM:
         return status, math.nan
+    if nearby and is_known(system, structure, known):
+        copy(known.u, u)
+        return CONVERGED, efficiency_of(system, u)
     status = UNCONVERGED
     guess = scratch.vectors[GUESS]
     if nearby:
@@ -160,6 +178,8 @@ def find_response(
             if not known.present[beam]:
                 scratch.tension[beam] = 0.0
         status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP)
+        if status == CONVERGED and efficiency_of(system, u) <= least:
+            return UNVERIFIED, efficiency_of(system, u)
     if status != CONVERGED or not is_reached_from_rest(system, structure, guess, u, scratch):
         status = follow_path(system, structure, u, scratch, largest_increment)
     place_hanging_pieces(system, structure, u)
@@ -173,6 +193,7 @@ def respond(
     core: bool,
     known: Known,
     nearby: bool,
+    least: float,
     largest_increment: float,
     structure: Structure,
     u: Floats,
@@ -180,7 +201,7 @@ def respond(
 ) -> tuple[int, float, float]:
     """As `find_response`, for calls from Python; returns the elastic energy too."""
     status, efficiency = find_response(
-        system, mask, core, known, nearby, largest_increment, structure, u, scratch
+        system, mask, core, known, nearby, least, largest_increment, structure, u, scratch
     )
     energy = math.nan
     if status != MECHANISM:

@@ -21,12 +21,10 @@ from bellcrank.mechanics.kernels.response import (
     find_response,
     remember,
 )
+from bellcrank.search.blocks import FORBIDDEN
 
 EXPONENTIAL = 0
 NEGATIVE = 1
-
-FORBIDDEN = 4
-"""Status of a proposal that breaks a rule on designs and is refused unevaluated."""
 
 
 class Rules(NamedTuple):
@@ -137,8 +135,9 @@ def advance(
         status, efficiency = FORBIDDEN, math.nan
         if not is_forbidden(system, rules.minimum_degree, chain.mask, beam):
             status, efficiency = find_response(
-                system, chain.mask, rules.core, known, True, 1.0, structure, u, scratch
-            )
+                system, chain.mask, rules.core, known, True, -math.inf, 1.0,
+                structure, u, scratch,
+            )  # fmt: skip
         cost = cost_of(rules.cost, efficiency)
         accepted = status == CONVERGED and accepts(
             chain.value[1], cost, temperature, uniforms[step, 1]

@@ -1,0 +1,100 @@
+"""Blocks: the fixed numbers of proposals between two states at which a chain can be stopped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.mechanics import Status
+from bellcrank.runs import Proposals
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics import Response
+    from bellcrank.model import Problem
+    from bellcrank.search.responder import Responder
+    from bellcrank.search.settings import SearchSettings
+
+BLOCK = 250
+"""Steps between two states at which a chain can be stopped and resumed."""
+FORBIDDEN = 4
+"""Status of a proposal that breaks a rule on designs and is refused unevaluated."""
+FORESEEN = 5
+"""Status of a proposal that is refused unevaluated because a prediction spoke against it."""
+
+
+def random_numbers(seed: int, chain: int, block: int) -> np.random.Generator:
+    """Return the random numbers of one block of one chain, the same whenever asked for."""
+    sequence = np.random.SeedSequence(seed, spawn_key=(chain, block))
+    return np.random.Generator(np.random.Philox(sequence))
+
+
+def steps_ahead(settings: SearchSettings, step: int) -> int:
+    """Return the number of steps of the block that begins at `step`."""
+    return min(BLOCK, settings.steps - step)
+
+
+def initial_response(responder: Responder) -> Response:
+    """Return the response of a problem's initial design, which a search starts from.
+
+    Raises
+    ------
+    InvalidSettings
+        If it has none, so that there is nothing to compare with.
+    """
+    problem = responder.problem
+    response = responder.respond(problem.initial)
+    if response.status is not Status.CONVERGED:
+        raise InvalidSettings(
+            f"problem {problem.name!r}: the search cannot start from the initial design: "
+            f"{response.status.message}"
+        )
+    return response
+
+
+@dataclass(slots=True)
+class Rows:
+    """The rows of a block as they come."""
+
+    mask: list[NDArray[np.uint8]] = field(default_factory=list)
+    efficiency: list[float] = field(default_factory=list)
+    cost: list[float] = field(default_factory=list)
+    temperature: list[float] = field(default_factory=list)
+    accepted: list[bool] = field(default_factory=list)
+    status: list[int] = field(default_factory=list)
+
+    def add(
+        self,
+        mask: NDArray[np.bool_],
+        efficiency: float,
+        cost: float,
+        temperature: float,
+        accepted: bool,
+        status: int,
+    ) -> None:
+        """Add the row of one proposal."""
+        self.mask.append(np.packbits(mask))
+        self.efficiency.append(efficiency)
+        self.cost.append(cost)
+        self.temperature.append(temperature)
+        self.accepted.append(accepted)
+        self.status.append(status)
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def proposals(self, problem: Problem) -> Proposals:
+        """Return the rows as columns."""
+        width = (problem.lattice.beam_count + 7) // 8
+        return Proposals(
+            np.array(self.mask, dtype=np.uint8).reshape(-1, width),
+            np.array(self.efficiency, dtype=np.float64),
+            np.array(self.cost, dtype=np.float64),
+            np.array(self.temperature, dtype=np.float64),
+            np.array(self.accepted, dtype=np.bool_),
+            np.array(self.status, dtype=np.int8),
+        )

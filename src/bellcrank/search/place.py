@@ -1,0 +1,96 @@
+"""A design that a chain is at or considers, as moves see it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import Screening, Status
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics import Response
+    from bellcrank.model import Problem
+    from bellcrank.search.costs import Cost
+    from bellcrank.search.responder import Responder
+
+
+@dataclass(slots=True, eq=False)
+class Place:
+    """A design, what it costs, and what its flips would.
+
+    Parameters
+    ----------
+    responder
+        Who evaluated it.
+    cost_function
+        What the search lowers.
+    temperature
+        At which the chain is.
+    mask : (M,) bool
+    response
+        Of the design.
+    """
+
+    responder: Responder
+    cost_function: Cost
+    temperature: float
+    mask: NDArray[np.bool_]
+    response: Response
+    is_last: bool = True
+    """Whether it is the design that the responder evaluated last; else it must be remembered."""
+    _screening: Screening | None = field(default=None, repr=False)
+
+    @property
+    def problem(self) -> Problem:
+        """What the design is for."""
+        return self.responder.problem
+
+    @property
+    def cost(self) -> float:
+        """What the search lowers."""
+        return self.cost_function.of(self.response.efficiency)
+
+    @property
+    def counts(self) -> bool:
+        """Whether the design has a unique, stable response, so that a chain may go there."""
+        return self.response.status is Status.CONVERGED
+
+    def screening(self) -> Screening:
+        """Predict what each flip would do, once; nothing where no prediction can be made."""
+        if self._screening is None:
+            if not self.is_last:
+                self.responder.respond_nearby(self.mask)
+            beams = self.problem.designable
+            nothing = Screening(beams, np.zeros(len(beams)), np.zeros(len(beams)))
+            self._screening = self.responder.screen(self.mask) or nothing
+        return self._screening
+
+    def log_gain(self, index: int | slice) -> NDArray[np.float64]:
+        """Predicted change of the log of the probability by flips: minus cost over temperature.
+
+        Parameters
+        ----------
+        index
+            Into the designable beams.
+        """
+        change = np.atleast_1d(self.screening().change[index])
+        rise = self.cost_function.rise(self.response.efficiency, change)
+        gain: NDArray[np.float64] = np.clip(-rise / self.temperature, -1e3, 1e3)
+        return gain
+
+
+def flipped(mask: NDArray[np.bool_], beams: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return a design with some beams flipped."""
+    other = mask.copy()
+    other[beams] ^= True
+    return other
+
+
+def accepts(log_ratio: float, uniform: float) -> bool:
+    """Metropolis and Hastings' rule: with probability min(1, ratio)."""
+    return log_ratio >= 0.0 or uniform < math.exp(log_ratio)

@@ -1,0 +1,212 @@
+"""Parallel tempering: chains at several temperatures that exchange their designs.
+
+Hot chains cross barriers, cold ones refine; neighbours exchange what they hold with
+probability min(1, exp((1/T_i - 1/T_j) (C_i - C_j))), which leaves each chain's distribution
+as it is (Hukushima and Nemoto, J. Phys. Soc. Jpn. 65, 1604, 1996). The chains take turns of
+a fixed number of steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.model import pack_mask
+from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
+from bellcrank.search.costs import costs
+from bellcrank.search.metropolis import place_of, step
+from bellcrank.search.moves import moves
+from bellcrank.search.place import accepts
+from bellcrank.search.searches import Search, searches
+from bellcrank.search.selection import peaks
+from bellcrank.search.settings import SearchSettings, check_positive, check_whole
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.runs import Proposals
+    from bellcrank.search.responder import Responder
+
+T = TypeVar("T")
+
+TURN = 25
+"""Steps of one replica before the next; a block is a whole number of turns."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TemperingSettings(SearchSettings):
+    """Settings of parallel tempering.
+
+    Parameters
+    ----------
+    steps
+        Proposals of all replicas together.
+    replicas
+        Temperatures, from `hot` to `cold`, each lower than the last by the same factor.
+    moves, cost
+        As in `MetropolisSettings`.
+
+    Examples
+    --------
+    >>> TemperingSettings(replicas=3, hot=0.4, cold=0.1).temperatures
+    array([0.4, 0.2, 0.1])
+    """
+
+    name: ClassVar[str] = "tempering"
+
+    replicas: int = 6
+    hot: float = 0.2
+    cold: float = 0.005
+    moves: tuple[str, ...] = ("balanced", "balanced", "delayed", "node")
+    cost: str = "negative"
+
+    def __post_init__(self) -> None:
+        SearchSettings.__post_init__(self)
+        check_whole("replicas", self.replicas, 2, 1000)
+        for name in ("hot", "cold"):
+            check_positive(name, getattr(self, name), "a temperature")
+        if self.cold > self.hot:
+            raise InvalidSettings(f"cold: expected at most hot = {self.hot!r}, got {self.cold!r}")
+        if not self.moves or isinstance(self.moves, str):
+            raise InvalidSettings(f"moves: expected names of moves, got {self.moves!r}")
+        costs[self.cost]  # an unknown name explains itself
+        for name in self.moves:
+            moves[name]
+
+    @property
+    def temperatures(self) -> NDArray[np.float64]:
+        """Temperature of each replica."""
+        return np.geomspace(self.hot, self.cold, self.replicas)
+
+
+@dataclass(frozen=True, slots=True)
+class TemperingState:
+    """Where the replicas stand between two blocks.
+
+    Parameters
+    ----------
+    step
+        Proposals made so far, by all.
+    mask
+        The design of each replica in hexadecimal, hottest first.
+    efficiencies
+        Of these designs.
+    best
+        Highest efficiency of an accepted design so far.
+    accepted, exchanges
+        Accepted proposals and exchanges so far.
+    """
+
+    step: int
+    mask: tuple[str, ...]
+    efficiencies: tuple[float, ...]
+    best: float
+    accepted: int = 0
+    exchanges: int = 0
+
+    @property
+    def efficiency(self) -> float:
+        """Of the coldest replica."""
+        return self.efficiencies[-1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the state as plain data."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Rebuild the state from plain data."""
+        lists = {key: tuple(data[key]) for key in ("mask", "efficiencies")}
+        return cls(**{**data, **lists})
+
+
+def start(responder: Responder, settings: TemperingSettings, _chain: int) -> TemperingState:
+    """Return the state with all replicas at the problem's initial design."""
+    efficiency = initial_response(responder).efficiency
+    mask = pack_mask(responder.problem.initial)
+    count = settings.replicas
+    return TemperingState(0, (mask,) * count, (efficiency,) * count, efficiency)
+
+
+def is_done(state: TemperingState, settings: TemperingSettings) -> bool:
+    """Whether all steps are made."""
+    return state.step >= settings.steps
+
+
+def advance(
+    responder: Responder, settings: TemperingSettings, chain: int, state: TemperingState
+) -> tuple[TemperingState, Proposals]:
+    """Let the replicas take turns for a block, with exchanges after each round."""
+    rng = random_numbers(settings.seed, chain, state.step // BLOCK)
+    rows = Rows()
+    last = state.step + steps_ahead(settings, state.step)
+    while state.step < last:
+        count = min(TURN, last - state.step)
+        replica = state.step // TURN % settings.replicas
+        state = _take_turn(responder, settings, state, replica, count, rng, rows)
+        if replica == settings.replicas - 1 and state.step % TURN == 0:
+            state = _exchange(settings, state, rng)
+    return state, rows.proposals(responder.problem)
+
+
+def _take_turn(
+    responder: Responder,
+    settings: TemperingSettings,
+    state: TemperingState,
+    replica: int,
+    count: int,
+    rng: np.random.Generator,
+    rows: Rows,
+) -> TemperingState:
+    temperature = float(settings.temperatures[replica])
+    here = place_of(responder, settings.cost, temperature, state.mask[replica])
+    accepted, best = state.accepted, state.best
+    for _ in range(count):
+        name = settings.moves[int(rng.random() * len(settings.moves))]
+        after = step(here, moves[name], rng, rows)
+        accepted += after is not here
+        best = max(best, after.response.efficiency)
+        here = after
+    return replace(
+        state,
+        step=state.step + count,
+        mask=_with(state.mask, replica, pack_mask(here.mask)),
+        efficiencies=_with(state.efficiencies, replica, here.response.efficiency),
+        best=best,
+        accepted=accepted,
+    )
+
+
+def _exchange(
+    settings: TemperingSettings, state: TemperingState, rng: np.random.Generator
+) -> TemperingState:
+    """Offer an exchange to every other pair of neighbours, the others the next time."""
+    temperatures = settings.temperatures
+    first = state.step // (TURN * settings.replicas) % 2
+    for hot in range(first, settings.replicas - 1, 2):
+        cold = hot + 1
+        rise = costs[settings.cost].of(state.efficiencies[hot]) - costs[settings.cost].of(
+            state.efficiencies[cold]
+        )
+        log_ratio = (1.0 / temperatures[hot] - 1.0 / temperatures[cold]) * rise
+        if accepts(float(log_ratio), rng.random()):
+            masks, values = state.mask, state.efficiencies
+            state = replace(
+                state,
+                mask=_with(_with(masks, hot, masks[cold]), cold, masks[hot]),
+                efficiencies=_with(_with(values, hot, values[cold]), cold, values[hot]),
+                exchanges=state.exchanges + 1,
+            )
+    return state
+
+
+def _with(values: tuple[T, ...], index: int, value: T) -> tuple[T, ...]:
+    return (*values[:index], value, *values[index + 1 :])
+
+
+searches.register("tempering")(
+    Search(TemperingSettings, TemperingState, start, advance, is_done, peaks, leaps=True)
+)
