@@ -16,6 +16,8 @@ from .helpers import PROBLEM, SMALL, call, refusal, write
 if TYPE_CHECKING:
     from pathlib import Path
 
+PAPER = ("--search", "paper")
+
 
 @pytest.mark.parametrize("name", ["a[/b]", "b[red]x", "c:warning:x"])
 def test_a_folder_of_any_name_is_named_as_it_is(here: Path, name: str) -> None:
@@ -36,8 +38,8 @@ def test_an_unknown_name_is_repeated_as_it_was_typed(here: Path, name: str) -> N
     [
         (("design", PROBLEM, "--steps", "many"), "--steps"),
         (("design", PROBLEM, "--frob"), "--frob"),
-        (("design", PROBLEM, "--patience", "9" * 20), "patience: expected a whole number of at"),
-        (("design", PROBLEM, "--minimum-degree", "9" * 20), "minimum_degree: expected a whole"),
+        (("design", PROBLEM, *PAPER, "--patience", "9" * 20), "patience: expected a whole number"),
+        (("design", PROBLEM, *PAPER, "--minimum-degree", "9" * 20), "minimum_degree: expected a"),
         (("design", PROBLEM, "--chains", "32769"), "chains: expected a whole number of at most"),
         (("frobnicate",), "frobnicate"),
         (("evaluate",), "problem"),

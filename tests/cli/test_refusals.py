@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+SEARCHES = "basin-hopping, paper, informed, tempering"
+
 pytestmark = pytest.mark.usefixtures("here")
 
 
@@ -35,7 +37,7 @@ def test_a_missing_problem_file_is_named(command: str) -> None:
 @pytest.mark.parametrize("name", ["a[b]", "a[/b]", "[bold]"])
 def test_what_was_typed_comes_back_as_it_was(name: str) -> None:
     line = refusal("design", PROBLEM, "--search", name)
-    assert line == f"error: unknown search {name!r}; known: paper"
+    assert line == f"error: unknown search {name!r}; known: {SEARCHES}"
 
 
 @pytest.mark.parametrize("command", ["design", "evaluate", "plot"])
@@ -153,14 +155,15 @@ def test_a_missing_file_of_designs_is_refused(small: str) -> None:
     [
         ("--minimiser", "unknown minimiser 'best'; known: newton, cg, fire"),
         ("--objective", "unknown objective 'best'; known: displacement, directional, force"),
-        ("--search", "unknown search 'best'; known: paper"),
+        ("--search", f"unknown search 'best'; known: {SEARCHES}"),
         ("--schedule", "unknown schedule 'best'; known: linear, geometric, constant"),
         ("--cost", "unknown cost 'best'; known: exponential, negative"),
         ("--dangling", "dangling must be one of counted, ignored; got 'best'"),
     ],
 )
 def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: str) -> None:
-    assert refusal("design", PROBLEM, option, "best") == f"error: {message}"
+    chain = ("--search", "paper") if option in ("--schedule", "--cost") else ()
+    assert refusal("design", PROBLEM, *chain, option, "best") == f"error: {message}"
     if option in ("--minimiser", "--objective", "--dangling"):
         assert refusal("evaluate", PROBLEM, option, "best") == f"error: {message}"
 
@@ -174,8 +177,24 @@ def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: 
         (("--seed", "-1"), "seed: expected a whole number of at least 0, got -1"),
         (("--workers", "-1"), "workers: expected at least 1, got -1"),
         (("--workers", "0"), "workers: expected at least 1, got 0"),
-        (("--patience", "0"), "patience: expected a whole number of at least 1, got 0"),
-        (("--minimum-degree", "-1"), "minimum_degree: expected a whole number of at least 0"),
+        (
+            ("--search", "paper", "--patience", "0"),
+            "patience: expected a whole number of at least 1, got 0",
+        ),
+        (
+            ("--search", "paper", "--minimum-degree", "-1"),
+            "minimum_degree: expected a whole number of at least 0",
+        ),
+        (("--patience", "9"), "search 'basin-hopping' has no setting 'patience'; it has: chains, "),
+        (("--set", "radius"), "--set radius: expected KEY=VALUE"),
+        (("--set", "radius=-1"), "radius: expected a number above 0, got -1"),
+        (("--set", "radius=wide"), "radius: expected a number above 0, got 'wide'"),
+        (("--set", "thinnest=[1]"), "thinnest: expected a part from 0 to 1, got (1,)"),
+        (("--set", "lines=2.5"), "lines: expected a whole number of at least 1, got 2.5"),
+        (("--set", "colour=3"), "search 'basin-hopping' has no setting 'colour'; it has: "),
+        (("--search", "informed", "--set", 'moves=["jump"]'), "unknown move 'jump'; known: "),
+        (("--search", "informed", "--set", "moves=flip"), "moves: expected names of moves, got"),
+        (("--search", "tempering", "--set", "cold=1"), "cold: expected at most hot = 0.2, got 1"),
         (("--objective", "directional:1"), "objective directional:1: the part after the colon"),
         (("--objective", "force"), "objective 'force' needs a problem with drive = 'force'"),
     ],

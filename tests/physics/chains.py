@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.search import MetropolisSettings, start_chain
-from bellcrank.search import chain as chain_module
+from bellcrank.search import MetropolisSettings, metropolis, start_chain
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +26,7 @@ def run_chain(
     settings = settings or MetropolisSettings()
     state = start_chain(evaluator, settings)
     uniforms = np.random.default_rng(seed).random((steps, 2))
-    _, proposals = chain_module._advance_compiled(evaluator, settings, state, uniforms)
+    _, proposals = metropolis._advance_compiled(evaluator, settings, state, uniforms)
     beams = evaluator.problem.lattice.beam_count
     return np.unpackbits(proposals.mask, axis=1, count=beams).astype(bool), proposals
 

@@ -297,7 +297,7 @@ class Evaluator:
         >>> flipped[screening.beams[best]] = False
         >>> gained = evaluator.respond(flipped).efficiency - efficiency
         >>> print(f"{screening.change[best]:.3f} predicted, {gained:.3f} gained")
-        0.027 predicted, 0.026 gained
+        0.026 predicted, 0.026 gained
         """
         from bellcrank.mechanics.kernels.screening import screen_flips
 

@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import CAREFUL, Status
 from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
 from bellcrank.search.climbing import Climb, resume_climb
 from bellcrank.search.searches import Search, searches
 from bellcrank.search.selection import peaks
-from bellcrank.search.settings import SearchSettings, check_positive, check_whole
+from bellcrank.search.settings import SearchSettings, check_part, check_positive, check_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,9 +75,7 @@ class HoppingSettings(SearchSettings):
         check_positive("radius", self.radius)
         check_positive("shared", self.shared)
         for name in ("thinnest", "largest_loss"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
-                raise InvalidSettings(f"{name}: expected a part from 0 to 1, got {value!r}")
+            check_part(name, getattr(self, name))
 
 
 @dataclass(frozen=True, slots=True)

@@ -103,3 +103,14 @@ def check_positive(name: str, value: object, what: str = "a number") -> None:
     """
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
         raise InvalidSettings(f"{name}: expected {what} above 0, got {value!r}")
+
+
+def check_part(name: str, value: object) -> None:
+    """Refuse what is not a number from 0 to 1.
+
+    Raises
+    ------
+    InvalidSettings
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
+        raise InvalidSettings(f"{name}: expected a part from 0 to 1, got {value!r}")
