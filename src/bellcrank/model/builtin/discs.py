@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from bellcrank.model.builtin.registry import builtin
@@ -10,14 +12,13 @@ from bellcrank.model.lattices.jammed import jammed_discs
 from bellcrank.model.problem import Problem
 
 DISCS = 100
-SEED = 1
+SEEDS = range(1, 11)
 
 
-@builtin.register("discs")
-def discs() -> Problem:
+def discs(seed: int = 1) -> Problem:
     """Push down the upper right corner of a disordered lattice, move the upper left.
 
-    The lowest tenth of the height is the support; input and output lie within a
+    Each seed is another lattice. The lowest tenth of the height is the support; input and output lie within a
     fifth of width and height of the corners; the push is 1 % of the height.
 
     Examples
@@ -26,11 +27,11 @@ def discs() -> Problem:
     >>> 150 <= problem.lattice.beam_count <= 250
     True
     """
-    lattice = jammed_discs(DISCS, rng=np.random.default_rng(SEED))
+    lattice = jammed_discs(DISCS, rng=np.random.default_rng(seed))
     width, height = lattice.positions.max(axis=0)
     x, y = (lattice.positions / (width, height)).T
     return Problem(
-        name="discs",
+        name=_name(seed),
         lattice=lattice,
         supports=Supports(fixed=np.flatnonzero(y < 0.1)),
         input=Input(
@@ -44,3 +45,11 @@ def discs() -> Problem:
             direction=np.array([-1.0, 0.0]),
         ),
     )
+
+
+def _name(seed: int) -> str:
+    return "discs" if seed == SEEDS[0] else f"discs-{seed}"
+
+
+for _seed in SEEDS:
+    builtin.register(_name(_seed))(functools.partial(discs, _seed))

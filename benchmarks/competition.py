@@ -1,0 +1,225 @@
+"""Searches against each other at equal cost: ``python -m benchmarks.competition [--quick]``.
+
+Each problem is searched by plain Metropolis (the paper's chain) and by the default search,
+with the same response of a design on both sides, from many seeds. They are compared at equal
+numbers of responses and at equal processor time: plain Metropolis goes on until it has had
+both the responses and the median time of the other. A flip that leaves what carries load as
+it is costs no response on either side; a screening of all flips is no response, but its time
+counts. The best design of a run counts only if it is stable when its path is followed in
+small increments.
+
+Results go to ``docs/competition/NAME.json``, the table to standard output.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import mannwhitneyu
+
+from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.model import builtin, find_problem
+from bellcrank.search import (
+    DEFAULT_SEARCH,
+    FORBIDDEN,
+    FORESEEN,
+    SearchSettings,
+    advance_chain,
+    make_responder,
+    read_settings,
+    start_chain,
+)
+
+FOLDER = Path(__file__).parents[1] / "docs" / "competition"
+PLAIN = "paper"
+RESPONSES = {
+    "crane": 20_000,
+    "anti-parallel": 20_000,
+    "scaling-14": 20_000,
+    "pliers": 5_000,
+    **{name: 10_000 for name in builtin if name.startswith("discs")},
+}
+FOR_EVER = 10**9
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A design better than all before it."""
+
+    efficiency: float
+    responses: int
+    seconds: float
+    mask: str
+
+
+@dataclass(frozen=True, slots=True)
+class Game:
+    """One run: when it got how far."""
+
+    seed: int
+    responses: int
+    seconds: float
+    records: list[Record]
+
+    def best(self, responses: float, seconds: float) -> float:
+        """Best efficiency within some responses and seconds."""
+        return max(
+            (
+                record.efficiency
+                for record in self.records
+                if record.responses <= responses and record.seconds <= seconds
+            ),
+            default=0.0,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Play:
+    """What to play."""
+
+    problem: str
+    search: str
+    dangling: str
+    seed: int
+    responses: int
+    seconds: float = 0.0
+
+    @property
+    def settings(self) -> SearchSettings:
+        """Settings of the search; a chain that may go on has no end."""
+        steps = FOR_EVER if self.search == PLAIN else self.responses
+        chosen = {"search": self.search, "dangling": self.dangling, "seed": self.seed}
+        return read_settings({**chosen, "steps": steps})
+
+
+def play(game: Play) -> Game:
+    """Search once, until both responses and processor time are spent."""
+    problem, settings = find_problem(game.problem), game.settings
+    responder = make_responder(problem, settings)
+    warm_up(game)
+    state = start_chain(responder, settings, 0)
+    current, best = state.efficiency, -np.inf
+    responses, seconds = 0, 0.0
+    found: list[Record] = []
+    while state.step < settings.steps and (responses < game.responses or seconds < game.seconds):
+        start = time.process_time()
+        state, rows = advance_chain(responder, settings, 0, state)
+        spent = time.process_time() - start
+        for index in range(len(rows.status)):
+            evaluated = rows.status[index] not in (FORBIDDEN, FORESEEN)
+            responses += bool(evaluated and rows.efficiency[index] != current)
+            if rows.accepted[index]:
+                current = rows.efficiency[index]
+                if current > best:
+                    best = current
+                    when = seconds + spent * (index + 1) / len(rows.status)
+                    found.append(
+                        Record(float(best), responses, when, rows.mask[index].tobytes().hex())
+                    )
+        seconds += spent
+    return Game(game.seed, responses, seconds, verified(game, found))
+
+
+def warm_up(game: Play) -> None:
+    """Load compiled kernels before the clock starts."""
+    settings = replace(game.settings, steps=2)
+    responder = make_responder(find_problem(game.problem), settings)
+    advance_chain(responder, settings, 0, start_chain(responder, settings, 0))
+    responder.screen(responder.problem.initial)
+
+
+def verified(game: Play, found: list[Record]) -> list[Record]:
+    """Leave out what is unstable when followed in small increments."""
+    problem = find_problem(game.problem)
+    evaluator = Evaluator(problem, dangling=game.dangling)  # type: ignore[arg-type]
+    kept = []
+    for record in found:
+        mask = np.unpackbits(np.frombuffer(bytes.fromhex(record.mask), np.uint8))
+        mask = mask[: problem.lattice.beam_count].astype(bool)
+        if evaluator.respond(mask, CAREFUL).status is Status.CONVERGED:
+            kept.append(record)
+    return kept
+
+
+def contest(name: str, dangling: str, seeds: int, share: float, pool: ProcessPoolExecutor) -> dict:
+    """Let both searches play a problem; return figures and games."""
+    responses = int(RESPONSES[name] * share)
+    new = [Play(name, DEFAULT_SEARCH, dangling, seed, responses) for seed in range(seeds)]
+    ours = list(pool.map(play, new))
+    seconds = float(np.median([game.seconds for game in ours]))
+    old = [replace(game, search=PLAIN, seconds=seconds) for game in new]
+    theirs = list(pool.map(play, old))
+    result = {
+        "problem": name, "dangling": dangling, "responses": responses, "seconds": seconds,
+        "equal responses": figures(ours, theirs, responses, np.inf),
+        "equal time": figures(ours, theirs, np.inf, seconds),
+    }  # fmt: skip
+    games = {DEFAULT_SEARCH: ours, PLAIN: theirs}
+    return {**result, "games": {key: [asdict(game) for game in games[key]] for key in games}}
+
+
+def figures(ours: list[Game], theirs: list[Game], responses: float, seconds: float) -> dict:
+    """Compare the best designs of two searches within a budget."""
+    a = np.array([game.best(responses, seconds) for game in ours])
+    b = np.array([game.best(responses, seconds) for game in theirs])
+    return {
+        "median": float(np.median(a)),
+        "tenth percentile": float(np.quantile(a, 0.1)),
+        "plain median": float(np.median(b)),
+        "plain tenth percentile": float(np.quantile(b, 0.1)),
+        "ratio": float(np.median(a) / np.median(b)),
+        "p": float(mannwhitneyu(a, b, alternative="greater").pvalue),
+    }
+
+
+def print_row(result: dict) -> None:
+    """Print a row of the table for each kind of budget."""
+    for kind in ("equal responses", "equal time"):
+        f = result[kind]
+        budget = result["responses"] if kind == "equal responses" else f"{result['seconds']:.1f} s"
+        print(
+            f"| {result['problem']} | {result['dangling']} | {budget} | {f['plain median']:.3f} "
+            f"| {f['median']:.3f} | {f['ratio']:.2f} | {f['tenth percentile']:.3f} "
+            f"| {f['p']:.1e} |",
+            flush=True,
+        )
+
+
+def main() -> None:
+    """Play all problems, or those that are named."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("problems", nargs="*", default=list(RESPONSES))
+    parser.add_argument("--dangling", default="ignored", choices=["ignored", "counted"])
+    parser.add_argument("--seeds", type=int, default=30)
+    parser.add_argument("--quick", action="store_true", help="A tenth of it; leaves no files.")
+    options = parser.parse_args()
+    seeds, share = (4, 0.1) if options.quick else (options.seeds, 1.0)
+    print("| problem | dead ends | budget | plain median | median | ratio | 10th percentile | p |")
+    print("|---|---|---|---|---|---|---|---|")
+    with ProcessPoolExecutor(2) as pool:
+        for name in options.problems:
+            result = contest(name, options.dangling, seeds, share, pool)
+            print_row(result)
+            if not options.quick:
+                FOLDER.mkdir(parents=True, exist_ok=True)
+                target = FOLDER / f"{name}-{options.dangling}.json"
+                target.write_text(json.dumps(rounded(result), indent=None))
+
+
+def rounded(value: object) -> object:
+    """Keep six digits, so that records stay small."""
+    if isinstance(value, dict):
+        return {key: rounded(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [rounded(part) for part in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,197 @@
+"""What every registered search promises: it can be stopped, kept as plain data and gone on with."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.mechanics import CAREFUL, Evaluator, Response, Screening, Status
+from bellcrank.model import Problem, find_problem
+from bellcrank.runs import Proposals
+from bellcrank.search import (
+    BLOCK,
+    SearchSettings,
+    State,
+    advance_chain,
+    chain_blocks,
+    is_done,
+    make_responder,
+    read_settings,
+    read_state,
+    searches,
+    start_chain,
+)
+
+STEPS = 3 * BLOCK + 10
+
+
+@pytest.fixture(scope="module")
+def small() -> Problem:
+    return find_problem("scaling-8")
+
+
+@pytest.fixture(params=list(searches))
+def settings(request: pytest.FixtureRequest) -> SearchSettings:
+    return read_settings({"search": request.param, "steps": STEPS, "seed": 3})
+
+
+def joined(parts: list[Proposals]) -> Proposals:
+    return Proposals(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def whole(problem: Problem, settings: SearchSettings, chain: int = 0) -> tuple[State, Proposals]:
+    blocks = list(chain_blocks(make_responder(problem, settings), settings, chain))
+    return blocks[-1][0], joined([proposals for _, proposals in blocks])
+
+
+def same(first: Proposals, second: Proposals) -> bool:
+    return all(
+        np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+        for a, b in zip(first, second, strict=True)
+    )
+
+
+def test_settings_survive_json(settings: SearchSettings) -> None:
+    assert read_settings(json.loads(json.dumps(settings.to_dict()))) == settings
+    assert settings.to_dict()["search"] == settings.name
+
+
+def test_an_unknown_setting_is_refused(settings: SearchSettings) -> None:
+    with pytest.raises(InvalidSettings, match=f"search '{settings.name}' has no setting 'color'"):
+        read_settings({"search": settings.name, "color": 1})
+
+
+def test_a_chain_resumed_from_json_is_the_same_to_the_last_bit(
+    small: Problem, settings: SearchSettings
+) -> None:
+    end, proposals = whole(small, settings)
+    state, parts = start_chain(make_responder(small, settings), settings, 0), []
+    while not is_done(state, settings):
+        state = read_state(settings, json.loads(json.dumps(state.to_dict())))
+        state, rows = advance_chain(make_responder(small, settings), settings, 0, state)
+        parts.append(rows)
+    assert state == end
+    assert same(joined(parts), proposals)
+
+
+def test_blocks_end_at_fixed_steps_with_one_row_for_each(
+    small: Problem, settings: SearchSettings
+) -> None:
+    ends, rows = [], 0
+    for state, proposals in chain_blocks(make_responder(small, settings), settings, 0):
+        ends.append(state.step)
+        rows += len(proposals.status)
+        assert rows == state.step
+    assert ends == [BLOCK, 2 * BLOCK, 3 * BLOCK, STEPS]
+
+
+def test_accepted_designs_have_the_efficiency_that_was_recorded(
+    small: Problem, settings: SearchSettings
+) -> None:
+    state, proposals = whole(small, settings)
+    evaluator = Evaluator(small, dangling=settings.dangling)
+    bits = np.unpackbits(proposals.mask, axis=1)[:, : small.lattice.beam_count].astype(bool)
+    taken = np.flatnonzero(proposals.accepted)
+    assert len(taken) == state.accepted > 20
+    for index in taken[::7]:
+        response = evaluator.respond(bits[index])
+        assert response.status is Status.CONVERGED
+        assert response.efficiency == pytest.approx(proposals.efficiency[index], abs=1e-8)
+    assert (proposals.status[taken] == Status.CONVERGED).all()
+
+
+def test_only_designable_beams_change(small: Problem, settings: SearchSettings) -> None:
+    _, proposals = whole(small, settings)
+    bits = np.unpackbits(proposals.mask, axis=1)[:, : small.lattice.beam_count].astype(bool)
+    others = np.setdiff1d(np.arange(small.lattice.beam_count), small.designable)
+    assert (bits[:, others] == small.initial[others]).all()
+
+
+def test_seeds_and_chains_differ(small: Problem, settings: SearchSettings) -> None:
+    runs = [
+        whole(small, replace(settings, seed=seed), chain)[1].efficiency
+        for seed, chain in [(0, 0), (0, 1), (1, 0)]
+    ]
+    assert not np.array_equal(runs[0], runs[1], equal_nan=True)
+    assert not np.array_equal(runs[0], runs[2], equal_nan=True)
+
+
+class Snapping:
+    """A responder that finds every third neighbour to snap, and can foresee nothing."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self._inner = Evaluator(problem)
+        self._asked = 0
+
+    def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
+        return self._inner.respond(mask, largest_increment)
+
+    def respond_nearby(self, mask: np.ndarray, least: float = -np.inf) -> Response:
+        self._asked += 1
+        response = self._inner.respond_nearby(mask, least)
+        return response if self._asked % 3 else replace(response, status=Status.SNAPPED)
+
+    def screen(self, mask: np.ndarray) -> Screening | None:
+        return self._inner.screen(mask)
+
+    def remember(self) -> None:
+        self._inner.remember()
+
+
+def test_designs_that_snap_are_never_accepted(small: Problem, settings: SearchSettings) -> None:
+    responder = Snapping(small)
+    state = start_chain(responder, settings, 0)
+    _, proposals = advance_chain(responder, settings, 0, state)
+    snapped = proposals.status == Status.SNAPPED
+    assert snapped.sum() > 20
+    assert not proposals.accepted[snapped].any()
+    assert proposals.accepted.any()
+
+
+def test_a_search_that_can_foresee_nothing_goes_on(
+    small: Problem, settings: SearchSettings
+) -> None:
+    class Blind(Snapping):
+        def screen(self, mask: np.ndarray) -> Screening | None:  # noqa: ARG002
+            return None
+
+    _, proposals = advance_chain(Blind(small), settings, 0, start_chain(Blind(small), settings, 0))
+    assert len(proposals.status) == BLOCK
+
+
+def test_a_search_cannot_start_from_a_design_without_response(
+    small: Problem, settings: SearchSettings
+) -> None:
+    class Broken(Snapping):
+        def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
+            return replace(super().respond(mask, largest_increment), status=Status.MECHANISM)
+
+    with pytest.raises(InvalidSettings, match="cannot start"):
+        start_chain(Broken(small), settings, 0)
+
+
+def test_a_state_between_blocks_is_the_only_one_to_go_on_from(
+    small: Problem, settings: SearchSettings
+) -> None:
+    responder = make_responder(small, settings)
+    state = replace(start_chain(responder, settings, 0), step=7)
+    with pytest.raises(InvalidSettings, match="a state at step 7 is not between blocks"):
+        advance_chain(responder, settings, 0, state)
+
+
+def test_what_a_search_offers_stands_up_to_a_closer_look(
+    small: Problem, settings: SearchSettings
+) -> None:
+    _, proposals = whole(small, settings)
+    taken = np.flatnonzero(proposals.accepted)
+    offered = searches[settings.name].offers(proposals.efficiency[taken])
+    best = max(offered, key=lambda index: proposals.efficiency[taken][index])
+    mask = np.unpackbits(proposals.mask[taken[best]])[: small.lattice.beam_count].astype(bool)
+    response = Evaluator(small, dangling=settings.dangling).respond(mask, CAREFUL)
+    assert response.efficiency == pytest.approx(proposals.efficiency[taken[best]], abs=1e-8)
+    assert response.efficiency > 0.1
