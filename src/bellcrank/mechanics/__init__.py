@@ -9,6 +9,7 @@ The work flow, in four lines:
 0.0420422
 """
 
+from bellcrank.mechanics.carrying import Core, output_stiffness
 from bellcrank.mechanics.evaluator import (
     CAREFUL,
     Dangling,
@@ -23,6 +24,7 @@ from bellcrank.mechanics.objectives import Objective, objective_of, objectives
 
 __all__ = [
     "CAREFUL",
+    "Core",
     "Dangling",
     "Evaluator",
     "Minimiser",
@@ -34,4 +36,5 @@ __all__ = [
     "minimisers",
     "objective_of",
     "objectives",
+    "output_stiffness",
 ]

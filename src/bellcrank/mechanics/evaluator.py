@@ -45,13 +45,15 @@ strides, and miss that one in a hundred of the designs near a loss of stability 
 
 
 class Status(IntEnum):
-    """How the search for an equilibrium ended."""
+    """How the search for an equilibrium ended, or what a search's goals say to the design."""
 
     CONVERGED = CONVERGED
     SNAPPED = SNAPPED
     MECHANISM = MECHANISM
     UNCONVERGED = UNCONVERGED
+    FORBIDDEN = 4
     UNVERIFIED = UNVERIFIED
+    UNMET = 7
 
     @property
     def label(self) -> str:
@@ -72,6 +74,13 @@ _MESSAGES = {
     ),
     Status.MECHANISM: "a driven piece is not held against moving as a rigid body",
     Status.UNCONVERGED: "no stable equilibrium was found at full load",
+    Status.FORBIDDEN: (
+        "the design breaks the rules or goals of the search more than the one at hand; where the "
+        "beams alone tell, it has no response"
+    ),
+    Status.UNMET: (
+        "a stable equilibrium was reached from rest, but the design does not keep the goals yet"
+    ),
     Status.UNVERIFIED: (
         "a stable equilibrium less efficient than was asked for; whether it is the one reached "
         "from rest was not looked at"
@@ -86,19 +95,32 @@ class Response:
     Parameters
     ----------
     status
-        Whether it can be relied on; only CONVERGED responses are unique.
+        Whether it can be relied on; only CONVERGED and UNMET responses are unique.
     efficiency
         As the objective defines it; nan for a mechanism.
     energy
         Elastic energy of beams, angular springs and output springs; nan if not computed.
     displacement : (N, 2)
         Of each node, in lattice units. Loose pieces are at rest.
+    penalty
+        For breaking the goals of a search, in units of the efficiency; 0 if they are kept.
     """
 
     status: Status
     efficiency: float
     energy: float
     displacement: NDArray[np.float64]
+    penalty: float = 0.0
+
+    @property
+    def score(self) -> float:
+        """What a search raises: the efficiency, less the penalty for broken goals."""
+        return self.efficiency - self.penalty
+
+    @property
+    def counts(self) -> bool:
+        """Whether a search may go there: the equilibrium is stable and reached from rest."""
+        return self.status in {Status.CONVERGED, Status.UNMET}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

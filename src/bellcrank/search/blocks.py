@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 BLOCK = 250
 """Steps between two states at which a chain can be stopped and resumed."""
-FORBIDDEN = 4
-"""Status of a proposal that breaks a rule on designs and is refused unevaluated."""
+FORBIDDEN = int(Status.FORBIDDEN)
+"""Status of a proposal that breaks rules or goals more than the design at hand, and is refused;
+unevaluated where the beams alone tell."""
 FORESEEN = 5
 """Status of a proposal that is refused unevaluated because a prediction spoke against it."""
 
@@ -48,7 +49,7 @@ def initial_response(responder: Responder) -> Response:
     """
     problem = responder.problem
     response = responder.respond(problem.initial)
-    if response.status is not Status.CONVERGED:
+    if not response.counts:
         raise InvalidSettings(
             f"problem {problem.name!r}: the search cannot start from the initial design: "
             f"{response.status.message}"

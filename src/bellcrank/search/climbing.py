@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import Status
-
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -39,7 +37,7 @@ class Climb:
     mask : (M,) bool
         The design reached.
     efficiency
-        Of it.
+        Of it, less the penalty for broken goals.
     depth
         Flips that are tried in vain before the climb ends.
     largest_loss
@@ -89,13 +87,10 @@ class Climb:
         mask = self.mask.copy()
         mask[beam] ^= True
         response = self.responder.respond_nearby(mask, self.efficiency + LEAST_GAIN)
-        taken = (
-            response.status is Status.CONVERGED
-            and response.efficiency > self.efficiency + LEAST_GAIN
-        )
+        taken = response.counts and response.score > self.efficiency + LEAST_GAIN
         if taken:
             self.responder.remember()
-            self.mask, self.efficiency = mask, response.efficiency
+            self.mask, self.efficiency = mask, response.score
             self.tried, self._waiting = [], None
         else:
             self.tried.append(beam)
@@ -111,7 +106,7 @@ def resume_climb(
 ) -> Climb | None:
     """Start a climb, or go on with it; None from a design without a stable response."""
     response = responder.respond(mask)
-    if response.status is not Status.CONVERGED:
+    if not response.counts:
         return None
     responder.remember()
-    return Climb(responder, mask, response.efficiency, depth, largest_loss, list(tried))
+    return Climb(responder, mask, response.score, depth, largest_loss, list(tried))

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from bellcrank.mechanics import CAREFUL, Status
+from bellcrank.mechanics import CAREFUL
 from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
 from bellcrank.search.climbing import Climb, resume_climb
@@ -27,6 +27,7 @@ from bellcrank.search.settings import SearchSettings, check_part, check_positive
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bellcrank.mechanics import Status
     from bellcrank.model import Problem
     from bellcrank.runs import Proposals
     from bellcrank.search.responder import Responder
@@ -153,7 +154,7 @@ def start(responder: Responder, settings: HoppingSettings, chain: int) -> Hoppin
 
     The first line begins with the problem's initial design, the others with less of it.
     """
-    efficiency = initial_response(responder).efficiency
+    efficiency = initial_response(responder).score
     problem = responder.problem
     # A stream of its own, since the blocks begin with the same numbers on a resume.
     rng = random_numbers(settings.seed, chain, 2**32 - 1)
@@ -205,9 +206,10 @@ class Hopper:
         efficiency: float,
         accepted: bool,
         status: Status,
+        penalty: float = 0.0,
     ) -> None:
         """Record a response and count it."""
-        self.rows.add(mask, efficiency, -efficiency, 0.0, accepted, int(status))
+        self.rows.add(mask, efficiency, penalty - efficiency, 0.0, accepted, int(status))
         self.state = replace(
             self.state, step=self.state.step + 1, accepted=self.state.accepted + accepted
         )
@@ -222,7 +224,7 @@ class Hopper:
             self.end_climb(self.climb)
             return
         mask, response, taken = self.climb.try_flip(beam)
-        self.note(mask, response.efficiency, taken, response.status)
+        self.note(mask, response.efficiency, taken, response.status, response.penalty)
 
     def begin_climb(self) -> None:
         """Disturb the design of the line, or take it as it is where it was never climbed from."""
@@ -232,12 +234,12 @@ class Hopper:
         if line.efficiency is not None:
             mask = kick(problem, mask, self.settings, self.rng)
         response = self.responder.respond(mask)
-        counts = response.status is Status.CONVERGED
-        self.note(mask, response.efficiency, counts, response.status)
+        counts = response.counts
+        self.note(mask, response.efficiency, counts, response.status, response.penalty)
         if counts:
             self.responder.remember()
             self.climb = Climb(
-                self.responder, mask, response.efficiency,
+                self.responder, mask, response.score,
                 self.settings.depth, self.settings.largest_loss, [],
             )  # fmt: skip
         elif line.efficiency is None:
@@ -250,12 +252,13 @@ class Hopper:
         line = self.state.lines[self.state.turn]
         if climb.efficiency >= line.rank:
             response = self.responder.respond(climb.mask, CAREFUL)
-            counts = response.status is Status.CONVERGED and response.efficiency >= line.rank
-            self.note(climb.mask, response.efficiency, counts, response.status)
+            counts = response.counts and response.score >= line.rank
+            self.note(climb.mask, response.efficiency, counts, response.status, response.penalty)
             if counts:
-                self._set_line(Line(pack_mask(climb.mask), response.efficiency))
+                self._set_line(Line(pack_mask(climb.mask), response.score))
         elif self.state.step == self.settings.steps - 1:
-            self.note(climb.mask, climb.efficiency, False, Status.CONVERGED)
+            response = self.responder.respond(climb.mask)
+            self.note(climb.mask, response.efficiency, False, response.status, response.penalty)
         self.climb = None
         self.state = replace(self.state, hops=self.state.hops + 1)
         self._next_line()

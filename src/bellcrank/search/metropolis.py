@@ -167,7 +167,7 @@ class ChainState:
 
 def start(responder: Responder, settings: MetropolisSettings, _chain: int) -> ChainState:
     """Return the state of a chain at the problem's initial design."""
-    efficiency = initial_response(responder).efficiency
+    efficiency = initial_response(responder).score
     return ChainState(
         step=0,
         mask=pack_mask(responder.problem.initial),
@@ -277,7 +277,7 @@ def advance_in_python(
         after = step(here, move, rng, rows, settings.minimum_degree)
         state = replace(state, step=state.step + 1, rejections=state.rejections + 1)
         if after is not here:
-            efficiency = after.response.efficiency
+            efficiency = after.response.score
             state = replace(
                 state, efficiency=efficiency, cost=after.cost, best=max(state.best, efficiency),
                 accepted=state.accepted + 1, rejections=0,

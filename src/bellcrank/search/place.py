@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import Screening, Status
+from bellcrank.mechanics import Screening
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,12 +53,12 @@ class Place:
     @property
     def cost(self) -> float:
         """What the search lowers."""
-        return self.cost_function.of(self.response.efficiency)
+        return self.cost_function.of(self.response.score)
 
     @property
     def counts(self) -> bool:
         """Whether the design has a unique, stable response, so that a chain may go there."""
-        return self.response.status is Status.CONVERGED
+        return self.response.counts
 
     def screening(self) -> Screening:
         """Predict what each flip would do, once; nothing where no prediction can be made."""
@@ -79,7 +79,7 @@ class Place:
             Into the designable beams.
         """
         change = np.atleast_1d(self.screening().change[index])
-        rise = self.cost_function.rise(self.response.efficiency, change)
+        rise = self.cost_function.rise(self.response.score, change)
         gain: NDArray[np.float64] = np.clip(-rise / self.temperature, -1e3, 1e3)
         return gain
 

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Protocol
 
 from bellcrank.mechanics import Evaluator, Response, Screening
+from bellcrank.search.goals import GoalResponder, at_strokes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,7 +27,7 @@ class Responder(Protocol):
     def respond_nearby(self, mask: NDArray[np.bool_], least: float = -math.inf) -> Response:
         """Response of a design similar to the remembered one.
 
-        One no more efficient than `least` is of no interest and need not be right.
+        One of no higher score than `least` is of no interest and need not be right.
         """
 
     def remember(self) -> None:
@@ -40,5 +41,16 @@ class Responder(Protocol):
 
 
 def make_responder(problem: Problem, settings: SearchSettings) -> Responder:
-    """Return what answers the questions of a search, as its settings want it answered."""
-    return Evaluator(problem, settings.objective, settings.dangling, settings.minimiser)
+    """Return what answers the questions of a search, as its settings want it answered.
+
+    Plain mechanics where there are neither goals nor several strokes: searches are faster then.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+        If the problem has not got the objective, or a goal makes no sense for it.
+    """
+    told = settings.objective, settings.dangling, settings.minimiser
+    if not settings.goals and settings.strokes == (1.0,):
+        return Evaluator(problem, *told)
+    return GoalResponder(at_strokes(problem, settings.strokes), settings.goals, *told)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from bellcrank.errors import InvalidSettings
 from bellcrank.registry import Registry
 from bellcrank.search.blocks import BLOCK
+from bellcrank.search.goals import GoalResponder
 from bellcrank.search.selection import plateau_ends
 
 if TYPE_CHECKING:
@@ -135,7 +136,10 @@ def advance_chain(
     """
     if state.step % BLOCK:
         raise InvalidSettings(f"chain {chain}: a state at step {state.step} is not between blocks")
-    return searches[settings.name].advance(responder, settings, chain, state)
+    after, proposals = searches[settings.name].advance(responder, settings, chain, state)
+    if isinstance(responder, GoalResponder):
+        proposals = responder.as_meant(proposals)
+    return after, proposals
 
 
 def is_done(state: State, settings: SearchSettings) -> bool:

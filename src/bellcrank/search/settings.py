@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Dangling, minimisers
+from bellcrank.search.goals.terms import read_goal
 
 NO_LIMIT = 2**62
 MOST_CHAINS = 2**15
@@ -32,6 +33,10 @@ class SearchSettings:
         Whether dead-end beams count (the literal model) or are ignored.
     minimiser
         Name of a minimiser.
+    goals
+        What a design must keep, each a text like ``"mass <= 0.6"`` (`bellcrank.search.goals`).
+    strokes
+        Parts of the full input over which the efficiency is averaged.
 
     Raises
     ------
@@ -47,12 +52,16 @@ class SearchSettings:
     objective: str | None = None
     dangling: Dangling = "ignored"
     minimiser: str = "newton"
+    goals: tuple[str, ...] = ()
+    strokes: tuple[float, ...] = (1.0,)
 
     def __post_init__(self) -> None:
         check_whole("steps", self.steps, 1)
         check_whole("seed", self.seed, 0)
         check_whole("chains", self.chains, 1, MOST_CHAINS)
         minimisers[self.minimiser]  # an unknown name explains itself
+        check_goals(self.goals)
+        check_strokes(self.strokes)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings as plain data, as `run.json` keeps them."""
@@ -103,6 +112,35 @@ def check_positive(name: str, value: object, what: str = "a number") -> None:
     """
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
         raise InvalidSettings(f"{name}: expected {what} above 0, got {value!r}")
+
+
+def check_goals(goals: object) -> None:
+    """Refuse what is not a tuple of texts that each name a goal.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+    """
+    if not isinstance(goals, tuple):
+        raise InvalidSettings(f"goals: expected texts like 'mass <= 0.6', got {goals!r}")
+    for goal in goals:
+        read_goal(goal)
+
+
+def check_strokes(strokes: object) -> None:
+    """Refuse what is not a tuple of different parts of the full input.
+
+    Raises
+    ------
+    InvalidSettings
+    """
+    if not isinstance(strokes, tuple) or not strokes or len(set(strokes)) < len(strokes):
+        raise InvalidSettings(
+            f"strokes: expected different parts of the full input, got {strokes!r}"
+        )
+    for stroke in strokes:
+        check_positive("strokes", stroke, "parts of the full input")
+        check_part("strokes", stroke)
 
 
 def check_part(name: str, value: object) -> None:

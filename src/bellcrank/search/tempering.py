@@ -125,7 +125,7 @@ class TemperingState:
 
 def start(responder: Responder, settings: TemperingSettings, _chain: int) -> TemperingState:
     """Return the state with all replicas at the problem's initial design."""
-    efficiency = initial_response(responder).efficiency
+    efficiency = initial_response(responder).score
     mask = pack_mask(responder.problem.initial)
     count = settings.replicas
     return TemperingState(0, (mask,) * count, (efficiency,) * count, efficiency)
@@ -168,13 +168,13 @@ def _take_turn(
         name = settings.moves[int(rng.random() * len(settings.moves))]
         after = step(here, moves[name], rng, rows)
         accepted += after is not here
-        best = max(best, after.response.efficiency)
+        best = max(best, after.response.score)
         here = after
     return replace(
         state,
         step=state.step + count,
         mask=_with(state.mask, replica, pack_mask(here.mask)),
-        efficiencies=_with(state.efficiencies, replica, here.response.efficiency),
+        efficiencies=_with(state.efficiencies, replica, here.response.score),
         best=best,
         accepted=accepted,
     )

@@ -1,0 +1,45 @@
+"""Goals: what a design must keep beside being efficient, in one, several or all of its loads.
+
+A goal is a short text (``"mass <= 0.6"``, ``"no-contact 0.1"``), an entry of the registry
+`terms`. `GoalResponder` answers a search that has some; `Case` and `at_strokes` say under which
+loads a design is judged; `ParetoArchive` keeps the designs that no other beats in all respects.
+
+Examples
+--------
+>>> list(terms)
+['mass', 'degree', 'connected', 'mirror', 'stiffness', 'strain', 'no-snapping', 'no-contact']
+"""
+
+from bellcrank.search.goals import shape, mirror, response, contact  # noqa: I001 - as listed
+from bellcrank.search.goals.cases import Case, at_strokes
+from bellcrank.search.goals.contact import near_pairs, segment_distances
+from bellcrank.search.goals.mirror import mirror_images
+from bellcrank.search.goals.pareto import MEASURES, ParetoArchive
+from bellcrank.search.goals.responder import GoalResponder, penalty_of
+from bellcrank.search.goals.response import largest_strain
+from bellcrank.search.goals.shape import mass_of
+from bellcrank.search.goals.terms import Goal, Kind, Moved, Term, read_goal, terms
+
+__all__ = [
+    "MEASURES",
+    "Case",
+    "Goal",
+    "GoalResponder",
+    "Kind",
+    "Moved",
+    "ParetoArchive",
+    "Term",
+    "at_strokes",
+    "contact",
+    "largest_strain",
+    "mass_of",
+    "mirror",
+    "mirror_images",
+    "near_pairs",
+    "penalty_of",
+    "read_goal",
+    "response",
+    "segment_distances",
+    "shape",
+    "terms",
+]

@@ -1,0 +1,291 @@
+"""Answers the questions of a search that has goals, several strokes or several load cases."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import Core, Dangling, Evaluator, Response, Screening, Status
+from bellcrank.search.goals.cases import Case, check_alike
+from bellcrank.search.goals.mirror import orbits_of
+from bellcrank.search.goals.terms import SMALLEST_EXCESS, Moved, read_goal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.runs import Proposals
+    from bellcrank.search.goals.terms import Term
+
+BROKEN = 100.0
+"""Penalty of any broken goal: no efficiency outweighs it."""
+WEIGHT = 10.0
+"""Penalty of an excess of 1, on top of that: how the way to the goals is weighed against
+efficiency as long as they are broken."""
+PROHIBITIVE = -100.0
+"""Predicted change of a flip that is known to break a goal."""
+
+
+def penalty_of(excess: float) -> float:
+    """Return what is taken off the efficiency of a design that breaks goals.
+
+    Examples
+    --------
+    >>> penalty_of(0.0), penalty_of(0.25)
+    (0.0, 102.5)
+    """
+    return BROKEN + WEIGHT * excess if excess > SMALLEST_EXCESS else 0.0
+
+
+class GoalResponder:
+    """The weighted mean of the efficiencies of one design in several cases, and its goals.
+
+    A design that breaks goals by some excess loses ``100 + 10 excess`` of its score, so that a
+    search first finds its way to the goals and never leaves them for efficiency. On the way,
+    `respond_nearby` forbids what has a larger excess than the design remembered: first by the
+    beams alone, without a response, and then with it, dear terms last.
+
+    Mirror images are flipped together: the lowest beam of each group stands for all, and is the
+    only one that `problem` calls designable. `expanded` gives the design that is meant.
+
+    Parameters
+    ----------
+    cases
+        What is asked of a design; response and screening are those of the first.
+    goals
+        Texts such as ``"mass <= 0.6"``.
+    objective, dangling, minimiser
+        As in `Evaluator`.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+        If the cases are not about the same designs, or a goal makes no sense.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> responder = GoalResponder([Case(find_problem("crane"))], ["mass <= 0.75"])
+    >>> response = responder.respond(responder.problem.initial)
+    >>> response.status.label, round(response.efficiency, 6), round(response.score, 6)
+    ('unmet', -0.064086, -102.564086)
+    """
+
+    def __init__(
+        self,
+        cases: Sequence[Case],
+        goals: Sequence[str] = (),
+        objective: str | None = None,
+        dangling: Dangling = "counted",
+        minimiser: str = "newton",
+    ) -> None:
+        check_alike(cases)
+        self.cases = list(cases)
+        self.goals = tuple(goals)
+        self.weights = [case.weight / sum(case.weight for case in cases) for case in cases]
+        self.evaluators = [
+            Evaluator(case.problem, objective, dangling, minimiser) for case in cases
+        ]
+        self._cores = [Core(evaluator) for evaluator in self.evaluators]
+        original = cases[0].problem
+        read = [read_goal(goal) for goal in goals]
+        # One term for each case, since regions may differ.
+        made = [(goal.text, [goal.term(case.problem) for case in cases]) for goal in read]
+        self._terms: list[tuple[str, list[Term]]] = sorted(made, key=lambda pair: pair[1][0].price)
+        axes = [goal.value for goal in read if goal.name == "mirror"]
+        self._members = original.designable
+        self._orbits = orbits_of(original, axes) if axes else original.designable
+        self.problem = original
+        if axes:
+            closed = self.closed(original.initial)
+            self.problem = replace(original, initial=closed, designable=np.unique(self._orbits))
+        self._excess = self._remembered = math.inf
+        self._value = [math.nan] * len(cases)
+
+    def expanded(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the design that is meant: each beam as the lowest of its mirror images."""
+        design = np.asarray(mask, dtype=bool).copy()
+        design[..., self._members] = design[..., self._orbits]
+        return design
+
+    def closed(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return a design with all mirror images of the beams that it has."""
+        design = mask.copy()
+        chosen = np.unique(self._orbits[mask[self._members]])
+        design[self._members] = np.isin(self._orbits, chosen)
+        return design
+
+    def as_meant(self, proposals: Proposals) -> Proposals:
+        """Return recorded proposals with the designs that were meant."""
+        if np.array_equal(self._members, self._orbits):
+            return proposals
+        count = self.problem.lattice.beam_count
+        bits = np.unpackbits(proposals.mask, axis=1)[:, :count].astype(bool)
+        return proposals._replace(mask=np.packbits(self.expanded(bits), axis=1))
+
+    def respond(self, mask: NDArray[np.bool_], largest_increment: float = 1.0) -> Response:
+        """Response of a design, from nothing; status UNMET if it breaks goals."""
+        design = self.expanded(mask)
+        core = self._core(design)
+        return self._judged(
+            design,
+            core,
+            self._excess_of_beams(design, core),
+            lambda evaluator: evaluator.respond(design, largest_increment),
+        )
+
+    def respond_nearby(self, mask: NDArray[np.bool_], least: float = -math.inf) -> Response:
+        """Response of a design similar to the remembered one, if it breaks goals no more.
+
+        Parameters
+        ----------
+        mask : (M,) bool
+        least
+            A design of no more score than this is of no interest: its status is UNVERIFIED.
+        """
+        design = self.expanded(mask)
+        core = self._core(design)
+        excess = self._excess_of_beams(design, core)
+        if excess > self._remembered + SMALLEST_EXCESS:
+            nowhere = np.zeros_like(self.problem.lattice.positions)
+            return Response(Status.FORBIDDEN, math.nan, math.nan, nowhere, penalty_of(excess))
+        alone = len(self.cases) == 1 and self.cases[0].wanted is None
+        floor = least + penalty_of(excess) if alone else -math.inf
+        return self._judged(
+            design,
+            core,
+            excess,
+            lambda evaluator: evaluator.respond_nearby(design, floor),
+            self._remembered,
+            least,
+        )
+
+    def remember(self) -> None:
+        """Keep the design evaluated last as the one to start from, and to be no worse than."""
+        for evaluator in self.evaluators:
+            evaluator.remember()
+        self._remembered = self._excess
+
+    def screen(self, mask: NDArray[np.bool_]) -> Screening | None:
+        """Predict what each flip would do to the score of the design evaluated last.
+
+        Mirror images are flipped together, and what each does alone is added up. Of the goals
+        only those whose terms foresee something count, once each.
+        """
+        design = self.expanded(mask)
+        change, strain = np.zeros(len(self._members)), np.zeros(len(self._members))
+        for index, evaluator in enumerate(self.evaluators):
+            screening = evaluator.screen(design, self._members)
+            if screening is None:
+                return None
+            value = self.cases[index].change(self._value[index], screening.change)
+            change += self.weights[index] * value
+            strain = np.maximum(strain, np.abs(screening.strain))
+        beams, place = np.unique(self._orbits, return_inverse=True)
+        total: NDArray[np.float64] = np.bincount(place, change).astype(float)
+        together = np.zeros(len(beams))
+        np.maximum.at(together, place, strain)
+        if self._terms:
+            total = total + self._foreseen(design, place, total)
+        return Screening(beams, total, together)
+
+    def broken(self, mask: NDArray[np.bool_]) -> list[str]:
+        """Return the goals that a design with a stable response breaks."""
+        design = self.expanded(mask)
+        core = self._core(design)
+        moved = self._moved(design, core, [e.respond(design) for e in self.evaluators])
+        return [
+            text
+            for text, made in self._terms
+            if _of_beams(made, design, core) + _of_response(made, moved) > SMALLEST_EXCESS
+        ]
+
+    def _core(self, design: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        core = self._cores[0].of(design)
+        for other in self._cores[1:]:
+            core |= other.of(design)
+        return core
+
+    def _excess_of_beams(self, design: NDArray[np.bool_], core: NDArray[np.bool_]) -> float:
+        return sum(_of_beams(made, design, core) for _, made in self._terms)
+
+    def _moved(
+        self, design: NDArray[np.bool_], core: NDArray[np.bool_], responses: list[Response]
+    ) -> list[Moved]:
+        return [
+            Moved(evaluator, design, core, response)
+            for evaluator, response in zip(self.evaluators, responses, strict=True)
+        ]
+
+    def _judged(
+        self,
+        design: NDArray[np.bool_],
+        core: NDArray[np.bool_],
+        excess: float,
+        answer: Callable[[Evaluator], Response],
+        most: float = math.inf,
+        least: float = -math.inf,
+    ) -> Response:
+        """Ask every case for its response, and the terms what they think of it."""
+        self._excess = math.inf
+        responses = []
+        for evaluator in self.evaluators:
+            responses.append(answer(evaluator))
+            if responses[-1].status is not Status.CONVERGED:
+                return replace(responses[-1], penalty=penalty_of(excess))
+        self._value = [response.efficiency for response in responses]
+        efficiency = math.fsum(
+            weight * case.value(value)
+            for weight, case, value in zip(self.weights, self.cases, self._value, strict=True)
+        )
+        response = replace(responses[0], efficiency=efficiency)
+        moved = self._moved(design, core, responses)
+        for _, made in self._terms:
+            if efficiency - penalty_of(excess) <= least:
+                return replace(response, status=Status.UNVERIFIED, penalty=penalty_of(excess))
+            excess += _of_response(made, moved)
+            if excess > most + SMALLEST_EXCESS:
+                return replace(response, status=Status.FORBIDDEN, penalty=penalty_of(excess))
+        self._excess = excess
+        status = Status.UNMET if penalty_of(excess) else Status.CONVERGED
+        return replace(response, status=status, penalty=penalty_of(excess))
+
+    def _foreseen(
+        self, design: NDArray[np.bool_], place: NDArray[np.int64], change: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the change of the score by what flips are foreseen to do to the excess.
+
+        Nothing for flips that no load can feel: they add and remove no load-bearing beam.
+        """
+        core = self._core(design)
+        excess = np.zeros(len(change))
+        for _, made in self._terms:
+            if (by_flip := made[0].by_flip) is not None:
+                excess += np.bincount(place, by_flip(core)[self._members])
+        felt = change != 0.0
+        kept = self._excess <= SMALLEST_EXCESS
+        gain = np.where(kept & (excess > SMALLEST_EXCESS), PROHIBITIVE, -WEIGHT * excess)
+        return np.where(felt, gain, 0.0)
+
+
+def _of_beams(made: list[Term], design: NDArray[np.bool_], core: NDArray[np.bool_]) -> float:
+    """Return the excess of a goal in the worst case, as far as the beams tell."""
+    return max(
+        (term.of_beams(design, core) for term in made if term.of_beams is not None), default=0.0
+    )
+
+
+def _of_response(made: list[Term], moved: list[Moved]) -> float:
+    """Return the excess of a goal in the worst case, as far as the response tells."""
+    return max(
+        (
+            term.of_response(one)
+            for term, one in zip(made, moved, strict=True)
+            if term.of_response is not None
+        ),
+        default=0.0,
+    )

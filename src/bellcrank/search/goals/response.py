@@ -1,0 +1,72 @@
+"""Terms of the response: how stiff the output is, how far beams stretch, whether it snaps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics.carrying import output_stiffness
+from bellcrank.search.goals.terms import (
+    Kind,
+    Moved,
+    Term,
+    above,
+    at_least,
+    at_most,
+    below,
+    nothing,
+)
+from bellcrank.search.goals.terms import terms as registry
+
+if TYPE_CHECKING:
+    from bellcrank.model import Problem
+
+
+def stiffness(_problem: Problem, bound: float) -> Term:
+    """At least so stiff an output at full load: see `bellcrank.mechanics.output_stiffness`."""
+    return Term(of_response=lambda moved: below(output_stiffness(moved.evaluator), bound), price=2)
+
+
+def largest_strain(moved: Moved) -> float:
+    """Return the largest stretch or shortening of a load-bearing beam, by its rest length."""
+    lattice = moved.evaluator.problem.lattice
+    beams, rest = lattice.beams[moved.core], lattice.rest_length[moved.core]
+    if not len(beams):
+        return 0.0
+    ends = moved.positions[beams]
+    return float((np.abs(np.hypot(*(ends[:, 1] - ends[:, 0]).T) - rest) / rest).max())
+
+
+def strain(_problem: Problem, bound: float) -> Term:
+    """At most so large a strain in any beam at full load."""
+    return Term(of_response=lambda moved: above(largest_strain(moved), bound), price=1)
+
+
+def no_snapping(_problem: Problem, _nothing: None) -> Term:
+    """Stable along the whole stroke, followed in small increments.
+
+    All searches refuse what snaps; they follow the path in longer strides, and overlook one
+    design in a hundred among those near a loss of stability.
+    """
+    # One of its own: the evaluator that holds the response must not forget it.
+    careful: dict[tuple[float, bool], Evaluator] = {}
+
+    def of_response(moved: Moved) -> float:
+        given = moved.evaluator
+        key = (given.problem.input.amount, given.core)
+        if key not in careful:
+            careful[key] = Evaluator(
+                given.problem, "displacement", "ignored" if given.core else "counted"
+            )
+        return float(careful[key].respond(moved.mask, CAREFUL).status is not Status.CONVERGED)
+
+    return Term(of_response=of_response, price=4)
+
+
+registry.register("stiffness")(
+    Kind("'stiffness >= NUMBER', the number above 0", at_least, stiffness)
+)
+registry.register("strain")(Kind("'strain <= NUMBER', the number above 0", at_most, strain))
+registry.register("no-snapping")(Kind("'no-snapping' alone", nothing, no_snapping))
