@@ -2,8 +2,10 @@
 
 Both halves are mirror images, so that only the upper one is modelled. It rests
 on rollers along the mirror line, right of the open mouth, and is pinned at one
-node of that line, the pivot. A beam that lies on the mirror line belongs to
-both halves and still counts in full here, as in the published code.
+node of that line, the pivot. The halves do not cross, as those of ordinary
+pliers do, so that a plain lever from handle to jaw would open them. A beam that
+lies on the mirror line belongs to both halves and still counts in full here, as
+in the published code.
 """
 
 from __future__ import annotations
