@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import spearmanr
 
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import Evaluator, Status
 from bellcrank.model import find_problem
 from benchmarks.chains import Recording, record, walk_on
 
@@ -159,12 +160,71 @@ def print_minimisers(crane: Recording, effort: Effort) -> None:
     )
 
 
+def foresee(name: str, run: Recording, start: int) -> tuple[int, float, float, float, float]:
+    """Screen all flips of the design that is current at a step of a chain.
+
+    Returns
+    -------
+    flips
+        How many.
+    seconds, response
+        Of the screening; of a response to one of the flips.
+    screened, first_order
+        Rank correlation of what is foreseen, and of the sensitivity, with the true changes.
+    """
+    evaluator = Evaluator(find_problem(name))
+    mask = run.stretch(start, 1).masks[0] if start else evaluator.problem.initial
+    before = evaluator.respond(mask).efficiency
+    slope = evaluator.sensitivity(mask)[evaluator.problem.designable]
+    evaluator.screen(mask)
+    clock = time.perf_counter()
+    for _ in range(20):
+        screening = evaluator.screen(mask)
+    seconds = (time.perf_counter() - clock) / 20
+    assert screening is not None
+    evaluator.remember()
+    gained = np.full(len(screening.beams), np.nan)
+    clock = time.perf_counter()
+    for index, beam in enumerate(screening.beams):
+        flipped = mask.copy()
+        flipped[beam] ^= True
+        response = evaluator.respond_nearby(flipped)
+        if response.status is Status.CONVERGED:
+            gained[index] = response.efficiency - before
+    response_seconds = (time.perf_counter() - clock) / len(gained)
+    counts = np.isfinite(gained)
+    foreseen = [
+        float(spearmanr(found[counts], gained[counts]).statistic)
+        for found in (screening.change, slope)
+    ]
+    return len(gained), seconds, response_seconds, foreseen[0], foreseen[1]
+
+
+def print_screening(crane: Recording, effort: Effort) -> None:
+    """Print what it costs to foresee all flips, and how well they are ranked."""
+    print("\n| problem | at step | flips | ms for all | a response is | rank correlation "
+          "| first order alone |")  # fmt: skip
+    print("|---|---|---|---|---|---|---|")
+    runs = [("crane", crane, start) for start in (0, *effort.stretches)]
+    for size in effort.sizes[:: max(1, len(effort.sizes) // 3)]:
+        name = f"scaling-{size}"
+        runs.append((name, record(name, effort.scaling_steps), effort.scaling_steps - 1))
+    for name, run, start in runs:
+        flips, seconds, response, screened, slope = foresee(name, run, start)
+        print(
+            f"| {name} | {start} | {flips} | {1e3 * seconds:.2f} | {1e3 * response:.2f} ms "
+            f"| {screened:.2f} | {slope:.2f} |"
+        )
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a rough look in a few seconds")
     effort = QUICK if parser.parse_args().quick else FULL
-    print_minimisers(print_steps(effort), effort)
+    crane = print_steps(effort)
+    print_minimisers(crane, effort)
+    print_screening(crane, effort)
 
 
 if __name__ == "__main__":

@@ -48,3 +48,11 @@ def test_block_of_250_metropolis_steps(benchmark: Benchmark, name: str) -> None:
     for state, _ in chain_blocks(evaluator, MetropolisSettings(steps=BURN_IN), 0):
         after = state
     benchmark.pedantic(advance_chain, args=(evaluator, settings, 0, after), rounds=5)
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_screening_of_all_flips(benchmark: Benchmark, name: str) -> None:
+    evaluator = Evaluator(find_problem(name))
+    mask = record(name, BURN_IN + 250).masks[BURN_IN]
+    evaluator.respond(mask)
+    benchmark.pedantic(evaluator.screen, args=(mask,), rounds=50, warmup_rounds=1)

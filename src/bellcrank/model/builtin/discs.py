@@ -18,8 +18,8 @@ SEEDS = range(1, 11)
 def discs(seed: int = 1) -> Problem:
     """Push down the upper right corner of a disordered lattice, move the upper left.
 
-    Each seed is another lattice. The lowest tenth of the height is the support; input and output lie within a
-    fifth of width and height of the corners; the push is 1 % of the height.
+    Each seed is another lattice. The lowest tenth of the height is the support; input and
+    output lie within a fifth of width and height of the corners; the push is 1 % of the height.
 
     Examples
     --------
