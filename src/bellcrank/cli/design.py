@@ -64,6 +64,17 @@ def design(
     patience: Annotated[
         int | None, typer.Option(help="End a chain after so many rejections in a row.")
     ] = None,
+    goal: Annotated[
+        list[str] | None,
+        typer.Option(help="What the design must keep, like 'mass <= 0.6'; repeatable."),
+    ] = None,
+    strokes: Annotated[
+        str | None, typer.Option(help="Average over these parts of the stroke, like 0.25,0.5,1.")
+    ] = None,
+    pareto: Annotated[
+        str | None,
+        typer.Option(help="Write the front of these, like efficiency,stiffness,mass."),
+    ] = None,
     more: Annotated[
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE: any other setting of the search; repeatable."),
@@ -82,6 +93,7 @@ def design(
 
     if (problem is None) == (resume is None):
         raise InvalidSettings("give either a problem to design for or --resume DIR")
+    measures = _measures(pareto)
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
     if problem is None:
@@ -94,6 +106,7 @@ def design(
             "steps": steps, "chains": chains, "seed": seed, "objective": objective,
             "dangling": dangling, "minimiser": minimiser, "cost": cost, "schedule": schedule,
             "minimum_degree": minimum_degree, "patience": patience,
+            "goals": goal and tuple(goal), "strokes": strokes and _numbers("--strokes", strokes),
         }  # fmt: skip
         chosen = {key: value for key, value in given.items() if value is not None}
         settings = read_settings({"search": search, **chosen, **dict(map(_setting, more or ()))})
@@ -102,7 +115,7 @@ def design(
         folder = start_design(task, settings, out or Path(Path(task.name).name))
     progress = SearchProgress(read_settings(folder.settings))
     with stopping_on_interrupt() as stop, progress:
-        report = complete_design(folder, workers=workers, tell=progress, stop=stop)
+        report = complete_design(folder, workers=workers, tell=progress, stop=stop, pareto=measures)
     if report is None:
         notes.print(
             "Stopped; what is done is kept. Go on with: "
@@ -110,6 +123,21 @@ def design(
         )
         sys.exit(INTERRUPTED)
     _print_report(report)
+
+
+def _numbers(option: str, text: str) -> tuple[float, ...]:
+    """Read numbers with commas between them."""
+    try:
+        return tuple(map(float, text.split(",")))
+    except ValueError:
+        raise InvalidSettings(f"{option} {text}: expected numbers with commas between") from None
+
+
+def _measures(text: str | None) -> tuple[str, ...]:
+    """Read the measures of a Pareto front, before hours are spent on a search."""
+    from bellcrank.search.goals import ParetoArchive
+
+    return () if text is None else ParetoArchive(tuple(text.split(","))).measures
 
 
 def _setting(text: str) -> tuple[str, Any]:
@@ -161,6 +189,8 @@ def _print_report(report: DesignReport) -> None:
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
     if report.human_response is not None:
         table.add_row("human design", f"{report.human_response.efficiency:.4f}")
+    if report.settings.goals:
+        table.add_row("goals kept", plain(", ".join(report.settings.goals)))
     table.add_row("beams", f"{selection.design.beam_count}")
     table.add_row(
         "verified",

@@ -13,6 +13,8 @@ from bellcrank.cli.console import notes
 from bellcrank.search import Progress as Step
 from bellcrank.search import SearchSettings
 
+NOT_KEPT = -50.0
+"""Below it a score is that of a design that breaks goals."""
 QUIET_INTERVAL = 10.0
 """Seconds between lines where there is no terminal."""
 
@@ -79,8 +81,9 @@ class SearchProgress:
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)
         temperature = f"T {self._temperature:.4f}  " if self._temperature > 0.0 else ""
+        best = f"best {self._best:6.3f}" if self._best > NOT_KEPT else "goals not kept yet"
         return (
-            f"best {self._best:6.3f}  {temperature}"
+            f"{best}  {temperature}"
             f"accepted {100.0 * self._accepted / self._made:2.0f} %  {speed:6.0f} steps/s"
         )
 

@@ -5,10 +5,12 @@ object interface: nothing global is read or changed, and pictures can be made in
 thread. The suffix of a path (png, svg, pdf) chooses the format.
 
 - `draw_motion`, `draw_comparison`, `draw_design` draw designs, given as `Motion` or Design;
-- `draw_paths` draws efficiency against accepted steps, given as `ChainPath`.
+- `draw_paths` draws efficiency against accepted steps, given as `ChainPath`;
+- `draw_front` draws a Pareto front.
 """
 
 from bellcrank.plots.chains import ChainPath, PathsStyle
+from bellcrank.plots.front import draw_front
 from bellcrank.plots.motion import draw_comparison, draw_design, draw_motion
 from bellcrank.plots.paths import draw_paths
 from bellcrank.plots.scene import Motion
@@ -19,6 +21,7 @@ __all__ = [
     "PathsStyle",
     "draw_comparison",
     "draw_design",
+    "draw_front",
     "draw_motion",
     "draw_paths",
 ]

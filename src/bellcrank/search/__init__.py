@@ -15,7 +15,7 @@ Examples
 """
 
 from bellcrank.search.blocks import BLOCK, FORBIDDEN, FORESEEN
-from bellcrank.search.cleaning import clean, loaded_beams
+from bellcrank.search.cleaning import clean, loaded_beams, pieces
 from bellcrank.search.costs import Cost, costs
 from bellcrank.search.hopping import HoppingSettings, HoppingState
 from bellcrank.search.metropolis import ChainState, InformedSettings, MetropolisSettings
@@ -40,7 +40,6 @@ from bellcrank.search.selection import (
     Selection,
     candidates_of,
     peaks,
-    pieces,
     plateau_ends,
     plateaus,
     select,

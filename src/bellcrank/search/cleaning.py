@@ -90,6 +90,18 @@ def _components_at(links: list[list[tuple[int, int]]], root: int) -> list[list[i
     return found
 
 
+def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:
+    """Count the separate pieces a design would print as."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    beams = problem.lattice.beams[mask]
+    used, local = np.unique(beams, return_inverse=True)
+    local = local.reshape(beams.shape)
+    graph = coo_matrix((np.ones(len(beams)), local.T), shape=(len(used), len(used)))
+    return int(connected_components(graph, directed=False)[0])
+
+
 def clean(design: Design, evaluator: Evaluator | None = None) -> Design:
     """Leave out of a design what no load can reach.
 

@@ -8,6 +8,7 @@ else. So candidates from all chains are cleaned first and compared after.
 from __future__ import annotations
 
 import heapq
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,12 +17,15 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import CAREFUL, Evaluator, Response, Status
 from bellcrank.model import Design, Problem
-from bellcrank.search.cleaning import clean
+from bellcrank.search.cleaning import clean, pieces
+from bellcrank.search.goals import GoalResponder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
+
+    from bellcrank.search.responder import Responder
 
 PLATEAU_TOLERANCE = 0.005
 """Relative change of the efficiency up to which an accepted step leaves it unmoved."""
@@ -167,39 +171,51 @@ def candidates_of(
     ]
 
 
-def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:
-    """Count the separate pieces a design would print as."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    beams = problem.lattice.beams[mask]
-    used, local = np.unique(beams, return_inverse=True)
-    local = local.reshape(beams.shape)
-    graph = coo_matrix((np.ones(len(beams)), local.T), shape=(len(used), len(used)))
-    return int(connected_components(graph, directed=False)[0])
-
-
 def _cleaned(
-    problem: Problem, candidates: Iterable[Candidate], evaluator: Evaluator
+    problem: Problem, candidates: Iterable[Candidate], evaluator: Evaluator, judge: Responder
 ) -> Iterator[tuple[Candidate, Design]]:
     """Yield each candidate cleaned, each cleaned design once."""
     seen: set[bytes] = set()
     for candidate in candidates:
-        bits = np.unpackbits(np.frombuffer(candidate.mask, np.uint8))
-        raw = Design(problem, bits[: problem.lattice.beam_count].astype(bool))
-        cleaned = clean(raw, evaluator)
+        cleaned = clean(Design(problem, _bits(problem, candidate)), evaluator)
+        if isinstance(judge, GoalResponder):
+            cleaned = cleaned.with_mask(judge.closed(cleaned.mask))
         key = np.packbits(cleaned.mask).tobytes()
         if key not in seen:
             seen.add(key)
             yield candidate, cleaned
 
 
+def _bits(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
+    bits = np.unpackbits(np.frombuffer(candidate.mask, np.uint8))
+    return bits[: problem.lattice.beam_count].astype(bool)
+
+
+def _why_not(judge: Responder, design: Design, response: Response) -> str | None:
+    """Return the reason to refuse a cleaned design, if there is one."""
+    if response.status is Status.UNMET and isinstance(judge, GoalResponder):
+        return f"breaks {', '.join(judge.broken(design.mask))}"
+    if response.status is not Status.CONVERGED:
+        return response.status.label
+    return "in several pieces" if pieces(design.problem, design.mask) > 1 else None
+
+
 def select(
-    problem: Problem, candidates: Iterable[Candidate], objective: str | None = None
+    problem: Problem,
+    candidates: Iterable[Candidate],
+    objective: str | None = None,
+    judge: Responder | None = None,
 ) -> Selection:
     """Clean the candidates and choose the one that is most efficient afterwards.
 
-    Only designs in one piece with a unique, stable response from rest are considered.
+    Only designs in one piece with a unique, stable response from rest are considered, and
+    only those that keep all goals. Where mirror images are to be alike, those of what is left
+    by cleaning stay.
+
+    Parameters
+    ----------
+    judge
+        Who knows the goals and strokes of the search, in the literal model; none by default.
 
     Raises
     ------
@@ -208,29 +224,43 @@ def select(
     """
     candidates = list(candidates)
     evaluator = Evaluator(problem, objective)
+    judge = judge or evaluator
     best: tuple[Candidate, Design, Response] | None = None
     refused: list[tuple[float, str]] = []
-    for candidate, design in _cleaned(problem, candidates, evaluator):
-        response = evaluator.respond(design.mask, largest_increment=CAREFUL)
-        if response.status is not Status.CONVERGED:
-            refused.append((response.efficiency, response.status.label))
-        elif pieces(problem, design.mask) > 1:
-            refused.append((response.efficiency, "in several pieces"))
+    for candidate, design in _cleaned(problem, candidates, evaluator, judge):
+        response = judge.respond(design.mask, largest_increment=CAREFUL)
+        if (reason := _why_not(judge, design, response)) is not None:
+            refused.append((response.efficiency, reason))
         elif best is None or response.efficiency > best[2].efficiency:
             best = candidate, design, response
     if best is None:
-        raise InvalidSettings(
-            f"problem {problem.name!r}: none of {len(candidates)} accepted designs is one stable "
-            "piece; search longer (--steps) or with more chains (--chains)"
-        )
+        raise InvalidSettings(_none_left(problem, len(candidates), refused, judge))
     candidate, design, response = best
-    bits = np.unpackbits(np.frombuffer(candidate.mask, np.uint8))[: len(design.mask)]
     reasons = [reason for value, reason in refused if value > response.efficiency]
     return Selection(
         design=design,
         response=response,
         found=candidate,
-        efficiency_before=evaluator.respond(bits.astype(bool)).efficiency,
+        efficiency_before=judge.respond(_bits(problem, candidate)).efficiency,
         efficiency_after=response.efficiency,
         refused={reason: reasons.count(reason) for reason in sorted(set(reasons))},
+    )
+
+
+def _none_left(
+    problem: Problem, count: int, refused: list[tuple[float, str]], judge: Responder
+) -> str:
+    """Say why no candidate qualifies."""
+    goals = judge.goals if isinstance(judge, GoalResponder) else ()
+    if goals and not count:
+        return (
+            f"problem {problem.name!r}: the search accepted no design that keeps its goals "
+            f"({', '.join(goals)}); relax them, or search longer (--steps)"
+        )
+    reasons = Counter(reason for _, reason in refused)
+    listed = ", ".join(f"{number} {reason}" for reason, number in reasons.most_common(3))
+    return (
+        f"problem {problem.name!r}: none of {count} accepted designs is one stable "
+        f"piece{' that keeps the goals' if goals else ''} ({listed}); "
+        "search longer (--steps) or with more chains (--chains)"
     )

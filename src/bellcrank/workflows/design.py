@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import BellcrankError
-from bellcrank.mechanics import CAREFUL, Evaluator, Response
+from bellcrank.mechanics import CAREFUL, Response, Status
 from bellcrank.model import Design, Problem, human_design, write_design
 from bellcrank.provenance import provenance
 from bellcrank.runs import RunFolder, check_free, remove_temporaries
 from bellcrank.search import (
     Candidate,
     Progress,
+    Responder,
     SearchSettings,
     advance_chain,
     candidates_of,
@@ -26,6 +27,7 @@ from bellcrank.search import (
     start_chain,
 )
 from bellcrank.workflows.outcome import DesignReport
+from bellcrank.workflows.pareto import write_front
 from bellcrank.workflows.report import RESULTS, write_report
 
 if TYPE_CHECKING:
@@ -92,6 +94,7 @@ def complete_design(
     workers: int | None = None,
     tell: Callable[[Progress], None] = lambda _progress: None,
     stop: threading.Event | None = None,
+    pareto: tuple[str, ...] = (),
 ) -> DesignReport | None:
     """Make what is left of a design job, and leave the results in its folder.
 
@@ -104,6 +107,8 @@ def complete_design(
         Called with the progress of a chain, from its own thread.
     stop
         Set it to end the search after the steps at hand; what is done is kept.
+    pareto
+        Measures to trade for each other: the designs that no other beats in all are kept too.
 
     Returns
     -------
@@ -126,6 +131,8 @@ def complete_design(
         folder.status = "stopped"
         return None
     report = conclude(folder, settings)
+    if pareto:
+        write_front(folder, settings, pareto)
     folder.finish()
     return report
 
@@ -141,13 +148,16 @@ def _try_to_mark_stopped(folder: RunFolder) -> None:
 def accepted_candidates(
     folder: RunFolder, settings: SearchSettings
 ) -> tuple[list[Candidate], int, list[float]]:
-    """Gather candidates from all chains, the number of proposals and each chain's best."""
+    """Gather candidates from all chains, the number of proposals and each chain's best.
+
+    On its way to the goals of a search a chain accepts what breaks them: that is left out.
+    """
     candidates: list[Candidate] = []
     proposals = 0
     best: list[float] = []
     for chain in range(settings.chains):
-        records = folder.read(chain, ["step", "mask", "efficiency", "accepted"])
-        taken = np.flatnonzero(records["accepted"])
+        records = folder.read(chain, ["step", "mask", "efficiency", "accepted", "status"])
+        taken = np.flatnonzero(records["accepted"] & (records["status"] == Status.CONVERGED))
         proposals += len(records["accepted"])
         efficiency = records["efficiency"][taken]
         best.append(float(efficiency.max(initial=-np.inf)))
@@ -158,9 +168,15 @@ def accepted_candidates(
     return candidates, proposals, best
 
 
-def verify(design: Design, objective: str | None, response: Response) -> dict[str, float]:
+def judge_for(problem: Problem, settings: SearchSettings, **changes: Any) -> Responder:
+    """Return who judges finished designs: in the literal model, with the goals of the search."""
+    told = {"dangling": "counted", "minimiser": "newton", **changes}
+    return make_responder(problem, replace(settings, **told))
+
+
+def verify(design: Design, settings: SearchSettings, response: Response) -> dict[str, float]:
     """Compute the efficiency of a design from rest by a second minimiser."""
-    second = Evaluator(design.problem, objective, minimiser="cg").respond(design.mask)
+    second = judge_for(design.problem, settings, minimiser="cg", goals=()).respond(design.mask)
     return {"newton": response.efficiency, "cg": second.efficiency}
 
 
@@ -169,16 +185,17 @@ def conclude(folder: RunFolder, settings: SearchSettings) -> DesignReport:
     remove_temporaries(folder.path, RESULTS)
     problem = folder.problem
     candidates, proposals, best = accepted_candidates(folder, settings)
-    selection = select(problem, candidates, settings.objective)
+    judge = judge_for(problem, settings)
+    selection = select(problem, candidates, settings.objective, judge)
     human = human_design(problem.name)
     human_response = None
     if human is not None:
-        human_response = Evaluator(problem, settings.objective).respond(human.mask, CAREFUL)
+        human_response = judge_for(problem, settings, goals=()).respond(human.mask, CAREFUL)
     report = DesignReport(
         folder=folder.path,
         settings=settings,
         selection=selection,
-        checks=verify(selection.design, settings.objective, selection.response),
+        checks=verify(selection.design, settings, selection.response),
         human=human,
         human_response=human_response,
         proposals=proposals,

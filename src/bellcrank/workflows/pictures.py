@@ -28,8 +28,8 @@ def chain_paths(folder: RunFolder, settings: SearchSettings) -> list[ChainPath]:
     """Read the accepted efficiencies of each chain of a run, or the best of them so far."""
     paths = []
     for chain in range(settings.chains):
-        columns = folder.read(chain, ["step", "efficiency", "accepted"])
-        taken = columns["accepted"]
+        columns = folder.read(chain, ["step", "efficiency", "accepted", "status"])
+        taken = columns["accepted"] & (columns["status"] == Status.CONVERGED)
         efficiency = columns["efficiency"][taken]
         if searches[settings.name].leaps:
             efficiency = np.fmax.accumulate(efficiency)

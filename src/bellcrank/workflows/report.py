@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
     from bellcrank.workflows.outcome import DesignReport
 
 
-RESULTS = re.compile(r"design\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png")
+RESULTS = re.compile(
+    r"design\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png|pareto\.(json|png)"
+)
 """Names of the files that conclude a design job."""
 
 
@@ -38,7 +41,7 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         },
         "refused_candidates": selection.refused,
         "proposals": report.proposals,
-        "best_by_chain": report.best_by_chain,
+        "best_by_chain": [b if math.isfinite(b) else None for b in report.best_by_chain],
         "settings": report.settings.to_dict(),
     }
 
@@ -54,6 +57,8 @@ def summary_text(report: DesignReport) -> str:
         ("found by chain, at step", f"{selection.found.chain}, {selection.found.step}"),
         ("designs looked at", str(report.proposals)),
     ]
+    if report.settings.goals:
+        rows.append(("goals kept", ", ".join(report.settings.goals).replace("|", "/")))
     if report.human_response is not None:
         rows.insert(2, ("human-designed counterpart", f"{report.human_response.efficiency:.6f}"))
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)

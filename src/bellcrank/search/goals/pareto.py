@@ -113,12 +113,12 @@ class ParetoArchive:
     def to_dict(self) -> dict[str, Any]:
         """Return the archive as plain data."""
         front = [{"mask": design, **values} for design, values in self.front()]
-        return {"measures": list(self.measures), "front": front}
+        return {"measures": list(self.measures), "results": front}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
         """Rebuild an archive from plain data."""
         archive = cls(tuple(data["measures"]))
-        for entry in data["front"]:
+        for entry in data["results"]:
             archive.add(str(entry["mask"]), {name: entry[name] for name in archive.measures})
         return archive

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.search.cleaning import pieces
 from bellcrank.search.goals.terms import Kind, Term, above, at_least, at_most, counted, nothing
 from bellcrank.search.goals.terms import terms as registry
-from bellcrank.search.selection import pieces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
