@@ -1,0 +1,358 @@
+"""Each goal against designs made by hand, with the value it must measure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidSettings, UnknownName
+from bellcrank.mechanics import Core, Evaluator, Status, output_stiffness
+from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem
+from bellcrank.search.goals import (
+    Case,
+    GoalResponder,
+    Moved,
+    largest_strain,
+    mass_of,
+    mirror_images,
+    near_pairs,
+    read_goal,
+    segment_distances,
+    terms,
+)
+
+EVERY_GOAL = {
+    "mass": "mass <= 0.5",
+    "degree": "degree >= 2",
+    "connected": "connected",
+    "mirror": "mirror x",
+    "stiffness": "stiffness >= 0.1",
+    "strain": "strain <= 0.1",
+    "no-snapping": "no-snapping",
+    "no-contact": "no-contact 0.1",
+}
+
+
+def ladder() -> Problem:
+    """Two rows of four nodes, one above the other, with both diagonals in each square.
+
+    The lower left node is held, the lower right one driven, the upper left one watched.
+    """
+    positions = [[x, y] for y in (0.0, 1.0) for x in range(4)]
+    beams = [[i, i + 1] for i in (0, 1, 2, 4, 5, 6)]
+    beams += [[i, i + 4] for i in range(4)]
+    beams += [[i, i + 5] for i in range(3)] + [[i + 1, i + 4] for i in range(3)]
+    return Problem(
+        name="ladder",
+        lattice=Lattice(positions, beams),
+        supports=Supports(fixed=[0]),
+        input=Input(nodes=[3], direction=[0.0, -1.0], drive="displacement", amount=0.1),
+        output=Output(nodes=[4], direction=[-1.0, 0.0]),
+        designable=list(range(len(beams))),
+    )
+
+
+def without(problem: Problem, *pairs: tuple[int, int]) -> np.ndarray:
+    mask = problem.initial.copy()
+    for pair in pairs:
+        mask[(problem.lattice.beams == pair).all(axis=1)] = False
+    return mask
+
+
+def excess_of_beams(problem: Problem, text: str, mask: np.ndarray) -> float:
+    measure = read_goal(text).term(problem).of_beams
+    assert measure is not None
+    return measure(mask, Core(Evaluator(problem)).of(mask))
+
+
+def moved(problem: Problem, mask: np.ndarray) -> Moved:
+    evaluator = Evaluator(problem)
+    response = evaluator.respond(mask)
+    assert response.status is Status.CONVERGED
+    return Moved(evaluator, mask, Core(evaluator).of(mask), response)
+
+
+def excess_of_response(text: str, state: Moved) -> float:
+    measure = read_goal(text).term(state.evaluator.problem).of_response
+    assert measure is not None
+    return measure(state)
+
+
+def random_designs(problem: Problem, count: int, thinnest: float = 0.6) -> list[np.ndarray]:
+    rng = np.random.default_rng(5)
+    designs = []
+    for _ in range(count):
+        mask = problem.initial.copy()
+        mask[problem.designable] &= rng.random(len(problem.designable)) < rng.uniform(thinnest, 1)
+        designs.append(mask)
+    return designs
+
+
+def test_every_goal_is_tested_here() -> None:
+    assert set(EVERY_GOAL) == set(terms)
+    for name, text in EVERY_GOAL.items():
+        assert read_goal(text).name == name
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "mass", "mass < 0.5", "mass <= x", "mass <= 0", "mass <= -1", "mass <= nan", "mass <= inf",
+        "degree >= 2.5", "degree <= 2", "connected 3", "mirror", "mirror z", "no-contact -1",
+        "stiffness <= 1", "strain >= 1", "no-snapping now",
+    ],
+)  # fmt: skip
+def test_bad_syntax_names_the_goal_and_says_what_was_expected(text: str) -> None:
+    name = text.split(maxsplit=1)[0]
+    with pytest.raises(InvalidSettings, match=f"goal '{text}': expected '{name}"):
+        read_goal(text)
+
+
+def test_an_unknown_goal_lists_the_known_ones() -> None:
+    with pytest.raises(UnknownName, match=r"unknown goal 'weight'; known: mass, .*no-contact"):
+        read_goal("weight <= 3")
+    with pytest.raises(InvalidSettings, match="expected a text"):
+        read_goal(3)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("mass <= 1", "expected a part below 1"),
+        ("degree >= 7", "no node of problem 'crane' has more than 6 beams"),
+        ("mirror x", "not symmetric in x: 9 of 203 designable beams have no designable mirror"),
+    ],
+)
+def test_goals_that_make_no_sense_for_a_problem_say_why(text: str, message: str) -> None:
+    with pytest.raises(InvalidSettings, match=f"goal '{text}': .*{message}"):
+        GoalResponder([Case(find_problem("crane"))], [text])
+
+
+def test_mass_is_the_length_that_carries_load() -> None:
+    problem = ladder()
+    full = 10.0 + 6.0 * np.sqrt(2.0)
+    mask = without(problem, (0, 1), (1, 2))
+    assert mass_of(problem, Core(Evaluator(problem)).of(mask)) == pytest.approx((full - 2) / full)
+    assert excess_of_beams(problem, "mass <= 0.5", problem.initial) == pytest.approx(0.5)
+    assert excess_of_beams(problem, "mass <= 0.5", mask) == pytest.approx(
+        1 - 0.5 / ((full - 2) / full)
+    )
+    assert excess_of_beams(problem, "mass <= 0.95", mask) == 0.0
+
+
+def test_dead_ends_have_no_mass_for_they_are_not_built() -> None:
+    problem = ladder()
+    # Node 5 keeps a single beam, down to node 1.
+    cut = without(problem, (4, 5), (5, 6), (0, 5), (2, 5))
+    gone = without(problem, (4, 5), (5, 6), (0, 5), (2, 5), (1, 5))
+    core = Core(Evaluator(problem))
+    assert (core.of(cut) == core.of(gone)).all()
+
+
+def test_the_foreseen_change_of_mass_is_exact_for_beams_that_leave_no_dead_end() -> None:
+    problem = ladder()
+    term = read_goal("mass <= 0.5").term(problem)
+    core = Core(Evaluator(problem))
+    assert term.by_flip is not None
+    foreseen = term.by_flip(core.of(problem.initial))
+    for beam in problem.designable:
+        mask = problem.initial.copy()
+        mask[beam] = False
+        gained = excess_of_beams(problem, "mass <= 0.5", mask) - 0.5
+        assert foreseen[beam] == pytest.approx(gained)
+
+
+def test_degree_counts_the_beams_that_free_nodes_lack() -> None:
+    problem = ladder()
+    # Free: 1, 2, 5, 6, 7. In the full ladder 1, 2, 5, 6 have five beams, the corner 7 three.
+    assert excess_of_beams(problem, "degree >= 3", problem.initial) == 0.0
+    assert excess_of_beams(problem, "degree >= 4", problem.initial) == pytest.approx(1 / 11)
+    fewer = without(problem, (6, 7))
+    assert excess_of_beams(problem, "degree >= 4", fewer) == pytest.approx(2 / 12)
+    assert excess_of_beams(problem, "degree >= 2", fewer) == 0.0
+
+
+def test_connected_counts_pieces_and_missing_regions() -> None:
+    problem = ladder()
+    assert excess_of_beams(problem, "connected", problem.initial) == 0.0
+    # The output hangs on three beams: 0-4, 4-5, 1-4.
+    cut = without(problem, (0, 4), (4, 5), (1, 4))
+    assert excess_of_beams(problem, "connected", cut) == pytest.approx(1 / 2)
+    nothing = np.zeros_like(problem.initial)
+    assert excess_of_beams(problem, "connected", nothing) == pytest.approx(3 / 4)
+
+
+def test_two_pieces_are_one_too_many() -> None:
+    positions = [[0, 0], [1, 0], [0, 1], [1, 1], [0.5, 2], [5, 0], [6, 0], [5.5, 1]]
+    beams = [[0, 2], [0, 3], [1, 3], [2, 3], [2, 4], [3, 4], [5, 7], [6, 7], [3, 7]]
+    problem = Problem(
+        name="two", lattice=Lattice(positions, beams), supports=Supports(fixed=[0, 1, 5, 6]),
+        input=Input([4, 7], [0.0, -1.0], "displacement", 0.05), output=Output([2], [-1.0, 0.0]),
+        designable=[1, 8],
+    )  # fmt: skip
+    apart = problem.initial.copy()
+    apart[8] = False
+    assert excess_of_beams(problem, "connected", problem.initial) == 0.0
+    assert excess_of_beams(problem, "connected", apart) == pytest.approx(1 / 2)
+
+
+def test_mirror_counts_the_beams_whose_image_differs() -> None:
+    problem = find_problem("scaling-8")
+    images = mirror_images(problem, "x")
+    assert (images[images] == np.arange(len(images))).all()
+    lattice = problem.lattice
+    middle = lattice.positions[lattice.beams].mean(axis=1)[problem.designable]
+    assert np.allclose(middle[images, 1], middle[:, 1])
+    assert np.allclose(middle[images, 0] + middle[:, 0], middle[0, 0] + middle[images[0], 0])
+    pair = next(i for i, image in enumerate(images) if image != i)
+    alone = next(i for i, image in enumerate(images) if image == i)
+    mask = problem.initial.copy()
+    mask[problem.designable[alone]] = False
+    assert excess_of_beams(problem, "mirror x", mask) == 0.0
+    mask[problem.designable[pair]] = False
+    assert excess_of_beams(problem, "mirror x", mask) == pytest.approx(2 / len(images))
+
+
+def test_images_tell_crossing_diagonals_apart() -> None:
+    problem = ladder()
+    images = mirror_images(problem, "x")
+    middle = np.flatnonzero((problem.lattice.beams == (1, 6)).all(axis=1))[0]
+    other = np.flatnonzero((problem.lattice.beams == (2, 5)).all(axis=1))[0]
+    assert images[middle] == other
+
+
+@pytest.mark.parametrize("name", ["crane", "pliers", "discs"])
+def test_output_stiffness_is_what_a_small_force_meets(name: str) -> None:
+    problem = find_problem(name)
+    rng = np.random.default_rng(1)
+    mask = problem.initial.copy()
+    mask[rng.choice(problem.designable, 15, replace=False)] = False
+    evaluator = Evaluator(problem)
+    before = evaluator.respond(mask)
+    assert before.status is Status.CONVERGED
+    nodes, wanted = problem.output.nodes, problem.output.direction
+    held = evaluator.structure.active[nodes] == 1
+    stiffness = output_stiffness(evaluator)
+
+    def output(force: float) -> float:
+        """Mean motion of the output under an additional force shared by its nodes."""
+        pushed = Evaluator(problem)
+        load = pushed.system.load.copy()
+        load[nodes[held]] += force / held.sum() * wanted[held]
+        pushed.system = pushed.system._replace(load=load)
+        motion = pushed.respond(mask, 0.25).displacement[nodes[held]]
+        return float((motion * wanted[held]).sum(axis=1).mean())
+
+    force = 1e-4 * stiffness
+    assert 2 * force / (output(force) - output(-force)) == pytest.approx(stiffness, rel=1e-5)
+
+
+def test_an_output_that_hangs_loose_has_no_stiffness() -> None:
+    problem = ladder()
+    state = moved(problem, without(problem, (0, 4), (4, 5), (1, 4)))
+    assert output_stiffness(state.evaluator) == 0.0
+    assert excess_of_response("stiffness >= 0.1", state) == 1.0
+
+
+def test_stiffness_falls_short_by_the_part_that_is_missing() -> None:
+    problem = ladder()
+    state = moved(problem, problem.initial)
+    stiffness = output_stiffness(state.evaluator)
+    assert excess_of_response(f"stiffness >= {4 * stiffness}", state) == pytest.approx(0.75)
+    assert excess_of_response(f"stiffness >= {stiffness / 2}", state) == 0.0
+
+
+def test_strain_is_that_of_the_most_stretched_beam() -> None:
+    problem = ladder()
+    state = moved(problem, problem.initial)
+    position = problem.lattice.positions + state.response.displacement
+    worst = max(
+        abs(np.linalg.norm(position[b] - position[a]) - r) / r
+        for (a, b), r in zip(problem.lattice.beams, problem.lattice.rest_length, strict=True)
+    )
+    assert largest_strain(state) == pytest.approx(worst, rel=1e-12)
+    assert excess_of_response(f"strain <= {worst / 4}", state) == pytest.approx(0.75)
+    assert excess_of_response(f"strain <= {worst * 1.01}", state) == 0.0
+
+
+def sampled_distance(first: np.ndarray, second: np.ndarray, count: int = 400) -> float:
+    part = np.linspace(0.0, 1.0, count)[:, None]
+    a, b = (s[0] + part * (s[1] - s[0]) for s in (first, second))
+    return float(np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1)).min())
+
+
+def test_distances_of_segments_match_points_sampled_along_them() -> None:
+    rng = np.random.default_rng(2)
+    first, second = rng.random((2, 300, 2, 2))
+    distance = segment_distances(first, second)
+    assert (distance == 0.0).sum() > 30
+    for a, b, d in zip(first, second, distance, strict=True):
+        assert sampled_distance(a, b) == pytest.approx(d, abs=5e-3)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.3, 0.9])
+def test_near_struts_are_those_that_a_search_over_all_pairs_finds(width: float) -> None:
+    problem = find_problem("crane")
+    rng = np.random.default_rng(4)
+    beams = problem.lattice.beams
+    position = problem.lattice.positions + rng.normal(0.0, 0.25, problem.lattice.positions.shape)
+    ends = position[beams]
+    expected = {}
+    for i in range(len(beams)):
+        for j in range(i):
+            if not set(beams[i].tolist()) & set(beams[j].tolist()):
+                distance = segment_distances(ends[i : i + 1], ends[j : j + 1])[0]
+                if distance < width or distance == 0.0:
+                    expected[frozenset((i, j))] = distance
+    pairs, distance = near_pairs(position, beams, width)
+    found = {frozenset(p): d for p, d in zip(pairs.tolist(), distance, strict=True)}
+    assert len(expected) > 10
+    assert found == expected
+
+
+def test_contact_counts_crossings_and_what_is_missing_of_the_width() -> None:
+    # Two bars, the lower one pushed up by its driven ends until the gap is 0.2.
+    positions = [[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [2, 1]]
+    beams = [[0, 1], [2, 3], [1, 4], [3, 5], [4, 5]]
+    problem = Problem(
+        name="bars", lattice=Lattice(positions, beams), supports=Supports(fixed=[2, 3, 4]),
+        input=Input([0, 1], [0.0, 1.0], "displacement", 0.8), output=Output([5], [1.0, 0.0]),
+        designable=[2],
+    )  # fmt: skip
+    evaluator = Evaluator(problem)
+    displacement = np.zeros((6, 2))
+    displacement[[0, 1], 1] = 0.8
+    response = replace(evaluator.respond(problem.initial), displacement=displacement)
+    mask = np.array([True, True, False, False, False])
+    state = Moved(evaluator, mask, np.zeros(5, bool), response)
+    assert excess_of_response("no-contact", state) == 0.0
+    assert excess_of_response("no-contact 0.19", state) == 0.0
+    assert excess_of_response("no-contact 0.4", state) == pytest.approx(0.5 / 1.5)
+    # Held beams count although they carry nothing; absent ones do not.
+    gone = replace(state, mask=np.zeros(5, bool))
+    assert excess_of_response("no-contact 0.4", gone) == 0.0
+    displacement[1, 1] = 1.2
+    crossed = replace(state, response=replace(response, displacement=displacement))
+    assert excess_of_response("no-contact", crossed) == pytest.approx(0.5)
+
+
+def test_snapping_is_what_a_careful_path_finds() -> None:
+    problem = find_problem("crane")
+    careful = Evaluator(problem)
+    for mask in random_designs(problem, 15, thinnest=0.4):
+        evaluator = Evaluator(problem)
+        response = evaluator.respond(mask)
+        state = Moved(evaluator, mask, Core(evaluator).of(mask), response)
+        expected = careful.respond(mask, 1 / 32).status is not Status.CONVERGED
+        assert excess_of_response("no-snapping", state) == expected
+
+
+def test_the_core_is_that_of_the_evaluator() -> None:
+    for name in ("crane", "pliers", "discs"):
+        problem = find_problem(name)
+        evaluator = Evaluator(problem)
+        core = Core(evaluator)
+        for mask in random_designs(problem, 20, thinnest=0.2):
+            assert (core.of(mask) == evaluator.load_bearing(mask)).all()
