@@ -41,3 +41,11 @@ class StorageError(BellcrankError, OSError):
 
 class CorruptRun(BellcrankError, ValueError):
     """A run directory does not hold what its own description says."""
+
+
+class ClusterError(BellcrankError, RuntimeError):
+    """The machines of a campaign cannot be reached, or do not fit together."""
+
+
+class RunFailed(BellcrankError, RuntimeError):
+    """Runs of a campaign could not be brought to their end."""

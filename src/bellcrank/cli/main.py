@@ -8,13 +8,15 @@ from typing import NoReturn, cast
 
 import typer
 
-from bellcrank.cli import design, evaluate, plot, problems
+from bellcrank.cli import campaign, design, evaluate, plot, problems
 from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, app
 from bellcrank.cli.console import notes, plain
-from bellcrank.errors import BellcrankError, CorruptRun, StorageError
+from bellcrank.errors import BellcrankError, CorruptRun, RunFailed, StorageError
 
-COMMANDS = (design, evaluate, plot, problems)
+COMMANDS = (campaign, design, evaluate, plot, problems)
 """Modules that register a command."""
+FAILURES = (StorageError, CorruptRun, RunFailed)
+"""What is not the fault of who typed the command."""
 
 
 UsageError = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
@@ -31,7 +33,7 @@ def main() -> None:
     except UsageError as error:
         _refuse(f"{error.format_message().rstrip('.')}; see bellcrank --help", BAD_INPUT)
     except BellcrankError as error:
-        _refuse(str(error), FAILED if isinstance(error, (StorageError, CorruptRun)) else BAD_INPUT)
+        _refuse(str(error), FAILED if isinstance(error, FAILURES) else BAD_INPUT)
     except KeyboardInterrupt:
         notes.print("Interrupted.")
         sys.exit(INTERRUPTED)

@@ -117,11 +117,19 @@ def append_shard(
 
 
 @contextlib.contextmanager
-def parquet_writer(file: IO[bytes], schema: Any, header: Mapping[str, Any]) -> Iterator[Any]:
-    """Open a Parquet writer on a file, with our `header` in its footer."""
+def parquet_writer(
+    file: IO[bytes], schema: Any, header: Mapping[str, Any], **options: Any
+) -> Iterator[Any]:
+    """Open a Parquet writer on a file, with our `header` in its footer.
+
+    Parameters
+    ----------
+    **options
+        Of the writer, where they differ from `WRITER_OPTIONS`.
+    """
     import pyarrow.parquet as pq
 
-    with pq.ParquetWriter(file, schema, **WRITER_OPTIONS) as writer:
+    with pq.ParquetWriter(file, schema, **{**WRITER_OPTIONS, **options}) as writer:
         text = json.dumps(header)
         writer.add_key_value_metadata({METADATA_KEY: text, DIGEST_KEY: _digest(text.encode())})
         yield writer

@@ -1,0 +1,25 @@
+"""Where runs are computed: here, on this machine's cores, or on machines elsewhere.
+
+Importing this package does not import Dask; entering one of its engines does.
+"""
+
+from bellcrank.campaign.engines import on_dask, serial
+from bellcrank.campaign.engines.base import (
+    LOOPBACK,
+    Engine,
+    EngineOptions,
+    Outcome,
+    WorkerDied,
+    engines,
+)
+
+__all__ = [
+    "LOOPBACK",
+    "Engine",
+    "EngineOptions",
+    "Outcome",
+    "WorkerDied",
+    "engines",
+    "on_dask",
+    "serial",
+]

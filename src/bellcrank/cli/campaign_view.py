@@ -1,0 +1,101 @@
+"""How a campaign looks in a terminal."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from bellcrank.cli.console import notes, plain
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bellcrank.campaign import Ranked, Status
+
+QUIET_INTERVAL = 10.0
+"""Seconds between lines where there is no terminal."""
+
+
+def status_table(status: Status) -> Table:
+    """Return one row for each task, and one for all."""
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    table.add_column("task")
+    for name in ("runs done", "steps", "best", "seed"):
+        table.add_column(name, justify="right")
+    for task in status.tasks:
+        table.add_row(
+            plain(task.name),
+            f"{task.runs_done} / {task.runs}",
+            f"{task.steps_done} / {task.steps}",
+            "" if task.best is None else f"{task.best:.4f}",
+            "" if task.best_seed is None else str(task.best_seed),
+        )
+    table.add_row(
+        "all",
+        f"{status.runs_done} / {status.runs}",
+        f"{status.steps_done} / {status.steps}",
+        style="bold",
+    )
+    return table
+
+
+def ranking_table(designs: Sequence[Ranked]) -> Table:
+    """Return one row for each design; masks, too long for a line, are in the JSON only."""
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    table.add_column("efficiency", justify="right")
+    table.add_column("task")
+    table.add_column("seed", justify="right")
+    table.add_column("step", justify="right")
+    for design in designs:
+        efficiency = f"{design.efficiency:.6f}"
+        table.add_row(efficiency, plain(design.task), str(design.seed), str(design.step))
+    return table
+
+
+def one_line(status: Status) -> str:
+    """Return how a campaign stands in one line."""
+    best = max((task.best for task in status.tasks if task.best is not None), default=None)
+    told = "" if best is None else f"  best {best:.3f}"
+    return f"runs {status.runs_done} / {status.runs}  steps {status.steps_done}{told}"
+
+
+class CampaignProgress:
+    """Shows how a campaign goes: a live line on a terminal, a few lines elsewhere."""
+
+    def __init__(self) -> None:
+        self._last_line = time.monotonic()
+        self._bar = Progress(
+            TextColumn("[bold]campaign"),
+            BarColumn(bar_width=24),
+            TextColumn("{task.percentage:3.0f} %"),
+            TextColumn("{task.fields[figures]}"),
+            TimeElapsedColumn(),
+            console=notes,
+            disable=not notes.is_terminal,
+        )
+        self._task = self._bar.add_task("", total=None, figures="")
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._bar.stop()
+
+    def __call__(self, status: Status) -> None:
+        """Take in how the campaign stands."""
+        line = one_line(status)
+        self._bar.update(self._task, total=status.steps, completed=status.steps_done, figures=line)
+        now = time.monotonic()
+        if not notes.is_terminal and now - self._last_line > QUIET_INTERVAL:
+            self._last_line = now
+            notes.print(plain(line))
