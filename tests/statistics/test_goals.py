@@ -1,0 +1,111 @@
+"""Chains with a hard goal visit the allowed designs as often as the Boltzmann distribution says.
+
+Restricted to the designs that keep the goal, a chain must visit each with probability
+exp(-cost / T) / Z, Z over those alone: by a rule that the beams tell, and by one that only the
+response tells.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from bellcrank.mechanics import Evaluator, output_stiffness
+from bellcrank.search import MetropolisSettings, chain_blocks, make_responder
+
+from .lattice import (
+    BURN_IN,
+    CHAINS,
+    LARGEST_DEVIATION,
+    all_efficiencies,
+    boltzmann,
+    deviations,
+    index_of,
+    ten_beams,
+)
+
+if TYPE_CHECKING:
+    from bellcrank.model import Problem
+
+TEMPERATURE = 0.03
+MASS = 0.65
+STIFFNESS = 3.34
+
+
+def all_designs(problem: Problem) -> np.ndarray:
+    masks = np.repeat(problem.initial[None], 1024, axis=0)
+    masks[:, problem.designable] = list(itertools.product([False, True], repeat=10))
+    return masks
+
+
+def is_light(problem: Problem) -> np.ndarray:
+    evaluator = Evaluator(problem)
+    length = problem.lattice.rest_length[problem.designable]
+    core = np.array([evaluator.load_bearing(m)[problem.designable] for m in all_designs(problem)])
+    return core @ length <= MASS * length.sum()
+
+
+def is_stiff(problem: Problem) -> np.ndarray:
+    evaluator = Evaluator(problem, dangling="ignored")
+    stiffness = []
+    for mask in all_designs(problem):
+        evaluator.respond(mask)
+        stiffness.append(output_stiffness(evaluator))
+    return np.array(stiffness) >= STIFFNESS
+
+
+RULES = {f"mass <= {MASS}": is_light, f"stiffness >= {STIFFNESS}": is_stiff}
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return ten_beams()
+
+
+@pytest.fixture(scope="module")
+def efficiency(problem: Problem) -> np.ndarray:
+    return all_efficiencies(problem, "ignored")
+
+
+def visits(problem: Problem, settings: MetropolisSettings, chain: int) -> np.ndarray:
+    mask = problem.initial.copy()
+    indices = []
+    for _, rows in chain_blocks(make_responder(problem, settings), settings, chain):
+        proposed = np.unpackbits(rows.mask, axis=1)[:, : len(mask)].astype(bool)
+        for row, accepted in zip(proposed, rows.accepted, strict=True):
+            mask = row if accepted else mask
+            indices.append(index_of(problem, mask))
+    return np.array(indices[BURN_IN:])
+
+
+def samples_of(problem: Problem, goal: str, *moves: str) -> list[np.ndarray]:
+    settings = MetropolisSettings(
+        steps=1250, schedule="constant", cold=TEMPERATURE, cost="negative", moves=moves,
+        dangling="ignored", goals=(goal,),
+    )  # fmt: skip
+    return [visits(problem, settings, chain) for chain in range(CHAINS)]
+
+
+@pytest.mark.parametrize("goal", RULES)
+@pytest.mark.parametrize("moves", [("flip",), ("balanced",), ("delayed", "node", "swap")])
+def test_visits_match_the_distribution_over_allowed_designs(
+    problem: Problem, efficiency: np.ndarray, goal: str, moves: tuple[str, ...]
+) -> None:
+    allowed = RULES[goal](problem)
+    assert 100 < allowed.sum() < 900
+    samples = samples_of(problem, goal, *moves)
+    assert allowed[np.concatenate(samples)].all()
+    weight = np.where(allowed, boltzmann(-efficiency, TEMPERATURE), 0.0)
+    assert deviations(samples, efficiency, weight / weight.sum()).max() < LARGEST_DEVIATION
+
+
+@pytest.mark.parametrize("goal", RULES)
+def test_the_distribution_over_all_designs_is_told_apart(
+    problem: Problem, efficiency: np.ndarray, goal: str
+) -> None:
+    samples = samples_of(problem, goal, "flip")
+    everything = boltzmann(-efficiency, TEMPERATURE)
+    assert deviations(samples, efficiency, everything).max() > LARGEST_DEVIATION
