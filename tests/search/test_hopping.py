@@ -64,7 +64,7 @@ def test_a_climb_cannot_begin_where_nothing_holds() -> None:
 
 def test_a_kick_redraws_a_disc_and_nothing_else(small: Problem) -> None:
     rng = np.random.default_rng(1)
-    settings = HoppingSettings(radius=1.5)
+    settings = HoppingSettings(radius=1.5, thinnest=0.5)
     middle = small.lattice.positions[small.lattice.beams].mean(axis=1)
     sizes = []
     for _ in range(200):
@@ -77,7 +77,7 @@ def test_a_kick_redraws_a_disc_and_nothing_else(small: Problem) -> None:
 
 
 def test_lines_only_rise_and_the_worst_are_given_up(small: Problem) -> None:
-    settings = HoppingSettings(steps=4000, seed=1)
+    settings = HoppingSettings(steps=4000, seed=1, lines=4)
     responder = make_responder(small, settings)
     best, counts = -np.inf, []
     for state, _ in chain_blocks(responder, settings, 0):

@@ -3,9 +3,9 @@
 A climb (`climbing`) ends at a design that no flip of a beam improves. From there a part of
 the lattice is drawn anew, more or less densely, and the climb goes on; the new design takes
 the place of the old one if it is at least as efficient (Wales and Doye, J. Phys. Chem. A
-101, 5111, 1997; iterated local search, Lourenco et al. 2003). Several such lines begin from
-different designs; the worst ones are given up one by one, so that most of the time goes to
-the most promising.
+101, 5111, 1997; iterated local search, Lourenco et al. 2003). Several such lines can begin
+from different designs; the worst ones are then given up one by one, so that most of the time
+goes to the most promising.
 """
 
 from __future__ import annotations
@@ -62,10 +62,10 @@ class HoppingSettings(SearchSettings):
 
     name: ClassVar[str] = "basin-hopping"
 
-    lines: int = 4
+    lines: int = 1
     shared: float = 0.6
-    radius: float = 2.0
-    thinnest: float = 0.6
+    radius: float = 2.5
+    thinnest: float = 0.95
     depth: int = 12
     largest_loss: float = 0.01
 
