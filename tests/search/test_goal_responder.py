@@ -129,7 +129,7 @@ def test_a_chain_comes_nearer_to_its_goals_step_by_step_and_never_leaves_them(
     assert (status[accepted][:first] == Status.UNMET).all()
     assert (status[accepted][first:] == Status.CONVERGED).all()
     refused = status == FORBIDDEN
-    assert refused.any()
+    assert refused.any() or search == "informed"  # which foresees most of them
     assert not accepted[refused].any()
 
 
@@ -141,7 +141,7 @@ def test_records_keep_the_true_efficiency_and_the_cost_that_was_compared(small: 
     assert len(unmet)
     evaluator = Evaluator(small)
     for index in unmet:
-        penalty = 100.0 + 10.0 * (1.0 - 0.9 / _mass(small, mask[index]))
+        penalty = 100.0 + 30.0 * (1.0 - 0.9 / _mass(small, mask[index]))
         assert cost[index] + efficiency[index] == pytest.approx(penalty)
         assert efficiency[index] == pytest.approx(
             evaluator.respond(mask[index]).efficiency, abs=1e-7

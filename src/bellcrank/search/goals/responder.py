@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 BROKEN = 100.0
 """Penalty of any broken goal: no efficiency outweighs it."""
-WEIGHT = 10.0
+WEIGHT = 30.0
 """Penalty of an excess of 1, on top of that: how the way to the goals is weighed against
 efficiency as long as they are broken."""
 PROHIBITIVE = -100.0
@@ -36,7 +36,7 @@ def penalty_of(excess: float) -> float:
     Examples
     --------
     >>> penalty_of(0.0), penalty_of(0.25)
-    (0.0, 102.5)
+    (0.0, 107.5)
     """
     return BROKEN + WEIGHT * excess if excess > SMALLEST_EXCESS else 0.0
 
@@ -44,7 +44,7 @@ def penalty_of(excess: float) -> float:
 class GoalResponder:
     """The weighted mean of the efficiencies of one design in several cases, and its goals.
 
-    A design that breaks goals by some excess loses ``100 + 10 excess`` of its score, so that a
+    A design that breaks goals by some excess loses ``100 + 30 excess`` of its score, so that a
     search first finds its way to the goals and never leaves them for efficiency. On the way,
     `respond_nearby` forbids what has a larger excess than the design remembered: first by the
     beams alone, without a response, and then with it, dear terms last.
@@ -72,7 +72,7 @@ class GoalResponder:
     >>> responder = GoalResponder([Case(find_problem("crane"))], ["mass <= 0.75"])
     >>> response = responder.respond(responder.problem.initial)
     >>> response.status.label, round(response.efficiency, 6), round(response.score, 6)
-    ('unmet', -0.064086, -102.564086)
+    ('unmet', -0.064086, -107.564086)
     """
 
     def __init__(

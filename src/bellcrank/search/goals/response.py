@@ -58,7 +58,7 @@ def no_snapping(_problem: Problem, _nothing: None) -> Term:
         key = (given.problem.input.amount, given.core)
         if key not in careful:
             careful[key] = Evaluator(
-                given.problem, "displacement", "ignored" if given.core else "counted"
+                given.problem, "displacement", get_args(Dangling)[given.core]
             )
         return float(careful[key].respond(moved.mask, CAREFUL).status is not Status.CONVERGED)
 

@@ -1,0 +1,134 @@
+"""`bellcrank design` with goals, strokes and a Pareto front."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from bellcrank.mechanics import Core, Evaluator, output_stiffness
+from bellcrank.model import read_design, unpack_mask
+from bellcrank.search import pieces
+from bellcrank.search.goals import mass_of, mirror_images, near_pairs
+
+from .helpers import PROBLEM, call, colours, refusal
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+QUICK = ("--steps", "500", "--chains", "2", "--seed", "5")
+FRONT = ("efficiency", "stiffness", "mass")
+
+
+@pytest.fixture(scope="module")
+def light(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a job with two goals, two strokes and a front."""
+    folder = tmp_path_factory.mktemp("goals") / "run"
+    outcome = call(
+        "design", PROBLEM, *QUICK, "--goal", "mass <= 0.6", "--goal", "no-contact 0.2",
+        "--strokes", "0.5,1", "--pareto", ",".join(FRONT), "--out", folder,
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    assert "goals kept" in outcome.out
+    assert "mass <= 0.6, no-contact 0.2" in outcome.out
+    return folder
+
+
+def test_the_design_keeps_its_goals(light: Path) -> None:
+    design = read_design(light / "design.json")
+    evaluator = Evaluator(design.problem)
+    moved = design.problem.lattice.positions + evaluator.respond(design.mask).displacement
+    assert mass_of(design.problem, Core(evaluator).of(design.mask)) <= 0.6
+    near, _ = near_pairs(moved, design.problem.lattice.beams[design.mask], 0.2)
+    assert len(near) == 0
+    assert design.provenance["settings"]["goals"] == ["mass <= 0.6", "no-contact 0.2"]
+
+
+def test_the_efficiency_is_the_mean_over_the_strokes(light: Path) -> None:
+    design = read_design(light / "design.json")
+    summary = json.loads((light / "summary.json").read_text())
+    assert design.efficiency == summary["efficiency"]
+    assert summary["verified"]
+    full = Evaluator(design.problem).respond(design.mask).efficiency
+    assert abs(full - summary["efficiency"]) > 1e-5
+    assert "| goals kept | mass <= 0.6, no-contact 0.2 |" in (light / "summary.md").read_text()
+
+
+def test_the_front_holds_designs_that_no_other_beats_with_true_values(light: Path) -> None:
+    data = json.loads((light / "pareto.json").read_text())
+    design = read_design(light / "design.json")
+    problem = design.problem
+    evaluator = Evaluator(problem)
+    core = Core(evaluator)
+    points = []
+    for entry in data["results"]:
+        mask = unpack_mask(entry["mask"], problem.lattice.beam_count)
+        evaluator.respond(mask)
+        assert entry["stiffness"] == pytest.approx(output_stiffness(evaluator), rel=1e-6)
+        assert entry["mass"] == pytest.approx(mass_of(problem, core.of(mask)))
+        assert entry["mass"] <= 0.6
+        assert pieces(problem, mask) == 1
+        points.append([entry["efficiency"], entry["stiffness"], -entry["mass"]])
+    assert len(points) > 1
+    better = np.array(points)[:, None] - np.array(points)[None]
+    assert not ((better >= 0).all(axis=2) & (better > 0).any(axis=2)).any()
+    best = max(entry["efficiency"] for entry in data["results"])
+    assert best >= design.efficiency - 1e-9
+    assert colours(light / "pareto.png") > 20
+
+
+def test_the_designs_of_a_front_can_be_evaluated(light: Path) -> None:
+    outcome = call("evaluate", PROBLEM, "--designs", light / "pareto.json", "--json")
+    assert outcome.code == 0, outcome.err
+    assert {one["status"] for one in outcome.data["results"]} == {"converged"}
+
+
+def test_a_finished_run_with_goals_can_be_drawn_again(light: Path, tmp_path: Path) -> None:
+    outcome = call("plot", light, "--paths", "--out", tmp_path / "again.png")
+    assert outcome.code == 0, outcome.err
+    assert colours(tmp_path / "again.png") > 5
+
+
+def test_a_mirror_symmetric_design_stays_so_when_it_is_cleaned(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    outcome = call("design", PROBLEM, *QUICK, "--goal", "mirror x", "--out", folder)
+    assert outcome.code == 0, outcome.err
+    design = read_design(folder / "design.json")
+    present = design.mask[design.problem.designable]
+    assert (present == present[mirror_images(design.problem, "x")]).all()
+    assert 0 < present.sum() < len(present)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--goal", "mass < 1"), "goal 'mass < 1': expected 'mass <= NUMBER'"),
+        (("--goal", "weight <= 1"), "unknown goal 'weight'; known: mass, degree, connected"),
+        (("--goal", ""), "goal '': expected a text like 'mass <= 0.6'"),
+        (("--goal", "mirror y"), "goal 'mirror y': problem 'scaling-8' is not symmetric in y"),
+        (("--goal", "degree >= 9"), "goal 'degree >= 9': no node of problem 'scaling-8' has more"),
+        (("--strokes", "1,a"), "--strokes 1,a: expected numbers with commas between"),
+        (("--strokes", "0"), "strokes: expected parts of the full input above 0, got 0.0"),
+        (("--strokes", "2"), "strokes: expected a part from 0 to 1, got 2.0"),
+        (("--strokes", "1,1"), "strokes: expected different parts of the full input"),
+        (("--pareto", "mass"), "measures: expected two or three different ones, got mass"),
+        (("--pareto", "mass,price"), "unknown measure 'price'; known: efficiency, stiffness, mass"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_bad_goals_are_refused_before_anything_is_written(
+    words: tuple[str, ...], message: str
+) -> None:
+    assert refusal("design", PROBLEM, *words).startswith(f"error: {message}")
+
+
+@pytest.mark.usefixtures("here")
+def test_goals_that_no_design_keeps_are_named_at_the_end() -> None:
+    outcome = call("design", PROBLEM, *QUICK, "--goal", "stiffness >= 500", "--out", "run")
+    assert outcome.code == 2
+    assert "error: problem 'scaling-8': the search accepted no design that keeps its goals " in (
+        outcome.err
+    )
+    assert "(stiffness >= 500); relax them" in outcome.err
