@@ -19,11 +19,12 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import CAREFUL, Dangling, Evaluator, Status
 from bellcrank.model import builtin, find_problem
 from bellcrank.search import (
     DEFAULT_SEARCH,
@@ -195,7 +196,9 @@ def main() -> None:
     """Play all problems, or those that are named."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("problems", nargs="*", default=list(RESPONSES))
-    parser.add_argument("--dangling", default="ignored", choices=["ignored", "counted"])
+    parser.add_argument(
+        "--dangling", default="stripped", choices=["stripped", "ignored", "counted"]
+    )
     parser.add_argument("--seeds", type=int, default=30)
     parser.add_argument("--quick", action="store_true", help="A tenth of it; leaves no files.")
     options = parser.parse_args()

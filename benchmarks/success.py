@@ -76,5 +76,5 @@ def draw_all(dangling: str) -> None:
 
 
 if __name__ == "__main__":
-    for kind in ("ignored", "counted"):
+    for kind in ("stripped", "ignored", "counted"):
         draw_all(kind)

@@ -158,7 +158,7 @@ def test_a_missing_file_of_designs_is_refused(small: str) -> None:
         ("--search", f"unknown search 'best'; known: {SEARCHES}"),
         ("--schedule", "unknown schedule 'best'; known: linear, geometric, constant"),
         ("--cost", "unknown cost 'best'; known: exponential, negative"),
-        ("--dangling", "dangling must be one of counted, ignored; got 'best'"),
+        ("--dangling", "dangling must be one of counted, ignored, stripped; got 'best'"),
     ],
 )
 def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: str) -> None:

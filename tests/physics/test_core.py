@@ -9,8 +9,9 @@ import pytest
 
 from bellcrank.mechanics import Evaluator, Status, load_bearing_core
 from bellcrank.model import Design, Problem, find_problem
+from bellcrank.search import clean
 
-from .problems import random_masks
+from .problems import frame, random_masks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -100,3 +101,40 @@ def test_counted_dead_ends_do_matter() -> None:
     counted, ignored = Evaluator(problem), Evaluator(problem, dangling="ignored")
     assert counted.respond(mask).status is Status.CONVERGED
     assert abs(counted.respond(mask).efficiency - ignored.respond(mask).efficiency) > 1e-6
+
+
+@pytest.mark.parametrize("name", ["crane", "pliers", "discs", "scaling-8"])
+def test_a_stripped_design_responds_as_the_cleaned_one(name: str) -> None:
+    problem = find_problem(name)
+    counted, stripped = Evaluator(problem), Evaluator(problem, dangling="stripped")
+    moved = 0
+    for share in (0.5, 0.65, 0.8, 0.95):
+        for mask in random_masks(problem, share, 15):
+            expected = counted.respond(clean(Design(problem, mask), counted).mask)
+            found = stripped.respond(mask)
+            assert found.status is expected.status
+            assert found.efficiency == pytest.approx(expected.efficiency, abs=1e-9, nan_ok=True)
+            moved += found.efficiency != 0.0
+    assert moved > 20
+
+
+def test_a_triangle_that_hangs_by_a_node_softens_nothing_when_stripped() -> None:
+    # The arm of a lever with a triangle hung on its middle node.
+    problem = frame(
+        [(0, 0), (1, 0), (2, 0), (0.5, 0.9), (1.5, 0.9)],
+        [(0, 1), (1, 2), (1, 3), (1, 4), (3, 4)],
+        fixed=[0],
+        drive=(2, (0.0, 1.0), 1e-3),
+        watch=(1, (0.0, 1.0)),
+        force=True,
+        spring=1.0,
+        spring_kind="isotropic",
+    )
+    bare = np.array([True, True, False, False, False])
+    counted, ignored, stripped = (
+        Evaluator(problem, "displacement", kind) for kind in ("counted", "ignored", "stripped")
+    )
+    expected = counted.respond(bare).efficiency
+    assert stripped.respond(problem.initial).efficiency == pytest.approx(expected, abs=1e-9)
+    for evaluator in (counted, ignored):
+        assert abs(evaluator.respond(problem.initial).efficiency - expected) > 1e-3

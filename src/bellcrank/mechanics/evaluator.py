@@ -12,6 +12,7 @@ import numpy as np
 from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
+    IGNORED,
     MECHANISM,
     SNAPPED,
     UNCONVERGED,
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.kernels.screening import Screen
     from bellcrank.model import Design, Problem
 
-Dangling = Literal["counted", "ignored"]
+Dangling = Literal["counted", "ignored", "stripped"]
 
 
 CAREFUL = 1 / 32
@@ -156,6 +157,8 @@ class Evaluator:
     dangling
         ``"counted"``: the literal model. ``"ignored"``: the load-bearing core, without
         dead-end beams, whose splitting of angular springs no real part has.
+        ``"stripped"``: also without what hangs by a single node or stands on supports
+        alone, which splits them as well.
     minimiser
         ``"newton"``, ``"cg"`` or ``"fire"``.
 
@@ -180,7 +183,7 @@ class Evaluator:
                 f"dangling must be one of {', '.join(get_args(Dangling))}; got {dangling!r}"
             )
         self.problem = problem
-        self.core = dangling == "ignored"
+        self.core = get_args(Dangling).index(dangling)
         self.minimiser = minimisers[minimiser]()
         self.system: System = build_system(problem, objective_of(problem, objective))
         self.structure: Structure = allocate_structure(self.system)
@@ -217,7 +220,7 @@ class Evaluator:
         return self._respond(mask, self.core, False, -math.inf, largest_increment)
 
     def _respond(
-        self, mask: ArrayLike, core: bool, nearby: bool, least: float, largest_increment: float
+        self, mask: ArrayLike, core: int, nearby: bool, least: float, largest_increment: float
     ) -> Response:
         status, efficiency, energy = self.minimiser(
             self.system, self._checked(mask), core, self.known, nearby, least,
@@ -256,7 +259,7 @@ class Evaluator:
         -------
         (M,) bool
         """
-        self._respond(mask, True, False, -math.inf, 1.0)
+        self._respond(mask, IGNORED, False, -math.inf, 1.0)
         ends_move = self.structure.active[self.system.beams].astype(bool).any(axis=1)
         core: NDArray[np.bool_] = (self.structure.present != 0) & ends_move
         return core

@@ -25,7 +25,7 @@ FORCE_TOLERANCE = 1e-12
 first-order minimisers stop."""
 
 Minimiser = Callable[
-    ["System", "Bytes", bool, "Known", bool, float, float, "Structure", "Floats", "Scratch"],
+    ["System", "Bytes", int, "Known", bool, float, float, "Structure", "Floats", "Scratch"],
     tuple[int, float, float],
 ]
 """``(system, mask, core, known, nearby, least, largest_increment, structure, u, scratch)`` to
@@ -66,7 +66,7 @@ def _first_order(name: str) -> Minimiser:
     def respond(
         system: System,
         mask: Bytes,
-        core: bool,
+        core: int,
         known: Known,
         nearby: bool,
         least: float,  # noqa: ARG001

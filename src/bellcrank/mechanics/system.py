@@ -95,6 +95,8 @@ def build_system(problem: Problem, objective: Objective) -> System:
     protected = (held != 0).astype(np.uint8)
     protected[problem.input.nodes] = 1
     protected[problem.output.nodes] = 1
+    grounded = np.zeros_like(held)
+    grounded[problem.supports.fixed] = 1
     motion = np.zeros_like(positions)
     motion[problem.input.nodes] = problem.input.amount * problem.input.direction
     driven = problem.input.drive == "displacement"
@@ -110,6 +112,7 @@ def build_system(problem: Problem, objective: Objective) -> System:
         ring_beam=ring_beam,
         held=held,
         protected=protected,
+        grounded=grounded,
         block=elimination_order(beams, ring_start, ring_beam, held == HELD),
         drive=motion if driven else np.zeros_like(motion),
         load=np.zeros_like(motion) if driven else motion,
@@ -135,6 +138,8 @@ def allocate_structure(system: System) -> Structure:
     words = blocks // 64 + 1
     return Structure(
         present=np.zeros(beams, np.uint8),
+        loaded=np.zeros(beams, np.uint8),
+        walk=np.zeros((nodes, 6), np.int64),
         active=np.zeros(nodes, np.uint8),
         order=np.zeros(nodes, np.int64),
         parent=np.full(nodes, -1),

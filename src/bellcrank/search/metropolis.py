@@ -118,7 +118,6 @@ class InformedSettings(MetropolisSettings):
 
     name: ClassVar[str] = "informed"
 
-    dangling: Dangling = "ignored"
     moves: tuple[str, ...] = ("balanced", "balanced", "delayed", "node")
     cost: str = "negative"
     schedule: str = "geometric"

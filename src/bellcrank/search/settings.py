@@ -30,7 +30,8 @@ class SearchSettings:
     objective
         Name of an efficiency, or None for the problem's own.
     dangling
-        Whether dead-end beams count (the literal model) or are ignored.
+        Whether dead-end beams count (the literal model), are ignored, or stripped together
+        with all else that no load can reach.
     minimiser
         Name of a minimiser.
     goals
@@ -50,7 +51,7 @@ class SearchSettings:
     chains: int = 4
     seed: int = 0
     objective: str | None = None
-    dangling: Dangling = "ignored"
+    dangling: Dangling = "stripped"
     minimiser: str = "newton"
     goals: tuple[str, ...] = ()
     strokes: tuple[float, ...] = (1.0,)

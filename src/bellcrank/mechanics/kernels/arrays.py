@@ -30,6 +30,10 @@ MECHANISM = 2
 UNCONVERGED = 3
 UNVERIFIED = 6
 
+COUNTED = 0
+IGNORED = 1
+STRIPPED = 2
+
 NEWTON = 0
 CG = 1
 FIRE = 2
@@ -56,6 +60,8 @@ class System(NamedTuple):
     """(N,) bits HELD_X, HELD_Y: coordinates prescribed by a support or the drive."""
     protected: Bytes
     """(N,) 1 for nodes at which a single beam is not a dead end."""
+    grounded: Bytes
+    """(N,) 1 for fixed supports."""
     block: Ints
     """(N,) elimination index of a free node, -1 for a fully held one."""
     drive: Floats
@@ -86,6 +92,10 @@ class Structure(NamedTuple):
 
     present: Bytes
     """(M,) beams that count: the mask, less dead ends where these are ignored."""
+    loaded: Bytes
+    """(M,) beams on some way between two nodes that are driven, watched or held."""
+    walk: Ints
+    """(N, 6) how a walk through the beams came by each node, and its stack."""
     active: Bytes
     """(N,) 1 for nodes that the drive can move through present beams."""
     order: Ints

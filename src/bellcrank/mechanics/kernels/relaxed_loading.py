@@ -91,7 +91,7 @@ def relax_path(
 def respond_by_relaxation(
     system: System,
     mask: Bytes,
-    core: bool,
+    core: int,
     minimiser: int,
     force_tolerance: float,
     known: Known,

@@ -144,7 +144,7 @@ def is_known(system: System, structure: Structure, known: Known) -> bool:
 def find_response(
     system: System,
     mask: Bytes,
-    core: bool,
+    core: int,
     known: Known,
     nearby: bool,
     least: float,
@@ -190,7 +190,7 @@ def find_response(
 def respond(
     system: System,
     mask: Bytes,
-    core: bool,
+    core: int,
     known: Known,
     nearby: bool,
     least: float,

@@ -332,7 +332,7 @@ def predicted_change(system: System, screen: Screen, adjoint: Floats) -> float:
 def screen_flips(
     system: System,
     mask: Bytes,
-    core: bool,
+    core: int,
     beams: Ints,
     structure: Structure,
     u: Floats,

@@ -164,7 +164,7 @@ def presence_share(
 def find_sensitivity(
     system: System,
     mask: Bytes,
-    core: bool,
+    core: int,
     structure: Structure,
     u: Floats,
     scratch: Scratch,

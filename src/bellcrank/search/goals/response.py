@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import CAREFUL, Dangling, Evaluator, Status
 from bellcrank.mechanics.carrying import output_stiffness
 from bellcrank.search.goals.terms import (
     Kind,
@@ -51,7 +51,7 @@ def no_snapping(_problem: Problem, _nothing: None) -> Term:
     design in a hundred among those near a loss of stability.
     """
     # One of its own: the evaluator that holds the response must not forget it.
-    careful: dict[tuple[float, bool], Evaluator] = {}
+    careful: dict[tuple[float, int], Evaluator] = {}
 
     def of_response(moved: Moved) -> float:
         given = moved.evaluator

@@ -31,7 +31,7 @@ class Rules(NamedTuple):
     """What the search is told, as plain numbers."""
 
     cost: int
-    core: bool
+    core: int
     minimum_degree: int
     patience: int
     """Rejections in a row after which the chain ends."""
