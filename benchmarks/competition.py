@@ -196,9 +196,7 @@ def main() -> None:
     """Play all problems, or those that are named."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("problems", nargs="*", default=list(RESPONSES))
-    parser.add_argument(
-        "--dangling", default="stripped", choices=["stripped", "ignored", "counted"]
-    )
+    parser.add_argument("--dangling", default="stripped", choices=get_args(Dangling))
     parser.add_argument("--seeds", type=int, default=30)
     parser.add_argument("--quick", action="store_true", help="A tenth of it; leaves no files.")
     options = parser.parse_args()
