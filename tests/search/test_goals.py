@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import spearmanr
 
 from bellcrank.errors import InvalidSettings, UnknownName
-from bellcrank.mechanics import Core, Evaluator, Status, output_stiffness
+from bellcrank.mechanics import Core, Evaluator, Status, foresee_stiffness, output_stiffness
 from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem
 from bellcrank.search.goals import (
     Case,
@@ -356,3 +357,25 @@ def test_the_core_is_that_of_the_evaluator() -> None:
         core = Core(evaluator)
         for mask in random_designs(problem, 20, thinnest=0.2):
             assert (core.of(mask) == evaluator.load_bearing(mask)).all()
+
+
+@pytest.mark.parametrize("name", ["crane", "scaling-8", "pliers"])
+def test_the_foreseen_stiffness_ranks_flips_as_the_true_one_does(name: str) -> None:
+    problem = find_problem(name)
+    rng = np.random.default_rng(1)
+    mask = problem.initial.copy()
+    mask[problem.designable] &= rng.random(len(problem.designable)) < 0.85
+    evaluator = Evaluator(problem)
+    assert evaluator.respond(mask).status is Status.CONVERGED
+    before = output_stiffness(evaluator)
+    evaluator.screen(mask)
+    beams = problem.designable[:: max(1, len(problem.designable) // 120)]
+    foreseen = foresee_stiffness(evaluator, beams, mask[beams])
+    real = []
+    for beam in beams:
+        flipped = mask.copy()
+        flipped[beam] ^= True
+        evaluator.respond(flipped)
+        real.append(output_stiffness(evaluator))
+    changes = np.array(real) - before, foreseen - before
+    assert spearmanr(*changes).statistic > 0.75

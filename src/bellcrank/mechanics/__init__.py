@@ -9,7 +9,7 @@ The work flow, in four lines:
 0.0420422
 """
 
-from bellcrank.mechanics.carrying import Core, output_stiffness
+from bellcrank.mechanics.carrying import Core, foresee_stiffness, output_stiffness
 from bellcrank.mechanics.evaluator import (
     CAREFUL,
     Dangling,
@@ -32,6 +32,7 @@ __all__ = [
     "Response",
     "Screening",
     "Status",
+    "foresee_stiffness",
     "load_bearing_core",
     "minimisers",
     "objective_of",

@@ -336,6 +336,24 @@ class Evaluator:
         )  # fmt: skip
         return Screening(chosen, change, strain) if found else None
 
+    def flexibility(self) -> NDArray[np.float64]:
+        """Return (n, 2, n, 2) the inverse of the stiffness that `screen` looked at last.
+
+        By elimination index of the nodes, ``system.block``.
+
+        Raises
+        ------
+        InvalidSettings
+            If nothing was screened yet.
+        """
+        if self._screen is None:
+            raise InvalidSettings("flexibility: screen a design first")
+        nodes = len(self._screen.inverse)
+        square = self._screen.inverse.reshape(nodes, nodes, 2, 2).transpose(0, 2, 1, 3)
+        lower = np.tril(square.reshape(2 * nodes, 2 * nodes))
+        whole: NDArray[np.float64] = lower + np.tril(lower, -1).T
+        return whole.reshape(nodes, 2, nodes, 2)
+
 
 def load_bearing_core(design: Design) -> NDArray[np.bool_]:
     """Return the mask of the beams that can carry load: see `Evaluator.load_bearing`.

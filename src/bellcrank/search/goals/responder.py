@@ -105,6 +105,7 @@ class GoalResponder:
             self.problem = replace(original, initial=closed, designable=np.unique(self._orbits))
         self._excess = self._remembered = math.inf
         self._value = [math.nan] * len(cases)
+        self._moved_last: list[Moved] = []
 
     def expanded(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the design that is meant: each beam as the lowest of its mirror images."""
@@ -243,7 +244,7 @@ class GoalResponder:
             for weight, case, value in zip(self.weights, self.cases, self._value, strict=True)
         )
         response = replace(responses[0], efficiency=efficiency)
-        moved = self._moved(design, core, responses)
+        moved = self._moved_last = self._moved(design, core, responses)
         for _, made in self._terms:
             if efficiency - penalty_of(excess) <= least:
                 return replace(response, status=Status.UNVERIFIED, penalty=penalty_of(excess))
@@ -269,7 +270,26 @@ class GoalResponder:
         felt = change != 0.0
         kept = self._excess <= SMALLEST_EXCESS
         gain = np.where(kept & (excess > SMALLEST_EXCESS), PROHIBITIVE, -WEIGHT * excess)
+        for _, made in self._terms:
+            rise = _foreseen_rise(made, self._moved_last, self._members)
+            if rise is not None:
+                gain -= WEIGHT * np.bincount(place, rise)
         return np.where(felt, gain, 0.0)
+
+
+def _foreseen_rise(
+    made: list[Term], moved: list[Moved], beams: NDArray[np.int64]
+) -> NDArray[np.float64] | None:
+    """Return what the flip of each beam is foreseen to add to the excess of a goal."""
+    after = [
+        term.foreseen(one, beams)
+        for term, one in zip(made, moved, strict=True)
+        if term.foreseen is not None
+    ]
+    if not after:
+        return None
+    rise: NDArray[np.float64] = np.maximum.reduce(after) - _of_response(made, moved)
+    return rise
 
 
 def _of_beams(made: list[Term], design: NDArray[np.bool_], core: NDArray[np.bool_]) -> float:

@@ -6,8 +6,14 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from bellcrank.mechanics import CAREFUL, Dangling, Evaluator, Status
-from bellcrank.mechanics.carrying import output_stiffness
+from bellcrank.mechanics import (
+    CAREFUL,
+    Dangling,
+    Evaluator,
+    Status,
+    foresee_stiffness,
+    output_stiffness,
+)
 from bellcrank.search.goals.terms import (
     Kind,
     Moved,
@@ -21,12 +27,27 @@ from bellcrank.search.goals.terms import (
 from bellcrank.search.goals.terms import terms as registry
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from bellcrank.model import Problem
+
+LEAST_FORESEEN = 0.02
+"""Smaller excesses that are foreseen are within the error of the prediction."""
 
 
 def stiffness(_problem: Problem, bound: float) -> Term:
     """At least so stiff an output at full load: see `bellcrank.mechanics.output_stiffness`."""
-    return Term(of_response=lambda moved: below(output_stiffness(moved.evaluator), bound), price=2)
+
+    def foreseen(moved: Moved, beams: NDArray[np.int64]) -> NDArray[np.float64]:
+        after = foresee_stiffness(moved.evaluator, beams, moved.mask[beams])
+        excess: NDArray[np.float64] = np.maximum(0.0, 1.0 - after / bound)
+        return np.where(excess < LEAST_FORESEEN, 0.0, excess)
+
+    return Term(
+        of_response=lambda moved: below(output_stiffness(moved.evaluator), bound),
+        foreseen=foreseen,
+        price=2,
+    )
 
 
 def largest_strain(moved: Moved) -> float:
@@ -57,9 +78,7 @@ def no_snapping(_problem: Problem, _nothing: None) -> Term:
         given = moved.evaluator
         key = (given.problem.input.amount, given.core)
         if key not in careful:
-            careful[key] = Evaluator(
-                given.problem, "displacement", get_args(Dangling)[given.core]
-            )
+            careful[key] = Evaluator(given.problem, "displacement", get_args(Dangling)[given.core])
         return float(careful[key].respond(moved.mask, CAREFUL).status is not Status.CONVERGED)
 
     return Term(of_response=of_response, price=4)

@@ -76,6 +76,9 @@ class Term:
     by_flip
         From the load-bearing part to what each beam's flip is foreseen to add to the excess,
         (M,), for searches that predict.
+    foreseen
+        From the moved design, just screened, and (n,) beams to the excess foreseen after the
+        flip of each, (n,).
     price
         Dear terms are asked last.
     """
@@ -83,6 +86,7 @@ class Term:
     of_beams: Callable[[NDArray[np.bool_], NDArray[np.bool_]], float] | None = None
     of_response: Callable[[Moved], float] | None = None
     by_flip: Callable[[NDArray[np.bool_]], NDArray[np.float64]] | None = None
+    foreseen: Callable[[Moved, NDArray[np.int64]], NDArray[np.float64]] | None = None
     price: int = 0
 
 
