@@ -49,7 +49,7 @@ def crane() -> Problem:
 
 def excess(problem: Problem, text: str, mask: np.ndarray) -> float:
     """Measured by a new evaluator, as the searches of the core see it."""
-    evaluator = Evaluator(problem, dangling="ignored")
+    evaluator = Evaluator(problem, dangling="stripped")
     response = evaluator.respond(mask)
     core = Core(evaluator).of(mask)
     term = read_goal(text).term(problem)
@@ -94,7 +94,7 @@ def test_a_search_with_a_goal_ends_with_designs_that_keep_it(small: Problem, goa
     mask, efficiency, accepted, status, _ = run(small, responder, settings)
     kept = accepted & (status == Status.CONVERGED)
     assert kept.any()
-    evaluator = Evaluator(small, dangling="ignored")
+    evaluator = Evaluator(small, dangling="stripped")
     for index in np.flatnonzero(kept)[-20:]:
         assert excess(small, goal, mask[index]) <= 1e-6
         assert efficiency[index] == pytest.approx(
@@ -118,7 +118,9 @@ def test_a_search_with_a_goal_ends_with_designs_that_keep_it(small: Problem, goa
 def test_a_chain_comes_nearer_to_its_goals_step_by_step_and_never_leaves_them(
     crane: Problem, search: str
 ) -> None:
-    settings = read_settings({"search": search, "steps": 600, "goals": ["mass <= 0.9"]})
+    settings = read_settings(
+        {"search": search, "steps": 600, "goals": ["mass <= 0.9"], "dangling": "stripped"}
+    )
     responder = make_responder(crane, settings)
     mask, _, accepted, status, _ = run(crane, responder, settings)
     excesses = np.array([excess(crane, "mass <= 0.9", one) for one in mask[accepted]])

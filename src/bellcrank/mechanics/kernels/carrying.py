@@ -13,16 +13,29 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
 )
 from bellcrank.mechanics.kernels.cholesky import solve
-from bellcrank.mechanics.kernels.structure import ACTIVE, find_pieces, strip_dead_ends
+from bellcrank.mechanics.kernels.structure import (
+    ACTIVE,
+    find_pieces,
+    strip_dead_ends,
+    strip_unloaded,
+)
 from bellcrank.mechanics.kernels.tangents import stiffness_is_definite
 
 
 @entry
-def find_core(system: System, mask: Bytes, structure: Structure, core: Bytes) -> None:
-    """Mark in `core` (M,) the beams of a design that carry load; overwrites `structure`."""
+def find_core(
+    system: System, mask: Bytes, stripped: bool, structure: Structure, core: Bytes
+) -> None:
+    """Mark in `core` (M,) the beams of a design that carry load; overwrites `structure`.
+
+    Without loose pieces and dead ends or, `stripped`, without all that no load can reach.
+    """
     for beam in range(len(mask)):
         structure.present[beam] = mask[beam]
-    strip_dead_ends(system, structure.present)
+    if stripped:
+        strip_unloaded(system, structure)
+    else:
+        strip_dead_ends(system, structure.present)
     find_pieces(system, structure)
     for beam in range(len(mask)):
         first, second = system.beams[beam, 0], system.beams[beam, 1]
