@@ -51,7 +51,8 @@ class Scale:
         one = self.judge.evaluators[0] if isinstance(self.judge, GoalResponder) else self.judge
         assert isinstance(one, Evaluator)
         self.evaluator = one
-        self.core = Core(one)
+        # What no load can reach is not built; left in, it would count in the literal model.
+        self.core = Core(Evaluator(problem, "displacement", "stripped"))
 
     def measure(
         self, mask: NDArray[np.bool_], largest_increment: float = 1.0
