@@ -95,7 +95,7 @@ def test_the_best_line_stands_up_to_a_closer_look(small: Problem) -> None:
     *_, (state, _) = chain_blocks(make_responder(small, settings), settings, 0)
     line = max(state.lines, key=lambda line: line.rank)
     mask = unpack_mask(line.mask, small.lattice.beam_count)
-    response = Evaluator(small, dangling="ignored").respond(mask, CAREFUL)
+    response = Evaluator(small, dangling="stripped").respond(mask, CAREFUL)
     assert response.status is Status.CONVERGED
     assert response.efficiency == pytest.approx(line.efficiency, abs=1e-8)
 
