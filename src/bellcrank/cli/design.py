@@ -48,7 +48,7 @@ def design(
     dangling: Annotated[
         str | None,
         typer.Option(
-            help="stripped (all that bears no load), ignored (dead ends) or counted (as in 'paper')."
+            help="stripped (what bears no load), ignored (dead ends) or counted (as in 'paper')."
         ),
     ] = None,
     minimiser: Annotated[str | None, typer.Option(help="newton, cg or fire. [newton]")] = None,
