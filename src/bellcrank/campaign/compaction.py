@@ -18,6 +18,7 @@ from bellcrank.campaign.layout import (
     PART_NAME,
     SEGMENTS,
     TABLE,
+    TOP_NAME,
     delete_segments,
     delete_table,
     part_files,
@@ -36,7 +37,7 @@ from bellcrank.campaign.segments import (
     store_content,
     table_schema,
 )
-from bellcrank.errors import CorruptRun
+from bellcrank.errors import CorruptRun, StorageError
 from bellcrank.runs.files import remove_temporaries
 from bellcrank.runs.shards import parquet_file
 
@@ -50,8 +51,6 @@ if TYPE_CHECKING:
 PART_SCHEMA = "bellcrank/table/1"
 PART_ROWS = 2**20
 """Rows of a part, about: few enough to hold in memory while it is made."""
-LEVEL = 9
-"""Of compression: a tenth smaller than that of segments, made only once."""
 WHAT_TO_DO = (
     "bellcrank campaign verify --repair turns the other parts back into segments, and resume "
     "computes the rest again"
@@ -81,13 +80,22 @@ def compact(store: Store) -> None:
         If there is no room for the table beside the segments.
     """
     if not store.compacted:
-        plan = list(_plan(store))
-        for number, segments in enumerate(plan):
-            if not part_path(store.path, number).exists():
-                _write_part(store, number, len(plan), segments)
-        show(store.path, TABLE)
+        try:
+            _write_table(store)
+            show(store.path, TABLE)
+        except (CorruptRun, StorageError):
+            if not store.compacted:  # or another process was faster, and the segments are gone
+                raise
     delete_segments(store.path)
     remove_temporaries(store.path / TABLE, PART_NAME)
+    remove_temporaries(store.path, TOP_NAME)
+
+
+def _write_table(store: Store) -> None:
+    plan = list(_plan(store))
+    for number, segments in enumerate(plan):
+        if not part_path(store.path, number).exists():
+            _write_part(store, number, len(plan), segments)
 
 
 def _plan(store: Store) -> Iterator[list[tuple[Run, Segment]]]:
@@ -118,9 +126,7 @@ def _write_part(
         "parts": count,
         "segments": [segment.to_dict() for _, segment in segments],
     }
-    content = encode(
-        _row_groups(store, segments), table_schema(store.spec.mask_bytes), header, LEVEL
-    )
+    content = encode(_row_groups(store, segments), table_schema(store.spec.mask_bytes), header)
     store_content(part_path(store.path, number), content)
 
 

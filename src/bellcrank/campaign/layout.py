@@ -35,6 +35,7 @@ TABLE = "table"
 VISIBLE = "proposals"
 SEGMENT_NAME = re.compile(r"\d{8,}\.parquet")
 PART_NAME = re.compile(r"part-\d{5}\.parquet")
+TOP_NAME = re.compile(re.escape(DESCRIPTION) + "|" + VISIBLE)
 OURS = (DESCRIPTION, SEGMENTS, TABLE, VISIBLE)
 
 

@@ -29,6 +29,14 @@ SEGMENT_SCHEMA = "bellcrank/segment/1"
 ROW_GROUP = 65_536
 WHAT_TO_DO = "bellcrank campaign verify --repair deletes it, and resume computes it again"
 
+# DuckDB and polars cannot read masks split by bytes; numbers they can.
+ENCODINGS = {
+    "step": "DELTA_BINARY_PACKED",
+    "efficiency": "BYTE_STREAM_SPLIT",
+    "cost": "BYTE_STREAM_SPLIT",
+}
+LEVEL = 9
+"""Of compression: a twentieth smaller than the usual 3, for milliseconds."""
 DICTIONARIES = ["task", "run", "seed", "temperature", "status"]
 STATISTICS = ["task", "run", "seed", "step", "efficiency"]
 """Columns by which readers may skip what they do not look for."""
@@ -89,22 +97,21 @@ def table_schema(mask_bytes: int) -> Any:
     )
 
 
-def encode(tables: Iterable[Any], schema: Any, header: Mapping[str, Any], level: int = 3) -> bytes:
+def encode(tables: Iterable[Any], schema: Any, header: Mapping[str, Any]) -> bytes:
     """Return the bytes of a sealed Parquet file.
 
     Parameters
     ----------
     tables
         The row groups.
-    level
-        Of compression.
     """
     buffer = io.BytesIO()
     with parquet_writer(
         buffer,
         schema,
         header,
-        compression_level=level,
+        compression_level=LEVEL,
+        column_encoding=ENCODINGS,
         use_dictionary=DICTIONARIES,
         write_statistics=STATISTICS,
     ) as writer:

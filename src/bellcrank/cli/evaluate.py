@@ -30,7 +30,8 @@ def evaluate(
         str | None, typer.Option(help="displacement, directional:N or force.")
     ] = None,
     dangling: Annotated[
-        str, typer.Option(help="counted (literal model), ignored (dead ends) or stripped (idle parts).")
+        str,
+        typer.Option(help="counted (literal model), ignored (dead ends) or stripped (idle parts)."),
     ] = "counted",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:

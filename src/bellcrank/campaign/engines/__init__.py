@@ -3,7 +3,7 @@
 Importing this package does not import Dask; entering one of its engines does.
 """
 
-from bellcrank.campaign.engines import on_dask, serial
+from bellcrank.campaign.engines import address, local, serial, slurm
 from bellcrank.campaign.engines.base import (
     LOOPBACK,
     Engine,
@@ -19,7 +19,9 @@ __all__ = [
     "EngineOptions",
     "Outcome",
     "WorkerDied",
+    "address",
     "engines",
-    "on_dask",
+    "local",
     "serial",
+    "slurm",
 ]

@@ -6,27 +6,22 @@ import contextlib
 import logging
 import os
 import queue
+import threading
 import time
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.campaign.engines.base import (
-    LOOPBACK,
-    Engine,
-    EngineOptions,
-    Outcome,
-    WorkerDied,
-    engines,
-)
+from bellcrank.campaign.engines.base import Outcome, WorkerDied
 from bellcrank.campaign.engines.versions import software, version_difference
 from bellcrank.campaign.work import allow_work, describe_store, request_stop, work
-from bellcrank.errors import ClusterError, InvalidSettings, StorageError
+from bellcrank.errors import ClusterError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
+    from collections.abc import Callable, Iterator
 
     from distributed import Client, Future, Security
 
+    from bellcrank.campaign.engines.base import Engine
     from bellcrank.campaign.store import Store
 
 AHEAD = 1
@@ -64,10 +59,17 @@ class DaskEngine:
         Connected to it.
     store
         Which all workers must see under the same path.
+    note
+        What to tell whoever started it.
+    renew
+        Called now and then, to replace workers that are gone for good.
     """
 
-    def __init__(self, client: Client, store: Store, note: str | None) -> None:
+    def __init__(
+        self, client: Client, store: Store, note: str | None, renew: Callable[[], object]
+    ) -> None:
         self.note = note
+        self._renew = renew
         self._client = client
         self._path = str(store.path)
         self._hash = store.spec.hash
@@ -87,6 +89,8 @@ class DaskEngine:
         """
         answers = self._client.run(introduce, self._path, on_error="return")
         for address, answer in sorted(answers.items()):
+            if isinstance(answer, OSError):
+                continue  # it died just now; `checked_work` asks the one that takes its place
             if isinstance(answer, BaseException):
                 raise ClusterError(
                     f"worker {address}: cannot work for this campaign: {answer!r}; is the same "
@@ -110,6 +114,7 @@ class DaskEngine:
         if time.monotonic() - counted > RECOUNT:
             with contextlib.suppress(OSError, TimeoutError):
                 workers = len(self._client.nthreads())
+                self._renew()
             self._workers = (time.monotonic(), workers)
         return AHEAD * max(1, workers)
 
@@ -155,12 +160,16 @@ class DaskEngine:
 
     def request_stop(self) -> None:
         """Let all runs end after the segment at hand."""
-        with contextlib.suppress(OSError, TimeoutError, RuntimeError):
-            self._client.run(request_stop, self._path, wait=False)
+        # In a thread of its own: a worker that cannot be reached must not hold us up.
+        threading.Thread(target=self._tell_all_to_stop, daemon=True).start()
+
+    def _tell_all_to_stop(self) -> None:
+        with contextlib.suppress(Exception):
+            self._client.run(request_stop, self._path, on_error="ignore")
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Keep Dask's own stories off standard error: what matters comes as one error."""
     names = ("distributed", "tornado", "asyncio", "dask_jobqueue")
     before = {name: logging.getLogger(name).level for name in names}
@@ -174,8 +183,27 @@ def _quiet() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _engine(store: Store, where: Any, options: EngineOptions, note: str | None) -> Iterator[Engine]:
+def connected(
+    store: Store,
+    where: Any,
+    *,
+    timeout: float,
+    security: Security | None = None,
+    note: str | None = None,
+    renew: Callable[[], object] = lambda: None,
+) -> Iterator[Engine]:
     """Connect to a scheduler, check its workers, and leave it afterwards.
+
+    Parameters
+    ----------
+    where
+        Address of the scheduler, or a cluster of ours.
+    timeout
+        Seconds to wait for a connection.
+    security
+        What proves who we are, for ``tls://``.
+    note, renew
+        For the engine.
 
     Raises
     ------
@@ -184,16 +212,15 @@ def _engine(store: Store, where: Any, options: EngineOptions, note: str | None) 
     """
     from distributed import Client
 
-    security = _security(options) if isinstance(where, str) else None
     try:
-        client = Client(where, timeout=options.timeout, security=security, set_as_default=False)
+        client = Client(where, timeout=timeout, security=security, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ClusterError(
-            f"scheduler {where}: cannot be reached within {options.timeout:g} s "
-            f"({_first_line(error)}); is it running, and is the address right?"
+            f"scheduler {where}: cannot be reached within {timeout:g} s "
+            f"({first_line(error)}); is it running, and is the address right?"
         ) from None
     try:
-        engine = DaskEngine(client, store, note)
+        engine = DaskEngine(client, store, note, renew)
         engine.check_workers()
         yield engine
     finally:
@@ -201,145 +228,14 @@ def _engine(store: Store, where: Any, options: EngineOptions, note: str | None) 
             client.close(timeout=GOODBYE)
 
 
-def _first_line(error: BaseException) -> str:
+def first_line(error: BaseException | None) -> str:
+    """Return what an error says, in one line."""
     text = str(error).strip() or type(error).__name__
     return text.splitlines()[0]
 
 
-def _security(options: EngineOptions) -> Security | None:
-    """Return what proves who we are, for ``tls://``.
-
-    Raises
-    ------
-    InvalidSettings
-        If a file is missing, or given without need.
-    """
-    from distributed import Security
-
-    files = {
-        "--tls-ca": options.tls_ca,
-        "--tls-cert": options.tls_cert,
-        "--tls-key": options.tls_key,
-    }
-    encrypted = (options.scheduler or "").startswith("tls://")
-    if not encrypted:
-        if given := [name for name, path in files.items() if path is not None]:
-            raise InvalidSettings(f"{given[0]}: only for a scheduler at tls://")
-        return None
-    for name, path in files.items():
-        if path is None or not path.is_file():
-            raise InvalidSettings(f"{name}: expected a file, as tls:// needs it; got {path}")
-    return Security(
-        require_encryption=True,
-        tls_ca_file=str(options.tls_ca),
-        tls_client_cert=str(options.tls_cert),
-        tls_client_key=str(options.tls_key),
-    )
-
-
-@engines.register("local")
-@contextlib.contextmanager
-def local(store: Store, options: EngineOptions) -> Iterator[Engine]:
-    """Compute in processes of this machine, which end with this one."""
-    import dask
-    from distributed import LocalCluster
-
-    from bellcrank.search import default_workers
-
-    with (
-        _quiet(),
-        dask.config.set({"distributed.worker.daemon": True}),
-        LocalCluster(
-            n_workers=options.workers or default_workers(),
-            threads_per_worker=1,
-            processes=True,
-            host=options.host or LOOPBACK,
-            dashboard_address=f"{options.host or LOOPBACK}:0",
-            memory_limit=0,  # a run holds little, and a worker must not be paused
-            silence_logs=logging.CRITICAL + 1,
-            preload=["bellcrank.campaign.engines.preload"],
-            scheduler_kwargs={"allowed_failures": 0},  # `drive` counts deaths itself
-        ) as cluster,
-        _engine(store, cluster, options, _dashboard(cluster)) as engine,
-    ):
-        yield engine
-
-
-def _dashboard(cluster: Any) -> str | None:
+def dashboard(cluster: Any) -> str | None:
     """Say where the dashboard is, if what it is made with is installed."""
-    try:
-        import bokeh  # noqa: F401
-    except ImportError:
+    if find_spec("bokeh") is None:
         return None
     return f"dashboard: {cluster.dashboard_link}"
-
-
-@engines.register("address")
-@contextlib.contextmanager
-def address(store: Store, options: EngineOptions) -> Iterator[Engine]:
-    """Compute on the workers of a scheduler that is running, and stays so afterwards.
-
-    Raises
-    ------
-    InvalidSettings
-        If its address is none.
-    """
-    where = options.scheduler or ""
-    if not where.startswith(("tcp://", "tls://")):
-        raise InvalidSettings(
-            f"scheduler: expected an address like tcp://host:8786 or tls://host:8786, got {where!r}"
-        )
-    with _quiet(), _engine(store, where, options, f"scheduler: {where}") as engine:
-        yield engine
-
-
-@engines.register("slurm")
-@contextlib.contextmanager
-def slurm(store: Store, options: EngineOptions) -> Iterator[Engine]:
-    """Compute in SLURM jobs of one core each, which end with this process.
-
-    The scheduler listens on the network, so all talk is encrypted, with keys made for the
-    occasion and kept in the store for as long.
-
-    Raises
-    ------
-    ClusterError
-        If dask-jobqueue is not installed, or SLURM refuses.
-    """
-    try:
-        from dask_jobqueue import SLURMCluster
-    except ImportError:
-        raise ClusterError(
-            "engine 'slurm' needs dask-jobqueue: pip install 'bellcrank[cluster]'"
-        ) from None
-    with _quiet(), _key_folder(store) as keys:
-        chosen: dict[str, Any] = {
-            "cores": 1, "processes": 1, "memory": "2GB", "nanny": True, "death_timeout": 60,
-            "protocol": "tls://", "security": True, "shared_temp_directory": str(keys),
-            "scheduler_options": {"host": options.host, "allowed_failures": 0},
-            **options.slurm,
-        }  # fmt: skip
-        try:
-            cluster = SLURMCluster(**chosen)
-        except (TypeError, ValueError, ImportError, OSError) as error:
-            raise ClusterError(f"SLURM cluster: {_first_line(error)}") from None
-        with cluster:
-            cluster.scale(jobs=options.workers or 1)
-            with _engine(store, cluster, options, _dashboard(cluster)) as engine:
-                yield engine
-
-
-@contextlib.contextmanager
-def _key_folder(store: Store) -> Iterator[Path]:
-    """Make a folder that only we can read, on the file system that all machines share."""
-    folder = store.path / f".keys.{os.urandom(4).hex()}"
-    try:
-        folder.mkdir(mode=0o700)
-    except OSError as error:
-        raise StorageError(f"{folder}: cannot be made ({error.strerror})") from None
-    try:
-        yield folder
-    finally:
-        for path in folder.iterdir():
-            path.unlink(missing_ok=True)
-        folder.rmdir()
