@@ -163,7 +163,9 @@ def small_disk(place: Path, kilobytes: int) -> Iterator[Path]:
         subprocess.run(["umount", "-l", str(place)], check=True)
 
 
-def fill_disk(place: Path, spec: Path, expected: dict[str, bytes | str], workers: int) -> int:
+def fill_disk(
+    place: Path, spec: Path, expected: dict[str, bytes | str], engine: str, more: int
+) -> int:
     """Run a campaign on a disk that is too small, and make room bit by bit until it ends."""
     room, log, failures = 100, place / "log", 0
     with small_disk(place / "disk", room) as disk:
@@ -171,7 +173,7 @@ def fill_disk(place: Path, spec: Path, expected: dict[str, bytes | str], workers
         while True:
             begun = (folder / "campaign.json").exists()
             words = ("resume", folder) if begun else ("run", spec, "--out", folder)
-            with process(campaign(*words, "--workers", workers), log) as running:
+            with process(campaign(*words, "--engine", engine), log) as running:
                 code = running.wait(DEADLINE)
             if code == 0:
                 break
@@ -180,7 +182,7 @@ def fill_disk(place: Path, spec: Path, expected: dict[str, bytes | str], workers
             assert said.count("error: ") == 1, said
             assert "No space left on device); make room and resume" in said, said
             failures += 1
-            room += 150
+            room += more
             remount = ["mount", "-o", f"remount,size={room}k", str(disk)]
             subprocess.run(remount, check=True)
         assert everything(folder) == expected
@@ -295,7 +297,7 @@ def main() -> None:
             f"drivers were killed: {tally.phases}\n"
         )
         try:
-            failures = fill_disk(place, spec, expected, 2)
+            failures = fill_disk(place, spec, expected, "local", 150)
             say(f"a disk full {failures} times: no bit differs\n")
         except OSError as error:
             say(f"full disk: left out ({error})\n")

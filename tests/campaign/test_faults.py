@@ -36,14 +36,15 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Reference:
 
 
 def test_kills_of_workers_and_drivers_change_nothing(tmp_path: Path, short: Reference) -> None:
-    tally = faults.kill_at_random(tmp_path, *short, 5, random.Random(4))
-    assert tally.kills == 5
+    tally = faults.kill_at_random(tmp_path, *short, 4, random.Random(4))
+    assert tally.kills == 4
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "kill"])
-@pytest.mark.parametrize("engine", ["serial", "local"])
+@pytest.mark.parametrize(
+    ("engine", "number"), [("serial", signal.SIGTERM), ("local", signal.SIGINT)]
+)
 def test_a_campaign_stops_on_request_and_says_how_to_go_on(
-    tmp_path: Path, short: Reference, number: signal.Signals, engine: str
+    tmp_path: Path, short: Reference, engine: str, number: signal.Signals
 ) -> None:
     spec, expected = short
     folder, log = tmp_path / "store", tmp_path / "log"
@@ -75,7 +76,7 @@ def full_after() -> Iterator[list[int]]:
         yield left
 
 
-@pytest.mark.parametrize("calls", [0, 2, 5, 9, 27, 34])
+@pytest.mark.parametrize("calls", [0, 2, 5, 9, 27, 31])
 def test_a_full_disk_is_said_and_nothing_is_lost(
     tmp_path: Path, spec: Spec, tabled: Path, full_after: list[int], calls: int
 ) -> None:
@@ -90,17 +91,15 @@ def test_a_full_disk_is_said_and_nothing_is_lost(
 
 def test_a_small_disk_changes_nothing_once_there_is_room(tmp_path: Path, short: Reference) -> None:
     try:
-        assert faults.fill_disk(tmp_path, *short, 2) >= 1
+        assert faults.fill_disk(tmp_path, *short, "serial", 300) >= 1
     except OSError as error:
         pytest.skip(str(error))
 
 
-@pytest.mark.parametrize("fault", [faults.cut_off_worker, faults.cut_off_driver])
-def test_a_cut_link_changes_nothing(tmp_path: Path, fault: object, tmp_path_factory) -> None:
+def test_a_cut_link_changes_nothing(tmp_path: Path, short: Reference) -> None:
     try:
         with faults.two_machines():
             pass
     except OSError as error:
         pytest.skip(f"no two network namespaces here: {error}")
-    place = tmp_path_factory.mktemp("long")
-    fault(tmp_path, *faults.reference(place, 8000))
+    faults.cut_off_worker(tmp_path, *short)

@@ -28,6 +28,8 @@ AHEAD = 1
 """Runs in hand for each worker: none queues behind a run whose worker dies, and dies with it."""
 RECOUNT = 5.0
 """Seconds after which the workers are counted again."""
+STORYTELLERS = ("distributed", "tornado", "asyncio", "dask_jobqueue")
+"""Loggers that write to standard error."""
 GOODBYE = 10.0
 """Seconds that a worker has to end before it is killed."""
 
@@ -171,7 +173,13 @@ class DaskEngine:
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
     """Keep Dask's own stories off standard error: what matters comes as one error."""
-    names = ("distributed", "tornado", "asyncio", "dask_jobqueue")
+    import distributed  # noqa: F401  # its loggers have levels of their own from then on
+
+    names = [
+        name
+        for name in (*logging.root.manager.loggerDict, *STORYTELLERS)
+        if name.partition(".")[0] in STORYTELLERS
+    ]
     before = {name: logging.getLogger(name).level for name in names}
     try:
         for name in names:
