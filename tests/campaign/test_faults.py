@@ -76,7 +76,7 @@ def full_after() -> Iterator[list[int]]:
         yield left
 
 
-@pytest.mark.parametrize("calls", [0, 2, 5, 9, 27, 31])
+@pytest.mark.parametrize("calls", [0, 2, 5, 9, 27, 29])
 def test_a_full_disk_is_said_and_nothing_is_lost(
     tmp_path: Path, spec: Spec, tabled: Path, full_after: list[int], calls: int
 ) -> None:
