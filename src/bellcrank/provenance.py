@@ -11,7 +11,10 @@ import platform
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 def provenance(**extra: Any) -> dict[str, Any]:
@@ -48,6 +51,27 @@ def provenance(**extra: Any) -> dict[str, Any]:
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         **extra,
     }
+
+
+def other_version(begun: Mapping[str, Any]) -> str | None:
+    """Return the version that something was begun with, if it is not this one.
+
+    Parameters
+    ----------
+    begun
+        Its `provenance`.
+
+    Examples
+    --------
+    >>> other_version(provenance())
+    >>> other_version({"version": "0.0.1", "commit": None})
+    '0.0.1'
+    """
+    now = provenance()
+    keys = ("version", "commit")
+    if all(begun.get(key) == now[key] for key in keys):
+        return None
+    return " ".join(str(begun[key]) for key in keys if begun.get(key)) or "unknown"
 
 
 def _version(package: str) -> str | None:

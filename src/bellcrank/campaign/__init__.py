@@ -34,15 +34,17 @@ True
 from bellcrank.campaign.compaction import compact
 from bellcrank.campaign.drive import Shard, complete
 from bellcrank.campaign.engines import EngineOptions, engines
+from bellcrank.campaign.harvest import Harvest, write_harvest
 from bellcrank.campaign.ranking import Ranked, best_designs
 from bellcrank.campaign.spec import Run, Spec, Task, read_spec
 from bellcrank.campaign.status import Status, TaskStatus, Watcher
-from bellcrank.campaign.store import Store, made_by_another_version
+from bellcrank.campaign.store import Store
 from bellcrank.campaign.verification import Verification, repair, verify
 from bellcrank.campaign.work import work
 
 __all__ = [
     "EngineOptions",
+    "Harvest",
     "Ranked",
     "Run",
     "Shard",
@@ -57,9 +59,9 @@ __all__ = [
     "compact",
     "complete",
     "engines",
-    "made_by_another_version",
     "read_spec",
     "repair",
     "verify",
     "work",
+    "write_harvest",
 ]

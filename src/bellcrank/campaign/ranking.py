@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.campaign.segments import WHAT_TO_DO
+from bellcrank.campaign.segments import CONVERGED, WHAT_TO_DO
 from bellcrank.errors import InvalidSettings
 from bellcrank.runs.shards import parquet_file
 
@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.campaign.store import Store
-
-CONVERGED = 0
-"""Status of a proposal whose efficiency is that of a stable equilibrium."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +72,8 @@ def best_designs(store: Store, count: int, task: str | None = None) -> list[Rank
         If a file that has to be read is damaged.
     """
     widths = {known.name: known.mask_bytes for known in store.spec.tasks}
-    if task is not None and task not in widths:
-        raise InvalidSettings(f"no task {task!r} in this campaign; it has: {', '.join(widths)}")
+    if task is not None:
+        store.spec.task(task)  # an unknown name explains itself
     if count < 1:
         raise InvalidSettings(f"n: expected at least 1, got {count}")
     groups = sorted(

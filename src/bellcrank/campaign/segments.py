@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 SEGMENT_SCHEMA = "bellcrank/segment/1"
 ROW_GROUP = 65_536
+CONVERGED = 0
+"""Status of a proposal whose efficiency is that of a stable equilibrium."""
 WHAT_TO_DO = "bellcrank campaign verify --repair deletes it, and resume computes it again"
 
 # DuckDB and polars cannot read masks split by bytes; numbers they can.

@@ -25,7 +25,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from bellcrank.errors import BellcrankError, InvalidFile, InvalidProblem, UnknownName
+from bellcrank.errors import (
+    BellcrankError,
+    InvalidFile,
+    InvalidProblem,
+    InvalidSettings,
+    UnknownName,
+)
 from bellcrank.model import find_problem, problem_to_dict
 from bellcrank.model.builtin import builtin
 from bellcrank.model.parsing import Table, parse, read_toml
@@ -185,6 +191,20 @@ class Spec:
     def mask_bytes(self) -> int:
         """Bytes of a mask in the store: those of the problem with the most beams."""
         return max(task.mask_bytes for task in self.tasks)
+
+    def task(self, name: str) -> Task:
+        """Return the task of that name.
+
+        Raises
+        ------
+        InvalidSettings
+            If there is none.
+        """
+        for task in self.tasks:
+            if task.name == name:
+                return task
+        known = ", ".join(task.name for task in self.tasks)
+        raise InvalidSettings(f"no task {name!r} in this campaign; it has: {known}")
 
     def run(self, number: int) -> Run:
         """Return the run of that number.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import median
 from typing import TYPE_CHECKING
 
 from bellcrank.campaign.compaction import read_parts
@@ -32,6 +33,8 @@ class TaskStatus:
     best, best_seed
         Highest efficiency of an accepted design so far, and the seed that found it; None at
         the start.
+    median
+        Of the highest efficiencies of the runs begun: what one run may hope for.
     """
 
     name: str
@@ -42,6 +45,7 @@ class TaskStatus:
     steps_done: int
     best: float | None
     best_seed: int | None
+    median: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +146,8 @@ class Watcher:
             run = runs.get(folder.name)
             if run is None:
                 raise foreign(folder)
+            if run.id in self._last and self._last[run.id].done:
+                continue
             files = segment_files(folder)
             if files and self._seen.get(run.id) != files[-1][0]:
                 segment = self._store.last_segment(run)
@@ -169,6 +175,7 @@ def status_of(spec: Spec, last: dict[str, Segment], *, compacted: bool) -> Statu
                 steps_done=sum(segment.last_step + 1 for _, segment in begun),
                 best=best[1].best if best else None,
                 best_seed=best[0].seed if best else None,
+                median=median(segment.best for _, segment in begun) if begun else None,
             )
         )
     return Status(spec.name, compacted, tasks)

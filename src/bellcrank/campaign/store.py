@@ -259,12 +259,3 @@ def _task_difference(old: Task, new: Task) -> str | None:
             return f"{what}: {difference}"
     seeds = ({"seeds": [task.first_seed, task.last_seed]} for task in (old, new))
     return first_difference(*seeds)
-
-
-def made_by_another_version(store: Store) -> str | None:
-    """Return the version that a campaign was begun with, if it is not this one."""
-    begun, now = store.provenance, provenance()
-    keys = ("version", "commit")
-    if all(begun.get(key) == now[key] for key in keys):
-        return None
-    return " ".join(str(begun[key]) for key in keys if begun.get(key)) or "unknown"

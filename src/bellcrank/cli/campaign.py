@@ -6,15 +6,23 @@ import json
 import shlex
 import sys
 import time
-from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bellcrank.cli.app import FAILED, INTERRUPTED, app
-from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.cli.arguments import settings_of
+from bellcrank.cli.console import (
+    announce_compilation,
+    notes,
+    number_of,
+    plain,
+    print_json,
+    results,
+    warn_of_another_version,
+)
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
@@ -29,10 +37,10 @@ app.add_typer(campaign)
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the campaign.")]
 Workers = Annotated[
-    int | None, typer.Option(help="Processes, or SLURM jobs; changes no result. [all cores]")
+    int | None, typer.Option(help="Processes, or SLURM jobs; changes no result. \\[all cores]")
 ]
 Engine = Annotated[
-    str | None, typer.Option(help="local, address, slurm or serial (no Dask). [local]")
+    str | None, typer.Option(help="local, address, slurm or serial (no Dask). \\[local]")
 ]
 Host = Annotated[str | None, typer.Option(help="Address to listen on. [127.0.0.1; slurm: any]")]
 Scheduler = Annotated[
@@ -134,18 +142,8 @@ def _options(
         tls_ca=tls_ca,
         tls_cert=tls_cert,
         tls_key=tls_key,
-        slurm=dict(map(_key_and_value, slurm or ())),
+        slurm=settings_of("--slurm", slurm),
     )
-
-
-def _key_and_value(text: str) -> tuple[str, Any]:
-    """Read ``key=value``; the value as JSON where it is some, else as text."""
-    key, equals, value = text.partition("=")
-    if not (key and equals):
-        raise InvalidSettings(f"--slurm {text}: expected KEY=VALUE")
-    with suppress(ValueError):
-        return key, json.loads(value)
-    return key, value
 
 
 def _complete(
@@ -157,7 +155,7 @@ def _complete(
     from bellcrank.cli.design import stopping_on_interrupt
 
     announce_compilation()
-    _warn_of_another_version(store)
+    warn_of_another_version(store.provenance, "campaign")
     part = Shard.parse(shard) if shard else None
     with stopping_on_interrupt() as stop, CampaignProgress() as progress:
         done = complete(
@@ -177,17 +175,6 @@ def _complete(
         )
         sys.exit(INTERRUPTED)
     results.print(status_table(Watcher(store).look()))
-
-
-def _warn_of_another_version(store: Store) -> None:
-    """Say that a campaign may not end as it would have, if it was begun elsewhere."""
-    from bellcrank.campaign import made_by_another_version
-
-    if version := made_by_another_version(store):
-        notes.print(
-            f"[yellow]note:[/] this campaign was begun with another version ({plain(version)}); "
-            "what follows may differ from what it would have found."
-        )
 
 
 @campaign.command()
@@ -255,7 +242,7 @@ def verify(
 
     store = Store.open(folder)
     found = verify_store(store)
-    results.print(f"{found.files} files with {found.rows} rows are as they were written.")
+    results.print(f"{number_of(found.files, 'file')} with {found.rows} rows as written.")
     if not found.damage:
         return
     for line in found.damage:
@@ -263,12 +250,14 @@ def verify(
     if repair and found.damage:
         repair_store(store, found)
         results.print(
-            f"Deleted {len(found.doomed)} files; "
-            f"bellcrank campaign resume {plain(shlex.quote(str(folder)))} computes them again."
+            f"Deleted {number_of(len(found.doomed), 'file')}; "
+            f"bellcrank campaign resume {plain(shlex.quote(str(folder)))} computes what is missing."
         )
     left = verify_store(store).damage if repair else found.damage
     if left:
-        notes.print(f"[bold red]error:[/] {len(left)} files of {plain(folder)} are damaged")
+        notes.print(
+            f"[bold red]error:[/] {plain(folder)} is damaged in {number_of(len(left), 'place')}"
+        )
         sys.exit(FAILED)
 
 
@@ -288,3 +277,23 @@ def top(
         print_json(json.dumps({"results": [asdict(design) for design in designs]}, indent=1))
     else:
         results.print(ranking_table(designs))
+
+
+@campaign.command()
+def harvest(
+    folder: Folder,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the designs; default: FOLDER-designs.")
+    ] = None,
+    task: Annotated[str | None, typer.Option(help="Of this task only.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files.")] = False,
+) -> None:
+    """Write the best design of each task, cleaned and checked, as a file of its own."""
+    from bellcrank.campaign import Store, write_harvest
+    from bellcrank.cli.campaign_view import harvest_table
+
+    announce_compilation()
+    target = out or Path(f"{folder if folder.name else folder.absolute()}-designs")
+    found = write_harvest(Store.open(folder), target, task, overwrite=overwrite)
+    results.print(harvest_table(found))
+    results.print(f"written to {plain(target)}/")

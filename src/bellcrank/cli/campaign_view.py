@@ -14,7 +14,7 @@ from bellcrank.cli.console import notes, plain
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bellcrank.campaign import Ranked, Status
+    from bellcrank.campaign import Harvest, Ranked, Status
 
 QUIET_INTERVAL = 10.0
 """Seconds between lines where there is no terminal."""
@@ -24,13 +24,14 @@ def status_table(status: Status) -> Table:
     """Return one row for each task, and one for all."""
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("task")
-    for name in ("runs done", "steps", "best", "seed"):
+    for name in ("runs done", "steps", "median", "best", "seed"):
         table.add_column(name, justify="right")
     for task in status.tasks:
         table.add_row(
             plain(task.name),
             f"{task.runs_done} / {task.runs}",
             f"{task.steps_done} / {task.steps}",
+            "" if task.median is None else f"{task.median:.4f}",
             "" if task.best is None else f"{task.best:.4f}",
             "" if task.best_seed is None else str(task.best_seed),
         )
@@ -53,6 +54,25 @@ def ranking_table(designs: Sequence[Ranked]) -> Table:
     for design in designs:
         efficiency = f"{design.efficiency:.6f}"
         table.add_row(efficiency, plain(design.task), str(design.seed), str(design.step))
+    return table
+
+
+def harvest_table(harvests: Sequence[Harvest]) -> Table:
+    """Return one row for each design, with the file that it was written to."""
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    table.add_column("task")
+    for name in ("efficiency", "beams", "seed", "step"):
+        table.add_column(name, justify="right")
+    table.add_column("file", overflow="fold")
+    for found in harvests:
+        table.add_row(
+            plain(found.task),
+            f"{found.design.efficiency:.4f}",
+            str(found.design.beam_count),
+            str(found.seed),
+            str(found.step),
+            plain(found.path.name),
+        )
     return table
 
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
+
+from bellcrank.provenance import other_version
 
 results = Console(highlight=False, soft_wrap=True, emoji=False)
 notes = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
@@ -19,9 +23,29 @@ def announce_compilation() -> None:
         notes.print("Compiling the kernels for this machine, once; this takes about half a minute.")
 
 
+def warn_of_another_version(begun: Mapping[str, Any], what: str) -> None:
+    """Say that what is resumed may not end as it would have, if it was begun elsewhere."""
+    if version := other_version(begun):
+        notes.print(
+            f"[yellow]note:[/] this {what} was begun with another version ({plain(version)}); "
+            "what follows may differ from what it would have found."
+        )
+
+
 def plain(text: object) -> str:
     """Keep square brackets in a name or message from being read as markup."""
     return escape(str(text))
+
+
+def number_of(count: int, what: str) -> str:
+    """Return how many there are, in words.
+
+    Examples
+    --------
+    >>> number_of(1, "file"), number_of(12, "file")
+    ('1 file', '12 files')
+    """
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def print_json(text: str) -> None:

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
 from bellcrank.cli.app import INTERRUPTED, app
-from bellcrank.cli.console import announce_compilation, notes, plain, results
+from bellcrank.cli.arguments import settings_of
+from bellcrank.cli.console import (
+    announce_compilation,
+    notes,
+    plain,
+    results,
+    warn_of_another_version,
+)
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from bellcrank.runs import RunFolder
     from bellcrank.workflows import DesignReport
 
 
@@ -51,7 +56,7 @@ def design(
             help="stripped (what bears no load), ignored (dead ends) or counted (as in 'paper')."
         ),
     ] = None,
-    minimiser: Annotated[str | None, typer.Option(help="newton, cg or fire. [newton]")] = None,
+    minimiser: Annotated[str | None, typer.Option(help="newton, cg or fire. \\[newton]")] = None,
     cost: Annotated[
         str | None, typer.Option(help="exponential (the paper) or negative; for chains.")
     ] = None,
@@ -100,7 +105,7 @@ def design(
         assert resume is not None
         announce_compilation()
         folder = reopen_design(resume)
-        _warn_of_another_version(folder)
+        warn_of_another_version(folder.provenance, "run")
     else:
         given = {
             "steps": steps, "chains": chains, "seed": seed, "objective": objective,
@@ -109,7 +114,7 @@ def design(
             "goals": goal and tuple(goal), "strokes": strokes and _numbers("--strokes", strokes),
         }  # fmt: skip
         chosen = {key: value for key, value in given.items() if value is not None}
-        settings = read_settings({"search": search, **chosen, **dict(map(_setting, more or ()))})
+        settings = read_settings({"search": search, **chosen, **settings_of("--set", more)})
         task = find_problem(problem)
         announce_compilation()
         folder = start_design(task, settings, out or Path(Path(task.name).name))
@@ -138,27 +143,6 @@ def _measures(text: str | None) -> tuple[str, ...]:
     from bellcrank.search.goals import ParetoArchive
 
     return () if text is None else ParetoArchive(tuple(text.split(","))).measures
-
-
-def _setting(text: str) -> tuple[str, Any]:
-    """Read ``key=value``; the value as JSON where it is some, else as text."""
-    key, equals, value = text.partition("=")
-    if not (key and equals):
-        raise InvalidSettings(f"--set {text}: expected KEY=VALUE")
-    with suppress(ValueError):
-        return key, json.loads(value)
-    return key, value
-
-
-def _warn_of_another_version(folder: RunFolder) -> None:
-    """Say that a resumed run may not end as it would have, if it was begun elsewhere."""
-    from bellcrank.workflows import made_by_another_version
-
-    if version := made_by_another_version(folder):
-        notes.print(
-            f"[yellow]note:[/] this run was begun with another version ({plain(version)}); "
-            "what follows may differ from what it would have found."
-        )
 
 
 @contextmanager

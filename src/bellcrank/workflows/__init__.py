@@ -2,7 +2,6 @@
 
 from bellcrank.workflows.design import (
     complete_design,
-    made_by_another_version,
     reopen_design,
     start_design,
 )
@@ -15,7 +14,6 @@ __all__ = [
     "complete_design",
     "draw_run",
     "find_design",
-    "made_by_another_version",
     "move",
     "reopen_design",
     "start_design",

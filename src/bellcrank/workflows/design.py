@@ -79,15 +79,6 @@ def reopen_design(out: Path) -> RunFolder:
     return folder
 
 
-def made_by_another_version(folder: RunFolder) -> str | None:
-    """Return the version that a run was begun with, if it is not this one."""
-    begun, now = folder.provenance, provenance()
-    keys = ("version", "commit")
-    if all(begun.get(key) == now[key] for key in keys):
-        return None
-    return " ".join(str(begun[key]) for key in keys if begun.get(key)) or "unknown"
-
-
 def complete_design(
     folder: RunFolder,
     *,
