@@ -60,6 +60,10 @@ def test_settings_survive_json(settings: SearchSettings) -> None:
     assert settings.to_dict()["search"] == settings.name
 
 
+def test_only_the_paper_s_search_feeds_on_what_carries_no_load(settings: SearchSettings) -> None:
+    assert settings.dangling == ("counted" if settings.name == "paper" else "stripped")
+
+
 def test_an_unknown_setting_is_refused(settings: SearchSettings) -> None:
     with pytest.raises(InvalidSettings, match=f"search '{settings.name}' has no setting 'color'"):
         read_settings({"search": settings.name, "color": 1})

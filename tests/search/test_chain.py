@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -236,3 +237,9 @@ def test_every_schedule_is_positive_and_never_rises(name: str) -> None:
     assert (table > 0).all()
     assert (np.diff(table) <= 0).all()
     assert table[-1] == pytest.approx(1e-3)
+
+
+def test_a_hopeless_flip_is_foreseen_without_a_warning() -> None:
+    rise = costs["exponential"].rise(0.5, np.array([-1e6, 1e6]))
+    assert rise[0] > 1e200
+    assert rise[1] == pytest.approx(-math.exp(-0.5))

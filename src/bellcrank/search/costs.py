@@ -35,13 +35,18 @@ class Cost:
     rise: Callable[[float, NDArray[np.float64]], NDArray[np.float64]]
 
 
+LARGEST_EXPONENT = 700.0
+"""What the exponential function can still take."""
+
 costs: Registry[Cost] = Registry("cost")
 
 costs.register("exponential")(
     Cost(
         0,
         lambda efficiency: math.exp(-efficiency),
-        lambda efficiency, change: math.exp(-efficiency) * np.expm1(-change),
+        lambda efficiency, change: (
+            math.exp(-efficiency) * np.expm1(np.minimum(-change, LARGEST_EXPONENT))
+        ),
     )
 )
 """exp(-efficiency): the paper's. Gains count less the better the design already is."""

@@ -8,7 +8,6 @@ a handful of plain numbers, and a chain resumed from it is the same to the last 
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -20,24 +19,21 @@ from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.runs import Proposals
 from bellcrank.search.blocks import (
     BLOCK,
-    FORBIDDEN,
-    FORESEEN,
     Rows,
     initial_response,
     random_numbers,
     steps_ahead,
 )
 from bellcrank.search.costs import costs
-from bellcrank.search.moves import Move, moves
-from bellcrank.search.place import Place, accepts, flipped
+from bellcrank.search.moves import moves
 from bellcrank.search.schedules import schedules
 from bellcrank.search.searches import Search, searches
 from bellcrank.search.settings import NO_LIMIT, SearchSettings, check_positive, check_whole
+from bellcrank.search.walking import place_of, step
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.model import Problem
     from bellcrank.search.responder import Responder
 
 
@@ -118,6 +114,7 @@ class InformedSettings(MetropolisSettings):
 
     name: ClassVar[str] = "informed"
 
+    dangling: Dangling = "stripped"
     moves: tuple[str, ...] = ("balanced", "balanced", "delayed", "node")
     cost: str = "negative"
     schedule: str = "geometric"
@@ -246,14 +243,6 @@ def _advance_compiled(
     )
 
 
-def place_of(responder: Responder, cost: str, temperature: float, mask: str) -> Place:
-    """Return where a chain stands, evaluated from rest and remembered."""
-    bits = unpack_mask(mask, responder.problem.lattice.beam_count).copy()
-    response = responder.respond(bits)
-    responder.remember()
-    return Place(responder, costs[cost], temperature, bits, response)
-
-
 def advance_in_python(
     responder: Responder,
     settings: MetropolisSettings,
@@ -283,54 +272,6 @@ def advance_in_python(
             )  # fmt: skip
         here = after
     return replace(state, mask=pack_mask(here.mask)), rows.proposals(responder.problem)
-
-
-def step(
-    here: Place, move: Move, rng: np.random.Generator, rows: Rows, minimum_degree: int = 0
-) -> Place:
-    """Make one proposal, note it, and return where the chain is then.
-
-    A design without a unique, stable response is refused whatever the temperature.
-    """
-    beams = move.propose(here, rng)
-    uniform = rng.random()
-    if beams is None:
-        rows.add(here.mask, math.nan, math.nan, here.temperature, False, FORESEEN)
-        return here
-    mask = flipped(here.mask, beams)
-    if minimum_degree and _is_forbidden(here.problem, minimum_degree, mask, beams):
-        rows.add(mask, math.nan, math.nan, here.temperature, False, FORBIDDEN)
-        return here
-    response = here.responder.respond_nearby(mask)
-    here.is_last = False
-    there = Place(here.responder, here.cost_function, here.temperature, mask, response)
-    accepted = False
-    if there.counts:
-        log_ratio = (here.cost - there.cost) / here.temperature
-        log_ratio += move.log_chance(there, beams) - move.log_chance(here, beams)
-        accepted = accepts(log_ratio, uniform)
-    rows.add(
-        mask, response.efficiency, there.cost, here.temperature, accepted, int(response.status)
-    )
-    if accepted:
-        here.responder.remember()
-        return there
-    return here
-
-
-def _is_forbidden(
-    problem: Problem, minimum_degree: int, mask: NDArray[np.bool_], beams: NDArray[np.int64]
-) -> bool:
-    """Whether removing beams has left a free end with too few."""
-    removed = beams[~mask[beams]]
-    if not len(removed):
-        return False
-    held = set(problem.supports.fixed.tolist())
-    if problem.input.drive == "displacement":
-        held.update(problem.input.nodes.tolist())
-    degree = np.bincount(problem.lattice.beams[mask].ravel(), minlength=problem.lattice.node_count)
-    ends = problem.lattice.beams[removed].ravel().tolist()
-    return any(degree[node] < minimum_degree and node not in held for node in ends)
 
 
 searches.register("paper")(Search(MetropolisSettings, ChainState, start, advance, is_done))

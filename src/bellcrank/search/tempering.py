@@ -17,12 +17,12 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.model import pack_mask
 from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
 from bellcrank.search.costs import costs
-from bellcrank.search.metropolis import place_of, step
 from bellcrank.search.moves import moves
 from bellcrank.search.place import accepts
 from bellcrank.search.searches import Search, searches
 from bellcrank.search.selection import peaks
 from bellcrank.search.settings import SearchSettings, check_positive, check_whole
+from bellcrank.search.walking import place_of, step
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

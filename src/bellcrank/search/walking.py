@@ -1,0 +1,77 @@
+"""One step of a Markov chain over designs, by any move and with any responder."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.model import unpack_mask
+from bellcrank.search.blocks import FORBIDDEN, FORESEEN
+from bellcrank.search.costs import costs
+from bellcrank.search.place import Place, accepts, flipped
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+    from bellcrank.search.blocks import Rows
+    from bellcrank.search.moves import Move
+    from bellcrank.search.responder import Responder
+
+
+def place_of(responder: Responder, cost: str, temperature: float, mask: str) -> Place:
+    """Return where a chain stands, evaluated from rest and remembered."""
+    bits = unpack_mask(mask, responder.problem.lattice.beam_count).copy()
+    response = responder.respond(bits)
+    responder.remember()
+    return Place(responder, costs[cost], temperature, bits, response)
+
+
+def step(
+    here: Place, move: Move, rng: np.random.Generator, rows: Rows, minimum_degree: int = 0
+) -> Place:
+    """Make one proposal, note it, and return where the chain is then.
+
+    A design without a unique, stable response is refused whatever the temperature.
+    """
+    beams = move.propose(here, rng)
+    uniform = rng.random()
+    if beams is None:
+        rows.add(here.mask, math.nan, math.nan, here.temperature, False, FORESEEN)
+        return here
+    mask = flipped(here.mask, beams)
+    if minimum_degree and _is_forbidden(here.problem, minimum_degree, mask, beams):
+        rows.add(mask, math.nan, math.nan, here.temperature, False, FORBIDDEN)
+        return here
+    response = here.responder.respond_nearby(mask)
+    here.is_last = False
+    there = Place(here.responder, here.cost_function, here.temperature, mask, response)
+    accepted = False
+    if there.counts:
+        log_ratio = (here.cost - there.cost) / here.temperature
+        log_ratio += move.log_chance(there, beams) - move.log_chance(here, beams)
+        accepted = accepts(log_ratio, uniform)
+    rows.add(
+        mask, response.efficiency, there.cost, here.temperature, accepted, int(response.status)
+    )
+    if accepted:
+        here.responder.remember()
+        return there
+    return here
+
+
+def _is_forbidden(
+    problem: Problem, minimum_degree: int, mask: NDArray[np.bool_], beams: NDArray[np.int64]
+) -> bool:
+    """Whether removing beams has left a free end with too few."""
+    removed = beams[~mask[beams]]
+    if not len(removed):
+        return False
+    held = set(problem.supports.fixed.tolist())
+    if problem.input.drive == "displacement":
+        held.update(problem.input.nodes.tolist())
+    degree = np.bincount(problem.lattice.beams[mask].ravel(), minlength=problem.lattice.node_count)
+    ends = problem.lattice.beams[removed].ravel().tolist()
+    return any(degree[node] < minimum_degree and node not in held for node in ends)
