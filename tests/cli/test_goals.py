@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +14,6 @@ from bellcrank.search import pieces
 from bellcrank.search.goals import mass_of, mirror_images, near_pairs
 
 from .helpers import PROBLEM, call, colours, refusal
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 QUICK = ("--steps", "500", "--chains", "2", "--seed", "5")
 FRONT = ("efficiency", "stiffness", "mass")
@@ -132,3 +129,4 @@ def test_goals_that_no_design_keeps_are_named_at_the_end() -> None:
         outcome.err
     )
     assert "(stiffness >= 500); relax them" in outcome.err
+    assert json.loads(Path("run/run.json").read_text())["status"] == "stopped"

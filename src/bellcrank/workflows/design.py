@@ -115,17 +115,17 @@ def complete_design(
     folder.status = "running"
     try:
         done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
+        if done:
+            report = conclude(folder, settings)
+            if pareto:
+                write_front(folder, settings, pareto)
+            folder.finish()
+            return report
     except BaseException:
         _try_to_mark_stopped(folder)
         raise
-    if not done:
-        folder.status = "stopped"
-        return None
-    report = conclude(folder, settings)
-    if pareto:
-        write_front(folder, settings, pareto)
-    folder.finish()
-    return report
+    folder.status = "stopped"
+    return None
 
 
 def _try_to_mark_stopped(folder: RunFolder) -> None:
