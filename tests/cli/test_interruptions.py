@@ -20,7 +20,6 @@ import pytest
 from bellcrank import __version__
 from bellcrank.provenance import provenance
 from bellcrank.search import BLOCK, parallel
-from bellcrank.workflows import design
 
 from .helpers import (
     BLOCKS,
@@ -279,7 +278,7 @@ def test_a_job_resumed_with_another_version_says_so(copy: Path, whole: Path) -> 
     def of_tomorrow(**more: object) -> dict[str, object]:
         return provenance(**more) | {"version": "9.9"}
 
-    with mock.patch.object(design, "provenance", of_tomorrow):
+    with mock.patch("bellcrank.provenance.provenance", of_tomorrow):
         outcome = call("design", "--resume", copy)
     assert outcome.code == 0
     assert outcome.err.startswith(f"{OTHER_VERSION}{__version__}")

@@ -21,7 +21,8 @@ TEST = "pip install '.[test]' && pytest"
 def blocks(language: str) -> list[str]:
     """Code blocks of the README in one language."""
     text = README.read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    return [code for named, code in found if named == language]
 
 
 def run(command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
@@ -67,12 +68,26 @@ def test_a_task_of_ones_own_is_designed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    [task] = blocks("toml")
+    task, _ = blocks("toml")
     Path("lift.toml").write_text(task)
     run("bellcrank design lift.toml --chains 2 --steps 3000", monkeypatch, capsys)
     efficiency = read_design("lift/design.json").efficiency
     assert efficiency is not None
     assert efficiency > 0.3
+
+
+def test_a_campaign_is_run_and_harvested(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _, spec = blocks("toml")
+    Path("many.toml").write_text(spec.replace("seeds = 30", "seeds = 3\nsteps = 500"))
+    first, second = blocks("")[3].strip().splitlines()
+    assert "3 / 3" in run(first, monkeypatch, capsys)
+    run(second, monkeypatch, capsys)
+    efficiency = read_design("many-designs/crane-basin-hopping.json").efficiency
+    assert efficiency is not None
+    assert efficiency > 1.0
 
 
 def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,6 +22,7 @@ from bellcrank.search import (
     metropolis,
     moves,
     tempering,
+    walking,
 )
 from bellcrank.search.moves.balanced import Balanced
 from bellcrank.search.moves.delayed import Delayed
@@ -140,7 +141,7 @@ def test_a_wrong_acceptance_rule_is_noticed(
     exact: Exact, monkeypatch: pytest.MonkeyPatch, rule: Callable[[float, float], bool]
 ) -> None:
     plain_loop(monkeypatch)
-    monkeypatch.setattr(metropolis, "accepts", rule)
+    monkeypatch.setattr(walking, "accepts", rule)
     assert deviation_of_the_paper(exact, steps=1500) > LARGEST_DEVIATION
 
 
