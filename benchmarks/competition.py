@@ -17,7 +17,7 @@ import argparse
 import json
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import get_args
 
@@ -44,9 +44,11 @@ RESPONSES = {
     "anti-parallel": 20_000,
     "scaling-14": 20_000,
     "pliers": 5_000,
-    **{name: 10_000 for name in builtin if name.startswith("discs")},
+    **{name: 20_000 for name in builtin if name.startswith("discs")},
 }
 FOR_EVER = 10**9
+VISIBLE = 2e-3
+"""Relative gain of efficiency that is noted in the files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,21 @@ class Game:
             ),
             default=0.0,
         )
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the run as plain data: gains that can be seen in a plot, and the best design."""
+        curve: list[list[float]] = []
+        for record in self.records:
+            seen = not curve or record.efficiency - curve[-1][2] > VISIBLE * abs(record.efficiency)
+            if seen or record is self.records[-1]:
+                curve.append([record.responses, record.seconds, record.efficiency])
+        return {
+            "seed": self.seed,
+            "responses": self.responses,
+            "seconds": self.seconds,
+            "curve": curve,
+            "best": self.records[-1].mask if self.records else None,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +179,7 @@ def contest(name: str, dangling: str, seeds: int, share: float, pool: ProcessPoo
         "equal time": figures(ours, theirs, np.inf, seconds),
     }  # fmt: skip
     games = {DEFAULT_SEARCH: ours, PLAIN: theirs}
-    return {**result, "games": {key: [asdict(game) for game in games[key]] for key in games}}
+    return {**result, "games": {key: [game.to_dict() for game in games[key]] for key in games}}
 
 
 def figures(ours: list[Game], theirs: list[Game], responses: float, seconds: float) -> dict:

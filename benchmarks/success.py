@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.plots import style
-from benchmarks.competition import FOLDER, PLAIN
+from benchmarks.competition import FOLDER, PLAIN, RESPONSES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,9 +30,9 @@ def best_so_far(
     """(games, points) best efficiency of each game when so much had been spent."""
     curves = np.zeros((len(games), len(grid)))
     for row, game in enumerate(games):
-        for record in game["records"]:
-            after = grid >= record[measure]
-            curves[row, after] = np.maximum(curves[row, after], record["efficiency"])
+        for responses, seconds, efficiency in game["curve"]:
+            after = grid >= (responses if measure == "responses" else seconds)
+            curves[row, after] = np.maximum(curves[row, after], efficiency)
     return curves
 
 
@@ -58,9 +58,10 @@ def draw(axes: Axes, result: dict[str, Any], measure: str) -> None:
 
 def draw_all(dangling: str) -> None:
     """Draw all problems that were played with one kind of response."""
-    paths = sorted(FOLDER.glob(f"*-{dangling}.json"), key=lambda path: len(path.name))
-    results = [json.loads(path.read_text()) for path in paths]
-    results = [result for result in results if not result["problem"].startswith("discs-")]
+    paths = [
+        FOLDER / f"{name}-{dangling}.json" for name in RESPONSES if not name.startswith("discs-")
+    ]
+    results = [json.loads(path.read_text()) for path in paths if path.exists()]
     if not results:
         return
     figure = style.new_figure(3.0 * len(results), 6.4)
