@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.search.snapping import Snapping
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import CAREFUL, Evaluator, Response, Screening, Status
@@ -124,31 +125,8 @@ def test_seeds_and_chains_differ(small: Problem, settings: SearchSettings) -> No
     assert not np.array_equal(runs[0], runs[2], equal_nan=True)
 
 
-class Snapping:
-    """A responder that finds every third neighbour to snap, and can foresee nothing."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        self._inner = Evaluator(problem)
-        self._asked = 0
-
-    def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
-        return self._inner.respond(mask, largest_increment)
-
-    def respond_nearby(self, mask: np.ndarray, least: float = -np.inf) -> Response:
-        self._asked += 1
-        response = self._inner.respond_nearby(mask, least)
-        return response if self._asked % 3 else replace(response, status=Status.SNAPPED)
-
-    def screen(self, mask: np.ndarray) -> Screening | None:
-        return self._inner.screen(mask)
-
-    def remember(self) -> None:
-        self._inner.remember()
-
-
 def test_designs_that_snap_are_never_accepted(small: Problem, settings: SearchSettings) -> None:
-    responder = Snapping(small)
+    responder = Snapping(small, 3)
     state = start_chain(responder, settings, 0)
     _, proposals = advance_chain(responder, settings, 0, state)
     snapped = proposals.status == Status.SNAPPED
@@ -164,7 +142,9 @@ def test_a_search_that_can_foresee_nothing_goes_on(
         def screen(self, mask: np.ndarray) -> Screening | None:  # noqa: ARG002
             return None
 
-    _, proposals = advance_chain(Blind(small), settings, 0, start_chain(Blind(small), settings, 0))
+    responder = Blind(small, 3)
+    state = start_chain(responder, settings, 0)
+    _, proposals = advance_chain(responder, settings, 0, state)
     assert len(proposals.status) == BLOCK
 
 
@@ -176,7 +156,7 @@ def test_a_search_cannot_start_from_a_design_without_response(
             return replace(super().respond(mask, largest_increment), status=Status.MECHANISM)
 
     with pytest.raises(InvalidSettings, match="cannot start"):
-        start_chain(Broken(small), settings, 0)
+        start_chain(Broken(small, 3), settings, 0)
 
 
 def test_a_state_between_blocks_is_the_only_one_to_go_on_from(

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.search.snapping import Snapping
 
 from bellcrank.errors import InvalidSettings, UnknownName
-from bellcrank.mechanics import Evaluator, Response, Screening, Status
+from bellcrank.mechanics import Evaluator, Response, Status
 from bellcrank.model import Problem, find_problem, unpack_mask
 from bellcrank.runs import Proposals
 from bellcrank.search import (
@@ -151,32 +152,9 @@ def test_patience_ends_a_chain(small: Problem) -> None:
     assert len(proposals.accepted) == end.step
 
 
-class Snapping:
-    """A responder that finds every other neighbour to snap."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        self._inner = Evaluator(problem)
-        self._asked = 0
-
-    def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
-        return self._inner.respond(mask, largest_increment)
-
-    def screen(self, mask: np.ndarray) -> Screening | None:
-        return self._inner.screen(mask)
-
-    def respond_nearby(self, mask: np.ndarray, least: float = -np.inf) -> Response:  # noqa: ARG002
-        self._asked += 1
-        response = self._inner.respond_nearby(mask)
-        return replace(response, status=Status.SNAPPED) if self._asked % 2 else response
-
-    def remember(self) -> None:
-        self._inner.remember()
-
-
 def test_designs_that_snap_are_recorded_and_refused(small: Problem) -> None:
     settings = MetropolisSettings(steps=BLOCK, schedule="constant", cold=1e6)
-    responder = Snapping(small)
+    responder = Snapping(small, 2)
     _, proposals = advance_chain(responder, settings, 0, start_chain(responder, settings))
     snapped = proposals.status == Status.SNAPPED
     assert snapped.sum() == BLOCK / 2
@@ -190,7 +168,7 @@ def test_a_search_cannot_start_from_a_design_without_response(small: Problem) ->
             return replace(super().respond(mask, largest_increment), status=Status.MECHANISM)
 
     with pytest.raises(InvalidSettings, match="cannot start"):
-        start_chain(Broken(small), MetropolisSettings())
+        start_chain(Broken(small, 2), MetropolisSettings())
 
 
 @pytest.mark.parametrize(

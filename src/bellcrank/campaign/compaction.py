@@ -26,15 +26,14 @@ from bellcrank.campaign.layout import (
     segment_path,
     show,
 )
-from bellcrank.campaign.seal import check_seal
 from bellcrank.campaign.segments import (
     ROW_GROUP,
     SEGMENT_SCHEMA,
     Segment,
     encode,
-    read_content,
     segment_from,
     store_content,
+    store_file,
     table_schema,
 )
 from bellcrank.errors import CorruptRun, StorageError
@@ -159,13 +158,8 @@ def read_part(path: Path, store: Store, *, thoroughly: bool) -> Part:
     ------
     CorruptRun
     """
-    if thoroughly:
-        check_seal(path, read_content(path), WHAT_TO_DO)
-    with parquet_file(path, WHAT_TO_DO) as (file, header):
-        if header["schema"] != PART_SCHEMA:
-            raise ValueError("it is no part of a table")
-        if header["spec"] != store.spec.hash:
-            raise CorruptRun(f"{path}: belongs to another campaign; move it elsewhere")
+    opened = store_file(path, PART_SCHEMA, store.spec, WHAT_TO_DO, thoroughly=thoroughly)
+    with opened as (file, header):
         segments = [segment_from(entry) for entry in header["segments"]]
         part = Part(path, int(header["part"]), int(header["parts"]), segments)
         rows = sum(segment.rows for segment in segments)

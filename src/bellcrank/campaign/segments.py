@@ -7,6 +7,7 @@ machine: whoever computes it again gets the same bytes.
 from __future__ import annotations
 
 import io
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from bellcrank.runs.files import make_folder, storage_error, whole_file
 from bellcrank.runs.shards import parquet_file, parquet_writer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     from bellcrank.campaign.spec import Run, Spec
@@ -188,6 +189,36 @@ def read_content(path: Path) -> bytes:
         raise storage_error(path.parent, error) from error
 
 
+@contextmanager
+def store_file(
+    path: Path, schema: str, spec: Spec, what_to_do: str, *, thoroughly: bool
+) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Open a file of the store; yield it and its header.
+
+    Parameters
+    ----------
+    schema
+        What it must be.
+    what_to_do
+        If it is damaged.
+    thoroughly
+        Check every byte of it, not only the footer.
+
+    Raises
+    ------
+    CorruptRun
+        If it is damaged, something else, or belongs to another campaign.
+    """
+    if thoroughly:
+        check_seal(path, read_content(path), what_to_do)
+    with parquet_file(path, what_to_do) as (file, header):
+        if header["schema"] != schema:
+            raise ValueError(f"it is {header['schema']}, not {schema}")
+        if header["spec"] != spec.hash:
+            raise CorruptRun(f"{path}: belongs to another campaign; move it elsewhere")
+        yield file, header
+
+
 def read_segment(path: Path, spec: Spec, run: Run, *, thoroughly: bool) -> Segment:
     """Read what a segment says about itself, and check that it is where it belongs.
 
@@ -200,13 +231,8 @@ def read_segment(path: Path, spec: Spec, run: Run, *, thoroughly: bool) -> Segme
     ------
     CorruptRun
     """
-    if thoroughly:
-        check_seal(path, read_content(path), WHAT_TO_DO)
-    with parquet_file(path, WHAT_TO_DO) as (file, header):
-        if header["schema"] != SEGMENT_SCHEMA:
-            raise ValueError("it is no segment")
-        if header["spec"] != spec.hash:
-            raise CorruptRun(f"{path}: belongs to another campaign; move it elsewhere")
+    opened = store_file(path, SEGMENT_SCHEMA, spec, WHAT_TO_DO, thoroughly=thoroughly)
+    with opened as (file, header):
         segment = segment_from(header)
         named = (segment.run, segment_path(path.parent, segment.first_step).name)
         if named != (run.id, path.name) or segment.rows != file.metadata.num_rows:

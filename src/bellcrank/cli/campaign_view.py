@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import time
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from bellcrank.cli.console import notes, plain
+from bellcrank.cli.console import plain
+from bellcrank.cli.live import Live
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bellcrank.campaign import Harvest, Ranked, Status
-
-QUIET_INTERVAL = 10.0
-"""Seconds between lines where there is no terminal."""
 
 
 def status_table(status: Status) -> Table:
@@ -83,39 +78,13 @@ def one_line(status: Status) -> str:
     return f"runs {status.runs_done} / {status.runs}  steps {status.steps_done}{told}"
 
 
-class CampaignProgress:
-    """Shows how a campaign goes: a live line on a terminal, a few lines elsewhere."""
+class CampaignProgress(Live):
+    """Shows how a campaign goes."""
 
     def __init__(self) -> None:
-        self._last_line = time.monotonic()
-        self._bar = Progress(
-            TextColumn("[bold]campaign"),
-            BarColumn(bar_width=24),
-            TextColumn("{task.percentage:3.0f} %"),
-            TextColumn("{task.fields[figures]}"),
-            TimeElapsedColumn(),
-            console=notes,
-            disable=not notes.is_terminal,
-        )
-        self._task = self._bar.add_task("", total=None, figures="")
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._bar.stop()
+        super().__init__("campaign", None)
 
     def __call__(self, status: Status) -> None:
         """Take in how the campaign stands."""
         line = one_line(status)
-        self._bar.update(self._task, total=status.steps, completed=status.steps_done, figures=line)
-        now = time.monotonic()
-        if not notes.is_terminal and now - self._last_line > QUIET_INTERVAL:
-            self._last_line = now
-            notes.print(plain(line))
+        self._show(status.steps_done, status.steps, line, plain(line))

@@ -1,25 +1,21 @@
-"""Progress of a search on standard error: a live line on a terminal, a few lines elsewhere."""
+"""Progress of a search on standard error."""
 
 from __future__ import annotations
 
 import threading
 import time
-from types import TracebackType
-from typing import Self
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import TextColumn, TimeRemainingColumn
 
-from bellcrank.cli.console import notes
+from bellcrank.cli.live import Live
 from bellcrank.search import Progress as Step
 from bellcrank.search import SearchSettings
 
 NOT_KEPT = -50.0
 """Below it a score is that of a design that breaks goals."""
-QUIET_INTERVAL = 10.0
-"""Seconds between lines where there is no terminal."""
 
 
-class SearchProgress:
+class SearchProgress(Live):
     """Collects what the chains tell, from their threads, and shows it.
 
     Parameters
@@ -36,31 +32,8 @@ class SearchProgress:
         self._done: dict[int, int] = {}
         self._made = self._accepted = 0
         self._temperature = 0.0
-        self._start = self._last_line = time.monotonic()
-        self._bar = Progress(
-            TextColumn("[bold]searching"),
-            BarColumn(bar_width=24),
-            TextColumn("{task.percentage:3.0f} %"),
-            TextColumn("{task.fields[figures]}"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=notes,
-            disable=not notes.is_terminal,
-        )
-        self._task = self._bar.add_task("", total=self._total, figures="")
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._bar.stop()
+        self._start = time.monotonic()
+        super().__init__("searching", self._total, TextColumn("left"), TimeRemainingColumn())
 
     def __call__(self, step: Step) -> None:
         """Take in the news of one chain."""
@@ -71,12 +44,10 @@ class SearchProgress:
             self._best = max(self._best, step.state.best)
             self._temperature = step.temperature
             figures = self._figures()
-            self._bar.update(self._task, completed=sum(self._done.values()), figures=figures)
-            now = time.monotonic()
-            if not notes.is_terminal and now - self._last_line > QUIET_INTERVAL:
-                self._last_line = now
-                share = 100.0 * sum(self._done.values()) / self._total
-                notes.print(f"searching {share:3.0f} %  {figures}  left {self._time_left():.0f} s")
+            done = sum(self._done.values())
+            share = 100.0 * done / self._total
+            line = f"searching {share:3.0f} %  {figures}  left {self._time_left():.0f} s"
+            self._show(done, self._total, figures, line)
 
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics.kernels.arrays import STRIPPED
+from bellcrank.mechanics.kernels.arrays import IGNORED, STRIPPED
 from bellcrank.mechanics.system import allocate_structure
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Core:
 
     def __init__(self, evaluator: Evaluator) -> None:
         self._system = evaluator.system
-        self._stripped = evaluator.core == STRIPPED
+        self._kind = STRIPPED if evaluator.core == STRIPPED else IGNORED
         self._structure = allocate_structure(evaluator.system)
 
     def of(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -41,7 +41,7 @@ class Core:
         from bellcrank.mechanics.kernels.carrying import find_core
 
         core = np.zeros(len(mask), np.uint8)
-        find_core(self._system, mask.astype(np.uint8), self._stripped, self._structure, core)
+        find_core(self._system, mask.astype(np.uint8), self._kind, self._structure, core)
         return core.astype(bool)
 
 

@@ -13,29 +13,18 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
 )
 from bellcrank.mechanics.kernels.cholesky import solve
-from bellcrank.mechanics.kernels.structure import (
-    ACTIVE,
-    find_pieces,
-    strip_dead_ends,
-    strip_unloaded,
-)
+from bellcrank.mechanics.kernels.core import keep_core
+from bellcrank.mechanics.kernels.structure import ACTIVE, find_pieces
 from bellcrank.mechanics.kernels.tangents import stiffness_is_definite
 
 
 @entry
-def find_core(
-    system: System, mask: Bytes, stripped: bool, structure: Structure, core: Bytes
-) -> None:
+def find_core(system: System, mask: Bytes, kind: int, structure: Structure, core: Bytes) -> None:
     """Mark in `core` (M,) the beams of a design that carry load; overwrites `structure`.
 
-    Without loose pieces and dead ends or, `stripped`, without all that no load can reach.
+    Without loose pieces, and without what its `kind` leaves out, as in `keep_core`.
     """
-    for beam in range(len(mask)):
-        structure.present[beam] = mask[beam]
-    if stripped:
-        strip_unloaded(system, structure)
-    else:
-        strip_dead_ends(system, structure.present)
+    keep_core(system, mask, kind, structure)
     find_pieces(system, structure)
     for beam in range(len(mask)):
         first, second = system.beams[beam, 0], system.beams[beam, 1]

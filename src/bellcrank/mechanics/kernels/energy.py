@@ -25,8 +25,9 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
+from bellcrank.mechanics.kernels.core import other_end
 from bellcrank.mechanics.kernels.fields import clear, pair, triple
-from bellcrank.mechanics.kernels.structure import ACTIVE, other_end
+from bellcrank.mechanics.kernels.structure import ACTIVE
 
 
 @kernel

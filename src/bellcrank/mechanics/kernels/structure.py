@@ -1,4 +1,4 @@
-"""Which part of a design carries load, and the pattern of its stiffness matrix.
+"""Which part of a design moves: its pieces, beams and angular springs.
 
 Only what the drive can reach through present beams moves; everything else stays
 exactly at rest and is left out of the equations.
@@ -6,138 +6,24 @@ exactly at rest and is left out of the equations.
 
 from __future__ import annotations
 
-import numpy as np
-
 from bellcrank.mechanics.kernels._compile import kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
     HELD,
     HELD_X,
     HELD_Y,
-    IGNORED,
     MECHANISM,
-    STRIPPED,
     Bytes,
     Structure,
     System,
 )
-from bellcrank.mechanics.kernels.bits import popcount, trailing_zeros
-from bellcrank.mechanics.kernels.fields import clear, pair, triple
+from bellcrank.mechanics.kernels.core import keep_core, other_end
+from bellcrank.mechanics.kernels.fields import pair, triple
+from bellcrank.mechanics.kernels.pattern import find_pattern
 
 ACTIVE = 1
 HANGING = 2
 """A piece that hangs from one held node: it follows as a rigid body, without stress."""
-
-ONE = np.uint64(1)
-DEPTH, LOW, SLOT, CAME_BY, MARK, STACK = range(6)
-"""Columns of `structure.walk`."""
-
-
-@kernel
-def other_end(system: System, beam: int, node: int) -> int:
-    """Return the end of `beam` that is not `node`."""
-    return system.beams[beam, 0] + system.beams[beam, 1] - node
-
-
-@kernel
-def only_beam(system: System, present: Bytes, node: int) -> int:
-    """Return the beam of a node that has exactly one present beam, else -1."""
-    found = -1
-    for slot in range(system.ring_start[node], system.ring_start[node + 1]):
-        beam = system.ring_beam[slot]
-        if present[beam]:
-            if found >= 0:
-                return -1
-            found = beam
-    return found
-
-
-@kernel
-def strip_dead_ends(system: System, present: Bytes) -> None:
-    """Remove, repeatedly, beams that end in an unprotected node of degree one."""
-    for start in range(len(system.held)):
-        node = start
-        while not system.protected[node]:
-            beam = only_beam(system, present, node)
-            if beam < 0:
-                break
-            present[beam] = 0
-            node = other_end(system, beam, node)
-
-
-@kernel
-def strip_unloaded(system: System, structure: Structure) -> None:
-    """Keep of the present beams those on some way between two nodes driven, watched or held.
-
-    With all fixed supports as one root, to which driven, watched and rolling nodes are tied,
-    these are the biconnected components that hold the root and a tie; and beams between two
-    fixed supports. A walk in depth that begins with a tie finds one of them: what a branch
-    has left on the trail is dropped if it reaches no higher than where the branch began
-    (Hopcroft and Tarjan, Commun. ACM 16, 372, 1973).
-    """
-    loaded = structure.loaded
-    for beam in range(len(loaded)):
-        first, second = pair(system.beams, beam)
-        loaded[beam] = structure.present[beam] and (
-            system.grounded[first] and system.grounded[second]
-        )
-    for node in range(len(system.held)):
-        structure.walk[node, DEPTH] = 0
-    for start in range(len(system.held)):
-        tied = system.protected[start] and not system.grounded[start]
-        if tied and structure.walk[start, DEPTH] == 0:
-            length = walk_from(system, structure, start)
-            for index in range(length):
-                loaded[structure.beam[index]] = 1
-    for beam in range(len(loaded)):
-        structure.present[beam] = loaded[beam]
-
-
-@kernel
-def enter(system: System, structure: Structure, node: int, depth: int, by: int, mark: int) -> None:
-    """Note how the walk came to a node; a tie leads back to the root at once."""
-    walk = structure.walk
-    walk[node, DEPTH] = depth
-    walk[node, LOW] = 0 if system.protected[node] and depth > 1 else depth
-    walk[node, SLOT] = system.ring_start[node]
-    walk[node, CAME_BY] = by
-    walk[node, MARK] = mark
-    walk[depth - 1, STACK] = node
-
-
-@kernel
-def walk_from(system: System, structure: Structure, start: int) -> int:
-    """Leave on the trail (`structure.beam`) the component of the tie of `start`; its length."""
-    walk, trail = structure.walk, structure.beam
-    depth, length = 1, 0
-    enter(system, structure, start, 1, -1, 0)
-    while depth > 0:
-        node = walk[depth - 1, STACK]
-        slot = walk[node, SLOT]
-        if slot == system.ring_start[node + 1]:
-            depth -= 1
-            if depth > 0:
-                parent = walk[depth - 1, STACK]
-                walk[parent, LOW] = min(walk[parent, LOW], walk[node, LOW])
-                if walk[node, LOW] >= depth:
-                    length = walk[node, MARK]
-            continue
-        walk[node, SLOT] = slot + 1
-        beam = system.ring_beam[slot]
-        if not structure.present[beam] or beam == walk[node, CAME_BY]:
-            continue
-        far = other_end(system, beam, node)
-        reach = 0 if system.grounded[far] else walk[far, DEPTH]
-        if not system.grounded[far] and reach == 0:
-            enter(system, structure, far, depth + 1, beam, length)
-            depth += 1
-        elif reach < walk[node, DEPTH]:
-            walk[node, LOW] = min(walk[node, LOW], reach)
-        else:
-            continue
-        trail[length] = beam
-        length += 1
-    return length
 
 
 @kernel
@@ -305,79 +191,6 @@ def list_springs(system: System, structure: Structure) -> None:
 
 
 @kernel
-def couple(structure: Structure, first: int, second: int) -> None:
-    """Note that two blocks interact, unless one of them is held."""
-    if first >= 0 and second >= 0 and first != second:
-        low = min(first, second)
-        high = max(first, second)
-        structure.column_bits[low, high >> 6] |= ONE << np.uint64(high & 63)
-
-
-@kernel
-def entry_of(structure: Structure, first: int, second: int) -> int:
-    """Return where the block of two interacting nodes is stored, -1 if one of them is held."""
-    if first < 0 or second < 0:
-        return -1
-    low = min(first, second)
-    high = max(first, second)
-    word = structure.column_bits[low, high >> 6]
-    below = word & ((ONE << np.uint64(high & 63)) - ONE)
-    return structure.word_start[low, high >> 6] + popcount(below)
-
-
-@kernel
-def fill_in(structure: Structure) -> None:
-    """Symbolic Cholesky factorisation: a column hands its rows on to its parent."""
-    bits = structure.column_bits
-    columns, words = bits.shape
-    count = 0
-    for column in range(columns):
-        structure.column_start[column] = count
-        parent = -1
-        for word in range(column >> 6, words):
-            rest = bits[column, word]
-            structure.word_start[column, word] = count
-            while rest:
-                row = (word << 6) + trailing_zeros(rest)
-                rest &= rest - ONE
-                if parent < 0:
-                    parent = row
-                structure.row[count] = row
-                count += 1
-        if parent >= 0:
-            for word in range(parent >> 6, words):
-                bits[parent, word] |= bits[column, word]
-            bits[parent, parent >> 6] &= ~(ONE << np.uint64(parent & 63))
-    structure.column_start[columns] = count
-
-
-@kernel
-def find_pattern(system: System, structure: Structure) -> None:
-    """Find the pattern of the stiffness and of its factor, and where each part adds to it."""
-    clear(structure.column_bits, len(structure.column_bits))
-    block, beams = system.block, system.beams
-    for index in range(structure.sizes[1]):
-        beam = structure.beam[index]
-        couple(structure, block[beams[beam, 0]], block[beams[beam, 1]])
-    for spring in range(structure.sizes[3]):
-        node = structure.spring_node[spring]
-        first = block[other_end(system, structure.spring_beams[spring, 0], node)]
-        second = block[other_end(system, structure.spring_beams[spring, 1], node)]
-        couple(structure, first, second)
-    fill_in(structure)
-    for index in range(structure.sizes[1]):
-        beam = structure.beam[index]
-        structure.beam_entry[beam] = entry_of(
-            structure, block[beams[beam, 0]], block[beams[beam, 1]]
-        )
-    for spring in range(structure.sizes[3]):
-        node = structure.spring_node[spring]
-        first = block[other_end(system, structure.spring_beams[spring, 0], node)]
-        second = block[other_end(system, structure.spring_beams[spring, 1], node)]
-        structure.spring_entry[spring] = entry_of(structure, first, second)
-
-
-@kernel
 def build_structure(system: System, mask: Bytes, core: int, structure: Structure) -> int:
     """Fill `structure` for the design `mask`; return CONVERGED or MECHANISM.
 
@@ -386,15 +199,9 @@ def build_structure(system: System, mask: Bytes, core: int, structure: Structure
     mask
         (M,) uint8, 1 where the beam is present.
     core
-        What to leave out: nothing, dead ends, or all that no load can reach
-        (`COUNTED`, `IGNORED`, `STRIPPED`).
+        What to leave out, as in `keep_core`.
     """
-    for beam in range(len(mask)):
-        structure.present[beam] = mask[beam]
-    if core == IGNORED:
-        strip_dead_ends(system, structure.present)
-    elif core == STRIPPED:
-        strip_unloaded(system, structure)
+    keep_core(system, mask, core, structure)
     status = find_pieces(system, structure)
     if status == CONVERGED:
         list_beams(system, structure)

@@ -1,0 +1,64 @@
+"""How far a long job is: a live line on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Self
+
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
+
+from bellcrank.cli.console import notes
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+QUIET_INTERVAL = 10.0
+"""Seconds between lines where there is no terminal."""
+
+
+class Live:
+    """A line on standard error that tells how far a job is.
+
+    Parameters
+    ----------
+    title
+        What is being done.
+    total
+        How much there is to do; None as long as that is unknown.
+    columns
+        To stand after the elapsed time.
+    """
+
+    def __init__(self, title: str, total: int | None, *columns: ProgressColumn) -> None:
+        self._last_line = time.monotonic()
+        self._bar = Progress(
+            TextColumn(f"[bold]{title}"),
+            BarColumn(bar_width=24),
+            TextColumn("{task.percentage:3.0f} %"),
+            TextColumn("{task.fields[figures]}"),
+            TimeElapsedColumn(),
+            *columns,
+            console=notes,
+            disable=not notes.is_terminal,
+        )
+        self._task = self._bar.add_task("", total=total, figures="")
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._bar.stop()
+
+    def _show(self, done: int, total: int, figures: str, line: str) -> None:
+        """Show how much is done, with figures; `line` says it where there is no terminal."""
+        self._bar.update(self._task, completed=done, total=total, figures=figures)
+        now = time.monotonic()
+        if not notes.is_terminal and now - self._last_line > QUIET_INTERVAL:
+            self._last_line = now
+            notes.print(line)
