@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-SEARCHES = "basin-hopping, paper, informed, tempering"
+SEARCHES = "paper, informed, basin-hopping, tempering"
 
 pytestmark = pytest.mark.usefixtures("here")
 
@@ -190,7 +190,7 @@ def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: 
         (("--set", "radius=-1"), "radius: expected a number above 0, got -1"),
         (("--set", "radius=wide"), "radius: expected a number above 0, got 'wide'"),
         (("--set", "thinnest=[1]"), "thinnest: expected a part from 0 to 1, got (1,)"),
-        (("--set", "lines=2.5"), "lines: expected a whole number of at least 1, got 2.5"),
+        (("--set", "depth=2.5"), "depth: expected a whole number of at least 1, got 2.5"),
         (("--set", "colour=3"), "search 'basin-hopping' has no setting 'colour'; it has: "),
         (("--search", "informed", "--set", 'moves=["jump"]'), "unknown move 'jump'; known: "),
         (("--search", "informed", "--set", "moves=flip"), "moves: expected names of moves, got"),

@@ -74,7 +74,7 @@ def test_the_compiled_block_equals_the_python_loop(small: Problem, variant: dict
             break
         rng = random_numbers(settings.seed, 0, block)
         compiled, rows = advance_chain(evaluator, settings, 0, state)
-        plain, plain_rows = advance_in_python(evaluator, settings, state, rng)
+        plain, plain_rows = advance_in_python(evaluator, settings, state, rng, BLOCK)
         assert compiled == plain
         assert same(rows, plain_rows)
         state = compiled

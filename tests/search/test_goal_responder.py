@@ -88,7 +88,7 @@ def test_a_goal_that_always_holds_changes_nothing_but_the_way(small: Problem, se
 
 @pytest.mark.parametrize("goal", GOALS)
 def test_a_search_with_a_goal_ends_with_designs_that_keep_it(small: Problem, goal: str) -> None:
-    settings = HoppingSettings(steps=2 * BLOCK, goals=(goal,), lines=2)
+    settings = HoppingSettings(steps=2 * BLOCK, goals=(goal,))
     responder = make_responder(small, settings)
     assert isinstance(responder, GoalResponder)
     mask, efficiency, accepted, status, _ = run(small, responder, settings)
@@ -235,7 +235,7 @@ def test_cases_are_weighed_and_predictions_with_them(crane: Problem) -> None:
 def test_a_search_follows_a_wanted_trajectory(small: Problem) -> None:
     strokes, wanted = [0.5, 1.0], np.array([0.02, 0.05])
     responder = GoalResponder(at_strokes(small, strokes, wanted), dangling="ignored")
-    settings = HoppingSettings(steps=3 * BLOCK, lines=2)
+    settings = HoppingSettings(steps=3 * BLOCK)
     start = responder.respond(small.initial)
     mask, efficiency, accepted, _, _ = run(small, responder, settings)
     best = mask[accepted][np.argmax(efficiency[accepted])]
@@ -284,7 +284,7 @@ def test_a_chain_with_goals_goes_on_from_plain_data_to_the_same_bit(small: Probl
             assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
         state = type(state).from_dict(state.to_dict())
     assert read_settings(settings.to_dict()) == settings
-    assert unpack_mask(state.lines[0].mask, small.lattice.beam_count).any()
+    assert unpack_mask(state.mask, small.lattice.beam_count).any()
 
 
 def test_a_design_that_breaks_a_goal_is_refused_and_the_goal_is_named(crane: Problem) -> None:

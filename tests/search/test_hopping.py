@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pytest
+from tests.search.snapping import Snapping
 
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import CAREFUL, Evaluator, Response, Status
 from bellcrank.model import Problem, find_problem, unpack_mask
-from bellcrank.search import HoppingSettings, chain_blocks, make_responder
+from bellcrank.search import (
+    BLOCK,
+    HoppingSettings,
+    HoppingState,
+    advance_chain,
+    chain_blocks,
+    make_responder,
+    start_chain,
+)
 from bellcrank.search.climbing import LEAST_GAIN, Climb, resume_climb
-from bellcrank.search.hopping import kick
+from bellcrank.search.hopping import Hopper, kick
+
+if TYPE_CHECKING:
+    from bellcrank.runs import Proposals
+    from bellcrank.search.responder import Responder
+
+EAGER: dict[str, Any] = {"walk": 300, "share": 0.5, "least_wait": 500, "wait": 0.2}
+"""Settings with which short runs of a small problem have walks."""
 
 
 @pytest.fixture(scope="module")
@@ -76,28 +95,111 @@ def test_a_kick_redraws_a_disc_and_nothing_else(small: Problem) -> None:
     assert 1 <= min(sizes) < 5 < max(sizes)
 
 
-def test_lines_only_rise_and_the_worst_are_given_up(small: Problem) -> None:
-    settings = HoppingSettings(steps=4000, seed=1, lines=4)
-    responder = make_responder(small, settings)
-    best, counts = -np.inf, []
-    for state, _ in chain_blocks(responder, settings, 0):
+def blocks(problem: Problem, settings: HoppingSettings) -> list[tuple[HoppingState, Proposals]]:
+    return list(chain_blocks(make_responder(problem, settings), settings, 0))
+
+
+def test_the_best_design_is_never_lost_and_stands_up_to_a_closer_look(small: Problem) -> None:
+    evaluator = Evaluator(small, dangling="stripped")
+    best = -np.inf
+    for state, _ in blocks(small, HoppingSettings(steps=2000, **EAGER)):
         assert state.best >= best
         best = state.best
-        counts.append(len(state.lines))
-    assert counts[0] == 4
-    assert counts[-1] == 1
-    assert counts == sorted(counts, reverse=True)
-    assert state.lines[0].efficiency == pytest.approx(state.best)
+        mask = unpack_mask(state.mask, small.lattice.beam_count)
+        response = evaluator.respond(mask, CAREFUL)
+        assert response.status is Status.CONVERGED
+        assert response.efficiency == pytest.approx(best, abs=1e-8)
+    assert best > 1.0
 
 
-def test_the_best_line_stands_up_to_a_closer_look(small: Problem) -> None:
-    settings = HoppingSettings(steps=2000)
-    *_, (state, _) = chain_blocks(make_responder(small, settings), settings, 0)
-    line = max(state.lines, key=lambda line: line.rank)
-    mask = unpack_mask(line.mask, small.lattice.beam_count)
-    response = Evaluator(small, dangling="stripped").respond(mask, CAREFUL)
-    assert response.status is Status.CONVERGED
-    assert response.efficiency == pytest.approx(line.efficiency, abs=1e-8)
+def walking(parts: list[tuple[HoppingState, Proposals]]) -> np.ndarray:
+    """Steps of walks; those at which a climb flips or a kick is made have no temperature."""
+    return np.concatenate([rows.temperature for _, rows in parts]) > 0.0
+
+
+def test_walks_begin_where_nothing_is_gained_and_take_their_share(small: Problem) -> None:
+    settings = HoppingSettings(steps=8000, **EAGER)
+    responder = make_responder(small, settings)
+    unbeatable = replace(start_chain(responder, settings, 0), best=1e3)
+    steps = walking(list(chain_blocks(responder, settings, 0, unbeatable)))
+    first = np.flatnonzero(steps)[0]
+    assert 0 <= first - EAGER["least_wait"] < 300  # a climb is not broken off
+    assert steps[first:].mean() == pytest.approx(EAGER["share"], abs=0.05)
+    lengths = np.diff(np.flatnonzero(np.diff(np.r_[0, steps, 0])))[::2]
+    assert (lengths[:-1] == EAGER["walk"]).all()
+
+
+def test_no_walks_without_steps_for_them(small: Problem) -> None:
+    assert not walking(blocks(small, HoppingSettings(steps=2000, **{**EAGER, "walk": 0}))).any()
+
+
+def test_a_walk_goes_on_where_the_last_ended_until_something_is_gained(small: Problem) -> None:
+    settings = HoppingSettings(steps=4000, **EAGER)
+    responder = make_responder(small, settings)
+    state = replace(start_chain(responder, settings, 0), step=1000)
+    rng = np.random.default_rng(1)
+    hopper = Hopper(responder, settings, state, rng, 2000, None)
+    walker = state.mask
+    for _ in range(2):
+        hopper.leave()
+        assert hopper.state.walker == walker
+        first = len(hopper.rows)
+        hopper.walk_on()
+        taken = np.flatnonzero(hopper.rows.accepted[first:])
+        assert flips(hopper.rows.mask[first], walker, small) == 1
+        assert flips(hopper.rows.mask[first + taken[-1]], hopper.state.walker, small) == 0
+        assert hopper.climb is not None
+        assert (hopper.climb.mask == unpack_mask(hopper.state.walker, len(small.initial))).all()
+        walker = hopper.state.walker
+        hopper.climb = None
+        hopper.state = replace(hopper.state, walked=0)
+    hopper.end_climb(replace(resume(responder, small.initial), efficiency=1e3))
+    assert hopper.state.walker == walker
+    hopper.state = replace(hopper.state, best=0.0)
+    hopper.end_climb(resume(responder, unpack_mask(walker, len(small.initial))))
+    assert hopper.state.best > 0.0
+    assert hopper.state.walker is None
+
+
+def flips(row: np.ndarray, mask: str, problem: Problem) -> int:
+    bits = np.unpackbits(row)[: problem.lattice.beam_count].astype(bool)
+    return int((bits != unpack_mask(mask, problem.lattice.beam_count)).sum())
+
+
+def resume(responder: Responder, mask: np.ndarray) -> Climb:
+    climb = resume_climb(responder, mask.copy(), 12, 0.01)
+    assert climb is not None
+    return climb
+
+
+def test_a_walk_that_got_lost_begins_again_at_the_best_design(small: Problem) -> None:
+    settings = HoppingSettings(steps=4000, **EAGER)
+    responder = make_responder(small, settings)
+    state = start_chain(responder, settings, 0)
+    nothing = "00" * len(bytes.fromhex(state.mask))
+    lost = replace(state, walk=100, walker=nothing)
+    after, _ = advance_chain(responder, settings, 0, lost)
+    assert after.step == BLOCK
+    assert after.walker != nothing
+    assert after.best > state.best
+
+
+def test_a_first_climb_in_vain_is_not_repeated(small: Problem) -> None:
+    class Strict(Snapping):
+        """Where every design that is looked at closely snaps."""
+
+        def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
+            response = super().respond(mask, largest_increment)
+            snaps = largest_increment == CAREFUL
+            return replace(response, status=Status.SNAPPED) if snaps else response
+
+    settings = HoppingSettings(steps=1000)
+    parts = list(chain_blocks(Strict(small, 10**9), settings, 0))
+    first_row = parts[0][1].mask[0]
+    masks = np.concatenate([rows.mask for _, rows in parts])
+    assert (masks == first_row).all(axis=1).sum() == 1
+    assert parts[-1][0].hops > 1
+    assert (unpack_mask(parts[-1][0].mask, small.lattice.beam_count) == small.initial).all()
 
 
 def test_a_run_shorter_than_one_climb_still_offers_a_design(small: Problem) -> None:

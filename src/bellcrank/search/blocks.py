@@ -85,6 +85,15 @@ class Rows:
         self.accepted.append(accepted)
         self.status.append(status)
 
+    def extend(self, proposals: Proposals) -> None:
+        """Add the rows of proposals that were made elsewhere."""
+        self.mask.extend(proposals.mask)
+        self.efficiency.extend(proposals.efficiency.tolist())
+        self.cost.extend(proposals.cost.tolist())
+        self.temperature.extend(proposals.temperature.tolist())
+        self.accepted.extend(proposals.accepted.tolist())
+        self.status.extend(proposals.status.tolist())
+
     def __len__(self) -> int:
         return len(self.status)
 

@@ -3,14 +3,15 @@
 A climb (`climbing`) ends at a design that no flip of a beam improves. From there a part of
 the lattice is drawn anew, more or less densely, and the climb goes on; the new design takes
 the place of the old one if it is at least as efficient (Wales and Doye, J. Phys. Chem. A
-101, 5111, 1997; iterated local search, Lourenco et al. 2003). Several such lines can begin
-from different designs; the worst ones are then given up one by one, so that most of the time
-goes to the most promising.
+101, 5111, 1997; iterated local search, Lourenco et al. 2003).
+
+Where nothing has been gained for long, what is missing is often many flips away, each of
+which changes next to nothing. Then most steps go to a Markov chain at a low temperature, which
+wanders off from the best design; now and then a climb begins where it is.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -20,11 +21,14 @@ from bellcrank.mechanics import CAREFUL
 from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
 from bellcrank.search.climbing import Climb, resume_climb
+from bellcrank.search.metropolis import ChainState, MetropolisSettings, make_steps
 from bellcrank.search.searches import Search, searches
 from bellcrank.search.selection import peaks
 from bellcrank.search.settings import SearchSettings, check_part, check_positive, check_whole
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from bellcrank.mechanics import Status
@@ -32,8 +36,8 @@ if TYPE_CHECKING:
     from bellcrank.runs import Proposals
     from bellcrank.search.responder import Responder
 
-THINNEST_START = 0.85
-"""Least part of the designable beams that a line begins with."""
+PROGRESS = 1e-3
+"""Relative gain of efficiency by which a search shows that it is not at its end."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,10 +46,6 @@ class HoppingSettings(SearchSettings):
 
     Parameters
     ----------
-    lines
-        Designs that are improved side by side at first.
-    shared
-        Part of the steps after which only the best line is left.
     radius
         Mean radius of the part that is drawn anew, in mean beam lengths.
     thinnest
@@ -54,6 +54,14 @@ class HoppingSettings(SearchSettings):
         Flips that a climb tries in vain before it ends.
     largest_loss
         Predicted loss, as a part of the efficiency, up to which a flip is tried.
+    walk
+        Steps that the Markov chain makes in place of a kick; 0 for none.
+    warmth
+        Its temperature, as a part of the efficiency.
+    share
+        Part of the steps that walks take, where nothing is gained otherwise.
+    least_wait, wait
+        Steps without a gain after which walks begin: a number, and a part of all so far.
 
     Raises
     ------
@@ -62,42 +70,25 @@ class HoppingSettings(SearchSettings):
 
     name: ClassVar[str] = "basin-hopping"
 
-    lines: int = 1
-    shared: float = 0.6
     radius: float = 2.5
     thinnest: float = 0.95
     depth: int = 12
     largest_loss: float = 0.01
+    walk: int = 1000
+    warmth: float = 0.01
+    share: float = 0.8
+    least_wait: int = 2000
+    wait: float = 0.4
 
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
-        check_whole("lines", self.lines, 1, 1000)
         check_whole("depth", self.depth, 1)
-        check_positive("radius", self.radius)
-        check_positive("shared", self.shared)
-        for name in ("thinnest", "largest_loss"):
+        for name in ("walk", "least_wait"):
+            check_whole(name, getattr(self, name), 0)
+        for name in ("radius", "warmth", "share"):
+            check_positive(name, getattr(self, name))
+        for name in ("thinnest", "largest_loss", "wait", "share"):
             check_part(name, getattr(self, name))
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A line of designs, each better than the last.
-
-    Parameters
-    ----------
-    mask
-        The design it has reached, in hexadecimal.
-    efficiency
-        Of it; None before the first climb.
-    """
-
-    mask: str
-    efficiency: float | None = None
-
-    @property
-    def rank(self) -> float:
-        """Efficiency for comparison."""
-        return -math.inf if self.efficiency is None else self.efficiency
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,27 +98,38 @@ class HoppingState:
     Parameters
     ----------
     step
-        Responses so far.
-    lines
-        Those that are left.
+        Proposals so far.
+    mask
+        The best design that stands up to a closer look, in hexadecimal; the initial design
+        before the first climb.
     best
-        Highest efficiency of a line so far.
-    turn
-        Index of the line that is being improved.
+        Its efficiency, less the penalty for broken goals.
+    gained
+        Step of the last gain that counts.
+    walked
+        Step at which the last walk ended.
+    walk
+        Steps left of a walk; 0 between walks.
+    walker
+        The design that walks have reached, in hexadecimal; None if the next one begins at the
+        best design.
     climbing
         The design that a climb has reached, in hexadecimal, or None between climbs.
     tried
         Beams that the climb has tried in vain since its last gain.
     accepted
-        Proposals taken, kicks and flips, so far.
+        Proposals taken, so far.
     hops
         Climbs that ended, so far.
     """
 
     step: int
-    lines: tuple[Line, ...]
+    mask: str
     best: float
-    turn: int = 0
+    gained: int = 0
+    walked: int = 0
+    walk: int = 0
+    walker: str | None = None
     climbing: str | None = None
     tried: tuple[int, ...] = ()
     accepted: int = 0
@@ -135,8 +137,8 @@ class HoppingState:
 
     @property
     def efficiency(self) -> float:
-        """Of the line at hand."""
-        return max(self.lines[self.turn].rank, -1e300)
+        """Of the best design."""
+        return self.best
 
     def to_dict(self) -> dict[str, Any]:
         """Return the state as plain data."""
@@ -145,26 +147,13 @@ class HoppingState:
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
         """Rebuild the state from plain data."""
-        lines = tuple(Line(**line) for line in data["lines"])
-        return cls(**{**data, "lines": lines, "tried": tuple(data["tried"])})
+        return cls(**{**data, "tried": tuple(data["tried"])})
 
 
-def start(responder: Responder, settings: HoppingSettings, chain: int) -> HoppingState:
-    """Return the state before the first climb.
-
-    The first line begins with the problem's initial design, the others with less of it.
-    """
+def start(responder: Responder, _settings: HoppingSettings, _chain: int) -> HoppingState:
+    """Return the state before the first climb, from the problem's initial design."""
     efficiency = initial_response(responder).score
-    problem = responder.problem
-    # A stream of its own, since the blocks begin with the same numbers on a resume.
-    rng = random_numbers(settings.seed, chain, 2**32 - 1)
-    lines = [Line(pack_mask(problem.initial))]
-    for _ in range(settings.lines - 1):
-        mask = problem.initial.copy()
-        present = rng.random(len(problem.designable)) < rng.uniform(THINNEST_START, 1.0)
-        mask[problem.designable] &= present
-        lines.append(Line(pack_mask(mask)))
-    return HoppingState(0, tuple(lines), efficiency)
+    return HoppingState(0, pack_mask(responder.problem.initial), efficiency)
 
 
 def is_done(state: HoppingState, settings: HoppingSettings) -> bool:
@@ -189,6 +178,23 @@ def kick(
             return kicked
 
 
+def walks_now(state: HoppingState, settings: HoppingSettings) -> bool:
+    """Whether it is time for a walk rather than for a kick."""
+    if not settings.walk:
+        return False
+    waited = state.step - state.gained > max(settings.least_wait, settings.wait * state.step)
+    between = settings.walk * (1.0 - settings.share) / settings.share
+    return waited and state.step - state.walked >= between
+
+
+def climb_from(
+    responder: Responder, settings: HoppingSettings, mask: str, tried: Iterable[int] = ()
+) -> Climb | None:
+    """Climb on, or from somewhere else; None from a design without a stable response."""
+    bits = unpack_mask(mask, responder.problem.lattice.beam_count).copy()
+    return resume_climb(responder, bits, settings.depth, settings.largest_loss, tried)
+
+
 @dataclass(slots=True, eq=False)
 class Hopper:
     """Basin hopping within a block."""
@@ -197,6 +203,8 @@ class Hopper:
     settings: HoppingSettings
     state: HoppingState
     rng: np.random.Generator
+    last: int
+    """Step at which the block ends."""
     climb: Climb | None
     rows: Rows = field(default_factory=Rows)
 
@@ -214,10 +222,13 @@ class Hopper:
             self.state, step=self.state.step + 1, accepted=self.state.accepted + accepted
         )
 
-    def make_step(self) -> None:
-        """Spend one response: on a kick, on a flip, or on the verification of a climb's end."""
+    def go_on(self) -> None:
+        """Make a kick, a flip, the verification of a climb's end, or steps of a walk."""
+        if self.state.walk:
+            self.walk_on()
+            return
         if self.climb is None:
-            self.begin_climb()
+            self.leave()
             return
         beam = self.climb.next_beam()
         if beam is None or self.state.step == self.settings.steps - 1:
@@ -226,13 +237,15 @@ class Hopper:
         mask, response, taken = self.climb.try_flip(beam)
         self.note(mask, response.efficiency, taken, response.status, response.penalty)
 
-    def begin_climb(self) -> None:
-        """Disturb the design of the line, or take it as it is where it was never climbed from."""
-        line = self.state.lines[self.state.turn]
-        problem = self.responder.problem
-        mask = unpack_mask(line.mask, problem.lattice.beam_count).copy()
-        if line.efficiency is not None:
-            mask = kick(problem, mask, self.settings, self.rng)
+    def leave(self) -> None:
+        """Disturb the best design, or take the initial one as it is for the first climb."""
+        state = self.state
+        if walks_now(state, self.settings):
+            self.state = replace(state, walk=self.settings.walk, walker=state.walker or state.mask)
+            return
+        mask = self._bits(state.mask)
+        if state.step > 0:
+            mask = kick(self.responder.problem, mask, self.settings, self.rng)
         response = self.responder.respond(mask)
         counts = response.counts
         self.note(mask, response.efficiency, counts, response.status, response.penalty)
@@ -242,68 +255,85 @@ class Hopper:
                 self.responder, mask, response.score,
                 self.settings.depth, self.settings.largest_loss, [],
             )  # fmt: skip
-        elif line.efficiency is None:
-            self._set_line(replace(line, mask=pack_mask(problem.initial)))
-        else:
-            self._next_line()
 
     def end_climb(self, climb: Climb) -> None:
-        """Let the line go on from where the climb ended, if that is no worse and stands up."""
-        line = self.state.lines[self.state.turn]
-        if climb.efficiency >= line.rank:
+        """Keep where the climb has led, if that is no worse and stands up to a closer look."""
+        if climb.efficiency >= self.state.best:
             response = self.responder.respond(climb.mask, CAREFUL)
-            counts = response.counts and response.score >= line.rank
+            counts = response.counts and response.score >= self.state.best
             self.note(climb.mask, response.efficiency, counts, response.status, response.penalty)
             if counts:
-                self._set_line(Line(pack_mask(climb.mask), response.score))
+                self._keep(climb.mask, response.score)
         elif self.state.step == self.settings.steps - 1:
             response = self.responder.respond(climb.mask)
             self.note(climb.mask, response.efficiency, False, response.status, response.penalty)
         self.climb = None
         self.state = replace(self.state, hops=self.state.hops + 1)
-        self._next_line()
 
-    def _set_line(self, line: Line) -> None:
-        lines, turn = self.state.lines, self.state.turn
-        self.state = replace(
-            self.state,
-            lines=(*lines[:turn], line, *lines[turn + 1 :]),
-            best=max(self.state.best, line.rank),
+    def walk_on(self) -> None:
+        """Walk to the end of the walk or of the block, and climb from the end of the walk.
+
+        A design that has no stable response from rest, though it had one as a neighbour, is
+        no place to go on from; the next walk begins at the best design again.
+        """
+        state = self.state
+        assert state.walker is not None
+        response = self.responder.respond(self._bits(state.walker))
+        if not response.counts:
+            self.state = replace(state, walk=0, walked=state.step, walker=None)
+            return
+        settings = MetropolisSettings(
+            cost="negative",
+            schedule="constant",
+            cold=self.settings.warmth * (abs(state.best) or 1.0),
+            dangling=self.settings.dangling,
+            minimiser=self.settings.minimiser,
         )
+        score = response.score
+        chain = ChainState(0, state.walker, score, -score, score)
+        count = min(state.walk, self.last - state.step)
+        chain, proposals = make_steps(self.responder, settings, chain, self.rng, count)
+        self.rows.extend(proposals)
+        self.state = replace(
+            state,
+            step=state.step + count,
+            accepted=state.accepted + chain.accepted,
+            walk=state.walk - count,
+            walked=state.step + count,
+            walker=chain.mask,
+        )
+        if not self.state.walk:
+            self.climb = climb_from(self.responder, self.settings, chain.mask)
 
-    def _next_line(self) -> None:
-        """Go on to the next line, after giving up those whose time is over, the worst first."""
-        lines = list(self.state.lines)
-        used = self.state.step / (self.settings.shared * self.settings.steps)
-        allowed = max(1, self.settings.lines - int(self.settings.lines * used))
-        turn = self.state.turn + 1
-        while len(lines) > allowed:
-            worst = min(range(len(lines)), key=lambda index: lines[index].rank)
-            del lines[worst]
-            turn -= worst < turn
-        self.state = replace(self.state, lines=tuple(lines), turn=turn % len(lines))
+    def _keep(self, mask: NDArray[np.bool_], efficiency: float) -> None:
+        state = self.state
+        self.state = replace(state, mask=pack_mask(mask), best=efficiency)
+        if efficiency >= state.best + PROGRESS * abs(efficiency):
+            self.state = replace(self.state, gained=state.step, walker=None)
+
+    def _bits(self, mask: str) -> NDArray[np.bool_]:
+        return unpack_mask(mask, self.responder.problem.lattice.beam_count).copy()
 
 
 def advance(
     responder: Responder, settings: HoppingSettings, chain: int, state: HoppingState
 ) -> tuple[HoppingState, Proposals]:
-    """Spend a block of responses."""
+    """Make the steps of a block."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
+    last = state.step + steps_ahead(settings, state.step)
     climb = None
     if state.climbing is not None:
-        mask = unpack_mask(state.climbing, responder.problem.lattice.beam_count).copy()
-        climb = resume_climb(responder, mask, settings.depth, settings.largest_loss, state.tried)
-    hopper = Hopper(responder, settings, state, rng, climb)
-    last = state.step + steps_ahead(settings, state.step)
+        climb = climb_from(responder, settings, state.climbing, state.tried)
+    hopper = Hopper(responder, settings, state, rng, last, climb)
     while hopper.state.step < last:
-        hopper.make_step()
+        hopper.go_on()
     climb = hopper.climb
-    after = replace(
+    state = replace(
         hopper.state,
         climbing=None if climb is None else pack_mask(climb.mask),
         tried=() if climb is None else tuple(climb.tried),
     )
-    return after, hopper.rows.proposals(responder.problem)
+    return state, hopper.rows.proposals(responder.problem)
 
 
 searches.register("basin-hopping")(

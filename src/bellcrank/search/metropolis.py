@@ -183,11 +183,21 @@ def advance(
 ) -> tuple[ChainState, Proposals]:
     """Advance a chain by one block, or less if its steps or its patience end first."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
+    return make_steps(responder, settings, state, rng, steps_ahead(settings, state.step))
+
+
+def make_steps(
+    responder: Responder,
+    settings: MetropolisSettings,
+    state: ChainState,
+    rng: np.random.Generator,
+    count: int,
+) -> tuple[ChainState, Proposals]:
+    """Make so many steps, at most a block of them, or less if the patience ends first."""
     flips_only = set(settings.moves) == {"flip"}
     if isinstance(responder, Evaluator) and settings.minimiser == "newton" and flips_only:
-        uniforms = rng.random((BLOCK, 2))[: steps_ahead(settings, state.step)]
-        return _advance_compiled(responder, settings, state, uniforms)
-    return advance_in_python(responder, settings, state, rng)
+        return _advance_compiled(responder, settings, state, rng.random((BLOCK, 2))[:count])
+    return advance_in_python(responder, settings, state, rng, count)
 
 
 def _advance_compiled(
@@ -248,8 +258,9 @@ def advance_in_python(
     settings: MetropolisSettings,
     state: ChainState,
     rng: np.random.Generator,
+    count: int,
 ) -> tuple[ChainState, Proposals]:
-    """Advance a chain by one block with any responder and any moves.
+    """Make steps with any responder and any moves.
 
     The compiled loop in `bellcrank.search.kernels.metropolis` does the same, faster, where
     single beams are flipped.
@@ -258,7 +269,7 @@ def advance_in_python(
     temperatures = settings.temperatures
     here = place_of(responder, settings.cost, temperatures[0], state.mask)
     rows = Rows()
-    last = state.step + steps_ahead(settings, state.step)
+    last = state.step + count
     while state.step < last and not is_done(state, settings):
         here.temperature = float(temperatures[min(state.accepted, len(temperatures) - 1)])
         move = chosen[0] if len(chosen) == 1 else chosen[int(rng.random() * len(chosen))]
