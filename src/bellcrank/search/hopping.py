@@ -3,7 +3,8 @@
 A climb (`climbing`) ends at a design that no flip of a beam improves. From there a part of
 the lattice is drawn anew, more or less densely, and the climb goes on; the new design takes
 the place of the old one if it is at least as efficient (Wales and Doye, J. Phys. Chem. A
-101, 5111, 1997; iterated local search, Lourenco et al. 2003).
+101, 5111, 1997; iterated local search, Lourenco et al. 2003). A short annealing comes first:
+searches that all began with the same climb would all begin in the same trap.
 
 Where nothing has been gained for long, what is missing is often many flips away, each of
 which changes next to nothing. Then most steps go to a Markov chain at a low temperature, which
@@ -21,6 +22,7 @@ from bellcrank.mechanics import CAREFUL
 from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
 from bellcrank.search.climbing import Climb, resume_climb
+from bellcrank.search.costs import costs
 from bellcrank.search.metropolis import ChainState, MetropolisSettings, make_steps
 from bellcrank.search.searches import Search, searches
 from bellcrank.search.selection import peaks
@@ -46,6 +48,8 @@ class HoppingSettings(SearchSettings):
 
     Parameters
     ----------
+    quench
+        Steps of the annealing at the beginning, at most a twentieth of all.
     radius
         Mean radius of the part that is drawn anew, in mean beam lengths.
     thinnest
@@ -70,6 +74,7 @@ class HoppingSettings(SearchSettings):
 
     name: ClassVar[str] = "basin-hopping"
 
+    quench: int = 1000
     radius: float = 2.5
     thinnest: float = 0.95
     depth: int = 12
@@ -83,7 +88,7 @@ class HoppingSettings(SearchSettings):
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
         check_whole("depth", self.depth, 1)
-        for name in ("walk", "least_wait"):
+        for name in ("quench", "walk", "least_wait"):
             check_whole(name, getattr(self, name), 0)
         for name in ("radius", "warmth", "share"):
             check_positive(name, getattr(self, name))
@@ -150,10 +155,21 @@ class HoppingState:
         return cls(**{**data, "tried": tuple(data["tried"])})
 
 
-def start(responder: Responder, _settings: HoppingSettings, _chain: int) -> HoppingState:
-    """Return the state before the first climb, from the problem's initial design."""
+def start(responder: Responder, settings: HoppingSettings, _chain: int) -> HoppingState:
+    """Return the state before the annealing, from the problem's initial design."""
     efficiency = initial_response(responder).score
-    return HoppingState(0, pack_mask(responder.problem.initial), efficiency)
+    mask = pack_mask(responder.problem.initial)
+    quench = min(settings.quench, settings.steps // 20)
+    return HoppingState(0, mask, efficiency, walk=quench, walker=mask if quench else None)
+
+
+def chain_settings(state: HoppingState, settings: HoppingSettings) -> MetropolisSettings:
+    """Return those of the annealing before the first climb, or of walks after it."""
+    annealing = MetropolisSettings(dangling=settings.dangling, minimiser=settings.minimiser)
+    if state.hops == 0:
+        return annealing
+    cold = settings.warmth * (abs(state.best) or 1.0)
+    return replace(annealing, cost="negative", schedule="constant", cold=cold)
 
 
 def is_done(state: HoppingState, settings: HoppingSettings) -> bool:
@@ -238,13 +254,13 @@ class Hopper:
         self.note(mask, response.efficiency, taken, response.status, response.penalty)
 
     def leave(self) -> None:
-        """Disturb the best design, or take the initial one as it is for the first climb."""
+        """Disturb the best design; take the initial one as it is for the first climb."""
         state = self.state
         if walks_now(state, self.settings):
             self.state = replace(state, walk=self.settings.walk, walker=state.walker or state.mask)
             return
         mask = self._bits(state.mask)
-        if state.step > 0:
+        if state.hops > 0:
             mask = kick(self.responder.problem, mask, self.settings, self.rng)
         response = self.responder.respond(mask)
         counts = response.counts
@@ -282,22 +298,19 @@ class Hopper:
         if not response.counts:
             self.state = replace(state, walk=0, walked=state.step, walker=None)
             return
-        settings = MetropolisSettings(
-            cost="negative",
-            schedule="constant",
-            cold=self.settings.warmth * (abs(state.best) or 1.0),
-            dangling=self.settings.dangling,
-            minimiser=self.settings.minimiser,
-        )
+        settings = chain_settings(state, self.settings)
         score = response.score
-        chain = ChainState(0, state.walker, score, -score, score)
+        cost = costs[settings.cost].of(score)
+        chain = ChainState(0, state.walker, score, cost, score, state.accepted)
         count = min(state.walk, self.last - state.step)
-        chain, proposals = make_steps(self.responder, settings, chain, self.rng, count)
+        # As many numbers as it wants, whether compiled or not, change nothing for what follows.
+        rng = np.random.default_rng(self.rng.integers(2**63))
+        chain, proposals = make_steps(self.responder, settings, chain, rng, count)
         self.rows.extend(proposals)
         self.state = replace(
             state,
             step=state.step + count,
-            accepted=state.accepted + chain.accepted,
+            accepted=chain.accepted,
             walk=state.walk - count,
             walked=state.step + count,
             walker=chain.mask,
