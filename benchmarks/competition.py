@@ -5,7 +5,7 @@ with the same response of a design on both sides, from many seeds. They are comp
 numbers of responses and at equal processor time: plain Metropolis goes on until it has had
 both the responses and the median time of the other. A flip that leaves what carries load as
 it is costs no response on either side; a screening of all flips is no response, but its time
-counts. The best design of a run counts only if it is stable when its path is followed in
+counts. Only designs count that are stable when their path is followed in
 small increments.
 
 Results go to ``docs/competition/NAME.json``, the table to standard output.
@@ -121,6 +121,7 @@ def play(game: Play) -> Game:
     problem, settings = find_problem(game.problem), game.settings
     responder = make_responder(problem, settings)
     warm_up(game)
+    judge = Judge(game)
     state = start_chain(responder, settings, 0)
     current, best = state.efficiency, -np.inf
     responses, seconds = 0, 0.0
@@ -134,14 +135,14 @@ def play(game: Play) -> Game:
             responses += bool(evaluated and rows.efficiency[index] != current)
             if rows.accepted[index]:
                 current = rows.efficiency[index]
-                if current > best:
+                if current > best and judge.stands(rows.mask[index]):
                     best = current
                     when = seconds + spent * (index + 1) / len(rows.status)
                     found.append(
                         Record(float(best), responses, when, rows.mask[index].tobytes().hex())
                     )
         seconds += spent
-    return Game(game.seed, responses, seconds, verified(game, found))
+    return Game(game.seed, responses, seconds, found)
 
 
 def warm_up(game: Play) -> None:
@@ -152,17 +153,22 @@ def warm_up(game: Play) -> None:
     responder.screen(responder.problem.initial)
 
 
-def verified(game: Play, found: list[Record]) -> list[Record]:
-    """Leave out what is unstable when followed in small increments."""
-    problem = find_problem(game.problem)
-    evaluator = Evaluator(problem, dangling=game.dangling)  # type: ignore[arg-type]
-    kept = []
-    for record in found:
-        mask = np.unpackbits(np.frombuffer(bytes.fromhex(record.mask), np.uint8))
-        mask = mask[: problem.lattice.beam_count].astype(bool)
-        if evaluator.respond(mask, CAREFUL).status is Status.CONVERGED:
-            kept.append(record)
-    return kept
+class Judge:
+    """Tells, off the clock, whether designs are stable when followed in small increments."""
+
+    def __init__(self, game: Play) -> None:
+        self._problem = find_problem(game.problem)
+        self._evaluator = Evaluator(self._problem, dangling=game.settings.dangling)
+        self._known: dict[bytes, bool] = {}
+
+    def stands(self, packed: np.ndarray) -> bool:
+        """Whether a design counts."""
+        key = packed.tobytes()
+        if key not in self._known:
+            mask = np.unpackbits(packed)[: self._problem.lattice.beam_count].astype(bool)
+            response = self._evaluator.respond(mask, CAREFUL)
+            self._known[key] = response.status is Status.CONVERGED
+        return self._known[key]
 
 
 def contest(name: str, dangling: str, seeds: int, share: float, pool: ProcessPoolExecutor) -> dict:

@@ -44,7 +44,7 @@ def test_the_design_is_the_best_that_the_runs_offer(tmp_path: Path, finished: Pa
     evaluator = Evaluator(problem)
     best = -np.inf
     for _, run in rows.sort_values(["seed", "step"]).groupby("seed"):
-        for index in plateau_ends(run["efficiency"].to_numpy()):
+        for index in plateau_ends(run["efficiency"].to_numpy(), np.empty((0, 0), np.uint8)):
             bits = np.unpackbits(np.frombuffer(run["mask"].iloc[index], np.uint8))
             mask = bits[: problem.lattice.beam_count].astype(bool)
             cleaned = clean(Design(problem, mask), evaluator)

@@ -173,7 +173,7 @@ def test_what_a_search_offers_stands_up_to_a_closer_look(
 ) -> None:
     _, proposals = whole(small, settings)
     taken = np.flatnonzero(proposals.accepted)
-    offered = searches[settings.name].offers(proposals.efficiency[taken])
+    offered = searches[settings.name].offers(proposals.efficiency[taken], proposals.mask[taken])
     best = max(offered, key=lambda index: proposals.efficiency[taken][index])
     mask = np.unpackbits(proposals.mask[taken[best]])[: small.lattice.beam_count].astype(bool)
     response = Evaluator(small, dangling=settings.dangling).respond(mask, CAREFUL)

@@ -15,7 +15,6 @@ from bellcrank.search import (
     BLOCK,
     HoppingSettings,
     HoppingState,
-    MetropolisSettings,
     advance_chain,
     chain_blocks,
     make_responder,
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from bellcrank.runs import Proposals
     from bellcrank.search.responder import Responder
 
-EAGER: dict[str, Any] = {"walk": 300, "share": 0.5, "least_wait": 500, "wait": 0.2, "quench": 0}
+EAGER: dict[str, Any] = {"walk": 300, "share": 0.5, "least_wait": 500, "wait": 0.2}
 """Settings with which short runs of a small problem have walks."""
 
 
@@ -134,23 +133,6 @@ def test_no_walks_without_steps_for_them(small: Problem) -> None:
     assert not walking(blocks(small, HoppingSettings(steps=2000, **{**EAGER, "walk": 0}))).any()
 
 
-def test_an_annealing_comes_first_and_the_first_climb_begins_where_it_ends(small: Problem) -> None:
-    settings = HoppingSettings(steps=3000, quench=100)
-    parts = blocks(small, settings)
-    temperature = np.concatenate([rows.temperature for _, rows in parts])
-    assert temperature[0] == MetropolisSettings().hot
-    assert (np.diff(temperature[:100]) <= 0.0).all()
-    assert (temperature[:100] > 0.0).all()
-    assert not (temperature[100:200] > 0.0).any()
-    rows = parts[0][1]
-    reached = rows.mask[np.flatnonzero(rows.accepted[:100])[-1]]
-    assert flips(rows.mask[100], reached.tobytes().hex(), small) == 1
-
-
-def test_the_annealing_of_a_short_run_is_short(small: Problem) -> None:
-    assert walking(blocks(small, HoppingSettings(steps=200))).sum() == 10
-
-
 def test_a_walk_goes_on_where_the_last_ended_until_something_is_gained(small: Problem) -> None:
     settings = HoppingSettings(steps=4000, **EAGER)
     responder = make_responder(small, settings)
@@ -211,7 +193,7 @@ def test_a_first_climb_in_vain_is_not_repeated(small: Problem) -> None:
             snaps = largest_increment == CAREFUL
             return replace(response, status=Status.SNAPPED) if snaps else response
 
-    settings = HoppingSettings(steps=1000, quench=0)
+    settings = HoppingSettings(steps=1000)
     parts = list(chain_blocks(Strict(small, 10**9), settings, 0))
     first_row = parts[0][1].mask[0]
     masks = np.concatenate([rows.mask for _, rows in parts])

@@ -12,6 +12,7 @@ from bellcrank.search import (
     Candidate,
     candidates_of,
     clean,
+    confirmed,
     loaded_beams,
     pieces,
     plateaus,
@@ -51,6 +52,15 @@ def test_candidates_are_the_ends_of_the_best_plateaus_best_first() -> None:
         (3.0, 4, 110, b"\x0b"),
         (2.0, 4, 170, b"\x11"),
     ]
+
+
+def test_what_a_search_did_not_keep_does_not_crowd_out_what_it_kept() -> None:
+    efficiency = np.array([0.1, 0.5, 0.5, 0.4, 9.0, 0.3, 8.0, 0.2, 0.45])
+    masks = np.arange(9, dtype=np.uint8)[:, None]
+    assert confirmed(efficiency, masks) == [2, 4, 6, 8]
+    masks[2] = masks[1]
+    assert confirmed(efficiency, masks) == [2, 8]
+    assert confirmed(np.empty(0), np.empty((0, 1), np.uint8)) == []
 
 
 def test_a_chain_without_plateaus_offers_its_best() -> None:

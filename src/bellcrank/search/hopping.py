@@ -3,8 +3,7 @@
 A climb (`climbing`) ends at a design that no flip of a beam improves. From there a part of
 the lattice is drawn anew, more or less densely, and the climb goes on; the new design takes
 the place of the old one if it is at least as efficient (Wales and Doye, J. Phys. Chem. A
-101, 5111, 1997; iterated local search, Lourenco et al. 2003). A short annealing comes first:
-searches that all began with the same climb would all begin in the same trap.
+101, 5111, 1997; iterated local search, Lourenco et al. 2003).
 
 Where nothing has been gained for long, what is missing is often many flips away, each of
 which changes next to nothing. Then most steps go to a Markov chain at a low temperature, which
@@ -22,10 +21,9 @@ from bellcrank.mechanics import CAREFUL
 from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
 from bellcrank.search.climbing import Climb, resume_climb
-from bellcrank.search.costs import costs
 from bellcrank.search.metropolis import ChainState, MetropolisSettings, make_steps
 from bellcrank.search.searches import Search, searches
-from bellcrank.search.selection import peaks
+from bellcrank.search.selection import confirmed
 from bellcrank.search.settings import SearchSettings, check_part, check_positive, check_whole
 
 if TYPE_CHECKING:
@@ -48,8 +46,6 @@ class HoppingSettings(SearchSettings):
 
     Parameters
     ----------
-    quench
-        Steps of the annealing at the beginning, at most a twentieth of all.
     radius
         Mean radius of the part that is drawn anew, in mean beam lengths.
     thinnest
@@ -74,21 +70,20 @@ class HoppingSettings(SearchSettings):
 
     name: ClassVar[str] = "basin-hopping"
 
-    quench: int = 1000
     radius: float = 2.5
     thinnest: float = 0.95
     depth: int = 12
     largest_loss: float = 0.01
     walk: int = 1000
     warmth: float = 0.01
-    share: float = 0.8
+    share: float = 0.7
     least_wait: int = 2000
     wait: float = 0.4
 
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
         check_whole("depth", self.depth, 1)
-        for name in ("quench", "walk", "least_wait"):
+        for name in ("walk", "least_wait"):
             check_whole(name, getattr(self, name), 0)
         for name in ("radius", "warmth", "share"):
             check_positive(name, getattr(self, name))
@@ -155,21 +150,10 @@ class HoppingState:
         return cls(**{**data, "tried": tuple(data["tried"])})
 
 
-def start(responder: Responder, settings: HoppingSettings, _chain: int) -> HoppingState:
-    """Return the state before the annealing, from the problem's initial design."""
+def start(responder: Responder, _settings: HoppingSettings, _chain: int) -> HoppingState:
+    """Return the state before the first climb, from the problem's initial design."""
     efficiency = initial_response(responder).score
-    mask = pack_mask(responder.problem.initial)
-    quench = min(settings.quench, settings.steps // 20)
-    return HoppingState(0, mask, efficiency, walk=quench, walker=mask if quench else None)
-
-
-def chain_settings(state: HoppingState, settings: HoppingSettings) -> MetropolisSettings:
-    """Return those of the annealing before the first climb, or of walks after it."""
-    annealing = MetropolisSettings(dangling=settings.dangling, minimiser=settings.minimiser)
-    if state.hops == 0:
-        return annealing
-    cold = settings.warmth * (abs(state.best) or 1.0)
-    return replace(annealing, cost="negative", schedule="constant", cold=cold)
+    return HoppingState(0, pack_mask(responder.problem.initial), efficiency)
 
 
 def is_done(state: HoppingState, settings: HoppingSettings) -> bool:
@@ -298,10 +282,15 @@ class Hopper:
         if not response.counts:
             self.state = replace(state, walk=0, walked=state.step, walker=None)
             return
-        settings = chain_settings(state, self.settings)
+        settings = MetropolisSettings(
+            cost="negative",
+            schedule="constant",
+            cold=self.settings.warmth * (abs(state.best) or 1.0),
+            dangling=self.settings.dangling,
+            minimiser=self.settings.minimiser,
+        )
         score = response.score
-        cost = costs[settings.cost].of(score)
-        chain = ChainState(0, state.walker, score, cost, score, state.accepted)
+        chain = ChainState(0, state.walker, score, -score, score)
         count = min(state.walk, self.last - state.step)
         # As many numbers as it wants, whether compiled or not, change nothing for what follows.
         rng = np.random.default_rng(self.rng.integers(2**63))
@@ -310,7 +299,7 @@ class Hopper:
         self.state = replace(
             state,
             step=state.step + count,
-            accepted=chain.accepted,
+            accepted=state.accepted + chain.accepted,
             walk=state.walk - count,
             walked=state.step + count,
             walker=chain.mask,
@@ -350,5 +339,5 @@ def advance(
 
 
 searches.register("basin-hopping")(
-    Search(HoppingSettings, HoppingState, start, advance, is_done, peaks, leaps=True)
+    Search(HoppingSettings, HoppingState, start, advance, is_done, confirmed, leaps=True)
 )

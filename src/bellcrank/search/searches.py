@@ -15,13 +15,10 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.registry import Registry
 from bellcrank.search.blocks import BLOCK
 from bellcrank.search.goals import GoalResponder
-from bellcrank.search.selection import plateau_ends
+from bellcrank.search.selection import Offers, plateau_ends
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-
-    import numpy as np
-    from numpy.typing import NDArray
 
     from bellcrank.runs import Proposals
     from bellcrank.search.responder import Responder
@@ -73,7 +70,7 @@ class Search:
     is_done
         ``(state, settings)``: whether the chain has ended.
     offers
-        Efficiencies of the accepted designs, in order, to the indices of those worth building.
+        Which of the accepted designs are worth building.
     leaps
         Whether the path goes up and down so much that a picture should show the best so far.
     """
@@ -83,7 +80,7 @@ class Search:
     start: Callable[[Responder, Any, int], State]
     advance: Callable[[Responder, Any, int, Any], tuple[State, Proposals]]
     is_done: Callable[[Any, Any], bool]
-    offers: Callable[[NDArray[np.float64]], list[int]] = plateau_ends
+    offers: Offers = plateau_ends
     leaps: bool = False
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
     from bellcrank.search.responder import Responder
 
+Offers: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.uint8]], list[int]]"
+"""From efficiencies (n,) and packed masks (n, bytes) of the accepted designs, in order, to the
+indices of those worth building."""
 PLATEAU_TOLERANCE = 0.005
 """Relative change of the efficiency up to which an accepted step leaves it unmoved."""
 PLATEAU_LENGTH = 4
@@ -120,29 +123,47 @@ def plateaus(
     return found
 
 
-def plateau_ends(efficiency: NDArray[np.float64]) -> list[int]:
+def plateau_ends(efficiency: NDArray[np.float64], _masks: NDArray[np.uint8]) -> list[int]:
     """Return where the plateaus end, what their changes have shed by then having done no work.
 
     A chain without plateaus offers all its designs.
 
     Examples
     --------
-    >>> plateau_ends(np.array([0.1, 0.5, 0.5, 0.501, 0.5, 0.5, 0.9]))
+    >>> plateau_ends(np.array([0.1, 0.5, 0.5, 0.501, 0.5, 0.5, 0.9]), np.empty((7, 1), np.uint8))
     [5]
     """
     return [last - 1 for _, last in plateaus(efficiency)] or list(range(len(efficiency)))
 
 
-def peaks(efficiency: NDArray[np.float64]) -> list[int]:
+def peaks(efficiency: NDArray[np.float64], _masks: NDArray[np.uint8]) -> list[int]:
     """Return where the efficiency falls next, or is at its end.
 
     Examples
     --------
-    >>> peaks(np.array([0.1, 0.5, 0.4, 0.7, 0.7]))
+    >>> peaks(np.array([0.1, 0.5, 0.4, 0.7, 0.7]), np.empty((5, 1), np.uint8))
     [1, 4]
     """
     falls = np.append(efficiency[1:] < efficiency[:-1], True)[: len(efficiency)]
     return np.flatnonzero(falls).tolist()
+
+
+def confirmed(efficiency: NDArray[np.float64], masks: NDArray[np.uint8]) -> list[int]:
+    """Return the peaks, less those above the best design that was accepted twice in a row.
+
+    That is how a search shows that it has looked closely at a design and kept it. What seems
+    better, and was not kept, is of no use, and may be there in any number.
+
+    Examples
+    --------
+    >>> masks = np.array([[1], [2], [2], [3]], np.uint8)
+    >>> confirmed(np.array([0.1, 0.5, 0.5, 0.7]), masks)
+    [2]
+    """
+    kept = np.flatnonzero((masks[1:] == masks[:-1]).all(axis=1)) + 1
+    limit = efficiency[kept].max(initial=-np.inf) if len(kept) else np.inf
+    below = [index for index in peaks(efficiency, masks) if efficiency[index] <= limit]
+    return sorted({*kept.tolist(), *below})
 
 
 def candidates_of(
@@ -150,7 +171,7 @@ def candidates_of(
     step: NDArray[np.int64],
     mask: NDArray[np.uint8],
     efficiency: NDArray[np.float64],
-    offers: Callable[[NDArray[np.float64]], list[int]] = plateau_ends,
+    offers: Offers = plateau_ends,
     count: int = CANDIDATES,
 ) -> list[Candidate]:
     """Pick the most efficient of the designs that a chain offers, best first.
@@ -160,11 +181,11 @@ def candidates_of(
     step, mask, efficiency
         (n,), (n, bytes) and (n,) of the accepted proposals, in order.
     offers
-        From the efficiencies to the indices of the designs worth building.
+        From efficiencies and masks to the indices of the designs worth building.
     count
         How many at most.
     """
-    ranked = [(float(efficiency[index]), index) for index in offers(efficiency)]
+    ranked = [(float(efficiency[index]), index) for index in offers(efficiency, mask)]
     return [
         Candidate(value, chain, int(step[index]), mask[index].tobytes())
         for value, index in heapq.nlargest(count, ranked)
