@@ -1,0 +1,1 @@
+"""Frames: struts as beam elements with rigid joints."""

@@ -1,0 +1,123 @@
+"""Beam elements: the stiffness of a straight strut, and how it turns with it.
+
+Local quantities of an element are its elongation and the rotations of its two ends relative to
+its chord. For these three a slender beam (Euler-Bernoulli) or one that shears (Timoshenko) is
+linear; what is not linear is how they follow from the motion of the ends (co-rotational
+formulation; Crisfield, Non-linear finite element analysis of solids and structures, vol. 1,
+1991, ch. 7). All functions take all elements at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.fem.frame.mesh import FrameMesh
+
+
+def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return angles between -pi and pi.
+
+    Examples
+    --------
+    >>> wrapped(np.array([0.5, 2 * np.pi + 0.5])).round(12)
+    array([0.5, 0.5])
+    """
+    turned: NDArray[np.float64] = np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi
+    return turned
+
+
+def natural(
+    mesh: FrameMesh, displacement: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return what strains the elements: elongation and end rotations relative to the chord.
+
+    Parameters
+    ----------
+    displacement : (n, 3)
+        Of the nodes: x, y in mm, rotation in radians.
+
+    Returns
+    -------
+    strain : (e, 3)
+        Elongation (mm), rotation of the first and of the second end.
+    direction : (e, 2)
+        Of the chords.
+    length : (e,)
+        Of the chords, mm.
+    """
+    first, second = mesh.elements.T
+    apart = displacement[second, :2] - displacement[first, :2]
+    chord = mesh.chord + apart
+    length = np.hypot(chord[:, 0], chord[:, 1])
+    direction = chord / length[:, None]
+    turned = np.arctan2(
+        mesh.chord[:, 0] * chord[:, 1] - mesh.chord[:, 1] * chord[:, 0],
+        (mesh.chord * chord).sum(axis=1),
+    )
+    strain = np.empty((len(length), 3))
+    # The difference of the squares: that of the lengths would be lost in rounding.
+    strain[:, 0] = ((mesh.chord + chord) * apart).sum(axis=1) / (length + mesh.length)
+    strain[:, 1] = wrapped(displacement[first, 2] - turned)
+    strain[:, 2] = wrapped(displacement[second, 2] - turned)
+    return strain, direction, length
+
+
+def gradient_of_natural(
+    direction: NDArray[np.float64], length: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return (e, 3, 6) derivatives of the natural quantities by the motion of the ends.
+
+    Also (e, 6) the derivatives r of the elongation and z, those of the rotation of the chord
+    times its length.
+    """
+    count = len(length)
+    along = np.zeros((count, 6))
+    along[:, 3:5] = direction
+    along[:, 0:2] = -direction
+    across = np.zeros((count, 6))
+    across[:, 0], across[:, 1] = direction[:, 1], -direction[:, 0]
+    across[:, 3], across[:, 4] = -direction[:, 1], direction[:, 0]
+    gradient = np.empty((count, 3, 6))
+    gradient[:, 0] = along
+    gradient[:, 1] = gradient[:, 2] = -across / length[:, None]
+    gradient[:, 1, 2] += 1.0
+    gradient[:, 2, 5] += 1.0
+    return gradient, along, across
+
+
+def forces_and_stiffness(
+    mesh: FrameMesh, displacement: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return (e, 6) the forces of the elements on their ends, and (e, 6, 6) their derivatives."""
+    strain, direction, length = natural(mesh, displacement)
+    gradient, along, across = gradient_of_natural(direction, length)
+    stress = np.einsum("eij,ej->ei", mesh.stiffness, strain)
+    force = np.einsum("eji,ej->ei", gradient, stress)
+    tangent = np.matmul(gradient.transpose(0, 2, 1), np.matmul(mesh.stiffness, gradient))
+    normal, bending = stress[:, 0], stress[:, 1] + stress[:, 2]
+    tangent += (normal / length)[:, None, None] * (across[:, :, None] * across[:, None, :])
+    mixed = along[:, :, None] * across[:, None, :]
+    tangent += (bending / length**2)[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
+    return force, tangent
+
+
+def linear_stiffness(mesh: FrameMesh) -> NDArray[np.float64]:
+    """Return (e, 6, 6) the stiffness of the elements at rest."""
+    direction = mesh.chord / mesh.length[:, None]
+    gradient, _, _ = gradient_of_natural(direction, mesh.length)
+    stiffness: NDArray[np.float64] = np.matmul(
+        gradient.transpose(0, 2, 1), np.matmul(mesh.stiffness, gradient)
+    )
+    return stiffness
+
+
+def energy(mesh: FrameMesh, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (e,) the elastic energy of the elements, N mm."""
+    strain, _, _ = natural(mesh, displacement)
+    stored: NDArray[np.float64] = 0.5 * np.einsum("ei,eij,ej->e", strain, mesh.stiffness, strain)
+    return stored

@@ -1,0 +1,134 @@
+"""From a design to a mesh of beam elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.fem.section import SHEAR_COEFFICIENT
+from bellcrank.registry import Registry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bellcrank.fem.part import Part
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameMesh:
+    """Straight elements between nodes in the plane.
+
+    Parameters
+    ----------
+    positions : (n, 2)
+        Of the nodes at rest, mm. First those of the lattice that beams touch, in order, then
+        those within struts.
+    node : (N,) int64
+        For each node of the lattice its node in the mesh, -1 where no beam is.
+    elements : (e, 2) int64
+        Their ends, strut by strut.
+    strut : (e,) int64
+        The beam of the lattice that each is a part of.
+    chord : (e, 2)
+        From the first to the second end at rest, mm.
+    length : (e,)
+        Of the elements at rest, mm.
+    stiffness : (e, 3, 3)
+        From elongation and end rotations to force (N) and end moments (N mm).
+    """
+
+    positions: NDArray[np.float64]
+    node: NDArray[np.int64]
+    elements: NDArray[np.int64]
+    strut: NDArray[np.int64]
+    chord: NDArray[np.float64]
+    length: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes."""
+        return len(self.positions)
+
+
+theories: Registry[Callable[[Part, NDArray[np.float64]], NDArray[np.float64]]] = Registry("theory")
+"""From a part and the lengths (e,) of elements to the ratio of shear to bending flexibility,
+12 E I / (kappa G A L^2)."""
+
+
+@theories.register("euler-bernoulli")
+def euler_bernoulli(_part: Part, length: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cross-sections stay normal to the axis: no shear."""
+    return np.zeros_like(length)
+
+
+@theories.register("timoshenko")
+def timoshenko(part: Part, length: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cross-sections stay plane, but shear."""
+    bending = 12.0 * part.material.young * part.section.inertia
+    ratio: NDArray[np.float64] = bending / (
+        SHEAR_COEFFICIENT * part.material.shear * part.section.area * length**2
+    )
+    return ratio
+
+
+def frame_mesh(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -> FrameMesh:
+    """Cut each strut of a part into elements.
+
+    Parameters
+    ----------
+    elements
+        Per strut.
+    theory
+        Name in the registry of theories.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+    """
+    if elements < 1:
+        raise InvalidSettings(f"elements: expected at least 1 in each strut, got {elements}")
+    shear = theories[theory]
+    lattice = part.design.problem.lattice
+    struts = np.flatnonzero(part.design.mask)
+    ends = lattice.beams[struts]
+    used = np.unique(ends)
+    node = np.full(lattice.node_count, -1, dtype=np.int64)
+    node[used] = np.arange(len(used))
+    corners = lattice.positions[used] * part.scale
+    first, second = corners[node[ends[:, 0]]], corners[node[ends[:, 1]]]
+    part_of = np.arange(1, elements) / elements
+    within = first[:, None] + part_of[None, :, None] * (second - first)[:, None]
+    inner = len(used) + np.arange(len(struts) * (elements - 1)).reshape(len(struts), -1)
+    along = np.column_stack([node[ends[:, 0]], inner, node[ends[:, 1]]])
+    pairs = np.stack([along[:, :-1], along[:, 1:]], axis=-1).reshape(-1, 2)
+    positions = np.concatenate([corners, within.reshape(-1, 2)])
+    chord = positions[pairs[:, 1]] - positions[pairs[:, 0]]
+    length = np.hypot(chord[:, 0], chord[:, 1])
+    return FrameMesh(
+        positions=positions,
+        node=node,
+        elements=pairs,
+        strut=np.repeat(struts, elements),
+        chord=chord,
+        length=length,
+        stiffness=natural_stiffness(part, length, shear(part, length)),
+    )
+
+
+def natural_stiffness(
+    part: Part, length: NDArray[np.float64], shear: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (e, 3, 3) what elongation and end rotations are resisted with."""
+    young, section = part.material.young, part.section
+    bending = young * section.inertia / (length * (1.0 + shear))
+    stiffness = np.zeros((len(length), 3, 3))
+    stiffness[:, 0, 0] = young * section.area / length
+    stiffness[:, 1, 1] = stiffness[:, 2, 2] = bending * (4.0 + shear)
+    stiffness[:, 1, 2] = stiffness[:, 2, 1] = bending * (2.0 - shear)
+    return stiffness

@@ -1,0 +1,222 @@
+"""Frames against closed forms, an independent code and figures that several codes agree on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from tests.fem import opensees
+
+from bellcrank.fem.frame.mesh import FrameMesh, frame_mesh
+from bellcrank.fem.frame.path import FrameState, PathStatus, follow, solve_linear
+from bellcrank.fem.frame.results import motion_of
+from bellcrank.fem.frame.system import frame_system
+from bellcrank.fem.materials import Material
+from bellcrank.fem.part import Part
+from bellcrank.fem.section import Section
+from bellcrank.model import (
+    Design,
+    Input,
+    Lattice,
+    Output,
+    Problem,
+    Supports,
+    find_problem,
+    read_problem,
+)
+
+REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "crane.problem.json"
+RUBBER = Material(name="rubber", young=12.0, poisson=0.48)
+
+
+def crane_part(crane: Problem, width: float, stroke: float) -> Part:
+    moved = replace(crane, input=replace(crane.input, amount=stroke / 10.0))
+    return Part(moved.full_design(), RUBBER, Section(width, 5.0))
+
+
+def figures(part: Part, mesh: FrameMesh, state: FrameState) -> list[float]:
+    """Mean output motion in x and y, force in y summed over the input."""
+    problem = part.design.problem
+    motion = motion_of(mesh, state)[problem.output.nodes].mean(axis=0)
+    return [*motion, state.reaction[mesh.node[problem.input.nodes], 1].sum()]
+
+
+@pytest.fixture(scope="module")
+def reference_crane() -> Problem:
+    if not REFERENCE.exists():
+        pytest.skip("the node table of these figures is not in this checkout")
+    return read_problem(REFERENCE)
+
+
+@pytest.mark.parametrize(
+    ("theory", "width", "expected"),
+    [
+        ("euler-bernoulli", 1.0, (3.015062782e-2, 3.480436969e-2, -5.412679980)),
+        ("euler-bernoulli", 2.0, (3.464962720e-2, 3.261786336e-2, -11.06770131)),
+        ("timoshenko", 2.0, (3.392924848e-2, 3.293548739e-2, -11.02935494)),
+    ],
+)
+@pytest.mark.parametrize("elements", [1, 8])
+def test_linear_figures_that_several_codes_agree_on(
+    reference_crane: Problem, theory: str, width: float, expected: tuple, elements: int
+) -> None:
+    part = crane_part(reference_crane, width, 1.0)
+    mesh = frame_mesh(part, elements, theory)
+    state = solve_linear(frame_system(part, mesh))
+    assert figures(part, mesh, state) == pytest.approx(expected, rel=5e-9)
+
+
+@pytest.mark.parametrize(
+    ("stroke", "expected"),
+    [
+        (1.0, (3.962278969e-2, 3.595412958e-2, -10.93101755)),
+        (4.330127, (0.2456675696, 0.2050114827, -45.16177558)),
+    ],
+)
+def test_nonlinear_figures_that_several_codes_agree_on(
+    reference_crane: Problem, stroke: float, expected: tuple
+) -> None:
+    part = crane_part(reference_crane, 2.0, stroke)
+    mesh = frame_mesh(part, 8)
+    path = follow(frame_system(part, mesh))
+    assert path.status is PathStatus.CONVERGED
+    assert figures(part, mesh, path.states[-1]) == pytest.approx(expected, rel=5e-8)
+
+
+def diluted(name: str, seed: int) -> Part:
+    """A connected random part of a lattice with displaced nodes."""
+    rng = np.random.default_rng(seed)
+    problem = find_problem(name)
+    lattice = problem.lattice
+    jitter = rng.uniform(-0.08, 0.08, lattice.positions.shape)
+    moved = Lattice(lattice.positions + jitter, lattice.beams)
+    problem = replace(problem, lattice=moved, input=replace(problem.input, amount=0.1))
+    mask = problem.initial.copy()
+    for beam in rng.permutation(problem.designable)[: len(problem.designable) // 3]:
+        mask[beam] = False
+    first, second = moved.beams[mask].T
+    graph = coo_array((np.ones(len(first)), (first, second)), (moved.node_count,) * 2)
+    piece = connected_components(graph, directed=False)[1]
+    mask &= piece[moved.beams[:, 0]] == piece[problem.input.nodes[0]]
+    return Part(Design(problem, mask), RUBBER, Section(rng.uniform(1.0, 2.5), 4.8))
+
+
+@pytest.mark.parametrize(
+    ("theory", "nonlinear"),
+    [("euler-bernoulli", False), ("euler-bernoulli", True), ("timoshenko", False)],
+)
+@pytest.mark.parametrize(("name", "seed"), [("crane", 1), ("scaling-8", 2), ("discs", 3)])
+def test_diluted_lattices_move_as_in_opensees(
+    name: str, seed: int, theory: str, nonlinear: bool
+) -> None:
+    try:
+        import openseespy.opensees  # noqa: F401
+    except (ImportError, RuntimeError):
+        pytest.skip("OpenSeesPy is not installed, or its system libraries (libblas3) are not")
+    part = diluted(name, seed)
+    motion, force = opensees.respond(part, 3, theory, nonlinear=nonlinear)
+    mesh = frame_mesh(part, 3, theory)
+    system = frame_system(part, mesh)
+    state = follow(system).states[-1] if nonlinear else solve_linear(system)
+    assert state.load == 1.0
+    scale = np.abs(motion).max()
+    assert np.abs(motion_of(mesh, state) - motion).max() < 1e-8 * scale
+    held = part.design.problem.input.nodes
+    ours = state.reaction[mesh.node[held], :2]
+    assert np.abs(ours - force[held]).max() < 1e-7 * np.abs(force[held]).max()
+
+
+LENGTH, SECTION = 100.0, Section(1.0, 5.0)
+BENDING = RUBBER.young * SECTION.inertia
+SLENDER = Section(0.25, 5.0)
+
+
+def chain(force: float, direction: tuple[float, float], section: Section = SECTION) -> Part:
+    """A straight bar of two struts along x, clamped at the left, with a force at the right."""
+    lattice = Lattice([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]], [[0, 1], [1, 2]])
+    problem = Problem(
+        name="bar",
+        lattice=lattice,
+        supports=Supports(fixed=[0]),
+        input=Input(nodes=[2], direction=direction, drive="force", amount=1.0),
+        output=Output(nodes=[1], direction=[0.0, 1.0]),
+        designable=[0],
+    )
+    part = Part(problem.full_design(), RUBBER, section, scale=LENGTH)
+    amount = force / (part.stiffness_unit * part.scale)
+    loaded = replace(problem, input=replace(problem.input, amount=amount))
+    return replace(part, design=loaded.full_design())
+
+
+def tip(part: Part, elements: int, theory: str = "euler-bernoulli") -> np.ndarray:
+    mesh = frame_mesh(part, elements, theory)
+    path = follow(frame_system(part, mesh))
+    assert path.status is PathStatus.CONVERGED
+    return path.states[-1].displacement[mesh.node[2]]
+
+
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+def test_a_cantilever_bends_as_in_the_textbook(theory: str) -> None:
+    part = chain(1e-3, (0.0, 1.0))
+    mesh = frame_mesh(part, 3, theory)
+    state = solve_linear(frame_system(part, mesh))
+    bent = 1e-3 * LENGTH**3 / (3.0 * BENDING)
+    shear = 1e-3 * LENGTH / (5.0 / 6.0 * RUBBER.shear * SECTION.area)
+    expected = bent + (shear if theory == "timoshenko" else 0.0)
+    assert state.displacement[mesh.node[2], 1] == pytest.approx(expected, rel=1e-9)
+    assert state.displacement[mesh.node[2], 2] == pytest.approx(1.5 * bent / LENGTH, rel=1e-9)
+
+
+def elastica(load: float) -> tuple[float, float, float]:
+    """Tip of an inextensible cantilever under a dead force across it, load = P L^2 / E I.
+
+    With psi the tip's angle, ds = d(theta) / sqrt(2 load (sin psi - sin theta)).
+    """
+
+    def integral(tip: float, weight) -> float:
+        # theta = tip - s^2 takes the root's singularity away.
+        def inner(s: float) -> float:
+            gap = 2.0 * math.cos(tip - s * s / 2.0) * math.sin(s * s / 2.0)
+            return weight(tip - s * s) * 2.0 * s / math.sqrt(2.0 * load * gap)
+
+        return quad(inner, 0.0, math.sqrt(tip), epsabs=1e-13, epsrel=1e-12)[0]
+
+    angle = brentq(lambda tip: integral(tip, lambda _: 1.0) - 1.0, 1e-3, 1.5707, xtol=1e-13)
+    return 1.0 - integral(angle, math.cos), integral(angle, math.sin), angle
+
+
+def test_a_long_cantilever_is_an_elastica_with_second_order_convergence() -> None:
+    load = 10.0
+    shorter, deflected, angle = elastica(load)
+    assert (shorter, deflected, angle) == pytest.approx((0.55500, 0.81061, 1.43029), abs=2e-5)
+    # A bar stretches a little, the elastica does not: the more slender, the less.
+    force = load * RUBBER.young * SLENDER.inertia / LENGTH**2
+    part = chain(force, (0.0, 1.0), SLENDER)
+    errors = []
+    for elements in (8, 16, 32):
+        ours = tip(part, elements)
+        exact = np.array([-shorter * LENGTH, deflected * LENGTH, angle])
+        errors.append(np.abs(ours - exact).max() / LENGTH)
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert rates == pytest.approx(2.0, abs=0.15)
+    assert errors[-1] < 5e-4
+
+
+def test_a_column_buckles_at_euler_s_load() -> None:
+    critical = math.pi**2 * BENDING / (4.0 * LENGTH**2)
+    path = None
+    for factor, status in ((0.995, PathStatus.CONVERGED), (1.02, PathStatus.SNAPPED)):
+        part = chain(factor * critical, (-1.0, 0.0))
+        path = follow(frame_system(part, frame_mesh(part, 8)))
+        assert path.status is status
+    # Its last stable state is that of Euler's load, for a length that the load has shortened.
+    shortened = LENGTH * (1.0 - critical / (RUBBER.young * SECTION.area))
+    assert shortened > 0.99 * LENGTH
+    assert path.states[-1].load * 1.02 == pytest.approx(1.0, rel=2e-3)
