@@ -272,7 +272,7 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
 
 def _resolve(entry: TaskTable, where: str, folder: Path) -> Task:
     """Find the problem of a task and complete its settings."""
-    from bellcrank.campaign.work import complete_settings
+    from bellcrank.search import read_settings
 
     given = dict(entry.model_extra or {})
     for key, instead in RESERVED.items():
@@ -287,7 +287,9 @@ def _resolve(entry: TaskTable, where: str, folder: Path) -> Task:
             f"{where}: problem: unknown problem {entry.problem!r}; known: {', '.join(builtin)}; "
             f"and there is no such file beside the spec"
         ) from None
-    settings = plain("settings", complete_settings(given))
+    completed = read_settings(given).to_dict()
+    of_runs = {key: value for key, value in completed.items() if key not in RESERVED}
+    settings = plain("settings", of_runs)
     name = entry.name or f"{problem.name}-{settings['search']}"
     return Task(name, plain("problem", problem_to_dict(problem)), settings, first, last)
 

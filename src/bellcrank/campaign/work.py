@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -108,19 +108,6 @@ def _store_at(store_path: str) -> Store:
     except OSError:
         return Store.open(store_path)  # which says what is wrong
     return _open(store_path, (told.st_ino, told.st_mtime_ns))
-
-
-def complete_settings(given: dict[str, Any]) -> dict[str, Any]:
-    """Return settings of a search with all defaults filled in, without seed and chains.
-
-    Raises
-    ------
-    UnknownName, InvalidSettings
-    """
-    from bellcrank.search import read_settings
-
-    settings = read_settings(given).to_dict()
-    return {key: value for key, value in settings.items() if key not in ("seed", "chains")}
 
 
 def check_tasks(spec: Spec) -> None:
