@@ -113,7 +113,8 @@ def plain_loop(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def advance(responder, settings, chain, state):
         rng = metropolis.random_numbers(settings.seed, chain, state.step // metropolis.BLOCK)
-        return metropolis.advance_in_python(responder, settings, state, rng)
+        count = metropolis.steps_ahead(settings, state.step)
+        return metropolis.advance_in_python(responder, settings, state, rng, count)
 
     monkeypatch.setattr(metropolis, "_advance_compiled", None)
     paper = metropolis.searches["paper"]
