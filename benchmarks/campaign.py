@@ -64,7 +64,7 @@ class Effort:
     row_seeds: int
 
 
-FULL = Effort(20_000, 40, 400, 10_000_000, 100)
+FULL = Effort(20_000, 30, 400, 10_000_000, 100)
 QUICK = Effort(4_000, 4, 40, 200_000, 10)
 
 SPEC = """
