@@ -14,9 +14,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from tests.fem import opensees
 
+from bellcrank.fem.frame.elements import energy, forces_and_stiffness
 from bellcrank.fem.frame.mesh import FrameMesh, frame_mesh
 from bellcrank.fem.frame.path import FrameState, PathStatus, follow, solve_linear
-from bellcrank.fem.frame.results import motion_of
 from bellcrank.fem.frame.system import frame_system
 from bellcrank.fem.materials import Material
 from bellcrank.fem.part import Part
@@ -44,7 +44,7 @@ def crane_part(crane: Problem, width: float, stroke: float) -> Part:
 def figures(part: Part, mesh: FrameMesh, state: FrameState) -> list[float]:
     """Mean output motion in x and y, force in y summed over the input."""
     problem = part.design.problem
-    motion = motion_of(mesh, state)[problem.output.nodes].mean(axis=0)
+    motion = mesh.at_lattice(state.displacement)[problem.output.nodes].mean(axis=0)
     return [*motion, state.reaction[mesh.node[problem.input.nodes], 1].sum()]
 
 
@@ -127,7 +127,7 @@ def test_diluted_lattices_move_as_in_opensees(
     state = follow(system).states[-1] if nonlinear else solve_linear(system)
     assert state.load == 1.0
     scale = np.abs(motion).max()
-    assert np.abs(motion_of(mesh, state) - motion).max() < 1e-8 * scale
+    assert np.abs(mesh.at_lattice(state.displacement) - motion).max() < 1e-8 * scale
     held = part.design.problem.input.nodes
     ours = state.reaction[mesh.node[held], :2]
     assert np.abs(ours - force[held]).max() < 1e-7 * np.abs(force[held]).max()
@@ -211,12 +211,51 @@ def test_a_long_cantilever_is_an_elastica_with_second_order_convergence() -> Non
 
 def test_a_column_buckles_at_euler_s_load() -> None:
     critical = math.pi**2 * BENDING / (4.0 * LENGTH**2)
-    path = None
-    for factor, status in ((0.995, PathStatus.CONVERGED), (1.02, PathStatus.SNAPPED)):
+    paths = []
+    for factor in (0.995, 1.02):
         part = chain(factor * critical, (-1.0, 0.0))
-        path = follow(frame_system(part, frame_mesh(part, 8)))
-        assert path.status is status
-    # Its last stable state is that of Euler's load, for a length that the load has shortened.
-    shortened = LENGTH * (1.0 - critical / (RUBBER.young * SECTION.area))
-    assert shortened > 0.99 * LENGTH
-    assert path.states[-1].load * 1.02 == pytest.approx(1.0, rel=2e-3)
+        paths.append(follow(frame_system(part, frame_mesh(part, 8))))
+    assert [path.status for path in paths] == [PathStatus.CONVERGED, PathStatus.SNAPPED]
+    assert paths[1].states[-1].load * 1.02 == pytest.approx(1.0, rel=2e-3)
+
+
+def test_an_output_spring_shares_the_load_with_the_bar() -> None:
+    part = chain(1e-3, (1.0, 0.0))
+    output = Output(nodes=[1], direction=[1.0, 0.0], spring=2.0)
+    problem = replace(part.design.problem, output=output)
+    part = replace(part, design=problem.full_design())
+    mesh = frame_mesh(part, 2)
+    state = solve_linear(frame_system(part, mesh))
+    bar = RUBBER.young * SECTION.area / (LENGTH / 2.0)
+    spring = 2.0 * bar / (2.0 * problem.stiffness.bond)  # a beam has 2 k, its strut E A / L
+    expected = 1e-3 / (bar + spring)
+    assert state.displacement[mesh.node[1], 0] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+def test_forces_are_the_gradient_of_the_energy_and_the_stiffness_theirs(theory: str) -> None:
+    part = diluted("scaling-8", 4)
+    mesh = frame_mesh(part, 2, theory)
+    rng = np.random.default_rng(5)
+    state = rng.uniform(-1.0, 1.0, (mesh.node_count, 3)) * [0.5, 0.5, 0.3]
+    along = rng.uniform(-1.0, 1.0, state.shape)
+    ends = along[mesh.elements].reshape(-1, 6)
+    force, tangent = forces_and_stiffness(mesh, state)
+    step = 1e-5
+    ahead, behind = state + step * along, state - step * along
+    work = (energy(mesh, ahead) - energy(mesh, behind)) / (2.0 * step)
+    assert np.einsum("ei,ei->e", force, ends) == pytest.approx(work, rel=1e-6, abs=1e-6)
+    change = forces_and_stiffness(mesh, ahead)[0]
+    change = (change - forces_and_stiffness(mesh, behind)[0]) / (2.0 * step)
+    assert np.einsum("eij,ej->ei", tangent, ends) == pytest.approx(change, rel=1e-5, abs=1e-5)
+    assert tangent == pytest.approx(tangent.transpose(0, 2, 1), abs=1e-12 * np.abs(tangent).max())
+
+
+def test_a_loose_piece_makes_a_mechanism() -> None:
+    crane = find_problem("crane")
+    rim = crane.lattice.beams_touching(np.concatenate([crane.output.nodes, crane.input.nodes]))
+    for loose in (rim, rim | ~np.isin(np.arange(len(rim)), crane.designable)):
+        part = Part(Design(crane, loose), RUBBER, Section(2.0, 5.0))
+        path = follow(frame_system(part, frame_mesh(part, 2)))
+        assert path.status is PathStatus.MECHANISM
+        assert [state.load for state in path.states] == [0.0]

@@ -37,11 +37,12 @@ class Part:
 
     Examples
     --------
-    >>> from bellcrank.fem.materials import materials
+    >>> from bellcrank.fem.materials import Material
     >>> from bellcrank.fem.section import Section
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane").full_design()
-    >>> part = Part(crane, materials["ninjaflex"], Section(2.0, 5.0))
+    >>> rubber = Material(name="rubber", young=12.0, poisson=0.48)
+    >>> part = Part(crane, rubber, Section(2.0, 5.0))
     >>> round(part.stroke, 6)
     4.330127
     """

@@ -161,7 +161,7 @@ def confirmed(efficiency: NDArray[np.float64], masks: NDArray[np.uint8]) -> list
     [2]
     """
     kept = np.flatnonzero((masks[1:] == masks[:-1]).all(axis=1)) + 1
-    limit = efficiency[kept].max(initial=-np.inf) if len(kept) else np.inf
+    limit = efficiency[kept].max() if len(kept) else np.inf
     below = [index for index in peaks(efficiency, masks) if efficiency[index] <= limit]
     return sorted({*kept.tolist(), *below})
 

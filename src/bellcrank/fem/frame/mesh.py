@@ -55,6 +55,13 @@ class FrameMesh:
         """Number of nodes."""
         return len(self.positions)
 
+    def at_lattice(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (N, 2) the motion of the lattice's nodes, mm; 0 where no strut is."""
+        moved = np.zeros((len(self.node), 2))
+        there = self.node >= 0
+        moved[there] = displacement[self.node[there], :2]
+        return moved
+
 
 theories: Registry[Callable[[Part, NDArray[np.float64]], NDArray[np.float64]]] = Registry("theory")
 """From a part and the lengths (e,) of elements to the ratio of shear to bending flexibility,

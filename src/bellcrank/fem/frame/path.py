@@ -29,6 +29,10 @@ LARGEST_STEP = 1.0 / 8.0
 SMALLEST_STEP = 1e-4
 LARGEST_DEPARTURE = 0.5
 """Of the corrector from the predictor, as a part of the predicted motion."""
+DIFFERENCE = 1e-7
+"""Part of the input by which it is moved to see what that does."""
+SOFTEST = 1e-12
+"""Least pivot, as a part of the largest, of a stiffness that holds everything in place."""
 EASY = 4
 """Iterations up to which the next step is larger."""
 
@@ -98,12 +102,12 @@ class Follower:
     def tangent(self, state: FrameState) -> tuple[Factor, NDArray[np.float64]]:
         """Return the factor at a state, and (n, 3) its motion for all of the load at once."""
         system = self.system
-        given = state.displacement + 1e-7 * system.motion
+        given = state.displacement + DIFFERENCE * system.motion
         force, matrix, _ = inner_forces(system, state.displacement)
         factor = self._factor(matrix)
         # What the given motion does to the free forces, without a matrix for it.
         moved, _, _ = inner_forces(system, given)
-        right = system.load - (moved - force) / 1e-7
+        right = system.load - (moved - force) / DIFFERENCE
         rate = system.motion.copy()
         rate.ravel()[system.free] = factor.solve(right.ravel()[system.free])
         return factor, rate
@@ -154,8 +158,11 @@ def follow(system: FrameSystem, largest_step: float = LARGEST_STEP) -> FramePath
     """
     follower = Follower(system)
     states = [follower.at_rest()]
-    factor, rate = follower.tangent(states[0])
-    if factor.negative or not np.isfinite(rate).all():
+    try:
+        factor, rate = follower.tangent(states[0])
+    except RuntimeError:
+        return FramePath(states, PathStatus.MECHANISM, follower.factorisations)
+    if factor.pivots.min() < SOFTEST * factor.pivots.max():
         return FramePath(states, PathStatus.MECHANISM, follower.factorisations)
     step = min(FIRST_STEP, largest_step)
     unstable = False

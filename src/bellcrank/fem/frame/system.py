@@ -23,6 +23,11 @@ class Factor:
     ----------
     matrix
         Symmetric, in compressed columns.
+
+    Raises
+    ------
+    RuntimeError
+        If it is exactly singular.
     """
 
     def __init__(self, matrix: csc_matrix) -> None:
@@ -34,7 +39,12 @@ class Factor:
         )
         # Pivots stay on the diagonal, so L U is L D L', whose signs are those of the matrix
         # (Sylvester's law of inertia).
-        self.negative = int((self._factor.U.diagonal() < 0.0).sum())
+        self.pivots: NDArray[np.float64] = self._factor.U.diagonal()
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues."""
+        return int((self.pivots < 0.0).sum())
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for a right-hand side."""
@@ -56,8 +66,12 @@ class FrameSystem:
         Given displacements at the full stroke, 0 where none is.
     load : (n, 3)
         Forces at the full stroke, N.
-    springs : (s, 3, 2)
-        Node (as a number), and 2 x 2 stiffness in N / mm, of springs to the ground.
+    spring_nodes : (s,) int64
+        Nodes with springs to the ground.
+    springs : (s, 2, 2)
+        Their stiffness, N / mm.
+    assembly
+        Of the stiffness for the free degrees of freedom, from elements and springs in order.
     """
 
     mesh: FrameMesh
@@ -71,7 +85,19 @@ class FrameSystem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembly:
-    """Where the entries of element matrices go, found once."""
+    """Where the entries of dense blocks go in a sparse matrix, found once.
+
+    Parameters
+    ----------
+    kept : (k,) int64
+        Those of the entries that are not about held degrees of freedom.
+    slot : (k,) int64
+        Which value of the matrix each is added to.
+    rows, starts
+        Of the values, in compressed columns.
+    size
+        Rows of the matrix.
+    """
 
     kept: NDArray[np.int64]
     slot: NDArray[np.int64]
