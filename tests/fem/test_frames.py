@@ -15,11 +15,14 @@ from scipy.sparse.csgraph import connected_components
 from tests.fem import opensees
 
 from bellcrank.fem.frame.elements import energy, forces_and_stiffness
+from bellcrank.fem.frame.equilibrium import FrameEquations, FrameState, solve_linear
 from bellcrank.fem.frame.mesh import FrameMesh, frame_mesh
-from bellcrank.fem.frame.path import FrameState, PathStatus, follow, solve_linear
-from bellcrank.fem.frame.system import frame_system
+from bellcrank.fem.frame.settling import settle
+from bellcrank.fem.frame.system import FrameSystem, assembly_of, dofs_of, frame_system
 from bellcrank.fem.materials import Material
 from bellcrank.fem.part import Part
+from bellcrank.fem.path import Loss, PathStatus, Stepping, follow
+from bellcrank.fem.path import Path as StrokePath
 from bellcrank.fem.section import Section
 from bellcrank.model import (
     Design,
@@ -34,6 +37,11 @@ from bellcrank.model import (
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "crane.problem.json"
 RUBBER = Material(name="rubber", young=12.0, poisson=0.48)
+
+
+def end_of(system: FrameSystem, path: StrokePath) -> FrameState:
+    """The last stable state of a path, in full."""
+    return FrameEquations(system).complete(path.states[-1])
 
 
 def crane_part(crane: Problem, width: float, stroke: float) -> Part:
@@ -85,9 +93,10 @@ def test_nonlinear_figures_that_several_codes_agree_on(
 ) -> None:
     part = crane_part(reference_crane, 2.0, stroke)
     mesh = frame_mesh(part, 8)
-    path = follow(frame_system(part, mesh))
+    system = frame_system(part, mesh)
+    path = follow(FrameEquations(system))
     assert path.status is PathStatus.CONVERGED
-    assert figures(part, mesh, path.states[-1]) == pytest.approx(expected, rel=5e-8)
+    assert figures(part, mesh, end_of(system, path)) == pytest.approx(expected, rel=5e-8)
 
 
 def diluted(name: str, seed: int) -> Part:
@@ -124,7 +133,8 @@ def test_diluted_lattices_move_as_in_opensees(
     motion, force = opensees.respond(part, 3, theory, nonlinear=nonlinear)
     mesh = frame_mesh(part, 3, theory)
     system = frame_system(part, mesh)
-    state = follow(system).states[-1] if nonlinear else solve_linear(system)
+    path = follow(FrameEquations(system))
+    state = end_of(system, path) if nonlinear else solve_linear(system)
     assert state.load == 1.0
     scale = np.abs(motion).max()
     assert np.abs(mesh.at_lattice(state.displacement) - motion).max() < 1e-8 * scale
@@ -157,9 +167,10 @@ def chain(force: float, direction: tuple[float, float], section: Section = SECTI
 
 def tip(part: Part, elements: int, theory: str = "euler-bernoulli") -> np.ndarray:
     mesh = frame_mesh(part, elements, theory)
-    path = follow(frame_system(part, mesh))
+    system = frame_system(part, mesh)
+    path = follow(FrameEquations(system))
     assert path.status is PathStatus.CONVERGED
-    return path.states[-1].displacement[mesh.node[2]]
+    return end_of(system, path).displacement[mesh.node[2]]
 
 
 @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
@@ -214,9 +225,61 @@ def test_a_column_buckles_at_euler_s_load() -> None:
     paths = []
     for factor in (0.995, 1.02):
         part = chain(factor * critical, (-1.0, 0.0))
-        paths.append(follow(frame_system(part, frame_mesh(part, 8))))
+        paths.append(follow(FrameEquations(frame_system(part, frame_mesh(part, 8)))))
     assert [path.status for path in paths] == [PathStatus.CONVERGED, PathStatus.SNAPPED]
     assert paths[1].states[-1].load * 1.02 == pytest.approx(1.0, rel=2e-3)
+    assert paths[1].loss is Loss.BIFURCATION
+
+
+def lee_frame(elements: int, drive: str) -> tuple[FrameMesh, FrameSystem]:
+    """A column and a bar of equal length, hinged at both far ends, pushed down at a fifth."""
+    lattice = Lattice([[0.0, 0.0], [0.0, 1.0], [0.2, 1.0], [1.0, 1.0]], [[0, 1], [1, 2], [2, 3]])
+    problem = Problem(
+        name="lee",
+        lattice=lattice,
+        supports=Supports(fixed=[0, 3]),
+        input=Input(nodes=[2], direction=[0.0, -1.0], drive=drive, amount=0.5),
+        output=Output(nodes=[1], direction=[1.0, 0.0]),
+        designable=[0],
+    )
+    steel = Material(name="as in the literature", young=72e3, poisson=0.3)
+    part = Part(problem.full_design(), steel, Section(20.0, 30.0), scale=1200.0)
+    if drive == "force":
+        amount = 25e3 / (part.stiffness_unit * part.scale)
+        driven = replace(problem, input=replace(problem.input, amount=amount))
+        part = replace(part, design=driven.full_design())
+    mesh = frame_mesh(part, elements)
+    system = frame_system(part, mesh)
+    # Hinges turn, and the pushed point slides sideways.
+    turning, sliding = 3 * mesh.node[[0, 3]] + 2, 3 * mesh.node[2]
+    free = np.union1d(system.free, [*turning, sliding])
+    blocks = [dofs_of(mesh.elements).reshape(-1, 6), np.empty((0, 2), dtype=np.int64)]
+    assembly = assembly_of(blocks, free, 3 * mesh.node_count)
+    return mesh, replace(system, free=free, assembly=assembly)
+
+
+def test_lee_s_frame_snaps_at_its_limit_load_and_settles_beyond() -> None:
+    # Moved by the same point it does not snap yet, and needs most force where it would.
+    mesh, system = lee_frame(12, "displacement")
+    moved = FrameEquations(system)
+    path = follow(moved, Stepping(largest=1.0 / 64.0))
+    assert path.status is PathStatus.CONVERGED
+    node = mesh.node[2]
+    limit = max(-moved.complete(state).reaction[node, 1] for state in path.states)
+    mesh, system = lee_frame(12, "force")
+    equations = FrameEquations(system)
+    path = follow(equations)
+    assert (path.status, path.loss) == (PathStatus.SNAPPED, Loss.LIMIT_POINT)
+    assert path.states[-1].load * 25e3 == pytest.approx(limit, rel=1e-3)
+    before = equations.complete(path.states[-1])
+    settled = settle(equations, path.states[-1], np.random.default_rng(0))
+    assert settled is not None
+    after = equations.complete(settled)
+    # The bar has swung through: the push is far below where it was, and the state is stable.
+    assert after.displacement[mesh.node[2], 1] < before.displacement[mesh.node[2], 1] - 300.0
+    held = equations.linearise(settled.unknowns, settled.load)
+    assert held.factor.negative == 0
+    assert np.abs(held.residual).max() <= held.tolerance
 
 
 def test_an_output_spring_shares_the_load_with_the_bar() -> None:
@@ -256,6 +319,6 @@ def test_a_loose_piece_makes_a_mechanism() -> None:
     rim = crane.lattice.beams_touching(np.concatenate([crane.output.nodes, crane.input.nodes]))
     for loose in (rim, rim | ~np.isin(np.arange(len(rim)), crane.designable)):
         part = Part(Design(crane, loose), RUBBER, Section(2.0, 5.0))
-        path = follow(frame_system(part, frame_mesh(part, 2)))
+        path = follow(FrameEquations(frame_system(part, frame_mesh(part, 2))))
         assert path.status is PathStatus.MECHANISM
         assert [state.load for state in path.states] == [0.0]

@@ -90,6 +90,14 @@ def gradient_of_natural(
     return gradient, along, across
 
 
+def forces(mesh: FrameMesh, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (e, 6) the forces of the elements on their ends."""
+    strain, direction, length = natural(mesh, displacement)
+    gradient, _, _ = gradient_of_natural(direction, length)
+    force: NDArray[np.float64] = np.einsum("eji,ejk,ek->ei", gradient, mesh.stiffness, strain)
+    return force
+
+
 def forces_and_stiffness(
     mesh: FrameMesh, displacement: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

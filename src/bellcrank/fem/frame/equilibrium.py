@@ -1,19 +1,94 @@
-"""Forces and stiffness of a whole frame in a state."""
+"""Forces and stiffness of a whole frame in a state, and the equations of its equilibrium."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.fem.frame import elements
-from bellcrank.fem.frame.system import dofs_of
+from bellcrank.fem.frame.system import SparseFactor, dofs_of
+from bellcrank.fem.path import Linearised, State
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy.sparse import csc_matrix
 
     from bellcrank.fem.frame.system import FrameSystem
+
+TOLERANCE = 1e-10
+"""Residual, as a part of the largest force within an element."""
+DIFFERENCE = 1e-7
+"""Part of the input by which it is moved to see what that does."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameState:
+    """An equilibrium of a frame.
+
+    Parameters
+    ----------
+    load
+        Part of the full input, 0 to 1.
+    displacement : (n, 3)
+        Of the mesh's nodes: x, y in mm, rotation in radians.
+    reaction : (n, 3)
+        Forces (N) and moments (N mm) on the held degrees of freedom, 0 on the others.
+    negative
+        Eigenvalues below 0 of its stiffness; stable if there are none.
+    """
+
+    load: float
+    displacement: NDArray[np.float64]
+    reaction: NDArray[np.float64]
+    negative: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameEquations:
+    """Equilibrium of a frame that moves far; the unknowns are its free degrees of freedom."""
+
+    system: FrameSystem
+
+    @property
+    def count(self) -> int:
+        """Number of unknowns."""
+        return len(self.system.free)
+
+    def displacement(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
+        """Return (n, 3) the displacement of all nodes."""
+        whole = load * self.system.motion
+        whole.ravel()[self.system.free] = unknowns
+        return whole
+
+    def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearised:
+        """Return the equations near a state."""
+        system = self.system
+        displacement = self.displacement(unknowns, load)
+        force, matrix, magnitude = inner_forces(system, displacement)
+        residual = (force - load * system.load).ravel()[system.free]
+        tolerance = TOLERANCE * magnitude + rounding(system, displacement)
+        return Linearised(residual, tolerance, SparseFactor(matrix))
+
+    def pull(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
+        """Return (f,) the derivative of the residual by the load."""
+        system = self.system
+        here = self.displacement(unknowns, load)
+        given = here + DIFFERENCE * system.motion
+        change = (forces(system, given) - forces(system, here)) / DIFFERENCE - system.load
+        return change.ravel()[system.free]
+
+    def distance(self, change: NDArray[np.float64]) -> float:
+        """Return the norm of a change without its rotations, mm."""
+        return float(np.linalg.norm(change[self.system.free % 3 < 2]))
+
+    def complete(self, state: State) -> FrameState:
+        """Return an equilibrium with all displacements and reactions."""
+        displacement = self.displacement(state.unknowns, state.load)
+        reaction = (forces(self.system, displacement) - state.load * self.system.load).ravel()
+        reaction[self.system.free] = 0.0
+        return FrameState(state.load, displacement, reaction.reshape(-1, 3), state.negative)
 
 
 def inner_forces(
@@ -24,23 +99,60 @@ def inner_forces(
     The derivative is by the free degrees of freedom only; the magnitude is the largest force
     within any element, against which a residual is small or not.
     """
-    mesh = system.mesh
-    force, tangent = elements.forces_and_stiffness(mesh, displacement)
+    force, tangent = elements.forces_and_stiffness(system.mesh, displacement)
     total = gathered(system, force, displacement)
     entries = np.concatenate([tangent.ravel(), system.springs.ravel()])
     return total, system.assembly.matrix(entries), float(np.abs(force[:, [0, 1, 3, 4]]).max())
 
 
-def linear_forces(
-    system: FrameSystem, displacement: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], csc_matrix]:
-    """Return the same for small motions."""
-    mesh = system.mesh
-    tangent = elements.linear_stiffness(mesh)
-    ends = displacement[mesh.elements].reshape(-1, 6)
-    force = np.einsum("eij,ej->ei", tangent, ends)
+def forces(system: FrameSystem, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n, 3) the forces that hold a state."""
+    return gathered(system, elements.forces(system.mesh, displacement), displacement)
+
+
+def potential(system: FrameSystem, load: float, displacement: NDArray[np.float64]) -> float:
+    """Return elastic energy less the work of the loads, N mm."""
+    moved = displacement[system.spring_nodes, :2]
+    springs = 0.5 * np.einsum("si,sij,sj->", moved, system.springs, moved)
+    work = load * float((system.load * displacement).sum())
+    return float(elements.energy(system.mesh, displacement).sum() + springs - work)
+
+
+def solve_linear(system: FrameSystem) -> FrameState:
+    """Return the response to the full input of a frame that moves little.
+
+    Raises
+    ------
+    RuntimeError
+        If the stiffness is singular.
+    """
+    given = system.motion
+    tangent = elements.linear_stiffness(system.mesh)
+
+    def held(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        ends = displacement[system.mesh.elements].reshape(-1, 6)
+        return gathered(system, np.einsum("eij,ej->ei", tangent, ends), displacement)
+
     entries = np.concatenate([tangent.ravel(), system.springs.ravel()])
-    return gathered(system, force, displacement), system.assembly.matrix(entries)
+    factor = SparseFactor(system.assembly.matrix(entries))
+    if not factor.firm:
+        raise RuntimeError("singular")
+    displacement = given.copy()
+    right = (system.load - held(given)).ravel()[system.free]
+    displacement.ravel()[system.free] = factor.solve(right)
+    reaction = (held(displacement) - system.load).ravel()
+    reaction[system.free] = 0.0
+    return FrameState(1.0, displacement, reaction.reshape(-1, 3), factor.negative)
+
+
+def rounding(system: FrameSystem, displacement: NDArray[np.float64]) -> float:
+    """Return the force that rounding the displacements makes in the stiffest element.
+
+    In slender struts it is no small part of what bends them.
+    """
+    stiffest = float(system.mesh.stiffness[:, 0, 0].max())
+    largest = float(np.abs(displacement[:, :2]).max())
+    return 100.0 * float(np.finfo(float).eps) * stiffest * largest
 
 
 def gathered(

@@ -16,7 +16,11 @@ if TYPE_CHECKING:
     from bellcrank.fem.part import Part
 
 
-class Factor:
+SOFTEST = 1e-12
+"""Least pivot, as a part of the largest, of a stiffness that holds everything in place."""
+
+
+class SparseFactor:
     """A symmetric factorisation that also tells how many eigenvalues are negative.
 
     Parameters
@@ -45,6 +49,11 @@ class Factor:
     def negative(self) -> int:
         """Number of negative eigenvalues."""
         return int((self.pivots < 0.0).sum())
+
+    @property
+    def firm(self) -> bool:
+        """Whether everything is held in place."""
+        return bool(self.pivots.min() >= SOFTEST * self.pivots.max())
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for a right-hand side."""
