@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidProblem, InvalidSettings, UnknownName
-from bellcrank.mechanics import Evaluator, Status, minimisers, objective_of, objectives
+from bellcrank.mechanics import (
+    Evaluator,
+    Status,
+    efficiency_of,
+    minimisers,
+    objective_of,
+    objectives,
+)
 from bellcrank.model import Input, Lattice, Output, Problem, Supports
 
 POSITIONS = [[0, 0], [1, 0], [0.5, 0.9], [1.5, 0.9], [1, 1.8]]
@@ -56,6 +63,8 @@ def test_every_objective_gives_a_number_or_says_why_not(objective: str, drive: s
     response = evaluator.respond(problem.initial)
     assert response.status is Status.CONVERGED
     assert np.isfinite(response.efficiency)
+    measured = efficiency_of(problem, response.displacement, objective)
+    assert measured == pytest.approx(response.efficiency, rel=1e-12)
     assert np.isfinite(evaluator.sensitivity(problem.initial)).all()
 
 

@@ -19,11 +19,8 @@ from bellcrank.fem.frame.equilibrium import FrameEquations, FrameState, solve_li
 from bellcrank.fem.frame.mesh import FrameMesh, frame_mesh
 from bellcrank.fem.frame.settling import settle
 from bellcrank.fem.frame.system import FrameSystem, assembly_of, dofs_of, frame_system
-from bellcrank.fem.materials import Material
-from bellcrank.fem.part import Part
 from bellcrank.fem.path import Loss, PathStatus, Stepping, follow
 from bellcrank.fem.path import Path as StrokePath
-from bellcrank.fem.section import Section
 from bellcrank.model import (
     Design,
     Input,
@@ -34,6 +31,9 @@ from bellcrank.model import (
     find_problem,
     read_problem,
 )
+from bellcrank.parts.materials import Material
+from bellcrank.parts.part import Part
+from bellcrank.parts.section import Section
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "crane.problem.json"
 RUBBER = Material(name="rubber", young=12.0, poisson=0.48)

@@ -27,6 +27,7 @@ from bellcrank.cli.console import (
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
+    from bellcrank.parts import PartSpec
     from bellcrank.workflows import DesignReport
 
 
@@ -80,6 +81,15 @@ def design(
         str | None,
         typer.Option(help="Write the front of these, like efficiency,stiffness,mass."),
     ] = None,
+    strut_width: Annotated[
+        str | None, typer.Option(help="Search with the stiffness of struts this wide, like 1.6mm.")
+    ] = None,
+    scale: Annotated[
+        str | None, typer.Option(help="Length of a lattice unit of that part. \\[10mm]")
+    ] = None,
+    material: Annotated[
+        str | None, typer.Option(help="Of that part, kept for validation. \\[ninjaflex]")
+    ] = None,
     more: Annotated[
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE: any other setting of the search; repeatable."),
@@ -99,6 +109,9 @@ def design(
     if (problem is None) == (resume is None):
         raise InvalidSettings("give either a problem to design for or --resume DIR")
     measures = _measures(pareto)
+    part = _part(strut_width, scale, material)
+    if resume is not None and part is not None:
+        raise InvalidSettings("--strut-width, --scale and --material are kept from the run's start")
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
     if problem is None:
@@ -117,7 +130,7 @@ def design(
         settings = read_settings({"search": search, **chosen, **settings_of("--set", more)})
         task = find_problem(problem)
         announce_compilation()
-        folder = start_design(task, settings, out or Path(Path(task.name).name))
+        folder = start_design(task, settings, out or Path(Path(task.name).name), part)
     progress = SearchProgress(read_settings(folder.settings))
     with stopping_on_interrupt() as stop, progress:
         report = complete_design(folder, workers=workers, tell=progress, stop=stop, pareto=measures)
@@ -128,6 +141,18 @@ def design(
         )
         sys.exit(INTERRUPTED)
     _print_report(report)
+
+
+def _part(width: str | None, scale: str | None, material: str | None) -> PartSpec | None:
+    """Return what the design will be made as, if anything was said about that."""
+    from bellcrank.parts import PartSpec, materials
+
+    if width is None:
+        if scale is not None or material is not None:
+            raise InvalidSettings("--scale and --material belong to a part; give --strut-width too")
+        return None
+    given = {"width": width, "scale": scale, "material": material and materials[material].name}
+    return PartSpec().changed({key: value for key, value in given.items() if value is not None})
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:

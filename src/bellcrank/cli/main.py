@@ -8,12 +8,12 @@ from typing import NoReturn, cast
 
 import typer
 
-from bellcrank.cli import campaign, design, evaluate, plot, problems
+from bellcrank.cli import campaign, design, evaluate, plot, problems, validate
 from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, app
 from bellcrank.cli.console import notes, plain
 from bellcrank.errors import BellcrankError, CorruptRun, RunFailed, StorageError
 
-COMMANDS = (campaign, design, evaluate, plot, problems)
+COMMANDS = (campaign, design, evaluate, plot, problems, validate)
 """Modules that register a command."""
 FAILURES = (StorageError, CorruptRun, RunFailed)
 """What is not the fault of who typed the command."""

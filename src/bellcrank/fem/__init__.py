@@ -1,1 +1,26 @@
-"""Finite elements, which tell whether a part moves as the model of its design says."""
+"""Finite elements, which tell whether a part moves as the model of its design says.
+
+>>> from bellcrank.fem import FemSettings, levels
+>>> from bellcrank.model import human_design
+>>> from bellcrank.parts import PartSpec
+>>> part = PartSpec(width=2.0).of(human_design("crane"))
+>>> analysis = levels["frame"](part, FemSettings())
+>>> analysis.status.value, round(analysis.efficiency, 3)
+('converged', 1.21)
+"""
+
+from bellcrank.fem import frame
+from bellcrank.fem.levels import FemSettings, levels
+from bellcrank.fem.path import Loss, PathStatus
+from bellcrank.fem.results import Analysis, Field, StrokePoint
+
+__all__ = [
+    "Analysis",
+    "FemSettings",
+    "Field",
+    "Loss",
+    "PathStatus",
+    "StrokePoint",
+    "frame",
+    "levels",
+]

@@ -20,7 +20,7 @@ from bellcrank.mechanics.evaluator import (
     load_bearing_core,
 )
 from bellcrank.mechanics.minimisers import Minimiser, minimisers
-from bellcrank.mechanics.objectives import Objective, objective_of, objectives
+from bellcrank.mechanics.objectives import Objective, efficiency_of, objective_of, objectives
 
 __all__ = [
     "CAREFUL",
@@ -32,6 +32,7 @@ __all__ = [
     "Response",
     "Screening",
     "Status",
+    "efficiency_of",
     "foresee_stiffness",
     "load_bearing_core",
     "minimisers",

@@ -16,11 +16,15 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bellcrank.errors import InvalidSettings
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
 
     from bellcrank.model import Problem
 
@@ -133,3 +137,51 @@ def objective_of(problem: Problem, name: str | None = None) -> Objective:
 def _usual_objective(problem: Problem) -> str:
     loaded = problem.input.drive == "force" and problem.output.spring is not None
     return "force" if loaded else "displacement"
+
+
+def efficiency_of(
+    problem: Problem, displacement: ArrayLike, name: str | None = None, load: float = 1.0
+) -> float:
+    """Return the efficiency of any motion of the lattice's nodes, whoever computed it.
+
+    Parameters
+    ----------
+    displacement : (N, 2)
+        Of the nodes, in lattice units.
+    name
+        Of the objective; by default the problem's own.
+    load
+        Part of the full input that makes the motion.
+
+    Returns
+    -------
+    float
+        nan if the input does not move.
+
+    Raises
+    ------
+    UnknownName, InvalidSettings
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> crane = find_problem("crane")
+    >>> moved = np.zeros((crane.lattice.node_count, 2))
+    >>> moved[crane.output.nodes] = [-crane.input.amount, 0.0]
+    >>> round(efficiency_of(crane, moved), 12)
+    1.0
+    """
+    objective = objective_of(problem, name)
+    motion = np.asarray(displacement, dtype=np.float64)
+    there = motion[problem.output.nodes]
+    size = np.hypot(there[:, 0], there[:, 1])
+    along = (there * problem.output.direction).sum(axis=1)
+    cosine = np.divide(along, size, out=np.zeros_like(size), where=size > 0.0)
+    half = np.sqrt(np.clip(0.5 * (1.0 + cosine), 0.0, 1.0))
+    total = float((size * (2.0 * half**objective.exponent - 1.0)).sum())
+    if objective.denominator is not None:
+        given = load * objective.denominator
+    else:
+        pushed = (motion[problem.input.nodes] * problem.input.direction).sum()
+        given = objective.denominator_scale * float(pushed)
+    return objective.numerator_scale * total / given if given else math.nan

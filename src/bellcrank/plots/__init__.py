@@ -6,7 +6,8 @@ thread. The suffix of a path (png, svg, pdf) chooses the format.
 
 - `draw_motion`, `draw_comparison`, `draw_design` draw designs, given as `Motion` or Design;
 - `draw_paths` draws efficiency against accepted steps, given as `ChainPath`;
-- `draw_front` draws a Pareto front.
+- `draw_front` draws a Pareto front;
+- `draw_stress` draws parts in the colours of their stress, given as `Stressed`.
 """
 
 from bellcrank.plots.chains import ChainPath, PathsStyle
@@ -14,14 +15,18 @@ from bellcrank.plots.front import draw_front
 from bellcrank.plots.motion import draw_comparison, draw_design, draw_motion
 from bellcrank.plots.paths import draw_paths
 from bellcrank.plots.scene import Motion
+from bellcrank.plots.stress import Stressed, StrokeAxes, draw_stress
 
 __all__ = [
     "ChainPath",
     "Motion",
     "PathsStyle",
+    "Stressed",
+    "StrokeAxes",
     "draw_comparison",
     "draw_design",
     "draw_front",
     "draw_motion",
     "draw_paths",
+    "draw_stress",
 ]

@@ -59,7 +59,7 @@ COLUMNS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class Drawing:
     """One drawing of a picture, and the words over it."""
 
     title: str
@@ -69,6 +69,7 @@ class _Part:
 
     @property
     def arrows(self) -> list[Arrow]:
+        """Of the input, and of what is wanted of the output."""
         problem = self.motion.design.problem
         return [*input_arrows(problem), *wanted_arrows(problem, self.motion.moved)]
 
@@ -113,7 +114,7 @@ def draw_motion(
     ['motion.png']
     """
     check_target(path, overwrite=overwrite)
-    part = _Part(title or motion.design.problem.name, motion.caption, motion, moving=True)
+    part = Drawing(title or motion.design.problem.name, motion.caption, motion, moving=True)
     save_figure(_picture([part], WIDTH), path, overwrite=overwrite)
 
 
@@ -130,7 +131,7 @@ def draw_comparison(
     """
     check_target(path, overwrite=overwrite)
     parts = [
-        _Part(motion.name or motion.design.problem.name, motion.caption, motion, moving=True)
+        Drawing(motion.name or motion.design.problem.name, motion.caption, motion, moving=True)
         for motion in (left, right)
     ]
     save_figure(_picture(parts, WIDE), path, overwrite=overwrite)
@@ -148,17 +149,17 @@ def draw_design(
     at_rest = Motion(design, np.zeros((problem.lattice.node_count, 2)))
     count = np.count_nonzero(design.mask[problem.designable])
     note = f"{design.beam_count} beams · {count} of {len(problem.designable)} designable ones"
-    part = _Part(title or problem.name, note, at_rest, moving=False)
+    part = Drawing(title or problem.name, note, at_rest, moving=False)
     save_figure(_picture([part], WIDTH), path, overwrite=overwrite)
 
 
-def _picture(parts: list[_Part], width: float) -> Figure:
+def _picture(parts: list[Drawing], width: float) -> Figure:
     """Lay out drawings to one scale, with words over them and a legend under all."""
-    frames = _level(parts)
+    frames = level_frames(parts)
     sizes = np.array([high - low for low, high in frames])
     room = width - 2 * MARGIN - GAP * (len(parts) - 1)
     scale = float(min(room / sizes[:, 0].sum(), TALLEST / sizes[:, 1].max()))
-    entries = _entries(parts)
+    entries = entries_of(parts)
     legend_height = ROW_HEIGHT * math.ceil(len(entries) / COLUMNS)
     top = MARGIN + max(style.heading_height(part.title, part.note) for part in parts)
     below = MARGIN + legend_height + 0.2
@@ -169,13 +170,13 @@ def _picture(parts: list[_Part], width: float) -> Figure:
         heading = MARGIN if len(parts) == 1 else left
         style.write_heading(figure, part.title, part.note, heading, MARGIN)
         panel = add_panel(figure, part.motion.design.problem, (left, below), scale, low, high)
-        _fill(panel, part)
+        fill(panel, part)
         left += scale * float(size[0]) + GAP
     add_legend(figure, entries, MARGIN, COLUMNS)
     return figure
 
 
-def _frame(part: _Part) -> Frame:
+def _frame(part: Drawing) -> Frame:
     """Lower left and upper right corner of what is drawn, lattice units."""
     problem = part.motion.design.problem
     positions, step = problem.lattice.positions, spacing(problem)
@@ -186,7 +187,7 @@ def _frame(part: _Part) -> Frame:
     return extent(places, part.arrows, 0.15 * step)
 
 
-def _level(parts: list[_Part]) -> list[Frame]:
+def level_frames(parts: list[Drawing]) -> list[Frame]:
     """Frames of equal height around the lattices' feet, so that drawings stand on one level."""
     frames = [_frame(part) for part in parts]
     feet = [float(part.motion.design.problem.lattice.positions[:, 1].min()) for part in parts]
@@ -198,7 +199,8 @@ def _level(parts: list[_Part]) -> list[Frame]:
     ]
 
 
-def _fill(panel: Panel, part: _Part) -> None:
+def fill(panel: Panel, part: Drawing) -> None:
+    """Draw a design into its panel."""
     problem = panel.problem
     put_supports(panel)
     if part.moving:
@@ -236,7 +238,7 @@ def _put_still_struts(panel: Panel, design: Design) -> None:
     put_struts(panel, rest, kinds.bearing[free], style.INK, level=2.2)
 
 
-def _entries(parts: list[_Part]) -> list[tuple[str, Any]]:
+def entries_of(parts: list[Drawing]) -> list[tuple[str, Any]]:
     """Legend entries for what the drawings hold, and for nothing else."""
     motions = [part.motion for part in parts]
     problems = [motion.design.problem for motion in motions]

@@ -88,6 +88,7 @@ class RunFolder:
         problem: Problem,
         settings: Mapping[str, Any],
         *,
+        notes: Mapping[str, Any] | None = None,
         overwrite: bool = False,
     ) -> RunFolder:
         """Begin a run in a new or empty folder.
@@ -96,6 +97,8 @@ class RunFolder:
         ----------
         settings
             Plain data from which the search can be repeated.
+        notes
+            More to keep with the provenance.
         overwrite
             Delete the run that is there. Files that are not a run's are left alone.
 
@@ -109,7 +112,7 @@ class RunFolder:
             If JSON cannot hold the settings.
         """
         folder = Path(path)
-        description = describe(problem, settings, provenance())
+        description = describe(problem, settings, provenance(**(notes or {})))
         claim_folder(folder, overwrite=overwrite)
         write_description(folder, description)
         return cls(folder, description, problem)

@@ -8,13 +8,25 @@ from bellcrank.workflows.design import (
 from bellcrank.workflows.find import find_design
 from bellcrank.workflows.outcome import DesignReport
 from bellcrank.workflows.pictures import draw_run, move
+from bellcrank.workflows.validate import (
+    Validation,
+    keep_record,
+    spec_for,
+    validate,
+    with_stroke,
+)
 
 __all__ = [
     "DesignReport",
+    "Validation",
     "complete_design",
     "draw_run",
     "find_design",
+    "keep_record",
     "move",
     "reopen_design",
+    "spec_for",
     "start_design",
+    "validate",
+    "with_stroke",
 ]

@@ -10,6 +10,7 @@ import numpy as np
 from bellcrank.errors import BellcrankError
 from bellcrank.mechanics import CAREFUL, Response, Status
 from bellcrank.model import Design, Problem, human_design, write_design
+from bellcrank.parts import calibrated
 from bellcrank.provenance import provenance
 from bellcrank.runs import RunFolder, check_free, remove_temporaries
 from bellcrank.search import (
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from bellcrank.parts import PartSpec
+
 
 def prepare(problem: Problem, settings: SearchSettings) -> None:
     """Compile what a search needs, and refuse a problem that it cannot start from.
@@ -49,21 +52,34 @@ def prepare(problem: Problem, settings: SearchSettings) -> None:
     advance_chain(responder, few, 0, start_chain(responder, few))
 
 
-def start_design(problem: Problem, settings: SearchSettings, out: Path) -> RunFolder:
+def start_design(
+    problem: Problem, settings: SearchSettings, out: Path, part: PartSpec | None = None
+) -> RunFolder:
     """Prepare a design job for `problem` in the new folder `out`.
+
+    Parameters
+    ----------
+    part
+        What the design will be made as: the problem's springs are given the stiffness of its
+        struts.
 
     Raises
     ------
     OutputExists
         If the folder holds something already.
     InvalidSettings
-        If the initial design has no unique, stable response.
+        If the initial design has no unique, stable response, or the part makes no sense.
     StorageError
         If the folder cannot be written.
     """
     check_free(out)
+    notes = {}
+    if part is not None:
+        part.of(problem.full_design())
+        problem = calibrated(problem, part.width, part.scale)
+        notes["part"] = part.to_dict()
     prepare(problem, settings)
-    return RunFolder.create(out, problem, settings.to_dict())
+    return RunFolder.create(out, problem, settings.to_dict(), notes=notes)
 
 
 def reopen_design(out: Path) -> RunFolder:
@@ -195,11 +211,16 @@ def conclude(folder: RunFolder, settings: SearchSettings) -> DesignReport:
     design = replace(
         selection.design,
         efficiency=selection.efficiency_after,
-        provenance=provenance(**_origin(report)),
+        provenance=provenance(**_origin(report), **_part_of(folder)),
     )
     write_design(design, folder.path / "design.json", overwrite=True)
     write_report(report, folder)
     return report
+
+
+def _part_of(folder: RunFolder) -> dict[str, Any]:
+    """Return the part that a run was begun for, if any."""
+    return {key: value for key, value in folder.provenance.items() if key == "part"}
 
 
 def _origin(report: DesignReport) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.fem.section import SHEAR_COEFFICIENT
+from bellcrank.parts.section import SHEAR_COEFFICIENT
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.fem.part import Part
+    from bellcrank.parts.part import Part
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +61,14 @@ class FrameMesh:
         there = self.node >= 0
         moved[there] = displacement[self.node[there], :2]
         return moved
+
+    def lines(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return (s,) the beams that have struts, and (s, k) the nodes along each."""
+        struts, first = np.unique(self.strut, return_index=True)
+        each = len(self.elements) // len(struts)
+        chains = self.elements.reshape(len(struts), each, 2)
+        along = np.concatenate([chains[:, :, 0], chains[:, -1:, 1]], axis=1)
+        return self.strut[first], along
 
 
 theories: Registry[Callable[[Part, NDArray[np.float64]], NDArray[np.float64]]] = Registry("theory")

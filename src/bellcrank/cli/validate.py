@@ -1,0 +1,229 @@
+"""`bellcrank validate`: finite elements of the part that a design becomes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.box import SIMPLE
+from rich.table import Table
+
+from bellcrank.cli.app import FAILED, app
+from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.cli.live import Live
+from bellcrank.errors import InvalidSettings
+
+if TYPE_CHECKING:
+    from bellcrank.fem import Analysis, FemSettings
+    from bellcrank.parts import PartSpec
+    from bellcrank.workflows import Validation
+
+
+class StrokeProgress(Live):
+    """A live line: which analysis, and how far along the stroke it is."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        super().__init__("validating", 100 * len(names))
+        self._names = names
+
+    def __call__(self, index: int, load: float) -> None:
+        """Show the part of the stroke that an analysis has reached."""
+        name = self._names[index]
+        line = f"{name}: {load:.0%} of the stroke"
+        self._show(int(100 * (index + load)), 100 * len(self._names), name, line)
+
+
+@app.command()
+def validate(
+    design: Annotated[
+        str, typer.Argument(help="A design file, a result folder, human:NAME, or a problem.")
+    ],
+    level: Annotated[
+        str, typer.Option(help="frame, plane or solid; several with commas between.")
+    ] = "frame",
+    theory: Annotated[
+        str, typer.Option(help="Of frames: euler-bernoulli or timoshenko, or both.")
+    ] = "euler-bernoulli",
+    law: Annotated[
+        str, typer.Option(help="Of plane and solid: neo-hookean or st-venant-kirchhoff, or both.")
+    ] = "neo-hookean",
+    linear: Annotated[bool, typer.Option("--linear", help="Small motions only.")] = False,
+    elements: Annotated[int, typer.Option(help="Beam elements in each strut.")] = 8,
+    size: Annotated[
+        str | None, typer.Option(help="Largest edge of plane and solid elements.")
+    ] = None,
+    part: Annotated[
+        Path | None, typer.Option(help="TOML file with width, thickness, scale, material, fillet.")
+    ] = None,
+    width: Annotated[str | None, typer.Option(help="Of the struts. \\[2mm]")] = None,
+    thickness: Annotated[str | None, typer.Option(help="Of the part. \\[5mm]")] = None,
+    scale: Annotated[str | None, typer.Option(help="Length of a lattice unit. \\[10mm]")] = None,
+    fillet: Annotated[str | None, typer.Option(help="Radius in corners between struts.")] = None,
+    stroke: Annotated[
+        str | None, typer.Option(help="Motion of the input; default: the problem's.")
+    ] = None,
+    material: Annotated[
+        str | None, typer.Option(help="ninjaflex, tpu-95a, pla or petg. \\[ninjaflex]")
+    ] = None,
+    young: Annotated[float | None, typer.Option(help="Young's modulus in MPa.")] = None,
+    poisson: Annotated[float | None, typer.Option(help="Poisson's ratio.")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw the moved part coloured by stress (png, svg, pdf).")
+    ] = None,
+    beside: Annotated[
+        str | None, typer.Option(help="A second design for the picture, like human:crane.")
+    ] = None,
+    vtu: Annotated[Path | None, typer.Option(help="Write the moved part for ParaView.")] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(help="Where to keep the record; default: validation.json beside the design."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace picture, VTU.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Check a design by finite elements: does the part move as it should."""
+    from bellcrank.workflows import find_design, keep_record, spec_for, validate, with_stroke
+    from bellcrank.workflows.figures import draw_validations, prepare_targets, write_vtu
+
+    chosen = find_design(design)
+    prepare_targets(picture, vtu, overwrite=overwrite)
+    lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
+    spec = _spec(part, spec_for(chosen), lengths, material, young, poisson)
+    plan = _plan(level, theory, law, linear=linear, elements=elements, size=size)
+    others = [find_design(beside)] if beside is not None else []
+    if others and picture is None:
+        raise InvalidSettings("--beside is for the picture; give --picture FILE too")
+    announce_compilation()
+    found = []
+    names = [f"{name} {_model(name, settings)}" for name, settings in plan]
+    for one in [chosen, *others]:
+        driven = one if stroke is None else with_stroke(one, stroke, spec.scale)
+        with StrokeProgress(names) as progress:
+            found.append(validate(driven, spec, plan, progress))
+    validation = found[0]
+    target = record or _beside(design)
+    if target is not None:
+        keep_record(validation, target)
+    if picture is not None:
+        draw_validations(
+            found, [design, *([beside] if beside else [])], picture, overwrite=overwrite
+        )
+    if vtu is not None:
+        write_vtu(validation.analyses[-1], vtu, overwrite=overwrite)
+    if as_json:
+        print_json(json.dumps(validation.to_dict(), indent=1))
+    else:
+        _print(validation)
+    for path in (picture, vtu, target):
+        if path is not None:
+            notes.print(f"wrote {plain(path)}")
+    if any(
+        analysis.status.value in ("mechanism", "unconverged") for analysis in validation.analyses
+    ):
+        raise typer.Exit(FAILED)
+
+
+def _spec(
+    path: Path | None,
+    spec: PartSpec,
+    lengths: dict[str, str | None],
+    material: str | None,
+    young: float | None,
+    poisson: float | None,
+) -> PartSpec:
+    """Put together the part from a file and what stands on the command line."""
+    from bellcrank.parts import Material, materials, read_part
+
+    if path is not None:
+        spec = read_part(path)
+    changes: dict[str, Any] = {key: value for key, value in lengths.items() if value is not None}
+    if (young is None) != (poisson is None):
+        raise InvalidSettings("give --young and --poisson together, or --material")
+    if young is not None and poisson is not None:
+        if material is not None:
+            raise InvalidSettings("give either --material or --young and --poisson")
+        changes["material"] = Material(name="custom", young=young, poisson=poisson)
+    elif material is not None:
+        changes["material"] = materials[material].name
+    return spec.changed(changes)
+
+
+def _plan(
+    level: str, theory: str, law: str, *, linear: bool, elements: int, size: str | None
+) -> list[tuple[str, FemSettings]]:
+    """Return each level with each of its theories or laws."""
+    from bellcrank.fem import FemSettings
+    from bellcrank.parts import read_length
+
+    longest = None if size is None else read_length("size", size)
+    common = FemSettings(linear=linear, elements=elements, size=longest)
+    plan = []
+    for name in level.split(","):
+        if name == "frame":
+            plan += [(name, replace(common, theory=one)) for one in theory.split(",")]
+        else:
+            laws = ["neo-hookean"] if linear else law.split(",")
+            plan += [(name, replace(common, law=one)) for one in laws]
+    return plan
+
+
+def _model(level: str, settings: FemSettings) -> str:
+    return settings.theory if level == "frame" else settings.law
+
+
+def _beside(design: str) -> Path | None:
+    """Return where the record of a design that lies in a file belongs."""
+    from bellcrank.model import builtin
+
+    path = Path(design)
+    if ":" in design or design in builtin or not path.exists():
+        return None
+    if path.is_dir():
+        return path / "validation.json"
+    stem = "" if path.stem == "design" else f"{path.stem}."
+    return path.with_name(f"{stem}validation.json")
+
+
+def _print(validation: Validation) -> None:
+    """Say what each level says, in a table: a column for each."""
+    table = Table(box=SIMPLE)
+    table.add_column("")
+    table.add_column("discrete model", justify="right")
+    columns = [_column(analysis) for analysis in validation.analyses]
+    for analysis in validation.analyses:
+        table.add_column(_heading(analysis), justify="right")
+    response = validation.response
+    first = [f"{response.efficiency:.4f}", "", "", "", "", response.status.label]
+    names = ("efficiency", "output, mm", "force, N", "stress, MPa", "strain", "status")
+    for place, name in enumerate(names):
+        table.add_row(name, first[place], *(column[place] for column in columns))
+    results.print(table)
+    for analysis in validation.analyses:
+        for warning in analysis.warnings:
+            notes.print(f"[yellow]{analysis.level}:[/] {plain(warning)}")
+
+
+def _heading(analysis: Analysis) -> str:
+    """Return what an analysis is called."""
+    kind = f"{analysis.level}, linear" if analysis.linear else analysis.level
+    return f"{kind}\n{analysis.theory}"
+
+
+def _column(analysis: Analysis) -> list[str]:
+    """Return the figures of an analysis as words."""
+    point = analysis.last
+    known = math.isfinite(analysis.efficiency)
+    status = analysis.status.value
+    return [
+        f"{analysis.efficiency:.4f}" if known else "-",
+        f"{point.output[0]:.3f}, {point.output[1]:.3f}",
+        f"{math.hypot(*point.force):.3f}",
+        f"{point.stress:.3f}",
+        f"{point.strain:.1%}",
+        status if known else f"{status} at {point.load:.1%}",
+    ]

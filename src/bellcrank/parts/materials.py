@@ -1,0 +1,141 @@
+"""What parts are made of: a registry of printable materials, and any other by its figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.registry import Registry
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+LARGEST_POISSON = 0.495
+"""Nearer to 0.5 a solid hardly changes its volume, and elements of displacements alone lock."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """An isotropic material, linear at small strains.
+
+    Parameters
+    ----------
+    name
+        What to call it.
+    young
+        Young's modulus E in MPa.
+    poisson
+        Poisson's ratio, 0 or more and below 0.495.
+    density
+        In g/cm^3; nan if nobody says.
+    strain_limit
+        Elongation that it stands without lasting damage, 0.65 for 65 %; nan if nobody says.
+    sources
+        Where each figure comes from.
+
+    Raises
+    ------
+    InvalidSettings
+        If a figure is impossible.
+
+    Examples
+    --------
+    >>> round(Material(name="rubber", young=12.0, poisson=0.48).shear, 3)
+    4.054
+    """
+
+    name: str
+    young: float
+    poisson: float
+    density: float = math.nan
+    strain_limit: float = math.nan
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.young < math.inf:
+            raise InvalidSettings(f"young: expected a modulus above 0 MPa, got {self.young!r}")
+        if not 0.0 <= self.poisson <= LARGEST_POISSON:
+            raise InvalidSettings(
+                f"poisson: expected a ratio from 0 to {LARGEST_POISSON}, got {self.poisson!r}"
+            )
+        for name in ("density", "strain_limit"):
+            value = getattr(self, name)
+            if not (math.isnan(value) or 0.0 < value < math.inf):
+                raise InvalidSettings(f"{name}: expected a number above 0, got {value!r}")
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus G in MPa."""
+        return self.young / (2.0 * (1.0 + self.poisson))
+
+
+materials: Registry[Material] = Registry("material")
+"""Printable materials by name. Printed parts differ with direction, machine and colour by tens
+of percent; efficiencies do not depend on E at all and hardly on Poisson's ratio, forces do on E."""
+
+NINJATEK = "NinjaTek, NinjaFlex technical data sheet (ASTM D638), as quoted by others"
+TPU_MODULUS = "Haid, Duncan, Hart and Foster, 14th dvs Symposium: 24 to 247 MPa over printed TPUs"
+TPU_RATIO = "Xu and Juang, Polymers 13, 1498 (2021): 0.48 after the first loading, measured on TPU"
+ULTIMAKER = "Ultimaker, material file of generic TPU 95A"
+PRUSAMENT = "Prusa Polymers, Prusament {} data sheet v1.1 (2022), ISO 527-1, printed flat"
+CUSTOMARY = "customary for the polymer; in no data sheet"
+
+materials.register("ninjaflex")(
+    Material(
+        name="ninjaflex",
+        young=12.0,
+        poisson=0.48,
+        density=1.19,
+        strain_limit=0.65,
+        sources={
+            "young": NINJATEK,
+            "poisson": TPU_RATIO,
+            "density": NINJATEK,
+            "strain_limit": f"elongation at yield: {NINJATEK}",
+        },
+    )
+)
+
+materials.register("tpu-95a")(
+    Material(
+        name="tpu-95a",
+        young=26.0,
+        poisson=0.48,
+        density=1.22,
+        sources={"young": TPU_MODULUS, "poisson": TPU_RATIO, "density": ULTIMAKER},
+    )
+)
+
+materials.register("pla")(
+    Material(
+        name="pla",
+        young=2300.0,
+        poisson=0.35,
+        density=1.24,
+        strain_limit=0.029,
+        sources={
+            "young": PRUSAMENT.format("PLA"),
+            "poisson": CUSTOMARY,
+            "density": PRUSAMENT.format("PLA"),
+            "strain_limit": f"yield strain: {PRUSAMENT.format('PLA')}",
+        },
+    )
+)
+
+materials.register("petg")(
+    Material(
+        name="petg",
+        young=1500.0,
+        poisson=0.38,
+        density=1.27,
+        strain_limit=0.051,
+        sources={
+            "young": PRUSAMENT.format("PETG"),
+            "poisson": CUSTOMARY,
+            "density": PRUSAMENT.format("PETG"),
+            "strain_limit": f"yield strain: {PRUSAMENT.format('PETG')}",
+        },
+    )
+)
