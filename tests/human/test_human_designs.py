@@ -139,7 +139,7 @@ def test_efficiency_is_as_noted_and_the_path_is_stable(design):
 
 def test_the_note_says_how_it_works(design):
     assert design.provenance["kind"] == "human"
-    assert 3 <= design.provenance["mechanism"].count(". ") + 1 <= 6
+    assert 3 <= design.provenance["origin"].count(". ") + 1 <= 6
 
 
 def test_the_design_beats_the_full_lattice(design):

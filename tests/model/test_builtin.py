@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidFile, UnknownName
-from bellcrank.model import builtin, find_problem, human_design, read_problem, write_problem
-from bellcrank.model import human as human_module
+from bellcrank.model import (
+    builtin,
+    find_problem,
+    gallery,
+    gallery_design,
+    human_design,
+    read_problem,
+    write_problem,
+)
+from bellcrank.parts import calibrated
 
 # Committed designs rely on this numbering.
 INPUT = [106, 107, 108, 117, 118, 119, 120, 130, 131, 132]
@@ -129,23 +137,34 @@ def test_a_file_is_found_by_its_path(tmp_path):
     assert find_problem(str(path)).hash == builtin["scaling-8"]().hash
 
 
+def test_machine_designs_are_for_struts_that_exist():
+    found = [gallery_design("machine", name) for name in builtin]
+    assert any(found)
+    for design in filter(None, found):
+        assert design.provenance["kind"] == "machine"
+        part = design.provenance["part"]
+        expected = calibrated(builtin[design.problem.name](), part["width"], part["scale"])
+        assert design.problem.stiffness.angle == pytest.approx(expected.stiffness.angle)
+
+
 def test_human_designs_leave_alone_what_is_not_designable():
     for design in filter(None, map(human_design, builtin)):
         kept = np.setdiff1d(np.arange(len(design.mask)), design.problem.designable)
         assert (design.mask[kept] == design.problem.initial[kept]).all()
         assert design.provenance["kind"] == "human"
-        assert design.provenance["mechanism"]
+        assert design.provenance["origin"]
 
 
 def test_a_human_design_is_read_from_its_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(human_module, "FOLDER", tmp_path)
+    monkeypatch.setattr(gallery, "FOLDER", tmp_path)
     assert human_design("scaling-8") is None
+    (tmp_path / "human").mkdir()
     mask = builtin["scaling-8"]().full_design().mask_hex
-    text = '{"schema": "bellcrank/human/1", "problem": "%s", "mechanism": "none", "mask": "%s"}'
-    (tmp_path / "scaling-8.json").write_text(text % ("scaling-8", mask))
+    text = '{"schema": "bellcrank/gallery/1", "problem": "%s", "origin": "none", "mask": "%s"}'
+    (tmp_path / "human" / "scaling-8.json").write_text(text % ("scaling-8", mask))
     design = human_design("scaling-8")
     assert design is not None
     assert design.mask_hex == mask
-    (tmp_path / "scaling-8.json").write_text(text % ("crane", mask))
+    (tmp_path / "human" / "scaling-8.json").write_text(text % ("crane", mask))
     with pytest.raises(InvalidFile, match=r"scaling-8.json: problem: expected 'scaling-8'"):
         human_design("scaling-8")

@@ -15,7 +15,8 @@ from bellcrank.errors import InvalidSettings
 @app.command()
 def plot(
     what: Annotated[
-        str, typer.Argument(help="A problem, a design file, human:NAME, or a result folder.")
+        str,
+        typer.Argument(help="A problem, a design file or folder, human:NAME, machine:NAME."),
     ],
     out: Annotated[
         Path | None, typer.Option(help="Picture to write (png, svg, pdf); default: NAME.png.")

@@ -8,26 +8,28 @@ from rich.table import Table
 from bellcrank.cli.app import app
 from bellcrank.cli.console import results
 
+DRIVES = {"displacement": "motion", "force": "force"}
+
 
 @app.command()
 def problems() -> None:
     """List the built-in problems."""
-    from bellcrank.model import builtin, find_problem, human_design
+    from bellcrank.model import builtin, find_problem, gallery_design
 
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
-    for name in ("problem", "designable beams", "drive", "amount", "input", "output", "human"):
-        figure = name in ("designable beams", "amount")
+    headings = ("designable", "drive", "input", "output", "human", "machine")
+    for name in ("problem", *headings):
+        figure = name == "designable"
         table.add_column(name, no_wrap=True, justify="right" if figure else "left")
     for name in builtin:
         problem = find_problem(name)
         table.add_row(
             name,
             f"{len(problem.designable)} of {problem.lattice.beam_count}",
-            problem.input.drive,
-            f"{problem.input.amount:.4f}",
+            f"{DRIVES[problem.input.drive]} {problem.input.amount:.4g}",
             _direction(problem.input.direction.tolist()),
             _direction(problem.output.direction.tolist()),
-            "yes" if human_design(name) else "",
+            *("yes" if gallery_design(kind, name) else "" for kind in ("human", "machine")),
         )
     results.print(table)
 

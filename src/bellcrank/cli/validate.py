@@ -41,7 +41,8 @@ class StrokeProgress(Live):
 @app.command()
 def validate(
     design: Annotated[
-        str, typer.Argument(help="A design file, a result folder, human:NAME, or a problem.")
+        str,
+        typer.Argument(help="A design file or folder, human:NAME, machine:NAME, or a problem."),
     ],
     level: Annotated[
         str, typer.Option(help="frame, plane or solid; several with commas between.")

@@ -36,7 +36,7 @@ from bellcrank.model.files import (
     write_problem,
 )
 from bellcrank.model.formats import formats, network_of, read_network, write_network
-from bellcrank.model.human import human_design
+from bellcrank.model.gallery import gallery_design, human_design
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
 from bellcrank.model.masks import pack_mask, unpack_mask
@@ -55,6 +55,7 @@ __all__ = [
     "builtin",
     "find_problem",
     "formats",
+    "gallery_design",
     "human_design",
     "lattices",
     "network_of",

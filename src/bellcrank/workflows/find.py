@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import cast, get_args
 
 from bellcrank.errors import UnknownName
-from bellcrank.model import Design, builtin, find_problem, human_design, read_design
+from bellcrank.model import Design, builtin, find_problem, gallery_design, read_design
+from bellcrank.model.gallery import Kind
 
 
 def find_design(name_or_path: str) -> Design:
@@ -16,9 +18,10 @@ def find_design(name_or_path: str) -> Design:
     ----------
     name_or_path
         A problem, built in or in a file, whose initial design is meant; a design file; a
-        result folder with a ``design.json``; or ``human:NAME`` for the human counterpart of
-        a built-in problem. The name of a built-in problem means the problem even where there
-        is a folder of that name: ``crane/`` is the folder.
+        result folder with a ``design.json``; or ``human:NAME`` or ``machine:NAME`` for a
+        design of a built-in problem that comes with the package. The name of a built-in
+        problem means the problem even where there is a folder of that name: ``crane/`` is
+        the folder.
 
     Raises
     ------
@@ -29,13 +32,14 @@ def find_design(name_or_path: str) -> Design:
     >>> find_design("crane").beam_count
     352
     """
-    kind, _, name = name_or_path.partition(":")
-    if kind == "human":
-        human = human_design(name)
-        if human is None:
-            there = ", ".join(known for known in builtin if human_design(known))
-            raise UnknownName(f"no human design for {name!r}; there are some for: {there}")
-        return human
+    kind, colon, name = name_or_path.partition(":")
+    if colon and kind in get_args(Kind):
+        of_kind = cast("Kind", kind)
+        found = gallery_design(of_kind, name)
+        if found is None:
+            there = ", ".join(known for known in builtin if gallery_design(of_kind, known))
+            raise UnknownName(f"no {kind} design for {name!r}; there are some for: {there}")
+        return found
     path = Path(name_or_path)
     if name_or_path in builtin:
         return find_problem(name_or_path).full_design()

@@ -1,0 +1,106 @@
+"""Designs that come with the package: drawn by hand, and what searches made of the same task.
+
+Each is a file ``human/NAME.json`` or ``machine/NAME.json`` next to this one, named like its
+problem::
+
+    {"schema": "bellcrank/gallery/1", "problem": "crane",
+     "origin": "how it works or was found, in a few sentences", "mask": "ffe0..."}
+
+It refers to the built-in problem by name instead of embedding it, so that the mask is read in
+the numbering of the code that ships it. A design for a part, with struts of a certain width,
+has that part and the stiffness of its struts too::
+
+     "stiffness": {"bond": 5.0, "angle": 0.018}, "part": {"width": 2.0}
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from bellcrank.errors import InvalidFile
+from bellcrank.model.builtin import builtin
+from bellcrank.model.conditions import Stiffness
+from bellcrank.model.masks import unpack_mask
+from bellcrank.model.parsing import Table, parse, read_json
+from bellcrank.model.problem import Design
+
+FOLDER = Path(__file__).parent
+
+Kind = Literal["human", "machine"]
+
+
+class StiffnessTable(Table):
+    """Of the springs that stand for the struts."""
+
+    bond: float
+    angle: float
+
+
+class GalleryTable(Table):
+    """A whole file of a design."""
+
+    schema_: Literal["bellcrank/gallery/1"] = Field(alias="schema")
+    problem: str
+    origin: str
+    mask: str
+    stiffness: StiffnessTable | None = None
+    part: dict[str, Any] | None = None
+
+
+def gallery_design(kind: Kind, name: str) -> Design | None:
+    """Return the design of a kind for a built-in problem, if there is one.
+
+    Parameters
+    ----------
+    kind
+        ``"human"`` for the one drawn by hand, ``"machine"`` for one that a search found.
+    name
+        Of the problem.
+
+    Returns
+    -------
+    Design or None
+        With ``provenance = {"kind": kind, "origin": ...}``, and the part where one was meant.
+
+    Raises
+    ------
+    InvalidFile
+        If the file that ships with the package does not fit its problem.
+
+    Examples
+    --------
+    >>> gallery_design("machine", "scaling-20") is None
+    True
+    """
+    path = FOLDER / kind / f"{name}.json"
+    if name not in builtin or not path.is_file():
+        return None
+    table = parse(GalleryTable, read_json(path), path.name)
+    if table.problem != name:
+        raise InvalidFile(f"{path.name}: problem: expected {name!r}, got {table.problem!r}")
+    problem = builtin[name]()
+    if table.stiffness is not None:
+        stiffness = Stiffness(table.stiffness.bond, table.stiffness.angle)
+        problem = replace(problem, stiffness=stiffness)
+    provenance: dict[str, Any] = {"kind": kind, "origin": table.origin}
+    if table.part is not None:
+        provenance["part"] = table.part
+    mask = unpack_mask(table.mask, problem.lattice.beam_count)
+    return Design(problem=problem, mask=mask, provenance=provenance)
+
+
+def human_design(name: str) -> Design | None:
+    """Return the design drawn by hand for a built-in problem, which a search must beat.
+
+    Errors are those of `gallery_design`.
+
+    Examples
+    --------
+    >>> human_design("scaling-8") is None
+    True
+    """
+    return gallery_design("human", name)
