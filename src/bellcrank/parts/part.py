@@ -8,11 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.geometry import room_for_fillet, strut_outline
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.geometry import Outline
     from bellcrank.model import Design
     from bellcrank.parts.materials import Material
     from bellcrank.parts.section import Section
+
+
+FILLET = 0.25
+"""Default fillet radius, as a part of the strut width."""
+ROOM = 0.5
+"""And at most so much of what leaves the holes open."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +79,34 @@ class Part:
                 f"width: struts {self.section.width:g} mm wide are not slender where the shortest "
                 f"is {shortest * self.scale:g} mm long; choose narrower struts or a larger scale"
             )
+
+    @property
+    def fillet_radius(self) -> float:
+        """Radius in the corners between struts, mm."""
+        if self.fillet is not None:
+            return self.fillet
+        room = room_for_fillet(self.positions, self.struts, self.section.width)
+        return min(FILLET * self.section.width, ROOM * room)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(N, 2) nodes of the lattice at rest, mm."""
+        return self.design.problem.lattice.positions * self.scale
+
+    @property
+    def struts(self) -> NDArray[np.int64]:
+        """(s, 2) nodes of the beams that are present."""
+        return self.design.problem.lattice.beams[self.design.mask]
+
+    def outline(self) -> Outline:
+        """Return the planar outline: what is meshed, printed and cut.
+
+        Raises
+        ------
+        InvalidSettings
+            If struts or fillets are so wide that holes between them close.
+        """
+        return strut_outline(self.positions, self.struts, self.section.width, self.fillet_radius)
 
     @property
     def stroke(self) -> float:

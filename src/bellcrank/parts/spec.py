@@ -122,7 +122,7 @@ class PartTable(Table):
     thickness: float | str | None = None
     scale: float | str | None = None
     fillet: float | str | None = None
-    material: str | MaterialTable | None = None
+    material: MaterialTable | str | None = None
 
 
 def read_part(path: str | os.PathLike[str]) -> PartSpec:

@@ -67,6 +67,15 @@ def natural(
     return strain, direction, length
 
 
+def linear_natural(mesh: FrameMesh, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (e, 3) what strains the elements if they move little."""
+    direction = mesh.chord / mesh.length[:, None]
+    gradient, _, _ = gradient_of_natural(direction, mesh.length)
+    ends = displacement[mesh.elements].reshape(-1, 6)
+    strain: NDArray[np.float64] = np.einsum("eij,ej->ei", gradient, ends)
+    return strain
+
+
 def gradient_of_natural(
     direction: NDArray[np.float64], length: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -124,8 +133,11 @@ def linear_stiffness(mesh: FrameMesh) -> NDArray[np.float64]:
     return stiffness
 
 
-def energy(mesh: FrameMesh, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+def energy(
+    mesh: FrameMesh, displacement: NDArray[np.float64], *, linear: bool = False
+) -> NDArray[np.float64]:
     """Return (e,) the elastic energy of the elements, N mm."""
-    strain, _, _ = natural(mesh, displacement)
+    small = linear_natural(mesh, displacement) if linear else None
+    strain = natural(mesh, displacement)[0] if small is None else small
     stored: NDArray[np.float64] = 0.5 * np.einsum("ei,eij,ej->e", strain, mesh.stiffness, strain)
     return stored

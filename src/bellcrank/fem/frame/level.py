@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.contact import find_contacts
-from bellcrank.fem.frame.elements import energy, natural
+from bellcrank.fem.frame.elements import energy, linear_natural, natural
 from bellcrank.fem.frame.equilibrium import FrameEquations, solve_linear
 from bellcrank.fem.frame.mesh import frame_mesh
 from bellcrank.fem.frame.settling import settle
@@ -66,6 +66,11 @@ def analyse_frame(
         if status is PathStatus.SNAPPED:
             after = beyond(equations, path)
     last = states[-1]
+    points = [
+        point_of(part, mesh, state, linear=settings.linear)
+        for state in states
+        if state.load or len(states) == 1
+    ]
     return Analysis(
         part=part,
         level="frame",
@@ -73,10 +78,10 @@ def analyse_frame(
         linear=settings.linear,
         status=status,
         loss=loss,
-        points=[point_of(part, mesh, state) for state in states if state.load or len(states) == 1],
+        points=points,
         after=point_of(part, mesh, after) if after else None,
         contacts=contacts_of(part, mesh, last),
-        field=field_of(part, mesh, last),
+        field=field_of(part, mesh, last, linear=settings.linear),
         cost={
             "seconds": time.perf_counter() - began,
             "unknowns": equations.count,
@@ -87,9 +92,8 @@ def analyse_frame(
 
 def beyond(equations: FrameEquations, path: Path) -> FrameState | None:
     """Return where a frame is at the full input, after all its jumps; None if that is not found."""
-    rng = np.random.default_rng(0)
     for _ in range(SNAPS):
-        landed = settle(equations, path.states[-1], rng)
+        landed = settle(equations, path.states[-1])
         if landed is None:
             return None
         path = Follower(equations, Stepping()).follow(landed)
@@ -100,11 +104,13 @@ def beyond(equations: FrameEquations, path: Path) -> FrameState | None:
     return None
 
 
-def point_of(part: Part, mesh: FrameMesh, state: FrameState) -> StrokePoint:
+def point_of(
+    part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool = False
+) -> StrokePoint:
     """Return the figures of an equilibrium."""
     problem = part.design.problem
     moved = mesh.at_lattice(state.displacement)
-    stress, strain = fibres(part, mesh, state.displacement)
+    stress, strain = fibres(part, mesh, state.displacement, linear=linear)
     mean = moved[problem.output.nodes].mean(axis=0)
     force = input_force(part, mesh, state)
     return StrokePoint(
@@ -112,7 +118,7 @@ def point_of(part: Part, mesh: FrameMesh, state: FrameState) -> StrokePoint:
         efficiency=efficiency_of(problem, moved / part.scale, load=state.load),
         output=(float(mean[0]), float(mean[1])),
         force=(float(force[0]), float(force[1])),
-        energy=float(energy(mesh, state.displacement).sum()),
+        energy=float(energy(mesh, state.displacement, linear=linear).sum()),
         stress=float(stress.max()),
         strain=float(strain.max()),
     )
@@ -131,18 +137,21 @@ def input_force(part: Part, mesh: FrameMesh, state: FrameState) -> NDArray[np.fl
 
 
 def fibres(
-    part: Part, mesh: FrameMesh, displacement: NDArray[np.float64]
+    part: Part, mesh: FrameMesh, displacement: NDArray[np.float64], *, linear: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return (e,) the largest stress in size, MPa, and the largest stretch of any fibre.
+    """Return (e,) the largest stress in size, MPa, and the largest principal strain.
 
     Stress is uniaxial, so its size is the von Mises stress as well.
     """
-    natural_strain, _, _ = natural(mesh, displacement)
-    inner = np.einsum("eij,ej->ei", mesh.stiffness, natural_strain)
+    small = linear_natural(mesh, displacement) if linear else None
+    strain = natural(mesh, displacement)[0] if small is None else small
+    inner = np.einsum("eij,ej->ei", mesh.stiffness, strain)
     section, young = part.section, part.material.young
     bent = np.abs(inner[:, 1:]).max(axis=1) * section.width / (2.0 * young * section.inertia)
-    stretched = natural_strain[:, 0] / mesh.length
-    return young * (np.abs(stretched) + bent), stretched + bent
+    stretched = strain[:, 0] / mesh.length
+    # What is pressed together one way grows the other.
+    widened = part.material.poisson * (bent - stretched)
+    return young * (np.abs(stretched) + bent), np.maximum(stretched + bent, widened)
 
 
 def contacts_of(part: Part, mesh: FrameMesh, state: FrameState) -> Contacts:
@@ -152,7 +161,7 @@ def contacts_of(part: Part, mesh: FrameMesh, state: FrameState) -> Contacts:
     return find_contacts(struts, mesh.positions[lines], moved[lines], part.section.width)
 
 
-def field_of(part: Part, mesh: FrameMesh, state: FrameState) -> Field:
+def field_of(part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool) -> Field:
     """Return what pictures need."""
-    stress, _ = fibres(part, mesh, state.displacement)
+    stress, _ = fibres(part, mesh, state.displacement, linear=linear)
     return Field(mesh.positions, state.displacement[:, :2], mesh.elements, stress)

@@ -2,12 +2,13 @@
 
 At a limit point or a bifurcation the part jumps. Quasi-statically it ends in some stable
 equilibrium of lower energy; which one is a matter of inertia and friction. Here it slides down
-the energy, each step a Newton step in a stiffness made positive by a multiple of its diagonal,
-shortened until the energy falls.
+the energy: where some direction is unstable, along it as long as the energy falls; elsewhere by
+Newton's method, shortened until the energy falls.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,12 +16,14 @@ from scipy.sparse import diags
 
 from bellcrank.fem.frame.equilibrium import TOLERANCE, inner_forces, potential, rounding
 from bellcrank.fem.frame.system import SparseFactor
-from bellcrank.fem.path import State
+from bellcrank.fem.path import State, softest_mode
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from scipy.sparse import csc_matrix
 
     from bellcrank.fem.frame.equilibrium import FrameEquations
+    from bellcrank.fem.frame.system import FrameSystem
 
 STEPS = 400
 FIRST_SHIFT = 1e-3
@@ -29,58 +32,92 @@ SHORTEST = 1e-6
 DESCENT = 1e-4
 """Part of the predicted fall of the energy that a step must reach (Armijo)."""
 NUDGE = 1e-3
-"""Disturbance that makes a symmetric frame choose a side, as a part of the largest motion."""
+"""First try along an unstable direction, as a part of the largest motion."""
+DOUBLINGS = 30
 BEYOND = 2e-3
 """Part of the input by which a frame is pushed over the edge of its stability."""
 
 
-def settle(equations: FrameEquations, edge: State, rng: np.random.Generator) -> State | None:
+@dataclass(slots=True, eq=False)
+class _Slide:
+    """A frame on its way down."""
+
+    system: FrameSystem
+    load: float
+    displacement: NDArray[np.float64]
+
+    @property
+    def energy(self) -> float:
+        return potential(self.system, self.load, self.displacement)
+
+    def moved(self, change: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Return where a change of the free degrees of freedom leads, and its energy."""
+        trial = self.displacement.copy()
+        trial.ravel()[self.system.free] += change
+        return trial, potential(self.system, self.load, trial)
+
+    def fall(self, mode: NDArray[np.float64]) -> bool:
+        """Follow a direction as long as the energy falls; False if it does not."""
+        energy = self.energy
+        size = NUDGE * max(float(np.abs(self.displacement[:, :2]).max()), 1.0)
+        step = size * mode / np.abs(mode).max()
+        best = None
+        for _ in range(DOUBLINGS):
+            trial, there = self.moved(step)
+            if there >= energy:
+                break
+            best, energy, step = trial, there, 2.0 * step
+        if best is None:
+            return False
+        self.displacement = best
+        return True
+
+    def descend(self, change: NDArray[np.float64], slope: float) -> None:
+        """Take a step against the residual, shortened until the energy falls as it should."""
+        energy, part = self.energy, 1.0
+        while part > SHORTEST:
+            trial, there = self.moved(-part * change)
+            if there <= energy - DESCENT * part * slope + 1e-14 * abs(energy):
+                break
+            part /= 2.0
+        self.displacement = trial
+
+
+def settle(equations: FrameEquations, edge: State) -> State | None:
     """Return the stable equilibrium that a frame slides to; None if it finds none.
 
     Parameters
     ----------
     edge
         The last stable state before stability was lost.
-    rng
-        For the nudge.
     """
     system = equations.system
     load = min(1.0, edge.load + BEYOND)
-    displacement = equations.displacement(edge.unknowns, load)
-    free = system.free
-    largest = float(np.abs(displacement[:, :2]).max(initial=0.0))
-    displacement.ravel()[free] += (
-        NUDGE * largest * rng.standard_normal(len(free)) / len(free) ** 0.5
-    )
-    energy = potential(system, load, displacement)
-    shift = 0.0
+    slide = _Slide(system, load, equations.displacement(edge.unknowns, load))
     for _ in range(STEPS):
-        force, matrix, magnitude = inner_forces(system, displacement)
-        residual = (force - load * system.load).ravel()[free]
-        small = TOLERANCE * magnitude + rounding(system, displacement)
+        force, matrix, magnitude = inner_forces(system, slide.displacement)
+        residual = (force - load * system.load).ravel()[system.free]
+        small = TOLERANCE * magnitude + rounding(system, slide.displacement)
         factor = SparseFactor(matrix)
         if np.abs(residual).max(initial=0.0) <= small and not factor.negative:
-            return State(load, displacement.ravel()[free])
-        shift = max(FIRST_SHIFT, shift / 4.0) if factor.negative else 0.0
-        factor, shift = stiffened(matrix, factor, shift)
+            return State(load, slide.displacement.ravel()[system.free])
+        if factor.negative:
+            mode = softest_mode(factor, equations.count)[1]
+            if slide.fall(mode if residual @ mode <= 0.0 else -mode):
+                continue
+            factor = stiffened(matrix)
         change = factor.solve(residual)
-        slope = float(residual @ change)
-        part = 1.0
-        while part > SHORTEST:
-            trial = displacement.copy()
-            trial.ravel()[free] -= part * change
-            there = potential(system, load, trial)
-            if there <= energy - DESCENT * part * slope + 1e-14 * abs(energy):
-                break
-            part /= 2.0
-        displacement, energy = trial, there
+        slide.descend(change, float(residual @ change))
     return None
 
 
-def stiffened(matrix: csc_matrix, factor: SparseFactor, shift: float) -> tuple[SparseFactor, float]:
+def stiffened(matrix: csc_matrix) -> SparseFactor:
     """Return a positive factor: with so much of the diagonal added as is needed."""
     diagonal = diags(np.abs(matrix.diagonal()), format="csc")
-    while factor.negative and shift < LARGEST_SHIFT:
+    shift = FIRST_SHIFT
+    while shift < LARGEST_SHIFT:
         factor = SparseFactor((matrix + shift * diagonal).tocsc())
-        shift *= 4.0 if factor.negative else 1.0
-    return factor, shift
+        if not factor.negative:
+            break
+        shift *= 4.0
+    return factor

@@ -1,0 +1,274 @@
+"""How well the discrete model foretells finite elements: ``python -m benchmarks.fidelity``.
+
+Three questions, each a part of the script (``--only correlate,width,search``):
+
+- correlate: over some hundred designs that searches came by, how do the efficiencies of the
+  discrete model, with the paper's stiffness and with that of the struts, agree with nonlinear
+  frames?
+- width: which stiffness of the angular springs fits frames of each strut width best, and which
+  width does the paper's stand for?
+- search: what is left of the efficiency that a search promises, when it searches with the one
+  stiffness or the other?
+
+Designs that snap or touch themselves as frames are counted and listed, not averaged.
+Results go to ``docs/validation/*.json`` and ``*.png``, tables to standard output.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from bellcrank.fem import FemSettings, levels
+from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.model import Design, Problem, Stiffness, find_problem, pack_mask, unpack_mask
+from bellcrank.parts import PartSpec, calibrated
+from bellcrank.parts.calibration import JOINT
+from bellcrank.plots import style
+from bellcrank.plots.saving import save_figure
+from bellcrank.provenance import provenance
+from bellcrank.search import advance_chain, make_responder, read_settings, start_chain
+from bellcrank.search.cleaning import clean
+
+FOLDER = Path(__file__).parents[1] / "docs" / "validation"
+PROBLEMS = ("crane", "anti-parallel")
+WIDTH = 2.0
+WIDTHS = (1.0, 1.5, 2.0, 3.0, 4.0)
+FACTORS = np.round(np.arange(0.30, 1.01, 0.05), 2)
+STEPS = 5_000
+CHAINS = {"paper": 8, "basin-hopping": 4}
+SEEDS = 8
+
+
+def sampled(name: str) -> list[str]:
+    """Masks that chains of a problem stood at, every 250 steps; cleaned, without doubles."""
+    problem = find_problem(name)
+    found: dict[str, None] = {}
+    for search, count in CHAINS.items():
+        for seed in range(count):
+            settings = read_settings({"search": search, "steps": STEPS, "seed": seed})
+            responder = make_responder(problem, settings)
+            state = start_chain(responder, settings, 0)
+            while state.step < STEPS:
+                state, rows = advance_chain(responder, settings, 0, state)
+                taken = np.flatnonzero(rows.accepted & (rows.status == Status.CONVERGED))
+                if len(taken):
+                    bits = np.unpackbits(rows.mask[taken[-1]])[: problem.lattice.beam_count]
+                    found[clean(Design(problem, bits.astype(bool))).mask_hex] = None
+    return list(found)
+
+
+def frame_of(job: tuple[str, str, float, float | None]) -> dict[str, object]:
+    """Analyse a design as a nonlinear frame; stroke in lattice units, or the problem's."""
+    name, mask, width, stroke = job
+    problem = find_problem(name)
+    if stroke is not None:
+        problem = replace(problem, input=replace(problem.input, amount=stroke))
+    design = Design(problem, unpack_mask(mask, problem.lattice.beam_count))
+    part = PartSpec(width=width).of(design)
+    analysis = levels["frame"](part, FemSettings())
+    return {
+        "mask": mask,
+        "status": analysis.status.value,
+        "reached": analysis.last.load,
+        "frame": analysis.efficiency,
+        "force": float(np.hypot(*analysis.last.force)) / (part.stiffness_unit * part.scale),
+        "contacts": len(analysis.contacts.pairs),
+    }
+
+
+def discrete(problem: Problem, masks: list[str]) -> np.ndarray:
+    """Efficiency of each design by the discrete model; nan where it is not unique."""
+    evaluator = Evaluator(problem)
+    found = []
+    for mask in masks:
+        response = evaluator.respond(unpack_mask(mask, problem.lattice.beam_count), CAREFUL)
+        found.append(response.efficiency if response.status is Status.CONVERGED else np.nan)
+    return np.array(found)
+
+
+def agreement(model: np.ndarray, frame: np.ndarray) -> dict[str, float]:
+    """Compare two efficiencies of the same designs."""
+    both = np.isfinite(model) & np.isfinite(frame)
+    x, y = model[both], frame[both]
+    return {
+        "designs": int(both.sum()),
+        "r_squared": float(np.corrcoef(x, y)[0, 1] ** 2),
+        "determination": float(1.0 - ((x - y) ** 2).sum() / ((y - y.mean()) ** 2).sum()),
+        "rank_correlation": float(spearmanr(x, y)[0]),
+        "slope": float(np.polyfit(x, y, 1)[0]),
+        "median_ratio": float(np.median(y / x)),
+    }
+
+
+def correlate(pool: ProcessPoolExecutor) -> None:
+    """Compare both stiffnesses with frames over the designs of searches."""
+    record: dict[str, object] = {"width": WIDTH, "provenance": provenance()}
+    pictured = {}
+    for name in PROBLEMS:
+        masks = sampled(name)
+        rows = list(pool.map(frame_of, [(name, mask, WIDTH, None) for mask in masks], chunksize=8))
+        frame = np.array([row["frame"] for row in rows], dtype=np.float64)
+        problem = find_problem(name)
+        before = discrete(problem, masks)
+        after = discrete(calibrated(problem, WIDTH), masks)
+        for row, one, other in zip(rows, before, after, strict=True):
+            row |= {"paper": one, "calibrated": other}
+        figures = {"paper": agreement(before, frame), "calibrated": agreement(after, frame)}
+        pictured[name] = (before, after, frame)
+        record[name] = {
+            **figures,
+            "designs": len(rows),
+            "not_stable_as_frames": sum(row["status"] != "converged" for row in rows),
+            "touching_as_frames": sum(row["contacts"] > 0 for row in rows),
+            "rows": [_plain(row) for row in rows],
+        }
+        for kind, one in figures.items():
+            print(f"| {name} | {kind} | " + " | ".join(f"{value:.3g}" for value in one.values()))
+    _write("correlation", record)
+    _scatter(pictured)
+
+
+def width_study(pool: ProcessPoolExecutor) -> None:
+    """Fit the stiffness of joints to frames of several widths."""
+    name = "crane"
+    problem = find_problem(name)
+    masks = sampled(name)[::4]
+    record: dict[str, object] = {"provenance": provenance(), "joint": JOINT, "widths": {}}
+    for width in WIDTHS:
+        jobs = [(name, mask, width, None) for mask in masks]
+        frame = np.array([row["frame"] for row in pool.map(frame_of, jobs, chunksize=4)])
+        rows = {}
+        for factor in FACTORS:
+            angle = problem.stiffness.bond * factor * (width / 10.0) ** 2 / 6.0
+            stiffness = Stiffness(problem.stiffness.bond, angle)
+            rows[str(factor)] = agreement(
+                discrete(replace(problem, stiffness=stiffness), masks), frame
+            )
+        best = max(rows, key=lambda factor: rows[factor]["determination"])
+        paper = agreement(discrete(problem, masks), frame)
+        record["widths"][str(width)] = {"best": best, "paper": paper, "factors": rows}  # type: ignore[index]
+        chosen = rows[str(JOINT)]
+        print(
+            f"| {width} mm | {best} | {rows[best]['determination']:.3f} | "
+            f"{chosen['determination']:.3f} | {paper['determination']:.3f} |"
+        )
+    _write("widths", record)
+
+
+def searched(job: tuple[str, bool, int]) -> dict[str, object]:
+    """Search once, and look at what was found as a frame."""
+    name, fitted, seed = job
+    problem = find_problem(name)
+    task = calibrated(problem, WIDTH) if fitted else problem
+    settings = read_settings(
+        {"steps": 20_000, "seed": seed, "goals": [f"no-contact {WIDTH / 10.0}"]}
+    )
+    responder = make_responder(task, settings)
+    state = start_chain(responder, settings, 0)
+    best, mask = -np.inf, ""
+    judge = Evaluator(task)
+    while state.step < settings.steps:
+        state, rows = advance_chain(responder, settings, 0, state)
+        for index in np.flatnonzero(rows.accepted & (rows.status == Status.CONVERGED)):
+            if rows.efficiency[index] > best:
+                bits = np.unpackbits(rows.mask[index])[: task.lattice.beam_count].astype(bool)
+                cleaned = clean(Design(task, bits))
+                response = judge.respond(cleaned.mask, CAREFUL)
+                if response.status is Status.CONVERGED and response.efficiency > best:
+                    best, mask = response.efficiency, pack_mask(cleaned.mask)
+    return {"seed": seed, "promised": best, **frame_of((name, mask, WIDTH, None))}
+
+
+def search_study(pool: ProcessPoolExecutor) -> None:
+    """Compare what searches promise with what frames keep of it."""
+    record: dict[str, object] = {"width": WIDTH, "provenance": provenance()}
+    for name in PROBLEMS:
+        for fitted in (False, True):
+            rows = list(pool.map(searched, [(name, fitted, seed) for seed in range(SEEDS)]))
+            kept = [row for row in rows if row["status"] == "converged"]
+            promised = float(np.median([row["promised"] for row in kept]))
+            frame = float(np.median([row["frame"] for row in kept]))
+            off = float(np.median([abs(row["frame"] / row["promised"] - 1.0) for row in kept]))  # type: ignore[operator]
+            kind = "calibrated" if fitted else "paper"
+            record[f"{name}, {kind}"] = {
+                "promised": promised, "frame": frame, "median_deviation": off,
+                "not_stable_as_frames": len(rows) - len(kept), "rows": [_plain(r) for r in rows],
+            }  # fmt: skip
+            print(
+                f"| {name} | {kind} | {promised:.2f} | {frame:.2f} | {off:.0%} | "
+                f"{len(rows) - len(kept)} of {len(rows)} |"
+            )
+    _write("search", record)
+
+
+def _plain(row: dict[str, object]) -> dict[str, object]:
+    """Round figures, and write what is none as null."""
+    return {
+        key: (round(value, 6) if np.isfinite(value) else None)
+        if isinstance(value, float)
+        else value
+        for key, value in row.items()
+    }
+
+
+def _write(name: str, record: dict[str, object]) -> None:
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    (FOLDER / f"{name}.json").write_text(json.dumps(record, indent=1) + "\n")
+
+
+def _scatter(pictured: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+    """Draw discrete model against frames, before and after."""
+    figure = style.new_figure(9.0, 4.4)
+    style.write_heading(
+        figure,
+        f"Discrete model against nonlinear frames, struts {WIDTH:g} mm wide on 10 mm",
+        "each dot is a design that a search came by; on the line they agree",
+        0.25,
+        0.2,
+    )
+    for place, title in enumerate(("paper's stiffness", "stiffness of the struts")):
+        axes = figure.add_axes((0.075 + 0.5 * place, 0.13, 0.40, 0.66))
+        for (name, columns), colour in zip(
+            pictured.items(), (style.OUTPUT, style.INPUT), strict=True
+        ):
+            figures = agreement(columns[place], columns[2])
+            label = f"{name}: R² {figures['r_squared']:.3f}"
+            axes.plot(
+                columns[place], columns[2], linestyle="none", marker="o", markersize=3.0,
+                color=colour, alpha=0.6, markeredgewidth=0.0, label=label,
+            )  # fmt: skip
+        everything = np.concatenate([np.concatenate(columns) for columns in pictured.values()])
+        low, high = np.nanmin(everything), np.nanmax(everything)
+        axes.plot([low, high], [low, high], color=style.IDLE, linewidth=1.0, zorder=1)
+        words = {"family": style.FONT, "size": style.SMALL_SIZE, "color": style.INK}
+        axes.set_xlabel(f"efficiency by the discrete model, {title}", **words)
+        axes.set_ylabel("efficiency by nonlinear frames", **words)
+        axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE)
+        axes.legend(frameon=False, prop={"family": style.FONT, "size": style.SMALL_SIZE})
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+    save_figure(figure, FOLDER / "correlation.png", overwrite=True)
+
+
+PARTS = {"correlate": correlate, "width": width_study, "search": search_study}
+
+
+def main() -> None:
+    """Run the parts that were asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", default=",".join(PARTS))
+    chosen = parser.parse_args().only.split(",")
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        for name in chosen:
+            PARTS[name](pool)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,164 @@
+"""What analyses say: stroke, contacts, snaps, stresses; the same at every level."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.fem import FemSettings, PathStatus, levels
+from bellcrank.fem.contact import find_contacts
+from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem, human_design
+from bellcrank.parts import Material, Part, PartSpec, Section
+
+RUBBER = Material(name="rubber", young=12.0, poisson=0.48, strain_limit=0.01)
+
+
+def bar(stroke: float, direction: tuple[float, float]) -> Part:
+    """A cantilever 20 mm long and 2 mm wide of two struts, moved at its tip."""
+    problem = Problem(
+        name="bar",
+        lattice=Lattice([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], [[0, 1], [1, 2]]),
+        supports=Supports(fixed=[0]),
+        input=Input(nodes=[2], direction=direction, drive="displacement", amount=stroke / 10.0),
+        output=Output(nodes=[1], direction=[1.0, 0.0]),
+        designable=[0],
+    )
+    return Part(problem.full_design(), RUBBER, Section(2.0, 5.0))
+
+
+@pytest.mark.parametrize("linear", [True, False])
+def test_a_stretched_bar_has_the_stress_and_force_of_hooke_s_law(linear: bool) -> None:
+    analysis = levels["frame"](bar(0.5, (1.0, 0.0)), FemSettings(linear=linear))
+    last = analysis.last
+    assert last.strain == pytest.approx(0.025)
+    assert last.stress == pytest.approx(12.0 * 0.025)
+    assert last.force == pytest.approx((12.0 * 10.0 * 0.025, 0.0), abs=1e-9)
+    assert last.energy == pytest.approx(0.5 * last.force[0] * 0.5)
+    assert last.output == pytest.approx((0.25, 0.0))
+    assert analysis.efficiency == pytest.approx(0.5)
+    assert "beyond the 1% that rubber stands" in " ".join(analysis.warnings)
+
+
+def test_a_bent_bar_is_stressed_most_where_it_is_clamped() -> None:
+    part = bar(0.1, (0.0, 1.0))
+    last = levels["frame"](part, FemSettings(linear=True)).last
+    # M = 3 E I d / L^2, stress M w / (2 I)
+    assert last.stress == pytest.approx(3.0 * 12.0 * 0.1 / 20.0**2 * 1.0, rel=1e-9)
+    assert last.strain == pytest.approx(last.stress / 12.0)
+
+
+def test_energy_is_the_work_done_along_the_stroke() -> None:
+    design = human_design("crane")
+    assert design is not None
+    points = levels["frame"](PartSpec().of(design), FemSettings()).points
+    load = np.array([0.0, *(point.load for point in points)])
+    force = np.array([0.0, *(-point.force[1] for point in points)])
+    work = np.trapezoid(force, load * design.problem.input.amount * 10.0)
+    assert points[-1].energy == pytest.approx(work, rel=5e-3)
+    assert points[-1].load == 1.0
+
+
+def test_efficiencies_do_not_depend_on_modulus_thickness_or_units() -> None:
+    design = human_design("anti-parallel")
+    assert design is not None
+    spec = PartSpec()
+    one = levels["frame"](spec.of(design), FemSettings(elements=2)).last
+    other = replace(spec, thickness=3.0, material=replace(RUBBER, young=2000.0))
+    two = levels["frame"](other.of(design), FemSettings(elements=2)).last
+    larger = replace(spec, width=6.0, scale=30.0)
+    three = levels["frame"](larger.of(design), FemSettings(elements=2)).last
+    assert two.efficiency == pytest.approx(one.efficiency, rel=1e-7)
+    assert three.efficiency == pytest.approx(one.efficiency, rel=1e-7)
+    assert three.strain == pytest.approx(one.strain, rel=1e-6)
+    assert two.stress == pytest.approx(one.stress * 2000.0 / 12.0, rel=1e-6)
+
+
+def arch(stroke: float) -> Part:
+    """A shallow arch whose middle is pushed through by a force."""
+    places = [[0.0, 0.0], [1.5, 0.225], [3.0, 0.45], [4.5, 0.225], [6.0, 0.0]]
+    lattice = Lattice(places, [[0, 1], [1, 2], [2, 3], [3, 4]])
+    problem = Problem(
+        name="arch",
+        lattice=lattice,
+        supports=Supports(fixed=[0, 4]),
+        input=Input(nodes=[2], direction=[0.0, -1.0], drive="force", amount=1.0),
+        output=Output(nodes=[1], direction=[0.0, -1.0]),
+        designable=[0],
+    )
+    part = Part(problem.full_design(), RUBBER, Section(1.0, 5.0))
+    amount = stroke / (part.stiffness_unit * part.scale)
+    driven = replace(problem, input=replace(problem.input, amount=amount))
+    return replace(part, design=driven.full_design())
+
+
+def test_an_arch_that_snaps_has_no_efficiency_but_a_place_where_it_ends() -> None:
+    analysis = levels["frame"](arch(0.05), FemSettings())
+    assert analysis.status is PathStatus.SNAPPED
+    assert math.isnan(analysis.efficiency)
+    assert 0.0 < analysis.last.load < 0.9
+    assert analysis.after is not None
+    assert analysis.after.load == 1.0
+    assert analysis.last.output[1] > -2.25 > analysis.after.output[1]  # below the supports' line
+    data = analysis.to_dict()
+    assert data["efficiency"] is None
+    assert data["input_force_N"] is None
+    assert data["reached"] == analysis.last.load
+    assert "stability is lost" in data["warnings"][0]
+
+
+def test_an_arch_pushed_less_does_not_snap() -> None:
+    analysis = levels["frame"](arch(0.02), FemSettings())
+    assert analysis.status is PathStatus.CONVERGED
+    assert analysis.loss is None
+
+
+def test_a_mechanism_is_never_a_result() -> None:
+    crane = find_problem("crane")
+    loose = crane.lattice.beams_touching(crane.output.nodes)
+    part = PartSpec().of(crane.full_design().with_mask(loose))
+    with pytest.raises(InvalidSettings, match=r"not held against moving as a rigid body"):
+        levels["frame"](part, FemSettings(linear=True))
+    analysis = levels["frame"](part, FemSettings())
+    assert analysis.status is PathStatus.MECHANISM
+    assert math.isnan(analysis.efficiency)
+
+
+LINES = np.array([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]], [[0.0, 4.0], [5.0, 4.0], [10.0, 4.0]]])
+
+
+def test_struts_that_come_near_touch() -> None:
+    moved = LINES.copy()
+    moved[1, 1] = [5.0, 1.5]
+    contacts = find_contacts(np.array([3, 8]), LINES, moved, 2.0)
+    assert contacts.pairs.tolist() == [[3, 8]]
+    assert contacts.overlap == pytest.approx([0.5])
+    assert "beams 3 and 8, by 0.5 mm" in contacts.message
+
+
+def test_struts_that_cross_touch_all_the_more() -> None:
+    moved = LINES.copy()
+    moved[1] = [[3.0, 6.0], [3.1, 0.4], [3.2, -6.0]]
+    contacts = find_contacts(np.array([3, 8]), LINES, moved, 2.0)
+    assert contacts.overlap == pytest.approx([2.0])
+
+
+def test_struts_of_one_joint_do_not_touch_at_it_but_where_they_close() -> None:
+    angle = np.radians(60.0)
+    along = np.linspace(0.0, 10.0, 9)
+    rest = np.array([np.outer(along, [1.0, 0.0]), np.outer(along, [np.cos(angle), np.sin(angle)])])
+    assert len(find_contacts(np.array([0, 1]), rest, rest, 2.0).pairs) == 0
+    closed = rest.copy()
+    closed[1] = np.outer(along, [np.cos(0.1), np.sin(0.1)])
+    assert find_contacts(np.array([0, 1]), rest, closed, 2.0).overlap[0] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "word"), [({"elements": 0}, "elements"), ({"size": -1.0}, "size")]
+)
+def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float], word: str) -> None:
+    with pytest.raises(InvalidSettings, match=f"^{word}: expected"):
+        FemSettings(**wrong)  # type: ignore[arg-type]
