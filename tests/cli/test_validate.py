@@ -1,0 +1,218 @@
+"""Every form of `bellcrank validate`, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import meshio
+import numpy as np
+import pytest
+
+from bellcrank.model import Design, find_problem, human_design, read_design, write_design
+
+from .helpers import PROBLEM, call, colours, files, refusal, write
+
+if TYPE_CHECKING:
+    from typing import Any
+
+pytestmark = pytest.mark.usefixtures("here")
+
+REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "crane.problem.json"
+RUBBER = ("--young", 12, "--poisson", 0.48, "--thickness", "5mm", "--scale", "10mm")
+
+
+def validated(*words: object) -> dict[str, Any]:
+    outcome = call("validate", *words, "--json")
+    assert outcome.code == 0, outcome.err
+    return outcome.data
+
+
+@pytest.mark.parametrize(
+    ("words", "expected", "digits"),
+    [
+        (("--linear", "--width", "1mm"), (3.015062782e-2, 3.480436969e-2, -5.412679980), 5e-9),
+        (("--linear", "--width", "2mm"), (3.464962720e-2, 3.261786336e-2, -11.06770131), 5e-9),
+        (
+            ("--linear", "--width", 2, "--theory", "timoshenko"),
+            (3.392924848e-2, 3.293548739e-2, -11.02935494),
+            5e-9,
+        ),
+        (("--width", "0.2cm"), (3.962278969e-2, 3.595412958e-2, -10.93101755), 5e-8),
+    ],
+)
+def test_the_command_gives_the_figures_that_several_codes_agree_on(
+    words: tuple[object, ...], expected: tuple[float, ...], digits: float
+) -> None:
+    if not REFERENCE.exists():
+        pytest.skip("the node table of these figures is not in this checkout")
+    data = validated(REFERENCE, *words, *RUBBER, "--stroke", "1mm", "--record", "kept.json")
+    found = [*data["mean_output_displacement_mm"], data["input_force_N"][1]]
+    assert found == pytest.approx(expected, rel=digits)
+    assert data["status"] == "converged"
+    assert data["efficiency"] == pytest.approx(-found[0])
+
+
+def test_the_table_says_what_the_json_says() -> None:
+    words = ("human:crane", "--theory", "euler-bernoulli,timoshenko", "--elements", 2)
+    outcome = call("validate", *words)
+    assert outcome.code == 0
+    data = validated(*words)
+    assert [entry["theory"] for entry in data["results"]] == ["euler-bernoulli", "timoshenko"]
+    for entry in data["results"]:
+        assert f" {entry['efficiency']:.4f} " in outcome.out
+    assert f" {data['discrete_model']['efficiency']:.4f} " in outcome.out
+    assert data["efficiency"] == data["results"][0]["efficiency"]
+
+
+def test_a_design_keeps_its_record_beside_it(copy: Path) -> None:
+    before = files(copy)
+    path = copy / "design.json"
+    outcome = call("validate", path, "--elements", 2)
+    assert outcome.code == 0, outcome.err
+    assert set(files(copy)) - set(before) == {"validation.json"}
+    assert outcome.err.splitlines()[-1] == f"wrote {copy / 'validation.json'}"
+    call("validate", copy, "--theory", "timoshenko", "--elements", 2)
+    call("validate", copy, "--theory", "timoshenko", "--elements", 3)
+    record = json.loads((copy / "validation.json").read_text())
+    assert record["schema"] == "bellcrank/validation/1"
+    assert [entry["theory"] for entry in record["results"]] == ["euler-bernoulli", "timoshenko"]
+    assert record["mask"] == read_design(path).mask_hex
+    kept = {name: content for name, content in files(copy).items() if name != "validation.json"}
+    assert kept == before
+
+
+def test_built_in_designs_leave_no_record(here: Path) -> None:
+    (here / "crane").mkdir()  # the name means the problem, not this folder
+    call("validate", "crane", "--elements", 1, "--linear")
+    call("validate", "human:crane", "--elements", 1, "--linear")
+    assert list(files(here)) == ["crane"]
+
+
+def test_a_file_that_is_no_record_is_left_alone(copy: Path) -> None:
+    write(copy / "validation.json", {"schema": "something/1"})
+    message = refusal("validate", copy, "--elements", 1, folder=copy)
+    assert "validation.json: expected a record of bellcrank/validation/1" in message
+
+
+@pytest.mark.parametrize("beside", [None, "machine:crane"])
+def test_a_picture_shows_stress_in_colours(here: Path, beside: str | None) -> None:
+    words = ("--beside", beside) if beside else ()
+    outcome = call("validate", "human:crane", *words, "--picture", "stress.png", "--elements", 2)
+    assert outcome.code == 0, outcome.err
+    assert colours(here / "stress.png") > 500
+
+
+def test_a_vtu_file_holds_displacement_and_stress(here: Path) -> None:
+    data = validated("human:crane", "--vtu", "part.vtu")
+    mesh = meshio.read(here / "part.vtu")
+    (lines,) = mesh.cells
+    assert lines.type == "line"
+    stress = mesh.cell_data["von_mises_MPa"][0]
+    assert len(lines.data) == len(stress) == 8 * human_design("crane").beam_count
+    assert stress.max() == pytest.approx(data["von_mises_MPa"])
+    moved = mesh.point_data["displacement_mm"]
+    assert moved.shape == (len(mesh.points), 3)
+    assert np.abs(moved[:, 1]).max() >= 4.33
+
+
+def test_a_part_is_described_in_a_file_and_changed_on_the_command_line(here: Path) -> None:
+    write(
+        here / "part.toml",
+        'schema = "bellcrank/part/1"\nwidth = "1.6mm"\nthickness = 4.8\nmaterial = "petg"\n',
+    )
+    words = ("human:crane", "--linear", "--elements", 1, "--part", "part.toml")
+    part = validated(*words, "--thickness", "5.12mm")["results"][0]["part"]
+    assert (part["width"], part["thickness"], part["material"]) == (1.6, 5.12, "petg")
+
+
+def test_a_search_for_struts_is_validated_as_what_it_searched_for(here: Path) -> None:
+    words = ("--strut-width", "1.6mm", "--material", "tpu-95a", "--scale", "12mm")
+    outcome = call("design", PROBLEM, "--steps", 500, "--chains", 1, *words, "--out", "run")
+    assert outcome.code == 0, outcome.err
+    design = read_design(here / "run" / "design.json")
+    assert design.problem.stiffness.angle == pytest.approx(5.0 * 0.55 * (1.6 / 12.0) ** 2 / 6.0)
+    part = validated("run")["results"][0]["part"]
+    assert (part["width"], part["scale"], part["material"]) == (1.6, 12.0, "tpu-95a")
+
+
+def snapping(here: Path) -> Path:
+    """A shallow arch pushed through by a force."""
+    places = [[0.0, 0.0], [1.5, 0.225], [3.0, 0.45], [4.5, 0.225], [6.0, 0.0]]
+    problem = {
+        "schema": "bellcrank/problem/1", "name": "arch", "positions": places,
+        "beams": [[0, 1], [1, 2], [2, 3], [3, 4]], "initial": "f0", "designable": [0],
+        "stiffness": {"bond": 5.0, "angle": 0.1},
+        "supports": {"fixed": [0, 4], "fixed_x": [], "fixed_y": []},
+        "input": {"nodes": [2], "direction": [0.0, -1.0], "drive": "force", "amount": 0.02},
+        "output": {"nodes": [1], "direction": [0.0, -1.0], "spring": None, "spring_kind": None},
+        "aggregate": "mean",
+    }  # fmt: skip
+    return write(here / "arch.json", problem)
+
+
+def test_a_part_that_snaps_is_told_apart_from_a_result(here: Path) -> None:
+    outcome = call("validate", snapping(here), "--width", "1mm", "--json")
+    assert outcome.code == 0
+    data = outcome.data
+    assert data["status"] == "snapped"
+    assert data["efficiency"] is None
+    assert data["mean_output_displacement_mm"] is None
+    assert 0.0 < data["reached"] < 1.0
+    assert data["results"][0]["after_snap"]["load"] == 1.0
+    words = call("validate", "arch.json", "--width", "1mm")
+    assert f"snapped at {data['reached']:.1%}" in words.out
+    assert "stability is lost" in words.err
+
+
+def in_pieces(here: Path) -> str:
+    crane = find_problem("crane")
+    mask = crane.initial.copy()
+    mask[crane.designable] = False
+    write_design(Design(crane, mask), here / "pieces.json")
+    return "pieces.json"
+
+
+@pytest.mark.parametrize(
+    ("words", "word"),
+    [
+        (("nothing",), "nothing"),
+        (("human:scaling-8",), "no human design for 'scaling-8'"),
+        (("crane", "--width", "12mm"), "width: struts 12 mm wide are not slender"),
+        (("crane", "--width", "wide"), "width: expected a length like 2mm"),
+        (("crane", "--width", "-1"), "width: expected a length above 0 mm"),
+        (("crane", "--thickness", "0"), "thickness: expected a length above 0 mm"),
+        (("crane", "--stroke", "0"), "stroke: expected a length above 0 mm"),
+        (("pliers", "--stroke", "1mm"), "driven by a force"),
+        (("crane", "--material", "jelly"), "unknown material 'jelly'; known: ninjaflex"),
+        (("crane", "--young", "12"), "give --young and --poisson together"),
+        (("crane", "--young", "-1", "--poisson", "0.3"), "young: expected a modulus above 0"),
+        (("crane", "--young", "1", "--poisson", "0.5"), "poisson: expected a ratio"),
+        (
+            ("crane", "--young", "1", "--poisson", "0.3", "--material", "pla"),
+            "either --material or --young",
+        ),
+        (("crane", "--level", "sponge"), "unknown level 'sponge'; known: frame"),
+        (("crane", "--theory", "kirchhoff"), "unknown theory 'kirchhoff'; known: euler-bernoulli"),
+        (("crane", "--elements", "0"), "elements: expected at least 1"),
+        (("crane", "--part", "none.toml"), "none.toml: no such file"),
+        (("crane", "--picture", "shape.jpg"), "shape.jpg: expected a picture name"),
+        (("crane", "--vtu", "shape.vtk"), "shape.vtk: expected a name ending in .vtu"),
+        (("crane", "--beside", "human:crane"), "--beside is for the picture"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(words: tuple[str, ...], word: str) -> None:
+    assert word in refusal("validate", *words)
+
+
+def test_a_design_in_pieces_is_refused(here: Path) -> None:
+    message = refusal("validate", in_pieces(here))
+    assert "the design is in 3 pieces" in message
+    assert "hang on no support" in message
+
+
+def test_a_picture_is_not_written_over(here: Path) -> None:
+    write(here / "stress.png", "mine")
+    message = refusal("validate", "human:crane", "--picture", "stress.png")
+    assert "stress.png: exists already" in message
