@@ -1,6 +1,6 @@
 """How well the discrete model foretells finite elements: ``python -m benchmarks.fidelity``.
 
-Three questions, each a part of the script (``--only correlate,width,search``):
+Four questions, each a part of the script (``--only correlate,width,search,levels``):
 
 - correlate: over some hundred designs that searches came by, how do the efficiencies of the
   discrete model, with the paper's stiffness and with that of the struts, agree with nonlinear
@@ -9,6 +9,7 @@ Three questions, each a part of the script (``--only correlate,width,search``):
   width does the paper's stand for?
 - search: what is left of the efficiency that a search promises, when it searches with the one
   stiffness or the other?
+- levels: what do all levels of finite elements say about each design that comes with the package?
 
 Designs that snap or touch themselves as frames are counted and listed, not averaged.
 Results go to ``docs/validation/*.json`` and ``*.png``, tables to standard output.
@@ -27,7 +28,16 @@ from scipy.stats import spearmanr
 
 from bellcrank.fem import FemSettings, levels
 from bellcrank.mechanics import CAREFUL, Evaluator, Status
-from bellcrank.model import Design, Problem, Stiffness, find_problem, pack_mask, unpack_mask
+from bellcrank.model import (
+    Design,
+    Problem,
+    Stiffness,
+    builtin,
+    find_problem,
+    gallery_design,
+    pack_mask,
+    unpack_mask,
+)
 from bellcrank.parts import PartSpec, calibrated
 from bellcrank.parts.calibration import JOINT
 from bellcrank.plots import style
@@ -35,6 +45,7 @@ from bellcrank.plots.saving import save_figure
 from bellcrank.provenance import provenance
 from bellcrank.search import advance_chain, make_responder, read_settings, start_chain
 from bellcrank.search.cleaning import clean
+from bellcrank.workflows import find_design, spec_for, validate
 
 FOLDER = Path(__file__).parents[1] / "docs" / "validation"
 PROBLEMS = ("crane", "anti-parallel")
@@ -208,6 +219,59 @@ def search_study(pool: ProcessPoolExecutor) -> None:
     _write("search", record)
 
 
+def level_of(job: tuple[str, str, FemSettings]) -> dict[str, object]:
+    """Analyse a design that comes with the package at a level."""
+    what, level, settings = job
+    design = find_design(what)
+    validation = validate(design, replace_width(spec_for(design)), [(level, settings)])
+    return {"design": what, **validation.to_dict(), **validation.analyses[0].to_dict()}
+
+
+def replace_width(spec: PartSpec) -> PartSpec:
+    """Return a part with struts of the width that all are compared at."""
+    return spec.changed({"width": WIDTH})
+
+
+def level_study(pool: ProcessPoolExecutor) -> None:
+    """Validate the designs that come with the package, by all levels."""
+    designs = [
+        f"{kind}:{name}"
+        for name in builtin
+        for kind in ("human", "machine")
+        if gallery_design(kind, name)  # type: ignore[arg-type]
+    ]
+    columns = {
+        "frame, linear": ("frame", FemSettings(linear=True)),
+        "frame, euler-bernoulli": ("frame", FemSettings()),
+        "frame, timoshenko": ("frame", FemSettings(theory="timoshenko")),
+        "plane, st-venant-kirchhoff": ("plane", FemSettings(law="st-venant-kirchhoff")),
+        "plane, neo-hookean": ("plane", FemSettings()),
+        "solid, linear": ("solid", FemSettings(linear=True)),
+    }
+    record: dict[str, object] = {"width": WIDTH, "provenance": provenance()}
+    for what in designs:
+        jobs = [(what, *column) for column in columns.values()]
+        rows = dict(zip(columns, pool.map(level_of, jobs), strict=True))
+        discrete_model = rows["frame, linear"]["discrete_model"]
+        record[what] = {
+            "discrete_model": discrete_model,
+            **{name: _short(row) for name, row in rows.items()},
+        }
+        figures = [discrete_model["efficiency"], *(row["efficiency"] for row in rows.values())]  # type: ignore[index]
+        words = " | ".join("-" if value is None else f"{value:.3f}" for value in figures)
+        print(f"| {what} | {words} |", flush=True)
+    _write("levels", record)
+
+
+def _short(row: dict[str, object]) -> dict[str, object]:
+    """Return what is worth keeping of an analysis."""
+    kept = (
+        "status", "reached", "loss_of_stability", "efficiency", "mean_output_displacement_mm",
+        "input_force_N", "energy_N_mm", "von_mises_MPa", "principal_strain", "cost", "warnings",
+    )  # fmt: skip
+    return {key: row[key] for key in kept}
+
+
 def _plain(row: dict[str, object]) -> dict[str, object]:
     """Round figures, and write what is none as null."""
     return {
@@ -257,7 +321,12 @@ def _scatter(pictured: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]) -> 
     save_figure(figure, FOLDER / "correlation.png", overwrite=True)
 
 
-PARTS = {"correlate": correlate, "width": width_study, "search": search_study}
+PARTS = {
+    "correlate": correlate,
+    "width": width_study,
+    "search": search_study,
+    "levels": level_study,
+}
 
 
 def main() -> None:

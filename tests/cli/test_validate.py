@@ -193,7 +193,7 @@ def in_pieces(here: Path) -> str:
             ("crane", "--young", "1", "--poisson", "0.3", "--material", "pla"),
             "either --material or --young",
         ),
-        (("crane", "--level", "sponge"), "unknown level 'sponge'; known: frame"),
+        (("crane", "--level", "sponge"), "unknown level 'sponge'; known: plane, solid, frame"),
         (("crane", "--theory", "kirchhoff"), "unknown theory 'kirchhoff'; known: euler-bernoulli"),
         (("crane", "--elements", "0"), "elements: expected at least 1"),
         (("crane", "--part", "none.toml"), "none.toml: no such file"),

@@ -100,16 +100,15 @@ def validate(
     if others and picture is None:
         raise InvalidSettings("--beside is for the picture; give --picture FILE too")
     announce_compilation()
+    target = record or _beside(design)
+    keep = [lambda so_far: keep_record(so_far, target) if target else None, lambda _so_far: None]
     found = []
     names = [f"{name} {_model(name, settings)}" for name, settings in plan]
-    for one in [chosen, *others]:
+    for one, kept in zip([chosen, *others], keep, strict=False):
         driven = one if stroke is None else with_stroke(one, stroke, spec.scale)
         with StrokeProgress(names) as progress:
-            found.append(validate(driven, spec, plan, progress))
+            found.append(validate(driven, spec, plan, progress, kept))
     validation = found[0]
-    target = record or _beside(design)
-    if target is not None:
-        keep_record(validation, target)
     if picture is not None:
         draw_validations(
             found, [design, *([beside] if beside else [])], picture, overwrite=overwrite

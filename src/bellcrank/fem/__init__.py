@@ -9,7 +9,7 @@
 ('converged', 1.21)
 """
 
-from bellcrank.fem import frame
+from bellcrank.fem import continuum, frame
 from bellcrank.fem.levels import FemSettings, levels
 from bellcrank.fem.path import Loss, PathStatus
 from bellcrank.fem.results import Analysis, Field, StrokePoint
@@ -21,6 +21,7 @@ __all__ = [
     "Loss",
     "PathStatus",
     "StrokePoint",
+    "continuum",
     "frame",
     "levels",
 ]

@@ -110,6 +110,7 @@ def validate(
     spec: PartSpec,
     plan: Sequence[tuple[str, FemSettings]],
     tell: Callable[[int, float], None] = lambda _index, _load: None,
+    keep: Callable[[Validation], None] = lambda _so_far: None,
 ) -> Validation:
     """Analyse a design as a part.
 
@@ -121,6 +122,8 @@ def validate(
         Levels with settings, in the order wanted.
     tell
         Called with the index in the plan and the part of the stroke that is reached.
+    keep
+        Called after each analysis with all so far, so that a kill during the next costs no more.
 
     Raises
     ------
@@ -139,10 +142,12 @@ def validate(
     part = spec.of(design)
     require_held(design)
     response = Evaluator(design.problem).respond(design.mask, CAREFUL)
-    analyses = []
+    found = Validation(design, spec, response, [])
     for index, (analyse, (_, settings)) in enumerate(zip(chosen, plan, strict=True)):
-        analyses.append(analyse(part, settings, lambda load, index=index: tell(index, load)))
-    return Validation(design, spec, response, analyses)
+        analysis = analyse(part, settings, lambda load, index=index: tell(index, load))
+        found = replace(found, analyses=[*found.analyses, analysis])
+        keep(found)
+    return found
 
 
 def keep_record(validation: Validation, path: Path) -> None:
