@@ -1,0 +1,146 @@
+"""Levels B and C: a part as a sheet or a body, along the whole stroke."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.fem.contact import Contacts, find_contacts
+from bellcrank.fem.continuum.response import solve_plane, solve_solid
+from bellcrank.fem.levels import levels
+from bellcrank.fem.path import PathStatus
+from bellcrank.fem.results import Analysis, StrokePoint
+from bellcrank.mechanics import efficiency_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bellcrank.fem.continuum.response import ContinuumState, Response
+    from bellcrank.fem.levels import FemSettings
+    from bellcrank.fem.results import Field
+    from bellcrank.parts import Part
+
+PLACES = 9
+"""Along the centre line of each strut where contact is looked for."""
+
+
+@levels.register("plane")
+def analyse_plane(
+    part: Part, settings: FemSettings, tell: Callable[[float], None] = lambda _load: None
+) -> Analysis:
+    """Analyse a part as a sheet in plane stress, cut into second-order triangles.
+
+    Raises
+    ------
+    InvalidSettings
+        If NGSolve is not installed, or struts or fillets are so wide that holes close.
+    """
+    return _analyse(part, settings, tell, "plane", solve_plane)
+
+
+@levels.register("solid")
+def analyse_solid(
+    part: Part, settings: FemSettings, tell: Callable[[float], None] = lambda _load: None
+) -> Analysis:
+    """Analyse a part as a body, cut into second-order tetrahedra.
+
+    Raises
+    ------
+    InvalidSettings
+        If NGSolve is not installed, or struts or fillets are so wide that holes close.
+    """
+    return _analyse(part, settings, tell, "solid", solve_solid)
+
+
+def _analyse(
+    part: Part,
+    settings: FemSettings,
+    tell: Callable[[float], None],
+    level: str,
+    solve: Callable[..., Response],
+) -> Analysis:
+    """Analyse a part by one of the two."""
+    began = time.perf_counter()
+    law = "linear" if settings.linear else settings.law
+    found = solve(part, law, settings.size, tell=lambda state: tell(state.load))
+    path = found.path
+    if settings.linear and path.status is PathStatus.MECHANISM:
+        raise InvalidSettings(f"the part cannot be analysed: {path.status.message}")
+    states = [state for state in found.states if state.load or len(found.states) == 1]
+    return Analysis(
+        part=part,
+        level=level,
+        theory=law,
+        linear=settings.linear,
+        status=path.status,
+        loss=path.loss,
+        points=[point_of(part, state) for state in states],
+        after=None,
+        contacts=contacts_of(part, found.field),
+        field=found.field,
+        cost={
+            "seconds": time.perf_counter() - began,
+            "unknowns": found.unknowns,
+            "elements": found.elements,
+            "factorisations": path.factorisations,
+        },
+    )
+
+
+def point_of(part: Part, state: ContinuumState) -> StrokePoint:
+    """Return the figures of an equilibrium."""
+    problem = part.design.problem
+    motion = state.motion[:, :2]
+    output = motion[problem.output.nodes].mean(axis=0)
+    force = state.force[problem.input.nodes, :2].sum(axis=0)
+    return StrokePoint(
+        load=state.load,
+        efficiency=efficiency_of(problem, motion / part.scale, load=state.load),
+        output=(float(output[0]), float(output[1])),
+        force=(float(force[0]), float(force[1])),
+        energy=state.energy,
+        stress=state.stress,
+        strain=state.strain,
+    )
+
+
+def contacts_of(part: Part, field: Field) -> Contacts:
+    """Find the struts that touch, by where their centre lines go."""
+    ends = part.positions[part.struts]
+    along = np.linspace(0.0, 1.0, PLACES)[None, :, None]
+    lines = ends[:, None, 0] * (1.0 - along) + ends[:, None, 1] * along
+    moved = lines + displacement_at(field, lines.reshape(-1, 2)).reshape(lines.shape)
+    beams = np.flatnonzero(part.design.mask)
+    return find_contacts(beams, lines, moved, part.section.width)
+
+
+def displacement_at(field: Field, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (p, 2) the displacement of points of a sheet, or of the lower face of a body, mm.
+
+    Parameters
+    ----------
+    points : (p, 2)
+        Within the part at rest, mm.
+    """
+    import shapely
+
+    rest, cells = field.rest[:, :2], field.cells
+    if field.rest.shape[1] == 3:
+        floor = field.rest[:, 2].min() + 1e-9 * np.ptp(field.rest[:, 0])
+        cells = cells[(field.rest[cells, 2] <= floor).all(axis=1)]
+    corners = rest[cells]
+    tree = shapely.STRtree(shapely.polygons(corners))
+    # A point on an edge is in two triangles, one between curved edges perhaps in none.
+    which, cell = tree.query_nearest(shapely.points(points), all_matches=False)
+    first, second, third = corners[cell].transpose(1, 0, 2)
+    sides = np.stack([second - first, third - first], axis=2)
+    part = np.linalg.solve(sides, (points[which] - first)[:, :, None])[:, :, 0]
+    weight = np.column_stack([1.0 - part.sum(axis=1), part])
+    moved = np.zeros_like(points)
+    moved[which] = np.einsum("pk,pkd->pd", weight, field.displacement[cells[cell], :2])
+    return moved
