@@ -1,1 +1,0 @@
-from bellcrank.parts.materials import *  # noqa: F403

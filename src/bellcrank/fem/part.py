@@ -1,1 +1,0 @@
-from bellcrank.parts.part import *  # noqa: F403

@@ -1,1 +1,0 @@
-from bellcrank.parts.section import *  # noqa: F403
