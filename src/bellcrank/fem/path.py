@@ -1,10 +1,10 @@
 """Along the stroke: equilibria of a part from rest to the full input.
 
-A step begins with a tangent predictor and ends with Newton's method. It is made smaller where
-the corrector ends far from the predictor, so that the path is not left for another one, and
-where stability is lost, so that the load at which it is lost is known. There the softest mode
-tells what happens: if the load pulls along it, the path turns back (a limit point) and the part
-jumps; if not, another path branches off (a bifurcation) and the part buckles into it.
+A step begins with a predictor, the tangent or a cubic, and ends with Newton's method. It is made
+smaller where the corrector ends far from the predictor, so that the path is not left for another
+one, and where stability is lost, so that the load at which it is lost is known. There the softest
+mode tells what happens: if the load pulls along it, the path turns back (a limit point) and the
+part jumps; if not, another path branches off (a bifurcation) and the part buckles into it.
 """
 
 from __future__ import annotations
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 SMALLEST_STEP = 1e-4
 LARGEST_DEPARTURE = 0.5
 """Of the corrector from the predictor, as a part of the predicted motion."""
+HOPE = 3
+"""Iterations that may raise the residual; one that does later is on its way to nowhere."""
+CURVED = 0.3
+"""Departure of the curved from the straight predictor up to which it is trusted."""
 EASY = 4
 """Iterations up to which the next step is larger."""
 SOFT = 0.15
@@ -180,7 +184,7 @@ class Stepping:
 
     first: float = 1.0 / 16.0
     largest: float = 1.0 / 8.0
-    iterations: int = 12
+    iterations: int = 15
 
     def __post_init__(self) -> None:
         for name in ("first", "largest"):
@@ -216,19 +220,49 @@ class Follower:
         The last correction is made although the state before it is settled already: the factor
         that it needs is needed anyway.
         """
-        unknowns = guess
+        unknowns, first = guess, 0.0
         for iteration in range(self.stepping.iterations):
             near = self._linearise(unknowns, load)
             if near is None:
                 return None
+            left = float(np.abs(near.residual).max(initial=0.0))
+            first = max(first, left) if iteration < HOPE else first
+            if left > first:
+                return None
             unknowns = unknowns - near.factor.solve(near.residual)
-            if np.abs(near.residual).max(initial=0.0) <= near.tolerance:
+            if left <= near.tolerance:
                 return State(load, unknowns, near.factor.negative), iteration, near.factor
         return None
 
     def rate(self, factor: Factor, state: State) -> NDArray[np.float64]:
         """Return (f,) the motion for all of the input at once, by the tangent at a state."""
         return -factor.solve(self.equations.pull(state.unknowns, state.load))
+
+    def predict(
+        self,
+        load: float,
+        here: State,
+        rate: NDArray[np.float64],
+        before: tuple[State, NDArray[np.float64]] | None,
+    ) -> NDArray[np.float64]:
+        """Return (f,) the motion to expect up to a load.
+
+        By the cubic through the last two states with their tangents, unless that leads far off
+        the last tangent, where a path bends too sharply for it.
+        """
+        step = load - here.load
+        straight = step * rate
+        if before is None:
+            return straight
+        last, slope = before
+        taken = here.load - last.load
+        part = step / taken
+        # Hermite's cubic in the part of the last step, continued beyond it.
+        chord, begin, end = here.unknowns - last.unknowns, taken * slope, taken * rate
+        second, third = 3.0 * chord - 2.0 * begin - end, begin + end - 2.0 * chord
+        curved = part * (begin + (2.0 + part) * second + (3.0 + part * (3.0 + part)) * third)
+        bend = self.equations.distance(curved - straight)
+        return curved if bend < CURVED * self.equations.distance(straight) else straight
 
     def strays(self, state: State, here: State, ahead: NDArray[np.float64]) -> bool:
         """Whether a state is so far from where it was expected that it may be another path's."""
@@ -247,9 +281,10 @@ class Follower:
         rate = self.rate(factor, here)
         step = min(self.stepping.first, self.stepping.largest)
         unstable = False
+        before: tuple[State, NDArray[np.float64]] | None = None
         while here.load < 1.0:
             load = min(1.0, here.load + step)
-            ahead = (load - here.load) * rate
+            ahead = self.predict(load, here, rate, before)
             found = self.correct(load, here.unknowns + ahead)
             # An unstable equilibrium ahead tells that the path ends where stability is lost,
             # even if Newton's method finds nothing at all closer to it.
@@ -262,6 +297,7 @@ class Follower:
                     status = PathStatus.SNAPPED if lost else PathStatus.UNCONVERGED
                     return Path(states, status, self.factorisations, loss)
                 continue
+            before = here, rate
             here, iterations, factor = found
             states.append(here)
             self.tell(here)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bellcrank.fem.results import Field
     from bellcrank.parts.part import Part
 
-STEPPING = Stepping(first=0.25, largest=0.5)
+STEPPING = Stepping(first=0.125, largest=0.25)
 
 
 def in_silence(_state: State) -> None:
