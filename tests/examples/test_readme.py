@@ -90,6 +90,31 @@ def test_a_campaign_is_run_and_harvested(
     assert efficiency > 1.0
 
 
+def test_a_part_is_searched_for_and_validated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    search, check, picture = blocks("")[4].strip().splitlines()
+    run(f"{search} --steps 500 --chains 1", monkeypatch, capsys)
+    assert read_design("part/design.json").provenance["part"]["width"] == 2.0
+    assert "euler-bernoulli" in run(check, monkeypatch, capsys)
+    record = json.loads(Path("part/validation.json").read_text())
+    assert record["results"][0]["status"] == "converged"
+    run(picture, monkeypatch, capsys)
+    assert Path("stress.png").stat().st_size > 50_000
+
+
+def test_the_validation_table_is_that_of_the_record() -> None:
+    record = json.loads((README.parent / "docs" / "validation" / "levels.json").read_text())
+    rows = re.findall(r"^\| ([\w-]+) \| (hand|machine) \| (.*?) \|$", README.read_text(), re.M)
+    assert len(rows) == sum(":" in name for name in record)
+    columns = ("discrete_model", "frame, euler-bernoulli", "plane, neo-hookean")
+    for task, by, figures in rows:
+        entry = record[f"{'human' if by == 'hand' else by}:{task}"]
+        expected = [f"{entry[column]['efficiency']:.2f}" for column in columns]
+        assert [figure.strip() for figure in figures.split("|")][:3] == expected, task
+
+
 def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     [example] = blocks("python")
     exec(compile(example, "README.md", "exec"), {})

@@ -28,7 +28,7 @@ from bellcrank.fem.continuum.laws import lame_of, laws
 from bellcrank.fem.continuum.mesh import plane_mesh, triangulated
 from bellcrank.fem.continuum.modes import negative, softest
 from bellcrank.fem.continuum.response import respond, solve_plane, solve_solid
-from bellcrank.fem.continuum.solid import solid_mesh
+from bellcrank.fem.continuum.solid import raised, solid_mesh, solid_of, tetrahedra
 from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.frame.equilibrium import FrameEquations
 from bellcrank.fem.frame.mesh import frame_mesh
@@ -172,6 +172,60 @@ def test_a_thick_ring_converges_at_the_order_of_curved_quadratic_elements() -> N
     assert np.log2(errors[-2] / errors[-1]) == pytest.approx(3.0, abs=0.3)
     assert np.log2(energy_errors[-2] / energy_errors[-1]) == pytest.approx(4.0, abs=0.4)
     assert energy_errors[-1] < 2e-6 * energies[-1]
+
+
+def block(cells: int) -> ContinuumMesh:
+    """The unit cube in tetrahedra, made of triangles layer by layer as parts are."""
+    line = np.linspace(0.0, 1.0, cells + 1)
+    flat = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+    corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    right = corner + cells + 1
+    lower = np.column_stack([corner, right, right + 1])
+    upper = np.column_stack([corner, right + 1, corner + 1])
+    elements = tetrahedra(np.concatenate([lower, upper]), len(flat), cells)
+    hubs = np.full(len(elements), -1)
+    return solid_of(raised(flat, 1.0, cells), elements, hubs, 0)
+
+
+def test_a_block_converges_at_the_order_of_quadratic_tetrahedra() -> None:
+    law, lame = laws["linear"], lame_of(RUBBER)
+    # The gradient of a harmonic function changes no volume and needs no forces within.
+    grown, turned = ng.exp(math.sqrt(2.0) * ng.x), (ng.sin(ng.y), ng.cos(ng.y))
+    up, side = ng.sin(ng.z), ng.cos(ng.z)
+    exact = 0.02 * ng.CF(
+        (
+            math.sqrt(2.0) * grown * turned[0] * up,
+            grown * turned[1] * up,
+            grown * turned[0] * side,
+        )
+    )
+    errors = []
+    for cells in (2, 4, 8):
+        solid = block(cells)
+        mesh = solid.mesh
+        space = ng.VectorH1(mesh, order=2)
+        moved = ng.GridFunction(space)
+        moved.Set(exact, dual=True)
+        places = solid.vertices
+        free = ng.BitArray(space.ndof)
+        free.Set()
+        for kind, ends in (
+            (ng.VERTEX, np.arange(len(places))[:, None]),
+            (ng.EDGE, np.array([[end.nr for end in edge.vertices] for edge in mesh.edges])),
+        ):
+            outside = ((places[ends] == 0.0).all(axis=1) | (places[ends] == 1.0).all(axis=1)).any(1)
+            for number in np.flatnonzero(outside).tolist():
+                for dof in space.GetDofNrs(ng.NodeId(kind, number)):
+                    free[dof] = False
+        form = ng.BilinearForm(space)
+        form += ng.Variation(law.solid(ng.Id(3) + ng.Grad(space.TrialFunction()), lame) * ng.dx)
+        form.AssembleLinearization(moved.vec)
+        force = moved.vec.CreateVector()
+        form.Apply(moved.vec, force)
+        moved.vec.data -= form.mat.Inverse(free, "sparsecholesky") * force
+        gap = moved - exact
+        errors.append(math.sqrt(ng.Integrate(gap * gap, mesh, order=8)))
+    assert np.log2(errors[-2] / errors[-1]) == pytest.approx(3.0, abs=0.3)
 
 
 def constant(values: np.ndarray) -> ng.CoefficientFunction:

@@ -238,6 +238,8 @@ def _dress(axes: Axes, below: str, beside: str) -> None:
     axes.set_xlabel(below, **looks)
     axes.set_ylabel(beside, **looks)
     axes.set_xlim(left=0.0)
+    if axes.get_ylim()[0] > 0.0:
+        axes.set_ylim(bottom=0.0)
     axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT)
     axes.grid(axis="y", color=style.IDLE_REST, linewidth=0.8)
     axes.set_axisbelow(True)
