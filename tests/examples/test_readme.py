@@ -106,7 +106,8 @@ def test_a_part_is_searched_for_and_validated(
 
 def test_the_validation_table_is_that_of_the_record() -> None:
     record = json.loads((README.parent / "docs" / "validation" / "levels.json").read_text())
-    rows = re.findall(r"^\| ([\w-]+) \| (hand|machine) \| (.*?) \|$", README.read_text(), re.M)
+    text = README.read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([\w-]+) \| (hand|machine) \| (.*?) \|$", text, re.MULTILINE)
     assert len(rows) == sum(":" in name for name in record)
     columns = ("discrete_model", "frame, euler-bernoulli", "plane, neo-hookean")
     for task, by, figures in rows:
