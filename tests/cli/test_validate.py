@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -204,6 +205,41 @@ def in_pieces(here: Path) -> str:
 )
 def test_bad_input_is_refused_in_one_line(words: tuple[str, ...], word: str) -> None:
     assert word in refusal("validate", *words)
+
+
+@pytest.mark.parametrize(
+    ("words", "word"),
+    [
+        (("--level", "plane", "--fillet", "3mm"), "fillet: a radius of 3 mm would close"),
+        (("--level", "plane", "--width", "6mm"), "width: struts 6 mm wide would close"),
+        (("--level", "frame", "--fillet", "-1mm"), "fillet: expected a radius"),
+        (("--level", "plane", "--size", "0"), "size: expected a length above 0 mm"),
+        (("--level", "solid", "--law", "jelly"), "unknown law 'jelly'; known: linear"),
+    ],
+)
+def test_outlines_that_cannot_be_meshed_are_refused(words: tuple[str, ...], word: str) -> None:
+    pytest.importorskip("ngsolve", reason="NGSolve is not installed")
+    assert word in refusal("validate", "crane", *words)
+
+
+def test_without_ngsolve_the_plane_is_refused_and_frames_are_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "ngsolve", None)
+    message = refusal("validate", "crane", "--level", "plane")
+    assert "pip install 'bellcrank[fem]'" in message
+    assert call("validate", "crane", "--linear").code == 0
+
+
+def test_all_levels_stand_in_one_table() -> None:
+    pytest.importorskip("ngsolve", reason="NGSolve is not installed")
+    words = ("human:crane", "--level", "frame,plane,solid", "--linear", "--size", "3mm")
+    results = validated(*words)["results"]
+    assert [entry["level"] for entry in results] == ["frame", "plane", "solid"]
+    frame, plane, solid = (entry["efficiency"] for entry in results)
+    assert plane == pytest.approx(frame, rel=0.2)
+    assert solid == pytest.approx(plane, rel=0.1)
+    assert all(entry["principal_strain"] > 0.0 for entry in results)
 
 
 def test_a_design_in_pieces_is_refused(here: Path) -> None:
