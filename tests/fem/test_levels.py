@@ -51,6 +51,35 @@ def test_a_bent_bar_is_stressed_most_where_it_is_clamped() -> None:
     assert last.strain == pytest.approx(last.stress / 12.0)
 
 
+@pytest.mark.parametrize("name", ["crane", "anti-parallel"])
+def test_short_strokes_are_small_motions_whatever_the_mesh(name: str) -> None:
+    design = human_design(name)
+    assert design is not None
+    part = PartSpec().of(design)
+    small = levels["frame"](part, FemSettings(linear=True)).efficiency
+    for stroke in (1e-7, 1e-3):
+        given = replace(design.problem.input, amount=stroke)
+        short = replace(design, problem=replace(design.problem, input=given))
+        for elements in (2, 16):
+            analysis = levels["frame"](PartSpec().of(short), FemSettings(elements=elements))
+            assert analysis.efficiency == pytest.approx(small, rel=max(1e-5, 5.0 * stroke))
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e5])
+def test_the_same_shape_moves_the_same_way_at_any_scale(scale: float) -> None:
+    design = human_design("crane")
+    assert design is not None
+    analysis = levels["frame"](PartSpec(scale=scale, width=scale / 5.0).of(design), FemSettings())
+    assert analysis.efficiency == pytest.approx(1.2100339656, rel=1e-8)
+
+
+def test_very_fine_meshes_converge_too() -> None:
+    design = human_design("crane")
+    assert design is not None
+    analysis = levels["frame"](PartSpec().of(design), FemSettings(elements=96))
+    assert analysis.efficiency == pytest.approx(1.2100, rel=1e-2)
+
+
 def test_energy_is_the_work_done_along_the_stroke() -> None:
     design = human_design("crane")
     assert design is not None

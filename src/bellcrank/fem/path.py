@@ -92,14 +92,14 @@ class Linearised:
     ----------
     residual : (f,)
         0 in equilibrium.
-    tolerance
-        The largest entry of the residual that may be left.
+    tolerance : (f,) or number
+        What may be left of each entry of the residual.
     factor
         Of the derivative of the residual by the unknowns.
     """
 
     residual: NDArray[np.float64]
-    tolerance: float
+    tolerance: NDArray[np.float64] | float
     factor: Factor
 
 
@@ -225,12 +225,12 @@ class Follower:
             near = self._linearise(unknowns, load)
             if near is None:
                 return None
-            left = float(np.abs(near.residual).max(initial=0.0))
+            left = float((np.abs(near.residual) / near.tolerance).max(initial=0.0))
             first = max(first, left) if iteration < HOPE else first
             if left > first:
                 return None
             unknowns = unknowns - near.factor.solve(near.residual)
-            if left <= near.tolerance:
+            if left <= 1.0:
                 return State(load, unknowns, near.factor.negative), iteration, near.factor
         return None
 

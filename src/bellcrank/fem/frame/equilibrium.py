@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 TOLERANCE = 1e-10
 """Residual, as a part of the largest force within an element."""
+ROUNDING = 100.0 * float(np.finfo(float).eps)
 DIFFERENCE = 1e-7
 """Part of the input by which it is moved to see what that does."""
 
@@ -68,8 +69,7 @@ class FrameEquations:
         displacement = self.displacement(unknowns, load)
         force, matrix, magnitude = inner_forces(system, displacement)
         residual = (force - load * system.load).ravel()[system.free]
-        tolerance = TOLERANCE * magnitude + rounding(system, displacement)
-        return Linearised(residual, tolerance, SparseFactor(matrix))
+        return Linearised(residual, allowed(system, displacement, magnitude), SparseFactor(matrix))
 
     def pull(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
         """Return (f,) the derivative of the residual by the load."""
@@ -145,14 +145,23 @@ def solve_linear(system: FrameSystem) -> FrameState:
     return FrameState(1.0, displacement, reaction.reshape(-1, 3), factor.negative)
 
 
-def rounding(system: FrameSystem, displacement: NDArray[np.float64]) -> float:
-    """Return the force that rounding the displacements makes in the stiffest element.
+def allowed(
+    system: FrameSystem, displacement: NDArray[np.float64], magnitude: float
+) -> NDArray[np.float64]:
+    """Return (f,) the residual that may be left: forces in N, moments in N mm.
 
-    In slender struts it is no small part of what bends them.
+    A small part of the forces at work, and what rounding makes of nothing: displacements are
+    exact to a part of themselves, angles of chords to that part over their length and to a part
+    of one. In slender struts the former is no small part of what bends them, in short elements
+    and at short strokes the latter.
     """
-    stiffest = float(system.mesh.stiffness[:, 0, 0].max())
-    largest = float(np.abs(displacement[:, :2]).max())
-    return 100.0 * float(np.finfo(float).eps) * stiffest * largest
+    mesh = system.mesh
+    moved = float(np.abs(displacement[:, :2]).max())
+    stretching = moved * float(mesh.stiffness[:, 0, 0].max())
+    bending = mesh.stiffness[:, 1, 1] / mesh.length * (1.0 + moved / mesh.length)
+    force = TOLERANCE * magnitude + ROUNDING * (stretching + float(bending.max()))
+    arm = np.where(system.free % 3 == 2, float(mesh.length.max()), 1.0)
+    return force * arm
 
 
 def gathered(

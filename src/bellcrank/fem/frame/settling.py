@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import diags
 
-from bellcrank.fem.frame.equilibrium import TOLERANCE, inner_forces, potential, rounding
+from bellcrank.fem.frame.equilibrium import allowed, inner_forces, potential
 from bellcrank.fem.frame.system import SparseFactor
 from bellcrank.fem.path import State, softest_mode
 
@@ -97,9 +97,9 @@ def settle(equations: FrameEquations, edge: State) -> State | None:
     for _ in range(STEPS):
         force, matrix, magnitude = inner_forces(system, slide.displacement)
         residual = (force - load * system.load).ravel()[system.free]
-        small = TOLERANCE * magnitude + rounding(system, slide.displacement)
+        small = allowed(system, slide.displacement, magnitude)
         factor = SparseFactor(matrix)
-        if np.abs(residual).max(initial=0.0) <= small and not factor.negative:
+        if (np.abs(residual) <= small).all() and not factor.negative:
             return State(load, slide.displacement.ravel()[system.free])
         if factor.negative:
             mode = softest_mode(factor, equations.count)[1]

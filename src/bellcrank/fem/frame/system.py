@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 SOFTEST = 1e-12
-"""Least pivot, as a part of the largest, of a stiffness that holds everything in place."""
+"""Least pivot, with a diagonal of ones, of a stiffness that holds everything in place."""
 
 
 class SparseFactor:
@@ -35,8 +35,13 @@ class SparseFactor:
     """
 
     def __init__(self, matrix: csc_matrix) -> None:
+        # With a diagonal of ones, forces and moments compare, and so do small parts and large.
+        diagonal = np.abs(matrix.diagonal())
+        self._scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        columns = np.repeat(np.arange(len(diagonal)), np.diff(matrix.indptr))
+        scaled = matrix.data * self._scale[matrix.indices] * self._scale[columns]
         self._factor: Any = splu(
-            matrix,
+            csc_matrix((scaled, matrix.indices, matrix.indptr), shape=matrix.shape),
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
@@ -53,11 +58,11 @@ class SparseFactor:
     @property
     def firm(self) -> bool:
         """Whether everything is held in place."""
-        return bool(self.pivots.min() >= SOFTEST * self.pivots.max())
+        return bool(self.pivots.min() >= SOFTEST)
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for a right-hand side."""
-        solution: NDArray[np.float64] = self._factor.solve(right)
+        solution: NDArray[np.float64] = self._scale * self._factor.solve(self._scale * right)
         return solution
 
 
