@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import json
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+from unittest import mock
 
 import meshio
 import numpy as np
 import pytest
 
+from bellcrank.errors import StorageError
+from bellcrank.fem import FemSettings
 from bellcrank.model import Design, find_problem, human_design, read_design, write_design
+from bellcrank.parts import PartSpec
+from bellcrank.workflows import find_design, keep_record, validate
+from bellcrank.workflows import record as record_module
 
 from .helpers import PROBLEM, call, colours, files, refusal, write
 
@@ -73,15 +81,16 @@ def test_a_design_keeps_its_record_beside_it(copy: Path) -> None:
     outcome = call("validate", path, "--elements", 2)
     assert outcome.code == 0, outcome.err
     assert set(files(copy)) - set(before) == {"validation.json"}
-    assert outcome.err.splitlines()[-1] == f"wrote {copy / 'validation.json'}"
-    call("validate", copy, "--theory", "timoshenko", "--elements", 2)
-    call("validate", copy, "--theory", "timoshenko", "--elements", 3)
+    assert outcome.err.splitlines()[-1] == f"kept {copy / 'validation.json'}"
+    for elements in (2, 3, 2):
+        call("validate", copy, "--theory", "timoshenko", "--elements", elements)
     record = json.loads((copy / "validation.json").read_text())
     assert record["schema"] == "bellcrank/validation/1"
-    assert [entry["theory"] for entry in record["results"]] == ["euler-bernoulli", "timoshenko"]
+    kept = [(entry["theory"], entry["settings"]["elements"]) for entry in record["results"]]
+    assert kept == [("euler-bernoulli", 2), ("timoshenko", 3), ("timoshenko", 2)]
     assert record["mask"] == read_design(path).mask_hex
-    kept = {name: content for name, content in files(copy).items() if name != "validation.json"}
-    assert kept == before
+    others = {name: content for name, content in files(copy).items() if name != "validation.json"}
+    assert others == before
 
 
 def test_built_in_designs_leave_no_record(here: Path) -> None:
@@ -91,10 +100,85 @@ def test_built_in_designs_leave_no_record(here: Path) -> None:
     assert list(files(here)) == ["crane"]
 
 
-def test_a_file_that_is_no_record_is_left_alone(copy: Path) -> None:
-    write(copy / "validation.json", {"schema": "something/1"})
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"schema": "something/1"},
+        {"schema": "bellcrank/validation/1"},
+        {"schema": "bellcrank/validation/1", "results": [{}]},
+    ],
+)
+def test_a_file_that_is_no_record_is_left_alone(copy: Path, content: object) -> None:
+    write(copy / "validation.json", content)
     message = refusal("validate", copy, "--elements", 1, folder=copy)
     assert "validation.json: expected a record of bellcrank/validation/1" in message
+
+
+def test_the_record_of_another_design_or_a_changed_problem_is_left_alone(
+    here: Path, small: str
+) -> None:
+    words = ("--linear", "--width", "1mm", "--record", "kept.json")
+    assert call("validate", small, *words).code == 0
+    assert "another design" in refusal("validate", "human:crane", *words)
+    data = json.loads((here / small).read_text())
+    data["output"]["nodes"] = [2]
+    write(here / small, data)
+    assert "another design or of a changed problem" in refusal("validate", small, *words)
+
+
+def test_files_of_one_stem_have_records_of_their_own(here: Path, small: str) -> None:
+    words = ("--linear", "--width", "1mm")
+    call("validate", small, *words)
+    (here / "small.v2.json").write_bytes((here / small).read_bytes())
+    call("validate", "small.v2.json", *words)
+    assert (here / "small.json.validation.json").exists()
+    assert (here / "small.v2.json.validation.json").exists()
+
+
+def test_processes_that_keep_a_record_at_once_lose_nothing(copy: Path) -> None:
+    validation = validate(find_design(str(copy)), PartSpec(), [("frame", FemSettings(elements=1))])
+
+    def keep(elements: int) -> None:
+        plan = [("frame", FemSettings(elements=elements))]
+        keep_record(replace(validation, plan=plan), copy / "validation.json")
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(keep, range(1, 25)))
+    record = json.loads((copy / "validation.json").read_text())
+    assert {entry["settings"]["elements"] for entry in record["results"]} == set(range(1, 25))
+
+
+def test_results_are_printed_even_where_no_record_can_be_kept(
+    copy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_words: object, **_options: object) -> None:
+        raise StorageError("disk full")
+
+    monkeypatch.setattr(record_module, "write_text", full)
+    outcome = call("validate", copy, "--elements", 1, "--json")
+    assert outcome.code == 0
+    assert outcome.data["status"] == "converged"
+    assert "no record kept: disk full" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("part", "word"),
+    [
+        ("nonsense", "provenance.part: expected a table"),
+        ([1], "provenance.part: expected a table"),
+        ({"material": {"E": 3}}, "provenance.part: material: "),
+        ({"material": 5}, "provenance.part: material: expected a name or a table"),
+        ({"girth": 1}, "girth"),
+        ({"width": True}, "width: expected a length"),
+    ],
+)
+def test_a_design_with_a_part_that_makes_no_sense_is_refused(
+    here: Path, part: object, word: str
+) -> None:
+    design = human_design("crane")
+    assert design is not None
+    write_design(replace(design, provenance={"part": part}), here / "odd.json")
+    assert word in refusal("validate", "odd.json")
 
 
 @pytest.mark.parametrize("beside", [None, "machine:crane"])
@@ -194,13 +278,22 @@ def in_pieces(here: Path) -> str:
             ("crane", "--young", "1", "--poisson", "0.3", "--material", "pla"),
             "either --material or --young",
         ),
-        (("crane", "--level", "sponge"), "unknown level 'sponge'; known: plane, solid, frame"),
+        (("crane", "--level", "sponge"), "unknown level 'sponge'; known: frame, plane, solid"),
         (("crane", "--theory", "kirchhoff"), "unknown theory 'kirchhoff'; known: euler-bernoulli"),
         (("crane", "--elements", "0"), "elements: expected at least 1"),
         (("crane", "--part", "none.toml"), "none.toml: no such file"),
         (("crane", "--picture", "shape.jpg"), "shape.jpg: expected a picture name"),
         (("crane", "--vtu", "shape.vtk"), "shape.vtk: expected a name ending in .vtu"),
         (("crane", "--beside", "human:crane"), "--beside is for the picture"),
+        (
+            ("crane", "--beside", "human:pliers", "--picture", "a.png"),
+            "human:pliers is driven otherwise than crane",
+        ),
+        (("crane", "--theory", "euler-bernoulli,foo"), "unknown theory 'foo'"),
+        (("crane", "--level", "frame,,plane"), "--level 'frame,,plane': expected names"),
+        (("crane", "--law", "foo"), "unknown law 'foo'"),
+        (("crane", "--level", "plane", "--law", "linear"), "for small motions; ask for --linear"),
+        (("crane", "--level", "frame,plane", "--width", "7mm"), "choose at most 5.77 mm"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(words: tuple[str, ...], word: str) -> None:
@@ -240,6 +333,54 @@ def test_all_levels_stand_in_one_table() -> None:
     assert plane == pytest.approx(frame, rel=0.2)
     assert solid == pytest.approx(plane, rel=0.1)
     assert all(entry["principal_strain"] > 0.0 for entry in results)
+
+
+@pytest.mark.parametrize("option", ["--picture", "--vtu", "--record"])
+def test_files_in_missing_folders_are_refused_before_anything_is_computed(option: str) -> None:
+    name = {"--picture": "none/a.png", "--vtu": "none/a.vtu", "--record": "none/a.json"}[option]
+    with mock.patch("bellcrank.workflows.validate.Evaluator", side_effect=AssertionError):
+        assert "(no folder none)" in refusal("validate", "crane", option, name, code=1)
+
+
+def test_a_part_file_changes_only_what_it_names(here: Path) -> None:
+    design = human_design("crane")
+    assert design is not None
+    write_design(replace(design, provenance={"part": {"width": 1.2}}), here / "thin.json")
+    write(here / "m.toml", 'schema = "bellcrank/part/1"\nmaterial = "pla"\n')
+    part = validated("thin.json", "--part", "m.toml", "--linear")["results"][0]["part"]
+    assert (part["width"], part["material"]) == (1.2, "pla")
+
+
+def test_beams_that_cross_are_doubted(here: Path) -> None:
+    problem = {
+        "schema": "bellcrank/problem/1", "name": "cross",
+        "positions": [[0, 0], [2, 2], [0, 2], [2, 0]], "beams": [[0, 1], [2, 3], [1, 2], [3, 0]],
+        "initial": "f0", "designable": [0], "stiffness": {"bond": 5.0, "angle": 0.1},
+        "supports": {"fixed": [0], "fixed_x": [], "fixed_y": []},
+        "input": {
+            "nodes": [3], "direction": [0.0, -1.0], "drive": "displacement", "amount": 0.01
+        },
+        "output": {"nodes": [2], "direction": [0.0, 1.0], "spring": None, "spring_kind": None},
+        "aggregate": "mean",
+    }  # fmt: skip
+    problem["positions"] = [[float(x), float(y)] for x, y in problem["positions"]]
+    write(here / "cross.json", problem)
+    data = validated("cross.json", "--linear", "--width", "1mm")
+    assert "beams cross each other without a node, 0 and 1" in " ".join(data["doubts"])
+
+
+def test_an_output_that_hangs_on_nothing_is_doubted(here: Path) -> None:
+    crane = find_problem("crane")
+    mask = crane.initial.copy()
+    mask[crane.lattice.beams_touching(crane.output.nodes)] = False
+    write_design(Design(crane, mask), here / "loose.json")
+    data = validated("loose.json", "--linear", "--elements", 1)
+    assert "none of the output nodes have beams" in " ".join(data["doubts"])
+
+
+def test_inputs_that_push_against_each_other_have_a_push() -> None:
+    data = validated("human:pliers", "--linear", "--elements", 1)
+    assert data["input_push_N"] == pytest.approx(-data["input_force_N"][1])
 
 
 def test_a_design_in_pieces_is_refused(here: Path) -> None:

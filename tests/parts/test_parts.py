@@ -121,7 +121,7 @@ def test_a_specification_survives_being_written(tmp_path: Path) -> None:
 def test_a_file_that_describes_no_part_is_refused(tmp_path: Path, text: str, word: str) -> None:
     path = tmp_path / "part.toml"
     path.write_text(text)
-    with pytest.raises(InvalidFile, match=word):
+    with pytest.raises((InvalidFile, InvalidSettings), match=word):
         read_part(path)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,11 +16,13 @@ from rich.table import Table
 from bellcrank.cli.app import FAILED, app
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.cli.live import Live
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import InvalidSettings, StorageError
 
 if TYPE_CHECKING:
     from bellcrank.fem import Analysis, FemSettings
+    from bellcrank.model import Design
     from bellcrank.parts import PartSpec
+    from bellcrank.registry import Registry
     from bellcrank.workflows import Validation
 
 
@@ -51,7 +53,7 @@ def validate(
         str, typer.Option(help="Of frames: euler-bernoulli or timoshenko, or both.")
     ] = "euler-bernoulli",
     law: Annotated[
-        str, typer.Option(help="Of plane and solid: neo-hookean or st-venant-kirchhoff, or both.")
+        str, typer.Option(help="Of plane and solid: neo-hookean, st-venant-kirchhoff, or both.")
     ] = "neo-hookean",
     linear: Annotated[bool, typer.Option("--linear", help="Small motions only.")] = False,
     elements: Annotated[int, typer.Option(help="Beam elements in each strut.")] = 8,
@@ -88,38 +90,46 @@ def validate(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Check a design by finite elements: does the part move as it should."""
-    from bellcrank.workflows import find_design, keep_record, spec_for, validate, with_stroke
+    from bellcrank.workflows import check_plan, find_design, spec_for, validate, with_stroke
     from bellcrank.workflows.figures import draw_validations, prepare_targets, write_vtu
 
     chosen = find_design(design)
     prepare_targets(picture, vtu, overwrite=overwrite)
+    target = record or _beside(design)
+    _check_record(target, chosen, asked=record is not None)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = _spec(part, spec_for(chosen), lengths, material, young, poisson)
     plan = _plan(level, theory, law, linear=linear, elements=elements, size=size)
     others = [find_design(beside)] if beside is not None else []
     if others and picture is None:
         raise InvalidSettings("--beside is for the picture; give --picture FILE too")
+    drives = {one.problem.input.drive for one in (chosen, *others)}
+    if len(drives) > 1:
+        raise InvalidSettings(f"--beside: {beside} is driven otherwise than {design}")
+    driven = [
+        one if stroke is None else with_stroke(one, stroke, spec.scale) for one in (chosen, *others)
+    ]
+    for one in driven:
+        check_plan(one, spec, plan)
     announce_compilation()
-    target = record or _beside(design)
-    keep = [lambda so_far: keep_record(so_far, target) if target else None, lambda _so_far: None]
+    keepers = [_keeper(target, asked=record is not None), lambda _so_far: None]
     found = []
     names = [f"{name} {_model(name, settings)}" for name, settings in plan]
-    for one, kept in zip([chosen, *others], keep, strict=False):
-        driven = one if stroke is None else with_stroke(one, stroke, spec.scale)
+    for one, keep in zip(driven, keepers, strict=False):
         with StrokeProgress(names) as progress:
-            found.append(validate(driven, spec, plan, progress, kept))
+            found.append(validate(one, spec, plan, progress, keep))
     validation = found[0]
+    if as_json:
+        print_json(json.dumps(validation.to_dict(), indent=1))
+    else:
+        _print(validation)
     if picture is not None:
         draw_validations(
             found, [design, *([beside] if beside else [])], picture, overwrite=overwrite
         )
     if vtu is not None:
         write_vtu(validation.analyses[-1], vtu, overwrite=overwrite)
-    if as_json:
-        print_json(json.dumps(validation.to_dict(), indent=1))
-    else:
-        _print(validation)
-    for path in (picture, vtu, target):
+    for path in (picture, vtu):
         if path is not None:
             notes.print(f"wrote {plain(path)}")
     if any(
@@ -140,7 +150,7 @@ def _spec(
     from bellcrank.parts import Material, materials, read_part
 
     if path is not None:
-        spec = read_part(path)
+        spec = read_part(path, spec)
     changes: dict[str, Any] = {key: value for key, value in lengths.items() if value is not None}
     if (young is None) != (poisson is None):
         raise InvalidSettings("give --young and --poisson together, or --material")
@@ -157,19 +167,31 @@ def _plan(
     level: str, theory: str, law: str, *, linear: bool, elements: int, size: str | None
 ) -> list[tuple[str, FemSettings]]:
     """Return each level with each of its theories or laws."""
-    from bellcrank.fem import FemSettings
+    from bellcrank.fem import FemSettings, levels
+    from bellcrank.fem.continuum.laws import laws
+    from bellcrank.fem.frame import theories
     from bellcrank.parts import read_length
 
     longest = None if size is None else read_length("size", size)
     common = FemSettings(linear=linear, elements=elements, size=longest)
+    theories_, laws_ = _words("--theory", theory, theories), _words("--law", law, laws)
     plan = []
-    for name in level.split(","):
+    for name in _words("--level", level, levels):
         if name == "frame":
-            plan += [(name, replace(common, theory=one)) for one in theory.split(",")]
+            plan += [(name, replace(common, theory=one)) for one in theories_]
         else:
-            laws = ["neo-hookean"] if linear else law.split(",")
-            plan += [(name, replace(common, law=one)) for one in laws]
+            plan += [(name, replace(common, law=one)) for one in laws_[: 1 if linear else None]]
     return plan
+
+
+def _words(option: str, text: str, known: Registry[Any]) -> list[str]:
+    """Read names with commas between them, each once."""
+    words = list(dict.fromkeys(word.strip() for word in text.split(",")))
+    if "" in words:
+        raise InvalidSettings(f"{option} {text!r}: expected names with commas between")
+    for word in words:
+        known[word]
+    return words
 
 
 def _model(level: str, settings: FemSettings) -> str:
@@ -181,12 +203,43 @@ def _beside(design: str) -> Path | None:
     from bellcrank.model import builtin
 
     path = Path(design)
-    if ":" in design or design in builtin or not path.exists():
+    if design.startswith(("human:", "machine:")) or design in builtin or not path.exists():
         return None
     if path.is_dir():
         return path / "validation.json"
-    stem = "" if path.stem == "design" else f"{path.stem}."
-    return path.with_name(f"{stem}validation.json")
+    name = "" if path.name == "design.json" else f"{path.name}."
+    return path.with_name(f"{name}validation.json")
+
+
+def _check_record(path: Path | None, design: Design, *, asked: bool) -> None:
+    """Refuse a record that could not be kept anyway, before anything is computed."""
+    from bellcrank.model.storage import check_folder
+    from bellcrank.workflows import check_record, identity
+
+    if path is not None:
+        check_record(path, identity(design), design.mask_hex)
+        if asked:
+            check_folder(path)
+
+
+def _keeper(path: Path | None, *, asked: bool) -> Callable[[Validation], None]:
+    """Return what keeps the record; nobody asked for one beside the design, so that may fail."""
+    from bellcrank.workflows import keep_record
+
+    def keep(so_far: Validation) -> None:
+        if path is None:
+            return
+        try:
+            keep_record(so_far, path)
+        except StorageError as error:
+            if asked:
+                raise
+            notes.print(f"[yellow]no record kept:[/] {plain(error)}")
+            return
+        if len(so_far.analyses) == len(so_far.plan):
+            notes.print(f"kept {plain(path)}")
+
+    return keep
 
 
 def _print(validation: Validation) -> None:
@@ -203,6 +256,8 @@ def _print(validation: Validation) -> None:
     for place, name in enumerate(names):
         table.add_row(name, first[place], *(column[place] for column in columns))
     results.print(table)
+    for doubt in validation.doubts:
+        notes.print(f"[yellow]design:[/] {plain(doubt)}")
     for analysis in validation.analyses:
         for warning in analysis.warnings:
             notes.print(f"[yellow]{analysis.level}:[/] {plain(warning)}")
@@ -222,7 +277,7 @@ def _column(analysis: Analysis) -> list[str]:
     return [
         f"{analysis.efficiency:.4f}" if known else "-",
         f"{point.output[0]:.3f}, {point.output[1]:.3f}",
-        f"{math.hypot(*point.force):.3f}",
+        f"{point.push:.3f}",
         f"{point.stress:.3f}",
         f"{point.strain:.1%}",
         status if known else f"{status} at {point.load:.1%}",

@@ -9,7 +9,8 @@
 ('converged', 1.21)
 """
 
-from bellcrank.fem import continuum, frame
+from bellcrank.fem import frame  # isort: skip
+from bellcrank.fem import continuum  # isort: skip
 from bellcrank.fem.levels import FemSettings, levels
 from bellcrank.fem.path import Loss, PathStatus
 from bellcrank.fem.results import Analysis, Field, StrokePoint

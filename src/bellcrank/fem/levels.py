@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bellcrank.fem.results import Analysis
+    from bellcrank.parts import Part
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,5 +48,31 @@ class FemSettings:
             raise InvalidSettings(f"size: expected a length above 0 mm, got {self.size!r}")
 
 
-levels: Registry[Callable[..., Analysis]] = Registry("level")
-"""From a part, settings and a function told the load that is reached, to an analysis."""
+@dataclass(frozen=True, slots=True)
+class Level:
+    """One level of fidelity.
+
+    Parameters
+    ----------
+    analyse
+        From a part, settings and a function told the load that is reached, to an analysis.
+    check
+        Refuses a part and settings that cannot be analysed, before anything is computed.
+    """
+
+    analyse: Callable[..., Analysis]
+    check: Callable[[Part, FemSettings], None]
+
+    def __call__(
+        self,
+        part: Part,
+        settings: FemSettings,
+        tell: Callable[[float], None] = lambda _load: None,
+    ) -> Analysis:
+        """Analyse a part."""
+        self.check(part, settings)
+        return self.analyse(part, settings, tell)
+
+
+levels: Registry[Level] = Registry("level")
+"""Levels by name, the coarsest first."""

@@ -32,6 +32,9 @@ class StrokePoint:
         Mean motion of the output nodes in x and y, mm.
     force : (2,)
         On all input nodes together, N.
+    push
+        On each input node along its direction, together, N: what is left where inputs push
+        against each other.
     energy
         Elastic, N mm.
     stress
@@ -44,6 +47,7 @@ class StrokePoint:
     efficiency: float
     output: tuple[float, float]
     force: tuple[float, float]
+    push: float
     energy: float
     stress: float
     strain: float
@@ -53,11 +57,12 @@ class StrokePoint:
         return {
             "load": self.load,
             "efficiency": finite(self.efficiency),
-            "mean_output_displacement_mm": list(self.output),
-            "input_force_N": list(self.force),
-            "energy_N_mm": self.energy,
-            "von_mises_MPa": self.stress,
-            "principal_strain": self.strain,
+            "mean_output_displacement_mm": [finite(value) for value in self.output],
+            "input_force_N": [finite(value) for value in self.force],
+            "input_push_N": finite(self.push),
+            "energy_N_mm": finite(self.energy),
+            "von_mises_MPa": finite(self.stress),
+            "principal_strain": finite(self.strain),
         }
 
 

@@ -123,7 +123,7 @@ def check_room(limits: Limits, width: float, fillet: float) -> None:
     if half >= most:
         raise InvalidSettings(
             f"width: struts {width:g} mm wide would {_change(limits, half)}; "
-            f"choose at most {_floored(2.0 * most)} mm, or keep_holes=False"
+            f"choose at most {_floored(2.0 * most)} mm"
         )
     # What `room_for_fillet` returned must pass, whichever way the sum was rounded.
     if fillet > 0.0 and half + fillet > (1.0 + 1e-12) * most:

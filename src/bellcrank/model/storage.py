@@ -82,6 +82,20 @@ def write_bytes(path: str | os.PathLike[str], content: bytes, *, overwrite: bool
         raise StorageError(f"{target}: cannot be written ({error.strerror or error})") from error
 
 
+def check_folder(target: Path) -> None:
+    """Refuse a file in a folder that is not there or may not be written, before long work.
+
+    Raises
+    ------
+    StorageError
+    """
+    folder = target.parent
+    if not folder.is_dir():
+        raise StorageError(f"{target}: cannot be written (no folder {folder})")
+    if not os.access(folder, os.W_OK):
+        raise StorageError(f"{target}: cannot be written (the folder is read-only)")
+
+
 def open_temporary(target: Path) -> tuple[Path, BinaryIO]:
     """Open a new file beside `target`, hidden until it takes its name.
 

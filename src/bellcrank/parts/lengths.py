@@ -8,9 +8,18 @@ from contextlib import suppress
 
 from bellcrank.errors import InvalidSettings
 
-UNITS = {"": 1.0, "um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+UNITS = {
+    "": 1.0,
+    "um": 1e-3,
+    "µm": 1e-3,
+    "μm": 1e-3,
+    "mm": 1.0,
+    "cm": 10.0,
+    "m": 1000.0,
+    "in": 25.4,
+}
 """In mm."""
-WRITTEN = re.compile(r"\s*([-+0-9.eE]+?)\s*([a-zµ]*)\s*")
+WRITTEN = re.compile(r"\s*([-+0-9.eE]+?)\s*([a-zµμ]*)\s*")
 
 
 def read_length(name: str, text: str | float) -> float:

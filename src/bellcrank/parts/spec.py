@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.model.parsing import Table, parse, read_toml
 from bellcrank.parts.lengths import read_length
 from bellcrank.parts.materials import Material, materials
@@ -95,13 +95,17 @@ class PartSpec:
         return data
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> PartSpec:
-        """Return what `to_dict` wrote."""
-        material = data.get("material")
-        given = dict(data)
-        if isinstance(material, dict):
-            given["material"] = Material(**{"name": "custom", **material})
-        return cls().changed(given)
+    def from_dict(cls, data: object, source: str = "part") -> PartSpec:
+        """Return what `to_dict` wrote, or what a file says.
+
+        Raises
+        ------
+        InvalidFile
+            Naming `source` and the first offender.
+        InvalidSettings
+            If a value makes no sense.
+        """
+        return cls().changed(_changes(data, source))
 
 
 class MaterialTable(Table):
@@ -115,18 +119,42 @@ class MaterialTable(Table):
 
 
 class PartTable(Table):
+    """What may be said of a part."""
+
+    width: Any = None  # what is no length is refused where lengths are read
+    thickness: Any = None
+    scale: Any = None
+    fillet: Any = None
+    material: Any = None
+
+
+class PartFile(PartTable):
     """A whole file of a part."""
 
     schema_: Literal["bellcrank/part/1"] = Field(alias="schema")
-    width: float | str | None = None
-    thickness: float | str | None = None
-    scale: float | str | None = None
-    fillet: float | str | None = None
-    material: MaterialTable | str | None = None
 
 
-def read_part(path: str | os.PathLike[str]) -> PartSpec:
+def _changes(data: object, source: str, table: type[PartTable] = PartTable) -> dict[str, Any]:
+    """Return what is said of a part, checked."""
+    if not isinstance(data, dict):
+        raise InvalidFile(f"{source}: expected a table, got {data!r}")
+    given = parse(table, data, source).model_dump(exclude={"schema_"}, exclude_none=True)
+    material = given.get("material")
+    if isinstance(material, dict):
+        figures = parse(MaterialTable, material, f"{source}: material")
+        given["material"] = Material(**figures.model_dump(exclude_none=True))
+    elif material is not None and not isinstance(material, str):
+        raise InvalidFile(f"{source}: material: expected a name or a table, got {material!r}")
+    return given
+
+
+def read_part(path: str | os.PathLike[str], base: PartSpec | None = None) -> PartSpec:
     r"""Read size and material of parts from a TOML file.
+
+    Parameters
+    ----------
+    base
+        What holds where the file says nothing.
 
     Raises
     ------
@@ -145,6 +173,5 @@ def read_part(path: str | os.PathLike[str]) -> PartSpec:
     ...     read_part(path).width
     1.6
     """
-    table = parse(PartTable, read_toml(path), str(path))
-    data = table.model_dump(exclude={"schema_"}, exclude_none=True)
-    return PartSpec.from_dict(data)
+    base = base or PartSpec()
+    return base.changed(_changes(read_toml(path), str(path), PartFile))

@@ -187,9 +187,22 @@ def _frame(part: Drawing) -> Frame:
     return extent(places, part.arrows, 0.15 * step)
 
 
-def level_frames(parts: list[Drawing]) -> list[Frame]:
-    """Frames of equal height around the lattices' feet, so that drawings stand on one level."""
+def level_frames(
+    parts: list[Drawing], more: list[NDArray[np.float64]] | None = None
+) -> list[Frame]:
+    """Frames of equal height around the lattices' feet, so that drawings stand on one level.
+
+    Parameters
+    ----------
+    more
+        For each drawing (n, 2) other places that must be seen.
+    """
     frames = [_frame(part) for part in parts]
+    if more is not None:
+        frames = [
+            (np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0)))
+            for (low, high), seen in zip(frames, more, strict=True)
+        ]
     feet = [float(part.motion.design.problem.lattice.positions[:, 1].min()) for part in parts]
     below = max(foot - float(low[1]) for foot, (low, _) in zip(feet, frames, strict=True))
     above = max(float(high[1]) - foot for foot, (_, high) in zip(feet, frames, strict=True))

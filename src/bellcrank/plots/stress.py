@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from bellcrank.plots import style
@@ -140,7 +140,7 @@ def draw_stress(
 
 def _sheet(drawings: list[Drawing], parts: list[Stressed], words: StrokeAxes) -> Figure:
     """Lay out drawings in two rows, a colour bar and curves."""
-    frames = level_frames(drawings)
+    frames = level_frames(drawings, [part.rest + part.displacement for part in parts])
     width = WIDTH if len(drawings) == 1 else WIDE
     sizes = np.array([high - low for low, high in frames])
     room = width - 2 * MARGIN - GAP * (len(drawings) - 1)
@@ -180,19 +180,23 @@ def _put_stressed(panel: Panel, part: Stressed, colours: ScalarMappable, drawing
     """Draw the moved part in the colours of its stress."""
     problem = panel.problem
     put_supports(panel)
-    corners = (part.rest + drawing.motion.magnify * part.displacement)[part.cells]
+    places = part.rest + drawing.motion.magnify * part.displacement
     looks: dict[str, Any] = {"cmap": colours.cmap, "norm": colours.norm, "zorder": 3.0}
     if part.cells.shape[1] == 2:
-        drawn: LineCollection | PolyCollection = LineCollection(
-            list(corners), linewidths=part.width * panel.points, capstyle="round", **looks
+        lines = LineCollection(
+            list(places[part.cells]),
+            linewidths=part.width * panel.points,
+            capstyle="round",
+            **looks,
         )
-        drawn.set_array(part.stress)
+        lines.set_array(part.stress)
+        panel.axes.add_collection(lines, autolim=False)
     else:
-        drawn = PolyCollection(
-            list(corners), edgecolors="face", linewidths=0.15, rasterized=True, **looks
+        window = panel.axes.axis()
+        panel.axes.tripcolor(
+            *places.T, part.cells, part.stress, shading="gouraud", rasterized=True, **looks
         )
-        drawn.set_array(part.stress[part.cells].mean(axis=1))
-    panel.axes.add_collection(drawn, autolim=False)
+        panel.axes.axis(window)
     put_arrows(panel, input_arrows(problem), style.INPUT, bold=True)
     put_arrows(panel, wanted_arrows(problem, drawing.motion.moved), style.WANTED, bold=True)
 
@@ -238,8 +242,8 @@ def _dress(axes: Axes, below: str, beside: str) -> None:
     axes.set_xlabel(below, **looks)
     axes.set_ylabel(beside, **looks)
     axes.set_xlim(left=0.0)
-    if axes.get_ylim()[0] > 0.0:
-        axes.set_ylim(bottom=0.0)
+    low, high = axes.get_ylim()
+    axes.set_ylim(min(low, 0.0), high + 0.06 * abs(high))
     axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT)
     axes.grid(axis="y", color=style.IDLE_REST, linewidth=0.8)
     axes.set_axisbelow(True)

@@ -8,9 +8,11 @@ from bellcrank.workflows.design import (
 from bellcrank.workflows.find import find_design
 from bellcrank.workflows.outcome import DesignReport
 from bellcrank.workflows.pictures import draw_run, move
+from bellcrank.workflows.record import check_record, keep_record
 from bellcrank.workflows.validate import (
     Validation,
-    keep_record,
+    check_plan,
+    identity,
     spec_for,
     validate,
     with_stroke,
@@ -19,9 +21,12 @@ from bellcrank.workflows.validate import (
 __all__ = [
     "DesignReport",
     "Validation",
+    "check_plan",
+    "check_record",
     "complete_design",
     "draw_run",
     "find_design",
+    "identity",
     "keep_record",
     "move",
     "reopen_design",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.model.storage import already_exists, write_bytes
+from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.plots import Motion, Stressed, StrokeAxes, draw_stress
 from bellcrank.plots.saving import check_target
 
@@ -30,14 +30,18 @@ def prepare_targets(picture: Path | None, vtu: Path | None, *, overwrite: bool) 
         If a suffix names no format.
     OutputExists
         If there is something of a name already.
+    StorageError
+        If a folder is not there or cannot be written.
     """
     if picture is not None:
         check_target(picture, overwrite=overwrite)
+        check_folder(picture)
     if vtu is not None:
         if vtu.suffix != ".vtu":
             raise InvalidSettings(f"{vtu}: expected a name ending in .vtu")
         if vtu.exists() and not overwrite:
             raise already_exists(vtu)
+        check_folder(vtu)
 
 
 def draw_validations(
@@ -75,7 +79,7 @@ def stressed(analysis: Analysis) -> Stressed:
     part, points = analysis.part, analysis.points
     given = part.design.problem.input
     load = np.array([0.0, *(point.load for point in points)])
-    force = np.array([0.0, *(np.hypot(*point.force) for point in points)])
+    force = np.array([0.0, *(point.push for point in points)])
     output = np.array([0.0, *(np.hypot(*point.output) for point in points)])
     moved = given.drive == "displacement"
     efficiency = np.array([np.nan, *(point.efficiency for point in points)])

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import InvalidFile, InvalidSettings
+from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings, levels
 from bellcrank.fem.results import finite
 from bellcrank.mechanics import CAREFUL, Evaluator, Response
-from bellcrank.model.parsing import read_json
-from bellcrank.model.storage import write_text
 from bellcrank.parts import PartSpec, read_length
-from bellcrank.parts.pieces import require_held
+from bellcrank.parts.pieces import doubts_about, require_held
 from bellcrank.provenance import provenance
+from bellcrank.workflows.record import SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from bellcrank.fem import Analysis
     from bellcrank.model import Design
 
-SCHEMA = "bellcrank/validation/1"
+TOP = (
+    "level", "theory", "linear", "status", "reached", "efficiency",
+    "mean_output_displacement_mm", "input_force_N", "input_push_N", "energy_N_mm",
+    "von_mises_MPa", "principal_strain",
+)  # fmt: skip
+"""Figures of the first analysis that stand by themselves."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,51 +40,67 @@ class Validation:
         Of the part.
     response
         Of the discrete model, with the stiffness that the design's problem gives.
+    plan
+        Levels and settings.
     analyses
-        In the order of levels and theories.
+        In the order of the plan, as far as they are done.
     """
 
     design: Design
     spec: PartSpec
     response: Response
+    plan: Sequence[tuple[str, FemSettings]]
     analyses: list[Analysis]
 
-    def entries(self) -> list[dict[str, Any]]:
-        """Return the analyses as plain data, each with the part it was made for."""
-        given = self.design.problem.input
-        stroke = given.amount * self.spec.scale if given.drive == "displacement" else None
-        part = {**self.spec.to_dict(), "stroke": stroke}
-        return [{**analysis.to_dict(), "part": part} for analysis in self.analyses]
+    @property
+    def doubts(self) -> list[str]:
+        """What a builder should know of the design itself, as sentences."""
+        return doubts_about(self.design)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all as plain data; the figures of the first analysis stand at the top."""
-        first = self.analyses[0].to_dict()
-        top = (
-            "level", "theory", "linear", "status", "reached", "efficiency",
-            "mean_output_displacement_mm", "input_force_N", "energy_N_mm", "von_mises_MPa",
-            "principal_strain",
-        )  # fmt: skip
+        given = self.design.problem.input
+        stroke = given.amount * self.spec.scale if given.drive == "displacement" else None
+        part = {**self.spec.to_dict(), "stroke": stroke}
+        stiffness = self.design.problem.stiffness
+        discrete = {
+            "efficiency": finite(self.response.efficiency),
+            "status": self.response.status.label,
+            "stiffness": {"bond": stiffness.bond, "angle": stiffness.angle},
+        }
+        results = [
+            {
+                **analysis.to_dict(),
+                "settings": {"elements": settings.elements}
+                if level == "frame"
+                else {"size": settings.size},
+                "part": part,
+                "discrete_model": discrete,
+            }
+            for analysis, (level, settings) in zip(self.analyses, self.plan, strict=False)
+        ]
         return {
             "schema": SCHEMA,
             "problem": self.design.problem.name,
+            "problem_hash": identity(self.design),
             "mask": self.design.mask_hex,
-            **{key: first[key] for key in top},
-            "discrete_model": {
-                "efficiency": finite(self.response.efficiency),
-                "status": self.response.status.label,
-                "stiffness": {
-                    "bond": self.design.problem.stiffness.bond,
-                    "angle": self.design.problem.stiffness.angle,
-                },
-            },
-            "results": self.entries(),
+            **{key: results[0][key] for key in TOP},
+            "discrete_model": discrete,
+            "doubts": self.doubts,
+            "results": results,
             "provenance": provenance(),
         }
 
 
+def identity(design: Design) -> str:
+    """Return what tells the problem of a design from others, whatever the stroke."""
+    problem = design.problem
+    return replace(problem, input=replace(problem.input, amount=1.0)).hash
+
+
 def spec_for(design: Design) -> PartSpec:
     """Return the part that a design was searched for, or the default one."""
-    return PartSpec.from_dict(design.provenance.get("part") or {})
+    return PartSpec.from_dict(design.provenance.get("part") or {}, "provenance.part")
 
 
 def with_stroke(design: Design, stroke: str | float, scale: float) -> Design:
@@ -103,6 +121,19 @@ def with_stroke(design: Design, stroke: str | float, scale: float) -> Design:
         raise InvalidSettings(f"stroke: expected a length above 0 mm, got {length:g}")
     driven = replace(given, amount=length / scale)
     return replace(design, problem=replace(design.problem, input=driven))
+
+
+def check_plan(design: Design, spec: PartSpec, plan: Sequence[tuple[str, FemSettings]]) -> None:
+    """Refuse what cannot be analysed, before anything is computed.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+    """
+    part = spec.of(design)
+    require_held(design)
+    for level, settings in plan:
+        levels[level].check(part, settings)
 
 
 def validate(
@@ -138,42 +169,14 @@ def validate(
     >>> round(found.analyses[0].efficiency, 3)
     1.21
     """
-    chosen = [levels[name] for name, _ in plan]  # before anything is computed
+    check_plan(design, spec, plan)
     part = spec.of(design)
-    require_held(design)
     response = Evaluator(design.problem).respond(design.mask, CAREFUL)
-    found = Validation(design, spec, response, [])
-    for index, (analyse, (_, settings)) in enumerate(zip(chosen, plan, strict=True)):
-        analysis = analyse(part, settings, lambda load, index=index: tell(index, load))
+    found = Validation(design, spec, response, plan, [])
+    for index, (level, settings) in enumerate(plan):
+        analysis = levels[level].analyse(
+            part, settings, lambda load, index=index: tell(index, load)
+        )
         found = replace(found, analyses=[*found.analyses, analysis])
         keep(found)
     return found
-
-
-def keep_record(validation: Validation, path: Path) -> None:
-    """Put a validation into the record of its design: other analyses stay, the same are renewed.
-
-    Raises
-    ------
-    InvalidFile
-        If there is something else of that name.
-    StorageError
-        If it cannot be written.
-    """
-    data = validation.to_dict()
-    kept: list[dict[str, Any]] = []
-    if path.exists():
-        old = read_json(path)
-        if old.get("schema") != SCHEMA:
-            raise InvalidFile(f"{path}: expected a record of {SCHEMA}, which may be renewed")
-        if (old.get("problem"), old.get("mask")) == (data["problem"], data["mask"]):
-            renewed = [_key(entry) for entry in data["results"]]
-            kept = [entry for entry in old["results"] if _key(entry) not in renewed]
-    record = {key: data[key] for key in ("schema", "problem", "mask", "discrete_model")}
-    record |= {"results": [*kept, *data["results"]], "provenance": data["provenance"]}
-    write_text(path, json.dumps(record, indent=1) + "\n", overwrite=True)
-
-
-def _key(entry: dict[str, Any]) -> str:
-    """Return what makes two analyses the same."""
-    return json.dumps([entry[key] for key in ("level", "theory", "linear", "part")], sort_keys=True)

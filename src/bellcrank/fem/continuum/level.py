@@ -9,8 +9,10 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.contact import Contacts, find_contacts
+from bellcrank.fem.continuum.backend import ngsolve
+from bellcrank.fem.continuum.laws import laws
 from bellcrank.fem.continuum.response import solve_plane, solve_solid
-from bellcrank.fem.levels import levels
+from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import PathStatus
 from bellcrank.fem.results import Analysis, StrokePoint
 from bellcrank.mechanics import efficiency_of
@@ -29,10 +31,16 @@ PLACES = 9
 """Along the centre line of each strut where contact is looked for."""
 
 
-@levels.register("plane")
-def analyse_plane(
-    part: Part, settings: FemSettings, tell: Callable[[float], None] = lambda _load: None
-) -> Analysis:
+def check_outline(part: Part, settings: FemSettings) -> None:
+    """Refuse what cannot be meshed: no NGSolve, an unknown law, no such outline."""
+    law = laws[settings.law]
+    if law.small:
+        raise InvalidSettings(f"law: {settings.law!r} is for small motions; ask for --linear")
+    ngsolve()
+    part.outline()
+
+
+def analyse_plane(part: Part, settings: FemSettings, tell: Callable[[float], None]) -> Analysis:
     """Analyse a part as a sheet in plane stress, cut into second-order triangles.
 
     Raises
@@ -43,10 +51,7 @@ def analyse_plane(
     return _analyse(part, settings, tell, "plane", solve_plane)
 
 
-@levels.register("solid")
-def analyse_solid(
-    part: Part, settings: FemSettings, tell: Callable[[float], None] = lambda _load: None
-) -> Analysis:
+def analyse_solid(part: Part, settings: FemSettings, tell: Callable[[float], None]) -> Analysis:
     """Analyse a part as a body, cut into second-order tetrahedra.
 
     Raises
@@ -55,6 +60,10 @@ def analyse_solid(
         If NGSolve is not installed, or struts or fillets are so wide that holes close.
     """
     return _analyse(part, settings, tell, "solid", solve_solid)
+
+
+levels.register("plane")(Level(analyse_plane, check_outline))
+levels.register("solid")(Level(analyse_solid, check_outline))
 
 
 def _analyse(
@@ -97,12 +106,14 @@ def point_of(part: Part, state: ContinuumState) -> StrokePoint:
     problem = part.design.problem
     motion = state.motion[:, :2]
     output = motion[problem.output.nodes].mean(axis=0)
-    force = state.force[problem.input.nodes, :2].sum(axis=0)
+    forces = state.force[problem.input.nodes, :2]
+    force = forces.sum(axis=0)
     return StrokePoint(
         load=state.load,
         efficiency=efficiency_of(problem, motion / part.scale, load=state.load),
         output=(float(output[0]), float(output[1])),
         force=(float(force[0]), float(force[1])),
+        push=float((forces * problem.input.direction).sum()),
         energy=state.energy,
         stress=state.stress,
         strain=state.strain,

@@ -11,10 +11,10 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.fem.contact import find_contacts
 from bellcrank.fem.frame.elements import energy, linear_natural, natural
 from bellcrank.fem.frame.equilibrium import FrameEquations, solve_linear
-from bellcrank.fem.frame.mesh import frame_mesh
+from bellcrank.fem.frame.mesh import frame_mesh, theories
 from bellcrank.fem.frame.settling import settle
 from bellcrank.fem.frame.system import frame_system
-from bellcrank.fem.levels import levels
+from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import Follower, PathStatus, Stepping
 from bellcrank.fem.results import Analysis, Field, StrokePoint
 from bellcrank.mechanics import efficiency_of
@@ -35,10 +35,12 @@ SNAPS = 5
 """Jumps after which nobody wants to know where the part ends."""
 
 
-@levels.register("frame")
-def analyse_frame(
-    part: Part, settings: FemSettings, tell: Callable[[float], None] = lambda _load: None
-) -> Analysis:
+def check_frame(_part: Part, settings: FemSettings) -> None:
+    """Refuse an unknown theory."""
+    theories[settings.theory]
+
+
+def analyse_frame(part: Part, settings: FemSettings, tell: Callable[[float], None]) -> Analysis:
     """Analyse a part as a frame.
 
     Raises
@@ -90,6 +92,9 @@ def analyse_frame(
     )
 
 
+levels.register("frame")(Level(analyse_frame, check_frame))
+
+
 def beyond(equations: FrameEquations, path: Path) -> FrameState | None:
     """Return where a frame is at the full input, after all its jumps; None if that is not found."""
     for _ in range(SNAPS):
@@ -112,28 +117,29 @@ def point_of(
     moved = mesh.at_lattice(state.displacement)
     stress, strain = fibres(part, mesh, state.displacement, linear=linear)
     mean = moved[problem.output.nodes].mean(axis=0)
-    force = input_force(part, mesh, state)
+    forces = input_forces(part, mesh, state)
+    force = forces.sum(axis=0)
     return StrokePoint(
         load=state.load,
         efficiency=efficiency_of(problem, moved / part.scale, load=state.load),
         output=(float(mean[0]), float(mean[1])),
         force=(float(force[0]), float(force[1])),
+        push=float((forces * problem.input.direction).sum()),
         energy=float(energy(mesh, state.displacement, linear=linear).sum()),
         stress=float(stress.max()),
         strain=float(strain.max()),
     )
 
 
-def input_force(part: Part, mesh: FrameMesh, state: FrameState) -> NDArray[np.float64]:
-    """Return (2,) what pushes the input, N."""
+def input_forces(part: Part, mesh: FrameMesh, state: FrameState) -> NDArray[np.float64]:
+    """Return (i, 2) what pushes each input node, N; 0 where no strut is."""
     given = part.design.problem.input
+    nodes = mesh.node[given.nodes]
+    there = (nodes >= 0)[:, None]
     if given.drive == "displacement":
-        nodes = mesh.node[given.nodes]
-        pushed: NDArray[np.float64] = state.reaction[nodes[nodes >= 0], :2].sum(axis=0)
-        return pushed
+        return np.where(there, state.reaction[nodes, :2], 0.0)
     force = state.load * given.amount * part.stiffness_unit * part.scale
-    total: NDArray[np.float64] = force * given.direction[mesh.node[given.nodes] >= 0].sum(axis=0)
-    return total
+    return np.where(there, force * given.direction, 0.0)
 
 
 def fibres(
