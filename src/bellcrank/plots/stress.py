@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.tri import Triangulation
 
 from bellcrank.plots import style
 from bellcrank.plots.legend import ROW_HEIGHT, add_legend
@@ -193,9 +194,8 @@ def _put_stressed(panel: Panel, part: Stressed, colours: ScalarMappable, drawing
         panel.axes.add_collection(lines, autolim=False)
     else:
         window = panel.axes.axis()
-        panel.axes.tripcolor(
-            *places.T, part.cells, part.stress, shading="gouraud", rasterized=True, **looks
-        )
+        mesh = Triangulation(places[:, 0], places[:, 1], part.cells)
+        panel.axes.tripcolor(mesh, part.stress, shading="gouraud", rasterized=True, **looks)
         panel.axes.axis(window)
     put_arrows(panel, input_arrows(problem), style.INPUT, bold=True)
     put_arrows(panel, wanted_arrows(problem, drawing.motion.moved), style.WANTED, bold=True)
