@@ -4,12 +4,62 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from bellcrank.parts import PartSpec
+
+DesignName = Annotated[
+    str,
+    typer.Argument(help="A design file or folder, human:NAME, machine:NAME, or a problem."),
+]
+PartFile = Annotated[
+    Path | None,
+    typer.Option("--part", help="TOML file with width, thickness, scale, material, fillet."),
+]
+Width = Annotated[str | None, typer.Option(help="Of the struts. \\[2mm]")]
+Thickness = Annotated[str | None, typer.Option(help="Of the part. \\[5mm]")]
+Scale = Annotated[str | None, typer.Option(help="Length of a lattice unit. \\[10mm]")]
+Fillet = Annotated[str | None, typer.Option(help="Radius in corners between struts.")]
+MaterialName = Annotated[
+    str | None, typer.Option(help="ninjaflex, tpu-95a, pla or petg. \\[ninjaflex]")
+]
+
+
+def part_of(
+    base: PartSpec,
+    path: Path | None,
+    lengths: dict[str, str | None],
+    material: str | None,
+    young: float | None = None,
+    poisson: float | None = None,
+) -> PartSpec:
+    """Put together a part from what a design says, a file, and the command line, the last first.
+
+    Raises
+    ------
+    InvalidFile, InvalidSettings, UnknownName
+    """
+    from bellcrank.parts import Material, materials, read_part
+
+    spec = base if path is None else read_part(path, base)
+    changes: dict[str, Any] = {key: value for key, value in lengths.items() if value is not None}
+    if (young is None) != (poisson is None):
+        raise InvalidSettings("give --young and --poisson together, or --material")
+    if young is not None and poisson is not None:
+        if material is not None:
+            raise InvalidSettings("give either --material or --young and --poisson")
+        changes["material"] = Material(name="custom", young=young, poisson=poisson)
+    elif material is not None:
+        changes["material"] = materials[material].name
+    return spec.changed(changes)
 
 
 def settings_of(option: str, texts: Iterable[str] | None) -> dict[str, Any]:

@@ -8,12 +8,22 @@ from typing import NoReturn, cast
 
 import typer
 
-from bellcrank.cli import campaign, design, evaluate, plot, problems, validate
+from bellcrank.cli import (
+    animate,
+    campaign,
+    design,
+    evaluate,
+    export,
+    plot,
+    print_part,
+    problems,
+    validate,
+)
 from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, app
 from bellcrank.cli.console import notes, plain
 from bellcrank.errors import BellcrankError, CorruptRun, RunFailed, StorageError
 
-COMMANDS = (campaign, design, evaluate, plot, problems, validate)
+COMMANDS = (campaign, design, evaluate, validate, export, print_part, plot, animate, problems)
 """Modules that register a command."""
 FAILURES = (StorageError, CorruptRun, RunFailed)
 """What is not the fault of who typed the command."""

@@ -14,6 +14,16 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import FAILED, app
+from bellcrank.cli.arguments import (
+    DesignName,
+    Fillet,
+    MaterialName,
+    PartFile,
+    Scale,
+    Thickness,
+    Width,
+    part_of,
+)
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.cli.live import Live
 from bellcrank.errors import InvalidSettings, StorageError
@@ -21,7 +31,6 @@ from bellcrank.errors import InvalidSettings, StorageError
 if TYPE_CHECKING:
     from bellcrank.fem import Analysis, FemSettings
     from bellcrank.model import Design
-    from bellcrank.parts import PartSpec
     from bellcrank.registry import Registry
     from bellcrank.workflows import Validation
 
@@ -42,10 +51,7 @@ class StrokeProgress(Live):
 
 @app.command()
 def validate(
-    design: Annotated[
-        str,
-        typer.Argument(help="A design file or folder, human:NAME, machine:NAME, or a problem."),
-    ],
+    design: DesignName,
     level: Annotated[
         str, typer.Option(help="frame, plane or solid; several with commas between.")
     ] = "frame",
@@ -60,19 +66,15 @@ def validate(
     size: Annotated[
         str | None, typer.Option(help="Largest edge of plane and solid elements.")
     ] = None,
-    part: Annotated[
-        Path | None, typer.Option(help="TOML file with width, thickness, scale, material, fillet.")
-    ] = None,
-    width: Annotated[str | None, typer.Option(help="Of the struts. \\[2mm]")] = None,
-    thickness: Annotated[str | None, typer.Option(help="Of the part. \\[5mm]")] = None,
-    scale: Annotated[str | None, typer.Option(help="Length of a lattice unit. \\[10mm]")] = None,
-    fillet: Annotated[str | None, typer.Option(help="Radius in corners between struts.")] = None,
+    part: PartFile = None,
+    width: Width = None,
+    thickness: Thickness = None,
+    scale: Scale = None,
+    fillet: Fillet = None,
     stroke: Annotated[
         str | None, typer.Option(help="Motion of the input; default: the problem's.")
     ] = None,
-    material: Annotated[
-        str | None, typer.Option(help="ninjaflex, tpu-95a, pla or petg. \\[ninjaflex]")
-    ] = None,
+    material: MaterialName = None,
     young: Annotated[float | None, typer.Option(help="Young's modulus in MPa.")] = None,
     poisson: Annotated[float | None, typer.Option(help="Poisson's ratio.")] = None,
     picture: Annotated[
@@ -98,7 +100,7 @@ def validate(
     target = record or _beside(design)
     _check_record(target, chosen, asked=record is not None)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
-    spec = _spec(part, spec_for(chosen), lengths, material, young, poisson)
+    spec = part_of(spec_for(chosen), part, lengths, material, young, poisson)
     plan = _plan(level, theory, law, linear=linear, elements=elements, size=size)
     others = [find_design(beside)] if beside is not None else []
     if others and picture is None:
@@ -136,31 +138,6 @@ def validate(
         analysis.status.value in ("mechanism", "unconverged") for analysis in validation.analyses
     ):
         raise typer.Exit(FAILED)
-
-
-def _spec(
-    path: Path | None,
-    spec: PartSpec,
-    lengths: dict[str, str | None],
-    material: str | None,
-    young: float | None,
-    poisson: float | None,
-) -> PartSpec:
-    """Put together the part from a file and what stands on the command line."""
-    from bellcrank.parts import Material, materials, read_part
-
-    if path is not None:
-        spec = read_part(path, spec)
-    changes: dict[str, Any] = {key: value for key, value in lengths.items() if value is not None}
-    if (young is None) != (poisson is None):
-        raise InvalidSettings("give --young and --poisson together, or --material")
-    if young is not None and poisson is not None:
-        if material is not None:
-            raise InvalidSettings("give either --material or --young and --poisson")
-        changes["material"] = Material(name="custom", young=young, poisson=poisson)
-    elif material is not None:
-        changes["material"] = materials[material].name
-    return spec.changed(changes)
 
 
 def _plan(

@@ -34,8 +34,9 @@ class Contacts:
     def message(self) -> str:
         """What touches, as a sentence."""
         first, second = self.pairs[np.argmax(self.overlap)]
+        count = "a pair" if len(self.pairs) == 1 else f"{len(self.pairs)} pairs"
         return (
-            f"{len(self.pairs)} pairs of struts touch or cross in the moved state, deepest those "
+            f"{count} of struts touch or cross in the moved state, deepest those "
             f"of beams {first} and {second}, by {self.overlap.max():.2g} mm"
         )
 

@@ -1,0 +1,106 @@
+"""`bellcrank print`: G-code for a printer, by a slicer."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from bellcrank.cli.app import app
+from bellcrank.cli.arguments import (
+    DesignName,
+    Fillet,
+    MaterialName,
+    PartFile,
+    Scale,
+    Thickness,
+    Width,
+    part_of,
+)
+from bellcrank.cli.console import announce_compilation, notes, plain, results
+from bellcrank.cli.export import Pad, Plate, Pointer, ScrewDiameter, Screws
+
+if TYPE_CHECKING:
+    from bellcrank.workflows.fabricate import PrintJob
+
+
+@app.command("print")
+def print_(
+    design: DesignName,
+    out: Annotated[
+        Path | None, typer.Argument(metavar="FILE", help="G-code to write; default: NAME.gcode.")
+    ] = None,
+    profile: Annotated[
+        str | None, typer.Option(help="Printer settings; default: those for the material.")
+    ] = None,
+    nozzle: Annotated[str | None, typer.Option(help="Diameter. \\[0.4mm]")] = None,
+    layer: Annotated[str | None, typer.Option(help="Height of layers. \\[0.32mm]")] = None,
+    bead_width: Annotated[str | None, typer.Option(help="Of lines. \\[0.45mm]")] = None,
+    slicer: Annotated[str | None, typer.Option(help="PrusaSlicer's program.")] = None,
+    part: PartFile = None,
+    width: Width = None,
+    thickness: Thickness = None,
+    scale: Scale = None,
+    fillet: Fillet = None,
+    material: MaterialName = None,
+    plate: Plate = False,
+    screws: Screws = 0,
+    screw_diameter: ScrewDiameter = "3.4mm",
+    pad: Pad = False,
+    pointer: Pointer = "0",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+) -> None:
+    """Slice a design for a printer, and say what it takes."""
+    from bellcrank.parts import read_length
+    from bellcrank.workflows import find_design, spec_for
+    from bellcrank.workflows.fabricate import (
+        Grips,
+        bundle_of,
+        findings_about,
+        print_design,
+        profile_for,
+    )
+
+    chosen = find_design(design)
+    lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
+    spec = part_of(spec_for(chosen), part, lengths, material)
+    given = {"nozzle": nozzle, "layer": layer, "bead_width": bead_width}
+    figures = {key: None if text is None else read_length(key, text) for key, text in given.items()}
+    printer = profile_for(profile, spec, **figures)
+    grips = Grips(
+        plate=plate,
+        screws=screws,
+        screw_diameter=read_length("screw diameter", screw_diameter),
+        pad=pad,
+        pointer=read_length("pointer", pointer),
+    )
+    bundle = bundle_of(chosen, spec, grips, layer=printer.layer)
+    target = out or Path(f"{chosen.problem.name}.gcode")
+    job = print_design(bundle, printer, target, slicer=slicer, overwrite=overwrite)
+    _print(job)
+    announce_compilation()
+    for sentence in findings_about(bundle, printer):
+        notes.print(f"[yellow]printing:[/] {plain(sentence)}")
+    notes.print(f"wrote {plain(target)}")
+
+
+def _print(job: PrintJob) -> None:
+    """Say what printing takes."""
+    deposit = job.sliced.deposit
+    size = deposit.high - deposit.low
+    table = Table.grid(padding=(0, 2))
+    table.add_row("layers", f"{deposit.layers} of {job.profile.layer:g} mm")
+    table.add_row("size", f"{size[0]:.1f} x {size[1]:.1f} x {deposit.high[2]:.2f} mm")
+    table.add_row("solid", f"{job.volume / 1000.0:.2f} cm3")
+    share = deposit.volume / job.volume
+    table.add_row("laid down", f"{deposit.volume / 1000.0:.2f} cm3, {share:.1%} of the solid")
+    if math.isfinite(job.mass):
+        table.add_row("mass", f"{job.mass:.1f} g")
+    if math.isfinite(deposit.seconds):
+        minutes = round(deposit.seconds / 60.0)
+        table.add_row("time", f"{minutes // 60} h {minutes % 60:02d} min, as the slicer estimates")
+    table.add_row("by", plain(job.sliced.slicer))
+    results.print(table)

@@ -1,0 +1,165 @@
+"""Graphs beside a lattice: curves with dots that move along them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullLocator
+
+from bellcrank.plots import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from numpy.typing import NDArray
+
+    from bellcrank.plots.movies.records import Graph, Line
+
+    Box = tuple[float, float, float, float]
+
+LABEL_LEFT, LABEL_BELOW = 0.62, 0.46
+"""Inches for words and numbers beside and under a graph."""
+HEADROOM = 0.08
+SMALL = 0.05
+"""Below it, numbers are written in a smaller unit."""
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+class Curves:
+    """Draws one graph.
+
+    Parameters
+    ----------
+    figure
+        Where.
+    graph
+        What.
+    box
+        Left, bottom, width and height in inches, words included.
+    shades
+        A colour for each line.
+    legend
+        Whether to say which is which.
+    """
+
+    def __init__(
+        self, figure: Figure, graph: Graph, box: Box, shades: tuple[str, ...], *, legend: bool
+    ) -> None:
+        width, height = figure.get_size_inches()
+        left, bottom = box[0] + LABEL_LEFT, box[1] + LABEL_BELOW
+        across, up = box[2] - LABEL_LEFT, box[3] - LABEL_BELOW
+        axes = figure.add_axes((left / width, bottom / height, across / width, up / height))
+        self._lines = graph.lines
+        _dress(axes, graph, up)
+        self._grown: list[tuple[Line2D, Line2D]] = []
+        for line, shade in zip(graph.lines, shades, strict=False):
+            if graph.foreseen:
+                axes.plot(line.x, line.y, color=shade, linewidth=1.4, alpha=0.28)
+            looks: dict[str, Any] = {"color": shade, "clip_on": False, "animated": True}
+            (grown,) = axes.plot(
+                [], [], linewidth=1.9, solid_capstyle="round", label=line.label, **looks
+            )
+            (dot,) = axes.plot(
+                [], [], marker="o", markersize=6.5, markeredgecolor="white",
+                markeredgewidth=1.0, **looks,
+            )  # fmt: skip
+            self._grown.append((grown, dot))
+        if legend:
+            axes.legend(
+                handles=[grown for grown, _ in self._grown],
+                frameon=False,
+                prop={"family": style.FONT, "size": style.SMALL_SIZE},
+                labelcolor=style.INK,
+            )
+        self.artists: list[Line2D] = [one for both in self._grown for one in both]
+
+    def place(self, state: int) -> None:
+        """Move the dots to a state."""
+        for line, (grown, dot) in zip(self._lines, self._grown, strict=True):
+            end = int(line.at[state]) + 1
+            grown.set_data(line.x[:end], line.y[:end])
+            dot.set_data(line.x[end - 1 : end], line.y[end - 1 : end])
+
+
+def _dress(axes: Axes, graph: Graph, height: float) -> None:
+    """Fix the limits and label the axes, quietly."""
+    span, rise = _span(graph), _rise(graph.lines)
+    for axis, word, limits in ((axes.xaxis, graph.across, span), (axes.yaxis, graph.up, rise)):
+        unit = power_of_ten(max(map(abs, limits)))
+        axis.set_label_text(
+            word + in_words(unit), family=style.FONT, size=style.SMALL_SIZE, color=style.INK
+        )
+        axis.set_major_formatter(FuncFormatter(lambda x, _place, u=unit: _number(x / u)))
+    axes.xaxis.labelpad = 2.0
+    axes.set_ylim(*rise)
+    axes.yaxis.set_major_locator(MaxNLocator(max(2, min(5, int(height / 0.3)))))
+    if graph.logarithmic:
+        axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _place: _number(x)))
+        axes.xaxis.set_minor_locator(NullLocator())
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+    axes.set_xlim(*span)
+    axes.yaxis.set_label_coords(-0.52 / axes.get_position().width / _wide(axes), 0.5)
+    axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT)
+    axes.grid(axis="y", color=style.IDLE_REST, linewidth=0.8)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(style.IDLE)
+
+
+def _wide(axes: Axes) -> float:
+    """Width of the figure that axes are on, inches."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    return float(figure.get_size_inches()[0])
+
+
+def power_of_ten(largest: float) -> float:
+    """Return the unit in which numbers up to the largest one are short.
+
+    Examples
+    --------
+    >>> power_of_ten(0.4), power_of_ten(0.004), power_of_ten(20000.0)
+    (1.0, 0.001, 1.0)
+    """
+    if not 0.0 < largest < SMALL:
+        return 1.0
+    return float(10.0 ** (3 * math.floor(math.log10(largest) / 3)))
+
+
+def in_words(unit: float) -> str:
+    """Return a unit as it stands after a word.
+
+    Examples
+    --------
+    >>> in_words(1e-6), in_words(1.0)
+    (' (10⁻⁶)', '')
+    """
+    power = str(round(math.log10(unit))).translate(SUPERSCRIPTS)
+    return "" if unit == 1.0 else f" (10{power})"
+
+
+def _number(x: float) -> str:
+    """Write the number of a tick."""
+    return f"{x:,.0f}".replace(",", "\u202f") if abs(x) >= 1000.0 else f"{x:.4g}"
+
+
+def _span(graph: Graph) -> tuple[float, float]:
+    """Limits of the horizontal axis."""
+    most = max(float(line.x.max()) for line in graph.lines)
+    return 0.0, (1.1 if graph.logarithmic else 1.03) * most or 1.0
+
+
+def _rise(lines: tuple[Line, ...]) -> tuple[float, float]:
+    """Limits of the vertical axis: nothing is hidden, and zero is among them."""
+    seen: NDArray[np.float64] = np.concatenate([line.y for line in lines])
+    seen = seen[np.isfinite(seen)]
+    low, high = min(0.0, seen.min(initial=0.0)), max(0.0, seen.max(initial=0.0))
+    room = HEADROOM * (high - low) or 1.0
+    return low - room * (low < 0.0), high + room

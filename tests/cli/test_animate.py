@@ -1,0 +1,160 @@
+"""Every form of `bellcrank animate`."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from bellcrank.plots.movies import movie_settings
+from bellcrank.runs import RunFolder
+from bellcrank.search import read_settings
+from bellcrank.workflows.animate_search import read_story, search_movie
+
+from .helpers import PROBLEM, call, design_of, files, refusal, write
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("here")
+
+QUICK = ("--seconds", "0.4", "--fps", "20", "--size", "320x180")
+
+
+def filmed(here: Path, *words: object) -> Path:
+    """Film, and return the only file that is new in the current folder."""
+    before = files(here)
+    outcome = call("animate", *words, *QUICK)
+    assert outcome.code == 0, outcome.err
+    assert outcome.out == ""
+    (name,) = set(files(here)) - set(before)
+    assert outcome.err == f"wrote {name}\n"
+    return here / name
+
+
+def frames_of(path: Path) -> list[np.ndarray]:
+    with av.open(str(path)) as container:
+        return [frame.to_ndarray(format="gray") for frame in container.decode(video=0)]
+
+
+def test_a_motion_is_filmed_as_long_and_as_large_as_asked_for(here: Path, small: str) -> None:
+    frames = frames_of(filmed(here, small, "motion.mp4"))
+    assert [frame.shape for frame in frames] == [(180, 320)] * 8
+    assert np.abs(frames[0].astype(int) - frames[-1]).mean() < 0.5
+    assert np.abs(frames[0].astype(int) - frames[4]).mean() > 0.5
+
+
+def test_the_suffix_chooses_the_format(here: Path, small: str) -> None:
+    with Image.open(filmed(here, small, "motion.gif")) as picture:
+        assert (picture.format, picture.size) == ("GIF", (320, 180))
+        assert picture.info["loop"] == 0
+
+
+@pytest.mark.parametrize("what", ["", "design.json"])
+def test_the_design_of_a_run_is_filmed(here: Path, whole: Path, what: str) -> None:
+    assert len(frames_of(filmed(here, whole / what, "motion.mp4"))) == 8
+
+
+def test_two_designs_are_filmed_beside_each_other(here: Path, whole: Path) -> None:
+    two = frames_of(filmed(here, PROBLEM, "two.mp4", "--beside", whole))
+    one = frames_of(filmed(here, PROBLEM, "one.mp4"))
+    assert np.abs(two[4].astype(int) - one[4]).mean() > 1.0
+
+
+def test_a_larger_motion_is_another_movie(here: Path, small: str) -> None:
+    plain = filmed(here, small, "plain.gif")
+    larger = filmed(here, small, "larger.gif", "--magnify", "3")
+    assert plain.read_bytes() != larger.read_bytes()
+
+
+def test_a_search_is_filmed(here: Path, whole: Path) -> None:
+    frames = frames_of(filmed(here, whole, "search.mp4", "--search"))
+    assert len(frames) == 8
+    assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 0.5
+
+
+def test_a_search_that_is_not_finished_is_filmed_and_left_alone(here: Path, half: Path) -> None:
+    before = files(half)
+    filmed(here, half, "search.gif", "--search")
+    assert files(half) == before
+
+
+def test_the_story_of_a_search_leads_from_the_full_lattice_to_the_chosen_design(
+    whole: Path,
+) -> None:
+    folder = RunFolder.open(whole)
+    story = read_story(folder, read_settings(folder.settings))
+    chosen = json.loads((whole / "design.json").read_text())["provenance"]
+    assert (story.chain, story.step[-1]) == (chosen["chain"], chosen["step"] + 1)
+    assert story.mask[0].all()
+    assert story.step[0] == 0
+    assert (np.diff(story.step) > 0).all()
+    assert (np.diff(story.efficiency) > 0.0).all()
+    assert story.efficiency[-1] == pytest.approx(design_of(whole)["efficiency"], rel=0.1)
+
+
+def test_the_movie_of_a_search_ends_with_its_best_design_and_no_news(whole: Path) -> None:
+    folder = RunFolder.open(whole)
+    told: list[tuple[str, int, int]] = []
+    movie = search_movie(folder, movie_settings("a.mp4", 4.0), tell=lambda *news: told.append(news))
+    (course,) = movie.courses
+    efficiency = movie.graphs[0].lines[0]
+    assert np.array_equal(course.present[-1], course.present[-2])
+    assert course.present[0].all()
+    assert efficiency.at[-1] == len(efficiency.y) - 1
+    assert told[-1] == ("loading", len(course.notes), len(course.notes))
+    assert set(movie.order) == set(range(len(course.notes)))
+    assert np.isfinite(course.displacement).all()
+
+
+def test_a_movie_is_replaced_on_request_only(here: Path, small: str) -> None:
+    write(here / "m.gif", "precious")
+    line = refusal("animate", small, "m.gif", *QUICK)
+    assert line.startswith("error: m.gif: exists already; ")
+    assert call("animate", small, "m.gif", "--overwrite", *QUICK).code == 0
+    assert (here / "m.gif").read_bytes().startswith(b"GIF89a")
+
+
+@pytest.mark.parametrize("form", [(), ("--search",), ("--beside", PROBLEM)])
+@pytest.mark.parametrize("name", ["m.avi", "m", "m.mp4.txt"])
+def test_an_unknown_format_is_refused(small: str, form: tuple[str, ...], name: str) -> None:
+    line = refusal("animate", small, name, *form)
+    assert line == f"error: {name}: expected a movie name ending in .mp4, .gif"
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--seconds", "0"), "seconds: expected a number above 0, got 0.0"),
+        (("--seconds", "nan"), "seconds: expected a number above 0, got nan"),
+        (("--seconds", "1e9"), "expected 3 to 36000"),
+        (("--fps", "0"), "fps: expected a whole number from 1 to 120, got 0"),
+        (("--size", "large"), "size: expected pixels like 1920x1080, got 'large'"),
+        (("--size", "-4x5"), "size: expected pixels like 1920x1080, got '-4x5'"),
+        (("--size", "101x100"), "size: expected even numbers for an MP4, got 101x100"),
+        (("--size", "8x8"), "size: expected 96 to 7680 pixels each way, got 8x8"),
+        (("--magnify", "0", *QUICK), "magnify: expected a number above 0, got 0.0"),
+        (("--objective", "best"), "unknown objective 'best'; known: displacement, "),
+        (("--beside", "nowhere"), "unknown problem 'nowhere'; known: "),
+        (("--search", "--beside", PROBLEM), "leave out --beside and --objective"),
+        (("--search", "--objective", "force"), "leave out --beside and --objective"),
+        (("--search",), "no such folder"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(small: str, words: tuple[str, ...], complaint: str) -> None:
+    assert complaint in refusal("animate", small, "m.mp4", *words)
+
+
+def test_a_search_needs_the_folder_of_a_run(here: Path) -> None:
+    (here / "empty").mkdir()
+    line = refusal("animate", "empty", "m.mp4", "--search")
+    assert line.startswith("error: empty: not the folder of a run: it has no run.json")
+
+
+def test_a_missing_folder_for_the_movie_is_named(small: str) -> None:
+    line = refusal("animate", small, "no/m.gif", *QUICK, code=1)
+    assert line.startswith("error: no/m.gif: cannot be written (No such file or directory)")
