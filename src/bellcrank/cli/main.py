@@ -11,6 +11,7 @@ import typer
 from bellcrank.cli import (
     animate,
     campaign,
+    card,
     design,
     evaluate,
     export,
@@ -23,7 +24,18 @@ from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, app
 from bellcrank.cli.console import notes, plain
 from bellcrank.errors import BellcrankError, CorruptRun, RunFailed, StorageError
 
-COMMANDS = (campaign, design, evaluate, validate, export, print_part, plot, animate, problems)
+COMMANDS = (
+    design,
+    evaluate,
+    validate,
+    export,
+    print_part,
+    card,
+    plot,
+    animate,
+    campaign,
+    problems,
+)
 """Modules that register a command."""
 FAILURES = (StorageError, CorruptRun, RunFailed)
 """What is not the fault of who typed the command."""

@@ -97,7 +97,7 @@ def validate(
 
     chosen = find_design(design)
     prepare_targets(picture, vtu, overwrite=overwrite)
-    target = record or _beside(design)
+    target = record or record_beside(design)
     _check_record(target, chosen, asked=record is not None)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material, young, poisson)
@@ -175,7 +175,7 @@ def _model(level: str, settings: FemSettings) -> str:
     return settings.theory if level == "frame" else settings.law
 
 
-def _beside(design: str) -> Path | None:
+def record_beside(design: str) -> Path | None:
     """Return where the record of a design that lies in a file belongs."""
     from bellcrank.model import builtin
 

@@ -231,12 +231,12 @@ def _put_curves(
                 part.stroke, part.efficiency if place == 0 else part.force,
                 color=colour, marker="o", markersize=3.0, linewidth=1.4, label=drawing.title,
             )  # fmt: skip
-        _dress(axes, words.stroke, label)
+        dress(axes, words.stroke, label)
         if len(parts) > 1:
             axes.legend(frameon=False, prop={"family": style.FONT, "size": style.SMALL_SIZE})
 
 
-def _dress(axes: Axes, below: str, beside: str) -> None:
+def dress(axes: Axes, below: str, beside: str) -> None:
     """Label axes, quietly."""
     looks: dict[str, Any] = {"family": style.FONT, "size": style.SMALL_SIZE, "color": style.INK}
     axes.set_xlabel(below, **looks)

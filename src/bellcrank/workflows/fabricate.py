@@ -245,9 +245,9 @@ def print_design(
     check_folder(path)
     left, bottom, right, top = bundle.outline().bounds
     solid = bundle.solid()
-    content = exporter_for("part.stl").to_bytes(bundle)
+    content = exporter_for("part.3mf").to_bytes(bundle)
     size = (right - left, top - bottom)
-    sliced = slice_solid(content, ".stl", profile, size, solid.volume, program)
+    sliced = slice_solid(content, ".3mf", profile, size, solid.volume, program)
     write_bytes(path, sliced.gcode, overwrite=overwrite)
     mass = solid.volume * bundle.part.material.density / 1000.0
     return PrintJob(sliced, solid.volume, mass, profile, round(bundle.thickness / profile.layer))

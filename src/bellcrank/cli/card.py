@@ -1,0 +1,49 @@
+"""`bellcrank card`: a page about a design as a part."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bellcrank.cli.app import app
+from bellcrank.cli.arguments import (
+    DesignName,
+    Fillet,
+    MaterialName,
+    PartFile,
+    Scale,
+    Thickness,
+    Width,
+    part_of,
+)
+from bellcrank.cli.console import announce_compilation, notes, plain
+from bellcrank.cli.validate import record_beside
+
+
+@app.command()
+def card(
+    design: DesignName,
+    out: Annotated[
+        Path | None, typer.Argument(metavar="FILE", help="pdf, png or svg; default: NAME.pdf.")
+    ] = None,
+    part: PartFile = None,
+    width: Width = None,
+    thickness: Thickness = None,
+    scale: Scale = None,
+    fillet: Fillet = None,
+    material: MaterialName = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the card.")] = False,
+) -> None:
+    """Put on one page what there is to say about a design as a part."""
+    from bellcrank.workflows import find_design, spec_for
+    from bellcrank.workflows.card import make_card
+
+    chosen = find_design(design)
+    lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
+    spec = part_of(spec_for(chosen), part, lengths, material)
+    target = out or Path(f"{chosen.problem.name}.pdf")
+    announce_compilation()
+    make_card(chosen, spec, target, record=record_beside(design), title=design, overwrite=overwrite)
+    notes.print(f"wrote {plain(target)}")

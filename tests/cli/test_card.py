@@ -1,0 +1,61 @@
+"""`bellcrank card`: one page about a design as a part."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bellcrank.model import find_problem, human_design
+from bellcrank.workflows.card import design_hash
+
+from .helpers import call, colours, files, refusal, write
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("here")
+
+
+@pytest.mark.parametrize("name", ["card.pdf", "card.png"])
+@pytest.mark.parametrize("design", ["human:crane", "machine:pliers"])
+def test_a_card_is_drawn_on_one_page(here: Path, design: str, name: str) -> None:
+    outcome = call("card", design, name)
+    assert outcome.code == 0, outcome.err
+    assert outcome.err == f"wrote {name}\n"
+    content = (here / name).read_bytes()
+    if name.endswith("pdf"):
+        assert content.startswith(b"%PDF")
+        assert b"/Count 1" in content
+    else:
+        assert colours(here / name) > 100
+
+
+def test_a_card_takes_up_the_record_of_a_run(copy: Path, here: Path) -> None:
+    call("validate", copy, "--elements", 2)
+    without = call("card", copy / "design.json", "one.png")
+    assert without.code == 0, without.err
+    call("validate", copy, "--theory", "timoshenko", "--linear")
+    assert call("card", copy, "two.png").code == 0
+    assert (here / "one.png").read_bytes() != (here / "two.png").read_bytes()
+
+
+def test_cards_are_refused_like_all_pictures(here: Path) -> None:
+    write(here / "card.pdf", "mine")
+    assert "card.pdf: exists already" in refusal("card", "crane", "card.pdf")
+    assert "card.txt: expected a picture name" in refusal("card", "crane", "card.txt")
+    assert "width: expected a length" in refusal("card", "crane", "a.pdf", "--width", "wide")
+    assert set(files(here)) == {"card.pdf"}
+
+
+def test_a_hash_names_problem_stroke_and_beams() -> None:
+    crane = find_problem("crane").full_design()
+    human = human_design("crane")
+    assert human is not None
+    hashes = {
+        design_hash(crane),
+        design_hash(human),
+        design_hash(find_problem("discs").full_design()),
+    }
+    assert len(hashes) == 3
+    assert design_hash(crane) == design_hash(find_problem("crane").full_design())

@@ -1,0 +1,145 @@
+"""Every form of `bellcrank export` and `bellcrank print`, and what they refuse."""
+
+from __future__ import annotations
+
+import shutil
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bellcrank.fabricate import Export, exporters, slicer
+from bellcrank.fabricate.gcode import read_gcode
+from bellcrank.fabricate.profiles import profiles
+from bellcrank.model import find_problem
+from bellcrank.parts import PartSpec, materials
+
+from .helpers import call, files, refusal, write
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("here")
+
+SLICER = pytest.mark.skipif(
+    shutil.which("prusa-slicer") is None, reason="PrusaSlicer is not installed"
+)
+
+
+@pytest.mark.parametrize("name", [name for name in exporters if name != "step"])
+def test_every_format_is_written_by_its_suffix(here: Path, name: str) -> None:
+    file = f"part{exporters[name].suffixes[0]}"
+    outcome = call("export", "human:crane", file, "--plate", "--screws", 2, "--pad", "--moved")
+    assert outcome.code == 0, outcome.err
+    assert outcome.err.endswith(f"wrote {file}, 5.12 mm thick\n")
+    assert list(files(here)) == [file]
+    assert (here / file).stat().st_size > 3000
+
+
+def test_the_part_is_as_wide_and_thick_as_said(here: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    words = ("--width", "1.6mm", "--thickness", "3mm", "--scale", "20mm")
+    call("export", "crane", "a.stl", *words, "--layer", "0")
+    call("export", "crane", "b.stl", *words, "--layer", "0.2mm")
+    whole = trimesh.load(here / "a.stl")
+    assert whole.extents[2] == pytest.approx(3.0)
+    assert whole.extents[0] == pytest.approx(13.0 * 20.0 + 1.6, abs=21.0)
+    assert trimesh.load(here / "b.stl").extents[2] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "word"),
+    [
+        (("crane", "part.foo"), "unknown export format '.foo'; known suffixes: .stl, .3mf"),
+        (("crane", "part.stl", "--width", "6mm"), "width: struts 6 mm wide would close"),
+        (("crane", "part.stl", "--fillet", "3mm"), "fillet: a radius of 3 mm would close"),
+        (("crane", "part.stl", "--thickness", "0.1mm"), "less than one layer of 0.32 mm"),
+        (("crane", "part.stl", "--screws", "2"), "screws need a plate"),
+        (("crane", "part.stl", "--plate", "--screws", "-1"), "screws: expected a number"),
+        (("crane", "part.stl", "--layer", "thin"), "layer: expected a length"),
+        (("crane", "part.stl", "--material", "jelly"), "unknown material 'jelly'"),
+        (("crane", "part.stl", "--pointer", "-2mm"), "pointer: expected a length"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(words: tuple[str, ...], word: str) -> None:
+    assert word in refusal("export", *words)
+
+
+def test_an_export_is_not_written_over(here: Path) -> None:
+    write(here / "part.svg", "mine")
+    assert "part.svg: exists already" in refusal("export", "crane", "part.svg")
+    assert call("export", "crane", "part.svg", "--overwrite").code == 0
+    assert "none/part.svg" in refusal("export", "crane", "none/part.svg", code=1)
+
+
+def test_without_a_slicer_the_way_round_it_is_told() -> None:
+    message = refusal("print", "crane", "--slicer", "no-such-slicer")
+    assert "apt install prusa-slicer" in message
+    assert "bellcrank export DESIGN part.3mf" in message
+
+
+@SLICER
+def test_the_crane_is_sliced_into_as_much_plastic_as_it_has(here: Path) -> None:
+    outcome = call("print", "crane")
+    assert outcome.code == 0, outcome.err
+    assert "16 of 0.32 mm" in outcome.out
+    lines = (here / "crane.gcode").read_text().splitlines()
+    deposit = read_gcode(lines, profiles["ninjaflex"].filament_diameter)
+    assert deposit.layers == 16
+    assert deposit.high[2] == pytest.approx(5.12)
+    share = float(next(w for w in outcome.out.split() if w.endswith("%")).rstrip("%"))
+    assert 97.0 <= share <= 103.0
+    assert "no whole number of layers" in outcome.err
+
+
+@SLICER
+def test_stl_is_sliced_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(slicer, "PERIMETERS", (4,))
+    part = PartSpec(width=2.0).of(find_problem("crane").full_design())
+    bundle = Export(part=part)
+    solid = bundle.solid()
+    profile = profiles["ninjaflex"]
+    size = (130.0, 100.0)
+    content = exporters["stl"].to_bytes(bundle)
+    sliced = slicer.slice_solid(content, ".stl", profile, size, solid.volume, slicer.find_slicer())
+    assert sliced.deposit.layers == 16
+    assert sliced.deposit.volume == pytest.approx(solid.volume, rel=0.03)
+
+
+@SLICER
+def test_what_is_to_be_sliced_is_checked_first() -> None:
+    assert "expected a name ending in .gcode" in refusal("print", "crane", "part.stl")
+    assert "unknown profile 'jelly'" in refusal("print", "crane", "--profile", "jelly")
+    assert "layer" in refusal("print", "crane", "--layer", "1mm")
+
+
+def test_every_material_has_a_profile_with_sources() -> None:
+    assert set(materials) <= set(profiles)
+    for profile in profiles.values():
+        figures = {"nozzle", "layer", "bead_width", "temperature", "bed_temperature", "speed"}
+        assert figures <= set(profile.sources)
+
+
+GCODE = """; generated by hand
+M82
+G92 E0
+G1 Z0.3 F600
+G1 X10 Y0
+G1 X20 Y0 E1.0
+G1 E0.2
+G1 X30 Y0
+G1 E1.0
+G1 X30 Y10 E2.0
+G1 Z0.6
+G92 E0
+G1 X10 Y10 E0.5
+; estimated printing time (normal mode) = 1h 2m 3s
+"""
+
+
+def test_gcode_with_absolute_filament_is_read_back() -> None:
+    deposit = read_gcode(GCODE.splitlines(), 2.0)
+    assert deposit.volume == pytest.approx(2.5 * 3.14159265)
+    assert deposit.low.tolist() == [10.0, 0.0, 0.3]
+    assert deposit.high.tolist() == [30.0, 10.0, 0.6]
+    assert deposit.layers == 2
+    assert deposit.seconds == 3723.0
