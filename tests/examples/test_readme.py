@@ -102,6 +102,11 @@ def test_a_part_is_searched_for_and_validated(
     assert record["results"][0]["status"] == "converged"
     run(picture, monkeypatch, capsys)
     assert Path("stress.png").stat().st_size > 50_000
+    commands = blocks("")[5].strip().splitlines()
+    assert len(commands) == 4
+    for command in commands:
+        run(command, monkeypatch, capsys)
+        assert Path(command.split()[3]).stat().st_size > 10_000, command
 
 
 def test_the_validation_table_is_that_of_the_record() -> None:

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from bellcrank.mechanics import Evaluator, Status
-from bellcrank.model import Problem, Stiffness
+from bellcrank.model import Problem, Stiffness, human_design
 
 from .problems import frame
 
@@ -134,3 +134,11 @@ def test_finer_increments_do_not_change_the_verdict() -> None:
 def test_sensitivity_is_defined_on_either_side_of_a_snap() -> None:
     problem = truss(1.2 * limit_load(HEIGHT))
     assert np.isfinite(Evaluator(problem).sensitivity(problem.initial)).all()
+
+
+@pytest.mark.parametrize("parts", [20, 24, 28, 30, 32, 48])
+def test_any_increment_leads_to_the_full_stroke(parts: int) -> None:
+    design = human_design("crane")
+    assert design is not None
+    response = Evaluator(design.problem).respond(design.mask, 1.0 / parts)
+    assert response.status is Status.CONVERGED

@@ -20,6 +20,9 @@ from bellcrank.cli.arguments import (
 )
 from bellcrank.cli.console import announce_compilation, notes, plain
 
+PRINTED = (".stl", ".3mf")
+"""What goes to a printer, whose limits are worth a word."""
+
 Plate = Annotated[bool, typer.Option("--plate", help="Make the supports a solid plate to clamp.")]
 Screws = Annotated[int, typer.Option(help="Screw holes through that plate.")]
 ScrewDiameter = Annotated[str, typer.Option(help="Of the screw holes.")]
@@ -54,7 +57,7 @@ def export(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Write the part that a design becomes, for printers, cutters and other programs."""
-    from bellcrank.fabricate import exporter_for
+    from bellcrank.fabricate import check_print, exporter_for
     from bellcrank.model.storage import check_folder
     from bellcrank.parts import read_length
     from bellcrank.workflows import find_design, spec_for
@@ -78,3 +81,6 @@ def export(
     bundle = bundle_of(chosen, spec, grips, layer=height or None, moved=moved)
     export_design(bundle, out, overwrite=overwrite)
     notes.print(f"wrote {plain(out)}, {bundle.thickness:g} mm thick")
+    if out.suffix.lower() in PRINTED:
+        for finding in check_print(bundle):
+            notes.print(f"[yellow]printing:[/] {plain(finding.sentence)}")

@@ -211,8 +211,10 @@ def follow_path(
     fraction = 0.0
     increment = last_increment = min(LARGEST_INCREMENT, largest)
     while fraction < 1.0 and increment >= SMALLEST_INCREMENT:
-        increment = min(increment, 1.0 - fraction)
-        end = fraction + increment if increment < 1.0 - fraction else 1.0
+        # What would be left of less than half the smallest increment could not be followed.
+        last = 1.0 - fraction - increment < 0.5 * SMALLEST_INCREMENT
+        increment = 1.0 - fraction if last else increment
+        end = 1.0 if last else fraction + increment
         copy(u, previous)
         extrapolate(u, tangent, last_tangent, increment, last_increment)
         now, departure = arrive(system, structure, increment, end, u, scratch)

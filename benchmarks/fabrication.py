@@ -1,0 +1,69 @@
+"""What files, G-code and movies cost: ``python -m benchmarks.fabrication [--quick]``."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from bellcrank.fabricate import Export, exporters
+from bellcrank.fabricate.profiles import profiles
+from bellcrank.model import find_problem
+from bellcrank.model.builtin.scaling import scaling
+from bellcrank.parts import PartSpec
+from bellcrank.plots.movies import movie_settings
+from bellcrank.workflows import find_design
+from bellcrank.workflows.animate import Looks, animate_motion
+from bellcrank.workflows.fabricate import print_design
+
+SLOW = ("step",)
+"""Formats that take minutes for thousands of struts."""
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="the crane only, no movie")
+    quick = parser.parse_args().quick
+    designs = {"crane": find_problem("crane").full_design()}
+    if not quick:
+        designs["scaling of 40 rows"] = scaling(40).full_design()
+    print("| part | struts | file | seconds | MB |\n|---|---|---|---|---|")
+    for name, design in designs.items():
+        part = PartSpec().of(design)
+        for kind, exporter in exporters.items():
+            if kind in SLOW and name != "crane":
+                continue
+            began = time.perf_counter()
+            content = exporter.to_bytes(Export(part=part))
+            spent = time.perf_counter() - began
+            print(
+                f"| {name} | {design.beam_count} | {kind} | {spent:.2f} "
+                f"| {len(content) / 1e6:.2f} |",
+                flush=True,
+            )
+    if quick:
+        return
+    with TemporaryDirectory() as folder:
+        began = time.perf_counter()
+        path = Path(folder) / "crane.mp4"
+        settings = movie_settings(path, 5.0, None, None)
+        animate_motion(
+            [("crane", find_design("machine:crane"))], path, settings, Looks(), overwrite=False
+        )
+        print(f"\nA movie of 5 s in 1080p: {time.perf_counter() - began:.1f} s")
+        if shutil.which("prusa-slicer"):
+            began = time.perf_counter()
+            bundle = Export(part=PartSpec().of(designs["crane"]))
+            job = print_design(bundle, profiles["ninjaflex"], Path(folder) / "crane.gcode")
+            share = job.sliced.deposit.volume / job.volume
+            print(
+                f"G-code of the crane: {time.perf_counter() - began:.1f} s, {share:.1%} of the "
+                f"solid in {job.sliced.deposit.layers} layers"
+            )
+
+
+if __name__ == "__main__":
+    main()
