@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from typing import TYPE_CHECKING, Any
@@ -109,23 +112,36 @@ def loop_area(points: NDArray[np.float64], turns: NDArray[np.float64]) -> float:
 
 
 def read_step(path: Path) -> tuple[float, int, bool]:
-    """Volume and number of the solids of a STEP file, and whether they are sound."""
-    from OCP.BRepCheck import BRepCheck_Analyzer
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
-    from OCP.STEPControl import STEPControl_Reader
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
+    """Volume and number of the solids of a STEP file, and whether they are sound.
 
-    reader = STEPControl_Reader()
-    reader.ReadFile(str(path))
-    reader.TransferRoots()
-    shape = reader.OneShape()
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, properties)
-    explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
-    count = 0
-    while explorer.More():
-        count += 1
-        explorer.Next()
-    return properties.Mass(), count, BRepCheck_Analyzer(shape).IsValid()
+    In a process of its own, like the writer: NGSolve brings another version of the kernel.
+    """
+    words = [sys.executable, "-c", READER, str(path)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    volume, count, sound = json.loads(done.stdout.splitlines()[-1])
+    return volume, count, sound
+
+
+READER = """
+import json, sys
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
+from OCP.STEPControl import STEPControl_Reader
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
+
+reader = STEPControl_Reader()
+reader.ReadFile(sys.argv[1])
+reader.TransferRoots()
+shape = reader.OneShape()
+properties = GProp_GProps()
+BRepGProp.VolumeProperties_s(shape, properties)
+explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
+count = 0
+while explorer.More():
+    count += 1
+    explorer.Next()
+print()
+print(json.dumps([properties.Mass(), count, BRepCheck_Analyzer(shape).IsValid()]))
+"""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import sys
@@ -48,9 +49,15 @@ def part_of(kind: str, name: str) -> Part:
     return PartSpec(width=min(2.0, 2.0 * shortest)).of(design)
 
 
+def require_kernel() -> None:
+    """Skip without Open CASCADE, and do not import it: NGSolve brings another version of it."""
+    if importlib.util.find_spec("OCP") is None:
+        pytest.skip("Open CASCADE is not installed")
+
+
 def require(name: str) -> None:
     if name == "step":
-        pytest.importorskip("OCP")
+        require_kernel()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -144,7 +151,6 @@ def test_step_without_its_extra_says_how_to_get_it(
     part: Part, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "OCP", None)
-    monkeypatch.setitem(sys.modules, "OCP.STEPControl", None)
     with pytest.raises(InvalidSettings, match=r"export to STEP needs .* 'bellcrank\[step\]'"):
         export(part, tmp_path / "part.step")
     assert list(tmp_path.iterdir()) == []
@@ -245,7 +251,7 @@ def test_changed_outlines_are_what_is_written(tmp_path: Path) -> None:
 def test_step_is_one_sound_solid_with_the_exact_volume(
     kind: str, name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    pytest.importorskip("OCP")
+    require_kernel()
     made = part_of(kind, name)
     export(made, tmp_path / "part.step")
     printed = capfd.readouterr()
@@ -256,7 +262,7 @@ def test_step_is_one_sound_solid_with_the_exact_volume(
 
 
 def test_step_has_pieces_within_holes_as_solids_of_their_own(tmp_path: Path) -> None:
-    pytest.importorskip("OCP")
+    require_kernel()
     corners = np.array([[0.0, 0.0], [12.0, 0.0], [6.0, 108.0**0.5]])
     inner = 0.3 * (corners - corners.mean(axis=0)) + corners.mean(axis=0)
     beams = np.array([[0, 1], [1, 2], [2, 0]])

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
+import subprocess
+import sys
 from contextlib import contextmanager
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import InvalidSettings, RunFailed
 from bellcrank.fabricate.formats.base import Export, Exporter, exporters
 
 if TYPE_CHECKING:
@@ -27,6 +31,8 @@ def to_bytes(export: Export) -> bytes:
     ------
     InvalidSettings
         If the modelling kernel is not installed.
+    RunFailed
+        If it fails.
     """
     _require_kernel()
     thickness = export.thickness
@@ -34,18 +40,45 @@ def to_bytes(export: Export) -> bytes:
 
 
 def solid_to_bytes(outline: Outline, thickness: float, name: str) -> bytes:
-    """Return the prism over an outline as a STEP file, a solid for each piece."""
-    return _written(_prisms(outline, thickness), name)
+    """Return the prism over an outline as a STEP file, a solid for each piece.
+
+    The kernel works in a process of its own: NGSolve brings another version of it, and both in
+    one process end in a crash.
+
+    Raises
+    ------
+    RunFailed
+        If the kernel fails.
+    """
+    loops = [
+        [[loop.points.tolist(), loop.bulge.tolist()] for loop in kind]
+        for kind in (outline.outer, outline.holes)
+    ]
+    task = json.dumps({"loops": loops, "thickness": thickness, "name": name})
+    words = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
+    done = subprocess.run(words, input=task.encode(), capture_output=True, check=False)
+    if done.returncode or not done.stdout:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise RunFailed(f"Open CASCADE wrote no STEP file: {said[-1] if said else 'no word'}")
+    return done.stdout
+
+
+def serve() -> None:
+    """Read a task from standard input and write its STEP file to standard output."""
+    from bellcrank.geometry import Loop, Outline
+
+    task = json.load(sys.stdin)
+    outer, holes = (tuple(Loop(*loop) for loop in kind) for kind in task["loops"])
+    content = _written(_prisms(Outline(outer, holes), task["thickness"]), task["name"])
+    sys.stdout.buffer.write(content)
 
 
 def _require_kernel() -> None:
-    try:
-        import OCP.STEPControl  # noqa: F401
-    except ImportError as error:
+    if importlib.util.find_spec("OCP") is None:
         raise InvalidSettings(
             "export to STEP needs the modelling kernel Open CASCADE; "
             "install it with: pip install 'bellcrank[step]'"
-        ) from error
+        )
 
 
 def _prisms(outline: Outline, thickness: float) -> Any:
