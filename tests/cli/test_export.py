@@ -10,7 +10,7 @@ import pytest
 from bellcrank.fabricate import Export, exporters, slicer
 from bellcrank.fabricate.gcode import read_gcode
 from bellcrank.fabricate.profiles import profiles
-from bellcrank.model import find_problem
+from bellcrank.model import Design, find_problem, write_design
 from bellcrank.parts import PartSpec, materials
 
 from .helpers import call, files, refusal, write
@@ -64,6 +64,16 @@ def test_the_part_is_as_wide_and_thick_as_said(here: Path) -> None:
 )
 def test_bad_input_is_refused_in_one_line(words: tuple[str, ...], word: str) -> None:
     assert word in refusal("export", *words)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "3mf", "dxf", "svg"])
+def test_a_design_in_pieces_is_no_part_but_still_a_lattice(here: Path, suffix: str) -> None:
+    crane = find_problem("crane")
+    mask = crane.initial.copy()
+    mask[crane.designable] = False
+    write_design(Design(crane, mask), here / "pieces.json")
+    assert "the design is in 3 pieces" in refusal("export", "pieces.json", f"part.{suffix}")
+    assert call("export", "pieces.json", "part.data").code == 0
 
 
 def test_an_export_is_not_written_over(here: Path) -> None:

@@ -22,6 +22,8 @@ from bellcrank.cli.console import announce_compilation, notes, plain
 
 PRINTED = (".stl", ".3mf")
 """What goes to a printer, whose limits are worth a word."""
+CUT = (".dxf", ".svg", ".step", ".stp")
+"""What becomes a part by other ways."""
 
 Plate = Annotated[bool, typer.Option("--plate", help="Make the supports a solid plate to clamp.")]
 Screws = Annotated[int, typer.Option(help="Screw holes through that plate.")]
@@ -78,7 +80,8 @@ def export(
     check_folder(out)
     if moved:
         announce_compilation()
-    bundle = bundle_of(chosen, spec, grips, layer=height or None, moved=moved)
+    whole = out.suffix.lower() in (*PRINTED, *CUT)
+    bundle = bundle_of(chosen, spec, grips, layer=height or None, moved=moved, whole=whole)
     export_design(bundle, out, overwrite=overwrite)
     notes.print(f"wrote {plain(out)}, {bundle.thickness:g} mm thick")
     if out.suffix.lower() in PRINTED:

@@ -16,7 +16,7 @@ from bellcrank.geometry import strut_outline
 from bellcrank.geometry.grips import drilled, filled, screw_places, with_pointer
 from bellcrank.mechanics import CAREFUL, Evaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
-from bellcrank.parts.pieces import doubts_about
+from bellcrank.parts.pieces import doubts_about, require_held
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -106,7 +106,13 @@ class Grips:
 
 
 def bundle_of(
-    design: Design, spec: PartSpec, grips: Grips, *, layer: float | None, moved: bool = False
+    design: Design,
+    spec: PartSpec,
+    grips: Grips,
+    *,
+    layer: float | None,
+    moved: bool = False,
+    whole: bool = True,
 ) -> Export:
     """Return a design ready to be written.
 
@@ -120,6 +126,8 @@ def bundle_of(
         Height of layers, of which the part gets a whole number; None for its own thickness.
     moved
         Whether formats that can are to hold the motion.
+    whole
+        Whether to refuse designs of which a piece hangs on nothing: what is printed or cut.
 
     Raises
     ------
@@ -127,6 +135,8 @@ def bundle_of(
         If there can be no such part.
     """
     part = spec.of(design)
+    if whole:
+        require_held(design)
     frames = motion_of(design) if moved else None
     return Export(
         part=part,
