@@ -23,7 +23,8 @@ from bellcrank.errors import (
 from bellcrank.fabricate import Export, export, exporter_for, exporters
 from bellcrank.fabricate.formats.step import solid_to_bytes as step_bytes
 from bellcrank.geometry import strut_outline
-from bellcrank.geometry.grips import drilled, filled
+from bellcrank.geometry.grips import filled
+from bellcrank.geometry.screws import drilled
 from bellcrank.model import find_problem, gallery_design, human_design, read_network
 from bellcrank.parts import PartSpec
 

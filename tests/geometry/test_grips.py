@@ -11,7 +11,8 @@ from tests.geometry.layouts import random_layout, triangular
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.geometry import Loop, Outline, room_for_fillet, strut_outline
-from bellcrank.geometry.grips import clearance, drilled, filled, screw_places, with_pointer
+from bellcrank.geometry.grips import filled, with_pointer
+from bellcrank.geometry.screws import clearance, drilled, screw_places
 from bellcrank.model import find_problem, human_design
 from bellcrank.parts import PartSpec
 

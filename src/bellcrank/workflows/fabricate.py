@@ -13,7 +13,8 @@ from bellcrank.fabricate.profiles import profiles
 from bellcrank.fabricate.slicer import find_slicer, slice_solid
 from bellcrank.fem.contact import find_contacts
 from bellcrank.geometry import strut_outline
-from bellcrank.geometry.grips import drilled, filled, screw_places, with_pointer
+from bellcrank.geometry.grips import filled, with_pointer
+from bellcrank.geometry.screws import drilled, screw_places
 from bellcrank.mechanics import CAREFUL, Evaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.parts.pieces import doubts_about, require_held
