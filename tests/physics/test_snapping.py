@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from bellcrank.mechanics import Evaluator, Status
-from bellcrank.model import Problem, Stiffness, human_design
+from bellcrank.model import Problem, Stiffness, gallery_design, human_design
 
 from .problems import frame
 
@@ -142,3 +142,12 @@ def test_any_increment_leads_to_the_full_stroke(parts: int) -> None:
     assert design is not None
     response = Evaluator(design.problem).respond(design.mask, 1.0 / parts)
     assert response.status is Status.CONVERGED
+
+
+@pytest.mark.parametrize("name", ["pliers", "crane", "discs"])
+def test_soft_designs_reach_the_full_load_in_fine_increments(name: str) -> None:
+    design = gallery_design("machine", name)
+    assert design is not None
+    for parts in (24, 32):
+        response = Evaluator(design.problem).respond(design.mask, 1.0 / parts)
+        assert response.status is Status.CONVERGED

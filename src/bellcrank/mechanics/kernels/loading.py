@@ -45,6 +45,7 @@ from bellcrank.mechanics.kernels.tangents import (
 )
 from bellcrank.mechanics.kernels.tension import add_tension_at, clear_tension
 
+REMNANT = 1e-12
 SMALLEST_INCREMENT = 1.0 / 1024.0
 DIP = 0.5
 """A path whose lowest stiffness falls below this part of its values at rest and at full load
@@ -211,10 +212,11 @@ def follow_path(
     fraction = 0.0
     increment = last_increment = min(LARGEST_INCREMENT, largest)
     while fraction < 1.0 and increment >= SMALLEST_INCREMENT:
-        # What would be left of less than half the smallest increment could not be followed.
-        last = 1.0 - fraction - increment < 0.5 * SMALLEST_INCREMENT
-        increment = 1.0 - fraction if last else increment
-        end = 1.0 if last else fraction + increment
+        increment = min(increment, 1.0 - fraction)
+        end = fraction + increment
+        # Rounding must not leave a last increment too small to be judged.
+        if 1.0 - end < REMNANT:
+            end = 1.0
         copy(u, previous)
         extrapolate(u, tangent, last_tangent, increment, last_increment)
         now, departure = arrive(system, structure, increment, end, u, scratch)
