@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +20,9 @@ from bellcrank.cli.arguments import (
 )
 from bellcrank.cli.console import announce_compilation, notes, plain
 
+if TYPE_CHECKING:
+    from bellcrank.workflows.fabricate import Grips
+
 PRINTED = (".stl", ".3mf")
 """What goes to a printer, whose limits are worth a word."""
 CUT = (".dxf", ".svg", ".step", ".stp")
@@ -30,6 +33,20 @@ Screws = Annotated[int, typer.Option(help="Screw holes through that plate.")]
 ScrewDiameter = Annotated[str, typer.Option(help="Of the screw holes.")]
 Pad = Annotated[bool, typer.Option("--pad", help="Make the input a solid pad to push.")]
 Pointer = Annotated[str, typer.Option(help="Length of a strut that points out of the output.")]
+
+
+def grips_of(plate: bool, screws: int, screw_diameter: str, pad: bool, pointer: str) -> Grips:
+    """Return what is added to a part, from what stands on the command line."""
+    from bellcrank.parts import read_length
+    from bellcrank.workflows.fabricate import Grips
+
+    return Grips(
+        plate=plate,
+        screws=screws,
+        screw_diameter=read_length("screw diameter", screw_diameter),
+        pad=pad,
+        pointer=read_length("pointer", pointer),
+    )
 
 
 @app.command()
@@ -60,29 +77,24 @@ def export(
 ) -> None:
     """Write the part that a design becomes, for printers, cutters and other programs."""
     from bellcrank.fabricate import check_print, exporter_for
+    from bellcrank.fabricate import export as write
     from bellcrank.model.storage import check_folder
     from bellcrank.parts import read_length
     from bellcrank.workflows import find_design, spec_for
-    from bellcrank.workflows.fabricate import Grips, bundle_of, export_design
+    from bellcrank.workflows.fabricate import bundle_of
 
     exporter_for(out)
     chosen = find_design(design)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material)
-    grips = Grips(
-        plate=plate,
-        screws=screws,
-        screw_diameter=read_length("screw diameter", screw_diameter),
-        pad=pad,
-        pointer=read_length("pointer", pointer),
-    )
+    grips = grips_of(plate, screws, screw_diameter, pad, pointer)
     height = read_length("layer", layer)
     check_folder(out)
     if moved:
         announce_compilation()
     whole = out.suffix.lower() in (*PRINTED, *CUT)
     bundle = bundle_of(chosen, spec, grips, layer=height or None, moved=moved, whole=whole)
-    export_design(bundle, out, overwrite=overwrite)
+    write(bundle, out, overwrite=overwrite)
     notes.print(f"wrote {plain(out)}, {bundle.thickness:g} mm thick")
     if out.suffix.lower() in PRINTED:
         for finding in check_print(bundle):

@@ -21,7 +21,7 @@ from bellcrank.cli.arguments import (
     part_of,
 )
 from bellcrank.cli.console import announce_compilation, notes, plain, results
-from bellcrank.cli.export import Pad, Plate, Pointer, ScrewDiameter, Screws
+from bellcrank.cli.export import Pad, Plate, Pointer, ScrewDiameter, Screws, grips_of
 
 if TYPE_CHECKING:
     from bellcrank.workflows.fabricate import PrintJob
@@ -57,7 +57,6 @@ def print_(
     from bellcrank.parts import read_length
     from bellcrank.workflows import find_design, spec_for
     from bellcrank.workflows.fabricate import (
-        Grips,
         bundle_of,
         findings_about,
         print_design,
@@ -70,13 +69,7 @@ def print_(
     given = {"nozzle": nozzle, "layer": layer, "bead_width": bead_width}
     figures = {key: None if text is None else read_length(key, text) for key, text in given.items()}
     printer = profile_for(profile, spec, **figures)
-    grips = Grips(
-        plate=plate,
-        screws=screws,
-        screw_diameter=read_length("screw diameter", screw_diameter),
-        pad=pad,
-        pointer=read_length("pointer", pointer),
-    )
+    grips = grips_of(plate, screws, screw_diameter, pad, pointer)
     bundle = bundle_of(chosen, spec, grips, layer=printer.layer)
     target = out or Path(f"{chosen.problem.name}.gcode")
     job = print_design(bundle, printer, target, slicer=slicer, overwrite=overwrite)

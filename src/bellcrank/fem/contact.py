@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+PLACES = 9
+"""Along the centre line of each strut where contact is looked for."""
 CLEAR = 1.5
 """Distance of centre lines in widths beyond which a place is clear of a joint and its fillets."""
 
@@ -46,6 +48,13 @@ class Contacts:
             {"beams": [int(one), int(other)], "overlap_mm": float(depth)}
             for (one, other), depth in zip(self.pairs, self.overlap, strict=True)
         ]
+
+
+def centre_lines(ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (s, k, 2) points along straight struts from (s, 2, 2) their ends."""
+    along = np.linspace(0.0, 1.0, PLACES)[None, :, None]
+    lines: NDArray[np.float64] = ends[:, :1] * (1.0 - along) + ends[:, 1:] * along
+    return lines
 
 
 def find_contacts(

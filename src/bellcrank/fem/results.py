@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.fem.path import PathStatus
+from bellcrank.mechanics import efficiency_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,6 +65,38 @@ class StrokePoint:
             "von_mises_MPa": finite(self.stress),
             "principal_strain": finite(self.strain),
         }
+
+
+def stroke_point(
+    part: Part,
+    load: float,
+    motion: NDArray[np.float64],
+    forces: NDArray[np.float64],
+    **inner: float,
+) -> StrokePoint:
+    """Return the figures of an equilibrium.
+
+    Parameters
+    ----------
+    load
+        Part of the full input, 0 to 1.
+    motion : (N, 2)
+        Of the lattice's nodes, mm; 0 where no strut is.
+    forces : (i, 2)
+        On each input node, N.
+    **inner
+        Energy, stress and strain.
+    """
+    problem = part.design.problem
+    output, force = motion[problem.output.nodes].mean(axis=0), forces.sum(axis=0)
+    return StrokePoint(
+        load=load,
+        efficiency=efficiency_of(problem, motion / part.scale, load=load),
+        output=(float(output[0]), float(output[1])),
+        force=(float(force[0]), float(force[1])),
+        push=float((forces * problem.input.direction).sum()),
+        **inner,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,17 +197,16 @@ class Analysis:
         """Return the analysis as plain data; what is not a result is null."""
         done = self.status is PathStatus.CONVERGED
         last = self.last.to_dict()
-        if not done:
-            last = {**dict.fromkeys(last), "load": None}
+        reached = last.pop("load")
         return {
             "level": self.level,
             "theory": self.theory,
             "linear": self.linear,
             "status": self.status.value,
             "stable": done,
-            "reached": self.last.load,
+            "reached": reached,
             "loss_of_stability": self.loss.value if self.loss else None,
-            **{key: value for key, value in last.items() if key != "load"},
+            **(last if done else dict.fromkeys(last)),
             "contacts": self.contacts.to_list(),
             "stroke": [point.to_dict() for point in self.points],
             "after_snap": self.after.to_dict() if self.after else None,

@@ -108,34 +108,23 @@ materials.register("tpu-95a")(
     )
 )
 
-materials.register("pla")(
-    Material(
-        name="pla",
-        young=2300.0,
-        poisson=0.35,
-        density=1.24,
-        strain_limit=0.029,
-        sources={
-            "young": PRUSAMENT.format("PLA"),
-            "poisson": CUSTOMARY,
-            "density": PRUSAMENT.format("PLA"),
-            "strain_limit": f"yield strain: {PRUSAMENT.format('PLA')}",
-        },
+for _name, _young, _poisson, _density, _strain_limit in (
+    ("pla", 2300.0, 0.35, 1.24, 0.029),
+    ("petg", 1500.0, 0.38, 1.27, 0.051),
+):
+    _sheet = PRUSAMENT.format(_name.upper())
+    materials.register(_name)(
+        Material(
+            name=_name,
+            young=_young,
+            poisson=_poisson,
+            density=_density,
+            strain_limit=_strain_limit,
+            sources={
+                "young": _sheet,
+                "poisson": CUSTOMARY,
+                "density": _sheet,
+                "strain_limit": f"yield strain: {_sheet}",
+            },
+        )
     )
-)
-
-materials.register("petg")(
-    Material(
-        name="petg",
-        young=1500.0,
-        poisson=0.38,
-        density=1.27,
-        strain_limit=0.051,
-        sources={
-            "young": PRUSAMENT.format("PETG"),
-            "poisson": CUSTOMARY,
-            "density": PRUSAMENT.format("PETG"),
-            "strain_limit": f"yield strain: {PRUSAMENT.format('PETG')}",
-        },
-    )
-)

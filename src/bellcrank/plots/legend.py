@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
+    from bellcrank.model import Problem
+
 ROW_HEIGHT = 0.24
 """Inches that a row of the legend takes."""
 
@@ -40,6 +42,16 @@ def wheel_entry() -> Line2D:
         [], [], linestyle="none", marker="o", markersize=6.0,
         markerfacecolor="white", markeredgecolor=style.NOTE,
     )  # fmt: skip
+
+
+def support_entries(problems: list[Problem]) -> list[tuple[str, Any]]:
+    """Entries for the supports and rollers that any of some problems has."""
+    entries: list[tuple[str, Any]] = []
+    if any(len(problem.supports.fixed) for problem in problems):
+        entries.append(("support", ground_entry()))
+    if any(len(p.supports.fixed_x) + len(p.supports.fixed_y) for p in problems):
+        entries.append(("roller", wheel_entry()))
+    return entries
 
 
 def _draw_arrow(

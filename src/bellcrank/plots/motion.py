@@ -13,9 +13,8 @@ from bellcrank.plots.legend import (
     ROW_HEIGHT,
     add_legend,
     arrow_entry,
-    ground_entry,
     strut_entry,
-    wheel_entry,
+    support_entries,
 )
 from bellcrank.plots.marks import (
     Panel,
@@ -32,6 +31,7 @@ from bellcrank.plots.scene import (
     beam_kinds,
     extent,
     input_arrows,
+    level_with,
     motion_arrows,
     outline_around,
     spacing,
@@ -203,13 +203,7 @@ def level_frames(
             (np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0)))
             for (low, high), seen in zip(frames, more, strict=True)
         ]
-    feet = [float(part.motion.design.problem.lattice.positions[:, 1].min()) for part in parts]
-    below = max(foot - float(low[1]) for foot, (low, _) in zip(feet, frames, strict=True))
-    above = max(float(high[1]) - foot for foot, (_, high) in zip(feet, frames, strict=True))
-    return [
-        (np.array([low[0], foot - below]), np.array([high[0], foot + above]))
-        for foot, (low, high) in zip(feet, frames, strict=True)
-    ]
+    return level_with(frames, [part.motion.design.problem for part in parts])
 
 
 def fill(panel: Panel, part: Drawing) -> None:
@@ -262,10 +256,7 @@ def entries_of(parts: list[Drawing]) -> list[tuple[str, Any]]:
         entries = [("designable", strut_entry(style.INK)), ("always kept", strut_entry(style.KEPT))]
     if any(len(beam_kinds(motion.design).idle) for motion in motions):
         entries.append(("bears no load", strut_entry(style.IDLE, 2.2)))
-    if any(len(problem.supports.fixed) for problem in problems):
-        entries.append(("support", ground_entry()))
-    if any(len(p.supports.fixed_x) + len(p.supports.fixed_y) for p in problems):
-        entries.append(("roller", wheel_entry()))
+    entries += support_entries(problems)
     entries.append(("input", arrow_entry(style.INPUT)))
     entries.append(("output, wanted", arrow_entry(style.WANTED)))
     if any(part.moving and motion_arrows(part.motion) for part in parts):

@@ -192,15 +192,7 @@ def _frame(axes: Axes, shown: PathsStyle, longest: float, *, logarithmic: bool) 
     words = {"accepted": "accepted changes", "proposals": "proposals"}
     axes.set_xlabel(words[shown.axis], family=style.FONT, size=style.LABEL_SIZE, color=style.INK)
     axes.set_ylabel(shown.measure, family=style.FONT, size=style.LABEL_SIZE, color=style.INK)
-    axes.tick_params(
-        which="both", labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT
-    )
-    axes.grid(axis="y", color=style.IDLE_REST, linewidth=0.8)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(style.IDLE)
+    style.quieten(axes)
 
 
 def _put_curve(axes: Axes, chain: ChainPath, axis: Axis, looks: Looks, level: float) -> None:

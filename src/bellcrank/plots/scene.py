@@ -231,6 +231,25 @@ def extent(
     return points.min(axis=0) - margin, points.max(axis=0) + margin
 
 
+def level_with(
+    frames: list[tuple[NDArray[np.float64], NDArray[np.float64]]], problems: list[Problem]
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Make frames equally high around the lattices' feet, so that all stand on one level.
+
+    Parameters
+    ----------
+    frames
+        Lower left and upper right corner, (2,) each, of what is seen of each problem.
+    """
+    feet = [float(problem.lattice.positions[:, 1].min()) for problem in problems]
+    below = max(foot - float(low[1]) for foot, (low, _) in zip(feet, frames, strict=True))
+    above = max(float(high[1]) - foot for foot, (_, high) in zip(feet, frames, strict=True))
+    return [
+        (np.array([low[0], foot - below]), np.array([high[0], foot + above]))
+        for foot, (low, high) in zip(feet, frames, strict=True)
+    ]
+
+
 def _one_direction(direction: NDArray[np.float64]) -> bool:
     return bool(np.allclose(direction, direction[0]))
 

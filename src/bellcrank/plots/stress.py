@@ -244,10 +244,4 @@ def dress(axes: Axes, below: str, beside: str) -> None:
     axes.set_xlim(left=0.0)
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, 0.0), high + 0.06 * abs(high))
-    axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT)
-    axes.grid(axis="y", color=style.IDLE_REST, linewidth=0.8)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(style.IDLE)
+    style.quieten(axes)

@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.text import Text
 
 DPI = 200
@@ -87,3 +88,14 @@ def write_heading(figure: Figure, title: str, note: str, left: float, top: float
 def heading_height(title: str, note: str) -> float:
     """Height in inches that `write_heading` needs."""
     return 0.27 * bool(title) + 0.24 * bool(note)
+
+
+def quieten(axes: Axes) -> None:
+    """Draw numbers, a grid of levels and two spines so that curves stand out."""
+    axes.tick_params(which="both", labelsize=SMALL_SIZE, colors=NOTE, labelfontfamily=FONT)
+    axes.grid(axis="y", color=IDLE_REST, linewidth=0.8)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(IDLE)

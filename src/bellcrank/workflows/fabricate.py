@@ -8,21 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.fabricate import Export, Finding, check_print, export, exporter_for
+from bellcrank.fabricate import Export, check_print, exporter_for
 from bellcrank.fabricate.profiles import profiles
 from bellcrank.fabricate.slicer import find_slicer, slice_solid
-from bellcrank.fem.contact import find_contacts
+from bellcrank.fem.contact import centre_lines, find_contacts
 from bellcrank.geometry import strut_outline
 from bellcrank.geometry.grips import filled, with_pointer
 from bellcrank.geometry.screws import drilled, screw_places
 from bellcrank.mechanics import CAREFUL, Evaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.parts.pieces import doubts_about, require_held
+from bellcrank.workflows.animate import load_design
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from numpy.typing import NDArray
 
     from bellcrank.fabricate.profiles import PrintProfile
     from bellcrank.fabricate.slicer import Sliced
@@ -138,7 +137,10 @@ def bundle_of(
     part = spec.of(design)
     if whole:
         require_held(design)
-    frames = motion_of(design) if moved else None
+    frames = None
+    if moved:
+        way = load_design(design, np.linspace(0.0, 1.0, FRAMES))
+        frames = design.problem.lattice.positions + way.displacement
     return Export(
         part=part,
         shape=grips.applied(part),
@@ -148,48 +150,19 @@ def bundle_of(
     )
 
 
-def motion_of(design: Design, count: int = FRAMES) -> NDArray[np.float64]:
-    """Return (F, N, 2) where the nodes are along the stroke, lattice units."""
-    problem = design.problem
-    rest = problem.lattice.positions
-    places = [rest]
-    for part in np.linspace(0.0, 1.0, count)[1:]:
-        given = replace(problem.input, amount=problem.input.amount * float(part))
-        response = Evaluator(replace(problem, input=given)).respond(design.mask, CAREFUL)
-        places.append(rest + response.displacement)
-    return np.array(places)
-
-
 def findings_about(bundle: Export, profile: PrintProfile) -> list[str]:
     """Return what is to be said about printing a part and moving it, as sentences."""
     part = bundle.part
-    found: list[Finding] = check_print(bundle, profile.rules)
-    sentences = [finding.sentence for finding in found] + doubts_about(part.design)
+    sentences = [finding.sentence for finding in check_print(bundle, profile.rules)]
+    sentences += doubts_about(part.design)
     response = Evaluator(part.design.problem).respond(part.design.mask, CAREFUL)
     moved = part.positions + part.scale * response.displacement
     beams = np.flatnonzero(part.design.mask)
-    rest, there = (_centre_lines(places[part.struts]) for places in (part.positions, moved))
+    rest, there = (centre_lines(places[part.struts]) for places in (part.positions, moved))
     contacts = find_contacts(beams, rest, there, part.section.width)
     if len(contacts.pairs):
         sentences.append(contacts.message)
     return sentences
-
-
-def _centre_lines(ends: NDArray[np.float64], places: int = 9) -> NDArray[np.float64]:
-    """Return (s, places, 2) points along struts from (s, 2, 2) their ends."""
-    along = np.linspace(0.0, 1.0, places)[None, :, None]
-    lines: NDArray[np.float64] = ends[:, :1] * (1.0 - along) + ends[:, 1:] * along
-    return lines
-
-
-def export_design(bundle: Export, path: Path, *, overwrite: bool = False) -> None:
-    """Write a part to a file, in the format that its suffix names.
-
-    Raises
-    ------
-    UnknownName, InvalidSettings, OutputExists, StorageError
-    """
-    export(bundle, path, overwrite=overwrite)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,15 +179,12 @@ class PrintJob:
         g; nan where nobody says how dense the material is.
     profile
         Printer and filament.
-    layers
-        Whole layers in the thickness.
     """
 
     sliced: Sliced
     volume: float
     mass: float
     profile: PrintProfile
-    layers: int
 
 
 def profile_for(name: str | None, spec: PartSpec, **changes: Any) -> PrintProfile:
@@ -261,4 +231,4 @@ def print_design(
     sliced = slice_solid(content, ".3mf", profile, size, solid.volume, program)
     write_bytes(path, sliced.gcode, overwrite=overwrite)
     mass = solid.volume * bundle.part.material.density / 1000.0
-    return PrintJob(sliced, solid.volume, mass, profile, round(bundle.thickness / profile.layer))
+    return PrintJob(sliced, solid.volume, mass, profile)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from io import BytesIO
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.fabricate.formats.vtu import mesh_to_bytes
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.plots import Motion, Stressed, StrokeAxes, draw_stress
 from bellcrank.plots.saving import check_target
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from bellcrank.fem import Analysis
     from bellcrank.workflows.validate import Validation
@@ -109,23 +108,13 @@ def write_vtu(analysis: Analysis, path: Path, *, overwrite: bool = False) -> Non
     ------
     OutputExists, StorageError
     """
-    import meshio
-
     field = analysis.field
-    flat = np.zeros((len(field.rest), 3))
-    flat[:, : field.rest.shape[1]] = field.rest
-    moved = np.zeros_like(flat)
-    moved[:, : field.displacement.shape[1]] = field.displacement
-    kind = {2: "line", 3: "triangle", 4: "tetra"}[field.cells.shape[1]]
-    of_points = {"displacement_mm": moved}
-    of_cells = {}
-    if len(field.stress) == len(field.cells):
-        of_cells["von_mises_MPa"] = [field.stress]
-    else:
-        of_points["von_mises_MPa"] = field.stress
-    mesh = meshio.Mesh(flat, [(kind, field.cells)], point_data=of_points, cell_data=of_cells)
-    with TemporaryDirectory() as folder:
-        temporary = Path(folder) / "part.vtu"
-        meshio.write(temporary, mesh, file_format="vtu")
-        content = BytesIO(temporary.read_bytes())
-    write_bytes(path, content.getvalue(), overwrite=overwrite)
+    stress = {"von_mises_MPa": field.stress}
+    by_cell = len(field.stress) == len(field.cells)
+    content = mesh_to_bytes(
+        field.rest,
+        field.cells,
+        {"displacement_mm": field.displacement, **({} if by_cell else stress)},
+        stress if by_cell else {},
+    )
+    write_bytes(path, content, overwrite=overwrite)

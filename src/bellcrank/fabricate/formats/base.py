@@ -124,13 +124,10 @@ class Exporter:
         The endings of its files, the usual one first.
     to_bytes
         The whole content of a file.
-    about
-        What it is good for, in a few words.
     """
 
     suffixes: tuple[str, ...]
     to_bytes: Callable[[Export], bytes]
-    about: str
 
 
 exporters: Registry[Exporter] = Registry("export format")

@@ -48,6 +48,4 @@ def _frame(time: int, nodes: NDArray[np.float64], roles: list[int], box: str) ->
     )
 
 
-exporters.register("dump")(
-    Exporter((".dump", ".lammpstrj"), to_bytes, "a motion for OVITO, beside a data file")
-)
+exporters.register("dump")(Exporter((".dump", ".lammpstrj"), to_bytes))

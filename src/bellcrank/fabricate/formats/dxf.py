@@ -59,4 +59,4 @@ def _no_dates() -> Iterator[None]:
         options.write_fixed_meta_data_for_testing = before
 
 
-exporters.register("dxf")(Exporter((".dxf",), to_bytes, "exact lines and arcs for cutting"))
+exporters.register("dxf")(Exporter((".dxf",), to_bytes))

@@ -17,6 +17,4 @@ def to_bytes(export: Export) -> bytes:
     return _FORMAT.to_text(network).encode("utf-8")
 
 
-exporters.register("lammps")(
-    Exporter(_FORMAT.suffixes, to_bytes, "the lattice for LAMMPS and OVITO")
-)
+exporters.register("lammps")(Exporter(_FORMAT.suffixes, to_bytes))

@@ -236,4 +236,4 @@ def _without_curves_in_surfaces() -> Iterator[None]:
         Interface_Static.SetIVal_s(mode, before)
 
 
-exporters.register("step")(Exporter((".step", ".stp"), to_bytes, "an exact solid for CAD"))
+exporters.register("step")(Exporter((".step", ".stp"), to_bytes))

@@ -36,4 +36,4 @@ def solid_to_bytes(solid: Solid, name: str) -> bytes:
     return header + struct.pack("<I", len(facets)) + facets.tobytes()
 
 
-exporters.register("stl")(Exporter((".stl",), to_bytes, "triangles for slicers"))
+exporters.register("stl")(Exporter((".stl",), to_bytes))

@@ -56,4 +56,4 @@ def _subpath(loop: Loop, left: float, top: float) -> str:
     return " ".join([*words, "Z"])
 
 
-exporters.register("svg")(Exporter((".svg",), to_bytes, "exact lines and arcs for drawings"))
+exporters.register("svg")(Exporter((".svg",), to_bytes))

@@ -73,4 +73,4 @@ def _model(solid: Solid, name: str) -> str:
     )
 
 
-exporters.register("3mf")(Exporter((".3mf",), to_bytes, "a named object in mm for slicers"))
+exporters.register("3mf")(Exporter((".3mf",), to_bytes))

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.fem.contact import Contacts, find_contacts
+from bellcrank.fem.contact import Contacts, centre_lines, find_contacts
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.fem.continuum.laws import laws
 from bellcrank.fem.continuum.response import solve_plane, solve_solid
 from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import PathStatus
-from bellcrank.fem.results import Analysis, StrokePoint
-from bellcrank.mechanics import efficiency_of
+from bellcrank.fem.results import Analysis, StrokePoint, stroke_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,9 +25,6 @@ if TYPE_CHECKING:
     from bellcrank.fem.levels import FemSettings
     from bellcrank.fem.results import Field
     from bellcrank.parts import Part
-
-PLACES = 9
-"""Along the centre line of each strut where contact is looked for."""
 
 
 def check_outline(part: Part, settings: FemSettings) -> None:
@@ -103,17 +99,11 @@ def _analyse(
 
 def point_of(part: Part, state: ContinuumState) -> StrokePoint:
     """Return the figures of an equilibrium."""
-    problem = part.design.problem
-    motion = state.motion[:, :2]
-    output = motion[problem.output.nodes].mean(axis=0)
-    forces = state.force[problem.input.nodes, :2]
-    force = forces.sum(axis=0)
-    return StrokePoint(
-        load=state.load,
-        efficiency=efficiency_of(problem, motion / part.scale, load=state.load),
-        output=(float(output[0]), float(output[1])),
-        force=(float(force[0]), float(force[1])),
-        push=float((forces * problem.input.direction).sum()),
+    return stroke_point(
+        part,
+        state.load,
+        state.motion[:, :2],
+        state.force[part.design.problem.input.nodes, :2],
         energy=state.energy,
         stress=state.stress,
         strain=state.strain,
@@ -122,9 +112,7 @@ def point_of(part: Part, state: ContinuumState) -> StrokePoint:
 
 def contacts_of(part: Part, field: Field) -> Contacts:
     """Find the struts that touch, by where their centre lines go."""
-    ends = part.positions[part.struts]
-    along = np.linspace(0.0, 1.0, PLACES)[None, :, None]
-    lines = ends[:, None, 0] * (1.0 - along) + ends[:, None, 1] * along
+    lines = centre_lines(part.positions[part.struts])
     moved = lines + displacement_at(field, lines.reshape(-1, 2)).reshape(lines.shape)
     beams = np.flatnonzero(part.design.mask)
     return find_contacts(beams, lines, moved, part.section.width)

@@ -67,8 +67,12 @@ def natural(
     return strain, direction, length
 
 
-def linear_natural(mesh: FrameMesh, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (e, 3) what strains the elements if they move little."""
+def strain_of(
+    mesh: FrameMesh, displacement: NDArray[np.float64], *, linear: bool
+) -> NDArray[np.float64]:
+    """Return (e, 3) what strains the elements, `linear` if they are taken to move little."""
+    if not linear:
+        return natural(mesh, displacement)[0]
     direction = mesh.chord / mesh.length[:, None]
     gradient, _, _ = gradient_of_natural(direction, mesh.length)
     ends = displacement[mesh.elements].reshape(-1, 6)
@@ -137,7 +141,6 @@ def energy(
     mesh: FrameMesh, displacement: NDArray[np.float64], *, linear: bool = False
 ) -> NDArray[np.float64]:
     """Return (e,) the elastic energy of the elements, N mm."""
-    small = linear_natural(mesh, displacement) if linear else None
-    strain = natural(mesh, displacement)[0] if small is None else small
+    strain = strain_of(mesh, displacement, linear=linear)
     stored: NDArray[np.float64] = 0.5 * np.einsum("ei,eij,ej->e", strain, mesh.stiffness, strain)
     return stored

@@ -9,15 +9,14 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.contact import find_contacts
-from bellcrank.fem.frame.elements import energy, linear_natural, natural
+from bellcrank.fem.frame.elements import energy, strain_of
 from bellcrank.fem.frame.equilibrium import FrameEquations, solve_linear
 from bellcrank.fem.frame.mesh import frame_mesh, theories
 from bellcrank.fem.frame.settling import settle
 from bellcrank.fem.frame.system import frame_system
 from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import Follower, PathStatus, Stepping
-from bellcrank.fem.results import Analysis, Field, StrokePoint
-from bellcrank.mechanics import efficiency_of
+from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -113,18 +112,12 @@ def point_of(
     part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool = False
 ) -> StrokePoint:
     """Return the figures of an equilibrium."""
-    problem = part.design.problem
-    moved = mesh.at_lattice(state.displacement)
     stress, strain = fibres(part, mesh, state.displacement, linear=linear)
-    mean = moved[problem.output.nodes].mean(axis=0)
-    forces = input_forces(part, mesh, state)
-    force = forces.sum(axis=0)
-    return StrokePoint(
-        load=state.load,
-        efficiency=efficiency_of(problem, moved / part.scale, load=state.load),
-        output=(float(mean[0]), float(mean[1])),
-        force=(float(force[0]), float(force[1])),
-        push=float((forces * problem.input.direction).sum()),
+    return stroke_point(
+        part,
+        state.load,
+        mesh.at_lattice(state.displacement),
+        input_forces(part, mesh, state),
         energy=float(energy(mesh, state.displacement, linear=linear).sum()),
         stress=float(stress.max()),
         strain=float(strain.max()),
@@ -149,8 +142,7 @@ def fibres(
 
     Stress is uniaxial, so its size is the von Mises stress as well.
     """
-    small = linear_natural(mesh, displacement) if linear else None
-    strain = natural(mesh, displacement)[0] if small is None else small
+    strain = strain_of(mesh, displacement, linear=linear)
     inner = np.einsum("eij,ej->ei", mesh.stiffness, strain)
     section, young = part.section, part.material.young
     bent = np.abs(inner[:, 1:]).max(axis=1) * section.width / (2.0 * young * section.inertia)

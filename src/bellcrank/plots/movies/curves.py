@@ -104,13 +104,7 @@ def _dress(axes: Axes, graph: Graph, height: float) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.set_xlim(*span)
     axes.yaxis.set_label_coords(-0.52 / axes.get_position().width / _wide(axes), 0.5)
-    axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT)
-    axes.grid(axis="y", color=style.IDLE_REST, linewidth=0.8)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(style.IDLE)
+    style.quieten(axes)
 
 
 def _wide(axes: Axes) -> float:

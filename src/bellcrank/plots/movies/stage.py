@@ -16,13 +16,13 @@ from bellcrank.plots.legend import (
     ROW_HEIGHT,
     add_legend,
     arrow_entry,
-    ground_entry,
     strut_entry,
-    wheel_entry,
+    support_entries,
 )
 from bellcrank.plots.marks import add_panel
 from bellcrank.plots.movies.actors import CAME, ENERGY, GONE, Actor, energy_scale, frame_of
 from bellcrank.plots.movies.curves import Curves, in_words, power_of_ten
+from bellcrank.plots.scene import level_with
 
 if TYPE_CHECKING:
     from matplotlib.colors import PowerNorm
@@ -103,7 +103,10 @@ class Stage:
         entries = _entries(movie.courses)
         rows = math.ceil(len(entries) / ENTRIES)
         foot = MARGIN + ROW_HEIGHT * rows + 0.1 + (0.0 if scale is None else 0.46)
-        frames = _level([frame_of(course) for course in movie.courses], movie.courses)
+        frames = level_with(
+            [frame_of(course) for course in movie.courses],
+            [course.problem for course in movie.courses],
+        )
         layout = _layout(inches, frames, len(movie.graphs), heading, foot)
         self._curves = [
             Curves(self._figure, graph, box, shades, legend=len(shades) > 1 and number == 0)
@@ -203,19 +206,6 @@ def _layout(
     return max(found, key=lambda layout: layout.scale)
 
 
-def _level(
-    frames: list[tuple[NDArray[np.float64], NDArray[np.float64]]], courses: tuple[Course, ...]
-) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Frames of equal height around the lattices' feet, so that they stand on one level."""
-    feet = [float(course.problem.lattice.positions[:, 1].min()) for course in courses]
-    below = max(foot - float(low[1]) for foot, (low, _) in zip(feet, frames, strict=True))
-    above = max(float(high[1]) - foot for foot, (_, high) in zip(feet, frames, strict=True))
-    return [
-        (np.array([low[0], foot - below]), np.array([high[0], foot + above]))
-        for foot, (low, high) in zip(feet, frames, strict=True)
-    ]
-
-
 def _entries(courses: tuple[Course, ...]) -> list[tuple[str, Any]]:
     """Legend entries for what the movie holds, and for nothing else."""
     problems = [course.problem for course in courses]
@@ -225,10 +215,7 @@ def _entries(courses: tuple[Course, ...]) -> list[tuple[str, Any]]:
         entries += [("removed", strut_entry(GONE, 2.2)), ("added", strut_entry(CAME))]
     if any((course.present & ~course.bearing).any() for course in courses):
         entries.append(("bears no load", strut_entry(style.IDLE, 2.2)))
-    if any(len(problem.supports.fixed) for problem in problems):
-        entries.append(("support", ground_entry()))
-    if any(len(p.supports.fixed_x) + len(p.supports.fixed_y) for p in problems):
-        entries.append(("roller", wheel_entry()))
+    entries += support_entries(problems)
     entries.append(("input", arrow_entry(style.INPUT)))
     entries.append(("output, wanted", arrow_entry(style.WANTED)))
     entries.append(
