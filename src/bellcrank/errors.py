@@ -49,3 +49,11 @@ class ClusterError(BellcrankError, RuntimeError):
 
 class RunFailed(BellcrankError, RuntimeError):
     """Runs of a campaign could not be brought to their end."""
+
+
+class InvalidDataset(BellcrankError, ValueError):
+    """Data to learn from is empty, inconsistent or has labels that are no numbers."""
+
+
+class InvalidModel(BellcrankError, ValueError):
+    """A trained network cannot be read, or is not for the lattice it is asked about."""

@@ -1,0 +1,1 @@
+"""Whole jobs of the learned surrogate: building data, searching, explaining, comparing."""

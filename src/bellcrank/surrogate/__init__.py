@@ -1,0 +1,1 @@
+"""Networks that learn the response from pictures of designs."""

@@ -1,0 +1,257 @@
+"""Datasets: designs with the efficiencies that the mechanics gives them.
+
+One Parquet file holds packed masks and efficiencies, run by run, and in its footer the
+problem and how the data was made. Designs of one run resemble each other, so a network is
+always tested on runs that it has seen nothing of.
+
+Examples
+--------
+>>> from tempfile import TemporaryDirectory
+>>> from pathlib import Path
+>>> from bellcrank.model import find_problem
+>>> crane = find_problem("crane")
+>>> data = Dataset(
+...     problem=crane,
+...     packed=np.packbits([crane.initial] * 4, axis=1),
+...     efficiency=[-0.064] * 4,
+...     run=[0, 0, 1, 1],
+... )
+>>> with TemporaryDirectory() as folder:
+...     data.write(Path(folder) / "four.parquet")
+...     again = read_dataset(Path(folder) / "four.parquet")
+>>> len(again), again.run_count, again.problem.name
+(4, 2, 'crane')
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.errors import CorruptRun, InvalidDataset, InvalidFile
+from bellcrank.model import problem_from_dict, problem_to_dict
+from bellcrank.model.storage import write_bytes
+from bellcrank.runs.shards import arrays_of, parquet_file, parquet_writer
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+
+DATASET_SCHEMA = "bellcrank/dataset/1"
+COLUMNS = ("run", "step", "mask", "efficiency", "accepted")
+ROW_GROUP = 2**17
+WRITER = {
+    "compression": "zstd",
+    "compression_level": 9,
+    "use_dictionary": False,
+    "column_encoding": {"efficiency": "BYTE_STREAM_SPLIT", "run": "DELTA_BINARY_PACKED",
+                        "step": "DELTA_BINARY_PACKED"},
+}  # fmt: skip
+WHAT_TO_DO = "build it again: bellcrank dataset build"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dataset:
+    """Designs for one problem, with their efficiencies.
+
+    Parameters
+    ----------
+    problem
+        What the designs are for.
+    packed : (n, bytes) uint8
+        Masks over the problem's beams, as `numpy.packbits` leaves them.
+    efficiency : (n,) float64
+        By the mechanics; each design has a unique, stable response.
+    run : (n,) int64
+        Which run each comes from, from 0, in ascending order.
+    step : (n,) int64
+        In its run; by default 0, 1, 2, ...
+    accepted : (n,) bool
+        Whether the search went there; by default all.
+    origin
+        How it was made, as plain data.
+
+    Raises
+    ------
+    InvalidDataset
+        If it is empty, columns are of different lengths, or an efficiency is no number.
+    """
+
+    problem: Problem
+    packed: NDArray[np.uint8]
+    efficiency: NDArray[np.float64]
+    run: NDArray[np.int64]
+    step: NDArray[np.int64] = field(default=None)  # type: ignore[arg-type]
+    accepted: NDArray[np.bool_] = field(default=None)  # type: ignore[arg-type]
+    origin: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        count = len(self.packed)
+        given = {
+            "packed": (self.packed, np.uint8),
+            "efficiency": (self.efficiency, np.float64),
+            "run": (self.run, np.int64),
+            "step": (np.arange(count) if self.step is None else self.step, np.int64),
+            "accepted": (np.ones(count) if self.accepted is None else self.accepted, np.bool_),
+        }
+        for name, (column, kind) in given.items():
+            array: NDArray[Any] = np.array(column, dtype=kind)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+            if len(array) != count:
+                raise InvalidDataset(
+                    f"{name}: expected {count} rows as in packed, got {len(array)}"
+                )
+        _check(self)
+
+    def __len__(self) -> int:
+        return len(self.packed)
+
+    @property
+    def run_count(self) -> int:
+        """Number of runs."""
+        return len(np.unique(self.run))
+
+    def take(self, rows: NDArray[Any]) -> Dataset:
+        """Return some of the rows, by index or by a mask over all."""
+        return Dataset(
+            self.problem, self.packed[rows], self.efficiency[rows], self.run[rows],
+            self.step[rows], self.accepted[rows], self.origin,
+        )  # fmt: skip
+
+    def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+        """Write the Parquet file, whole or not at all.
+
+        Raises
+        ------
+        OutputExists, StorageError
+        """
+        import pyarrow as pa
+
+        count, width = self.packed.shape
+        masks = pa.py_buffer(np.ascontiguousarray(self.packed))
+        columns = {
+            "run": self.run.astype(np.int32),
+            "step": self.step.astype(np.int32),
+            "mask": pa.Array.from_buffers(pa.binary(width), count, [None, masks]),
+            "efficiency": self.efficiency,
+            "accepted": self.accepted,
+        }
+        table = pa.table(columns)
+        header = {
+            "schema": DATASET_SCHEMA,
+            "problem": problem_to_dict(self.problem),
+            "origin": self.origin,
+        }
+        buffer = io.BytesIO()
+        with parquet_writer(buffer, table.schema, header, **WRITER) as writer:
+            writer.write_table(table, row_group_size=ROW_GROUP)
+        write_bytes(path, buffer.getvalue(), overwrite=overwrite)
+
+
+def _check(data: Dataset) -> None:
+    if not len(data):
+        raise InvalidDataset("the dataset is empty; expected at least one design")
+    width = (data.problem.lattice.beam_count + 7) // 8
+    if data.packed.shape != (len(data), width):
+        raise InvalidDataset(
+            f"packed: expected masks of {width} bytes for the {data.problem.lattice.beam_count} "
+            f"beams of {data.problem.name!r}, got an array of shape {data.packed.shape}"
+        )
+    wrong = np.flatnonzero(~np.isfinite(data.efficiency))
+    if len(wrong):
+        row = int(wrong[0])
+        raise InvalidDataset(
+            f"efficiency: row {row} (run {data.run[row]}, step {data.step[row]}) is "
+            f"{data.efficiency[row]}; leave out designs without a response"
+        )
+
+
+def read_dataset(path: str | os.PathLike[str]) -> Dataset:
+    """Read a dataset.
+
+    Raises
+    ------
+    InvalidFile
+        If there is no such file, or it is no dataset.
+    CorruptRun
+        If it is damaged.
+    InvalidDataset
+        If what is in it cannot be.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    place = Path(path)
+    if place.is_dir() and (place / DATASET_FILE).exists():
+        place /= DATASET_FILE
+    if not place.is_file():
+        raise InvalidFile(f"{path}: no such file; bellcrank dataset build makes datasets")
+    try:
+        named = pq.read_schema(place).names
+    except (OSError, pa.ArrowException) as error:
+        raise InvalidFile(f"{place}: not a Parquet file ({_first_line(error)})") from None
+    if missing := [name for name in COLUMNS if name not in named]:
+        raise InvalidFile(
+            f"{place}: not a dataset: it has no column {missing[0]!r}; bellcrank dataset build "
+            f"makes datasets"
+        )
+    with parquet_file(place, WHAT_TO_DO) as (file, header):
+        if header.get("schema") != DATASET_SCHEMA:
+            raise CorruptRun(
+                f"{place}: expected schema {DATASET_SCHEMA!r}, got {header.get('schema')!r}"
+            )
+        columns = arrays_of(file.read(columns=list(COLUMNS)), COLUMNS)
+    problem = problem_from_dict(header["problem"], str(place))
+    try:
+        return Dataset(
+            problem, columns["mask"], columns["efficiency"], columns["run"], columns["step"],
+            columns["accepted"], header["origin"],
+        )  # fmt: skip
+    except InvalidDataset as error:
+        raise InvalidDataset(f"{place}: {error}") from None
+
+
+DATASET_FILE = "dataset.parquet"
+"""Name of the dataset in the folder that it was built in."""
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).strip() or repr(error)).splitlines()[0]
+
+
+def merge(parts: Sequence[Dataset]) -> Dataset:
+    """Join datasets for one problem; their runs are numbered through.
+
+    Raises
+    ------
+    InvalidDataset
+        If they are for different problems.
+    """
+    first = parts[0]
+    told = problem_to_dict(first.problem)
+    runs, offset = [], 0
+    for part in parts:
+        if problem_to_dict(part.problem) != told:
+            raise InvalidDataset(
+                f"datasets for different problems: {first.problem.name!r} and {part.problem.name!r}"
+            )
+        runs.append(part.run + offset)
+        offset += int(part.run.max()) + 1
+    return Dataset(
+        first.problem,
+        np.concatenate([part.packed for part in parts]),
+        np.concatenate([part.efficiency for part in parts]),
+        np.concatenate(runs),
+        np.concatenate([part.step for part in parts]),
+        np.concatenate([part.accepted for part in parts]),
+        {"parts": [part.origin for part in parts]},
+    )

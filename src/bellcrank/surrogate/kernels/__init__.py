@@ -1,0 +1,1 @@
+"""Compiled loops of the surrogate: plain arrays in, arrays out."""

@@ -1,0 +1,84 @@
+"""How good predictions are, by several measures that are easily confused."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """Predictions against the truth.
+
+    Parameters
+    ----------
+    r_squared
+        Of the linear regression of predicted on actual: the square of their correlation. The
+        paper's measure; it forgives a wrong scale and a wrong zero.
+    determination
+        1 - (mean squared error) / (variance of the truth); forgives nothing.
+    rms_error
+        Root of the mean squared error, in units of the efficiency.
+    count
+        Designs that were looked at.
+    """
+
+    r_squared: float
+    determination: float
+    rms_error: float
+    count: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the measures as plain data."""
+        return asdict(self)
+
+
+def accuracy(predicted: NDArray[np.floating[Any]], actual: NDArray[np.floating[Any]]) -> Accuracy:
+    """Compare predictions with the truth.
+
+    Parameters
+    ----------
+    predicted, actual : (n,)
+
+    Examples
+    --------
+    >>> actual = np.array([0.0, 1.0, 2.0, 3.0])
+    >>> found = accuracy(0.5 * actual + 1.0, actual)
+    >>> round(found.r_squared, 6), round(found.determination, 6)
+    (1.0, 0.7)
+    """
+    truth = np.asarray(actual, np.float64)
+    guess = np.asarray(predicted, np.float64)
+    error = float(np.mean((guess - truth) ** 2))
+    variance = float(truth.var())
+    return Accuracy(
+        correlation(guess, truth) ** 2,
+        1.0 - error / variance if variance > 0.0 else float("nan"),
+        error**0.5,
+        len(truth),
+    )
+
+
+def correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
+    """Pearson's correlation; nan where one of them is constant."""
+    a, b = first - first.mean(), second - second.mean()
+    scale = float(np.sqrt((a * a).sum() * (b * b).sum()))
+    return float((a * b).sum()) / scale if scale > 0.0 else float("nan")
+
+
+def recall(predicted: NDArray[np.float64], actual: NDArray[np.float64], count: int) -> float:
+    """Fraction of the `count` largest actual values among the `count` largest predicted ones.
+
+    Examples
+    --------
+    >>> recall(np.array([3.0, 2.0, 1.0, 0.0]), np.array([3.0, 0.0, 1.0, 2.0]), 2)
+    0.5
+    """
+    best = np.argsort(-actual, kind="stable")[:count]
+    named = np.argsort(-predicted, kind="stable")[:count]
+    return len(np.intersect1d(best, named)) / count

@@ -1,0 +1,153 @@
+"""Predictions for the problem at hand, by one network or by several that keep each other honest.
+
+Examples
+--------
+A network for the crane comes with bellcrank.
+
+>>> import numpy as np
+>>> from bellcrank.model import find_problem
+>>> crane = find_problem("crane")
+>>> predictor = load_predictor(crane)  # doctest: +SKIP
+>>> predictor.predict(np.array([crane.initial]))  # doctest: +SKIP
+Prediction(efficiency=array([-0.06...]), spread=None)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidModel
+from bellcrank.surrogate.matching import beams_between
+from bellcrank.surrogate.trained import TrainedModel, read_model
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+
+SHIPPED = ("crane",)
+"""Problems that a trained network comes with bellcrank for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """What networks say of designs.
+
+    Parameters
+    ----------
+    efficiency : (n,) float64
+        Mean over the networks.
+    spread : (n,) float64 or None
+        Standard deviation between them: how much they dispute. None for a single one.
+    """
+
+    efficiency: NDArray[np.float64]
+    spread: NDArray[np.float64] | None
+
+
+class Predictor:
+    """Networks that have learnt one problem, asked about designs as numbered in another file.
+
+    Parameters
+    ----------
+    problem
+        At hand; its masks are what `predict` takes.
+    members
+        Networks that have learnt it.
+    device, precision
+        Where and how they compute.
+
+    Raises
+    ------
+    InvalidModel
+        If there is none, or one has learnt something else.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        members: Sequence[TrainedModel],
+        *,
+        device: str = "auto",
+        precision: str = "float32",
+    ) -> None:
+        if not members:
+            raise InvalidModel("expected at least one trained model")
+        self.problem = problem
+        self.members = tuple(members)
+        self.device = device
+        self.precision = precision
+        self._beams = [beams_between(member.problem, problem) for member in self.members]
+
+    def predict(self, masks: NDArray[np.bool_]) -> Prediction:
+        """Predict the efficiencies of designs.
+
+        Parameters
+        ----------
+        masks : (n, M) bool
+            Over the beams of `problem`.
+        """
+        said = np.array(
+            [
+                member.predict(
+                    _renumbered(masks, beams), device=self.device, precision=self.precision
+                )
+                for member, beams in zip(self.members, self._beams, strict=True)
+            ]
+        )
+        spread = said.std(axis=0, ddof=1) if len(said) > 1 else None
+        return Prediction(said.mean(axis=0), spread)
+
+
+def _renumbered(masks: NDArray[np.bool_], beams: NDArray[np.int64]) -> NDArray[np.uint8]:
+    known = np.zeros(masks.shape, np.bool_)
+    known[:, beams] = masks
+    return np.packbits(known, axis=1)
+
+
+def load_predictor(
+    problem: Problem,
+    paths: Sequence[str | os.PathLike[str]] = (),
+    *,
+    device: str = "auto",
+    precision: str = "float32",
+) -> Predictor:
+    """Return a predictor for a problem.
+
+    Parameters
+    ----------
+    paths
+        Files of trained models; by default the one that comes with bellcrank.
+
+    Raises
+    ------
+    InvalidModel
+        If none comes with bellcrank, or one of them has learnt another problem or is damaged.
+    InvalidFile
+        If there is no such file.
+    InvalidSettings
+        If PyTorch is not installed.
+    """
+    if paths:
+        members = [read_model(path) for path in paths]
+        return Predictor(problem, members, device=device, precision=precision)
+    refusals = []
+    for name in SHIPPED:
+        source = resources.files("bellcrank.surrogate") / "pretrained" / f"{name}.safetensors"
+        with resources.as_file(source) as path:
+            member = read_model(path)
+        try:
+            return Predictor(problem, [member], device=device, precision=precision)
+        except InvalidModel as error:
+            refusals.append(str(error))
+    raise InvalidModel(
+        f"no trained model for {problem.name!r} comes with bellcrank ({refusals[0]}); train one "
+        f"(bellcrank dataset build, bellcrank train) and name it with --model"
+    )
