@@ -185,6 +185,36 @@ def test_a_cantilever_bends_as_in_the_textbook(theory: str) -> None:
     assert state.displacement[mesh.node[2], 2] == pytest.approx(1.5 * bent / LENGTH, rel=1e-9)
 
 
+def portal(width: float) -> tuple[Part, float]:
+    """Two clamped columns and a bar between their heads, all alike, pushed sideways at a head."""
+    lattice = Lattice([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], [[0, 2], [2, 3], [1, 3]])
+    problem = Problem(
+        name="portal",
+        lattice=lattice,
+        supports=Supports(fixed=[0, 1]),
+        input=Input(nodes=[2], direction=[1.0, 0.0], drive="force", amount=1e-6),
+        output=Output(nodes=[3], direction=[1.0, 0.0]),
+        designable=[1],
+    )
+    part = Part(problem.full_design(), RUBBER, Section(width, 5.0), scale=LENGTH)
+    return part, 1e-6 * part.stiffness_unit * part.scale
+
+
+def test_a_portal_sways_as_in_the_textbook_the_more_so_the_more_slender_it_is() -> None:
+    # Slope deflection, struts of equal length L and E I that do not stretch: 5 P L^3 / (84 E I).
+    excess = []
+    for width in (4.0, 2.0, 1.0):
+        part, force = portal(width)
+        mesh = frame_mesh(part, 2)
+        state = solve_linear(frame_system(part, mesh))
+        sway = state.displacement[mesh.node[[2, 3]], 0].mean()
+        bending = RUBBER.young * part.section.inertia
+        excess.append(sway / (5.0 * force * LENGTH**3 / (84.0 * bending)) - 1.0)
+    # What is left is stretching, which goes with the square of width over length.
+    assert np.array(excess[:-1]) / excess[1:] == pytest.approx(4.0, rel=0.02)
+    assert 0.0 < excess[-1] < 3e-4
+
+
 def elastica(load: float) -> tuple[float, float, float]:
     """Tip of an inextensible cantilever under a dead force across it, load = P L^2 / E I.
 
