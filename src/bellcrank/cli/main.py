@@ -12,12 +12,15 @@ from bellcrank.cli import (
     animate,
     campaign,
     card,
+    dataset,
     design,
     evaluate,
     export,
     plot,
+    predict,
     print_part,
     problems,
+    train,
     validate,
 )
 from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, app
@@ -34,6 +37,9 @@ COMMANDS = (
     plot,
     animate,
     campaign,
+    dataset,
+    train,
+    predict,
     problems,
 )
 """Modules that register a command."""

@@ -339,14 +339,7 @@ def resume(folder: str | os.PathLike[str], data: Dataset, *, device: str = "auto
         If its checkpoint is damaged.
     """
     place = Path(folder)
-    if not (place / DESCRIPTION).exists():
-        raise InvalidFile(f"{folder}: no training to go on with: it has no {DESCRIPTION}")
-    told = read_json(place / DESCRIPTION)
-    if told.get("schema") != TRAINING_SCHEMA:
-        raise InvalidFile(
-            f"{place / DESCRIPTION}: expected schema {TRAINING_SCHEMA!r}, "
-            f"got {told.get('schema')!r}"
-        )
+    told = _read_description(place)
     if told["data"] != data_hash(data):
         raise InvalidSettings(f"{folder}: the training there was begun with other data")
     recipe = Recipe.from_dict(told["recipe"])
@@ -355,6 +348,30 @@ def resume(folder: str | os.PathLike[str], data: Dataset, *, device: str = "auto
     if (place / CHECKPOINT).exists():
         _restore(training, place / CHECKPOINT)
     return training
+
+
+def read_recipe(folder: str | os.PathLike[str]) -> Recipe:
+    """Return the recipe of the training in a folder.
+
+    Raises
+    ------
+    InvalidFile
+        If there is none.
+    """
+    return Recipe.from_dict(_read_description(Path(folder))["recipe"])
+
+
+def _read_description(place: Path) -> dict[str, Any]:
+    """Return what a training's folder says about it."""
+    if not (place / DESCRIPTION).exists():
+        raise InvalidFile(f"{place}: no training to go on with: it has no {DESCRIPTION}")
+    told = read_json(place / DESCRIPTION)
+    if told.get("schema") != TRAINING_SCHEMA:
+        raise InvalidFile(
+            f"{place / DESCRIPTION}: expected schema {TRAINING_SCHEMA!r}, "
+            f"got {told.get('schema')!r}"
+        )
+    return told
 
 
 def _build(data: Dataset, recipe: Recipe, device: torch.device, precision: str) -> Training:
