@@ -15,7 +15,8 @@ from bellcrank.plots.front import draw_front
 from bellcrank.plots.motion import draw_comparison, draw_design, draw_motion
 from bellcrank.plots.paths import draw_paths
 from bellcrank.plots.scene import Motion
-from bellcrank.plots.stress import Stressed, StrokeAxes, draw_stress
+from bellcrank.plots.stress import Stressed, draw_stress
+from bellcrank.plots.strokes import StrokeAxes, StrokeCurve
 
 __all__ = [
     "ChainPath",
@@ -23,6 +24,7 @@ __all__ = [
     "PathsStyle",
     "Stressed",
     "StrokeAxes",
+    "StrokeCurve",
     "draw_comparison",
     "draw_design",
     "draw_front",

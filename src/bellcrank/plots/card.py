@@ -6,27 +6,28 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.plots import style
+from bellcrank.plots.legend import add_legend
 from bellcrank.plots.marks import add_panel
 from bellcrank.plots.motion import Drawing, entries_of, fill, level_frames
 from bellcrank.plots.saving import check_target, save_figure
-from bellcrank.plots.stress import dress
+from bellcrank.plots.strokes import draw_strokes
 
 if TYPE_CHECKING:
     import os
 
-    import numpy as np
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from bellcrank.plots.scene import Motion
+    from bellcrank.plots.strokes import StrokeAxes, StrokeCurve
 
 WIDTH, HEIGHT = 11.69, 8.27
 """Inches: A4, lying."""
 MARGIN = 0.45
-ROW = 0.235
 DRAWING = (6.9, 5.2)
 """Inches that the drawing may take."""
 CURVES = (3.2, 1.45)
+LEGEND_COLUMNS = 3
 
 Table = tuple[str, list[tuple[str, str]]]
 """A heading and rows of a name and a value."""
@@ -42,10 +43,8 @@ class Card:
         At the top.
     motion
         The design at rest and moved.
-    stroke, efficiency, force : (p,)
-        Along the stroke; the words of the axes are `axes`.
-    axes
-        Of the stroke and of the force.
+    curve, axes
+        How efficiency and force grow along the stroke, and the words on the axes.
     tables
         Left to right, top to bottom.
     foot
@@ -55,10 +54,8 @@ class Card:
     title: str
     note: str
     motion: Motion
-    stroke: NDArray[np.float64]
-    efficiency: NDArray[np.float64]
-    force: NDArray[np.float64]
-    axes: tuple[str, str]
+    curve: StrokeCurve
+    axes: StrokeAxes
     tables: list[Table]
     foot: str
 
@@ -102,30 +99,19 @@ def _put_drawing(figure: Figure, card: Card) -> None:
     top = HEIGHT - MARGIN - 0.65
     corner = (MARGIN, top - scale * float(size[1]))
     fill(add_panel(figure, card.motion.design.problem, corner, scale, low, high), drawing)
-    entries = entries_of([drawing])
-    legend = figure.legend(
-        [handle for _, handle in entries if not hasattr(handle, "_head_length")],
-        [label for label, handle in entries if not hasattr(handle, "_head_length")],
-        loc="upper left", bbox_to_anchor=(MARGIN / WIDTH, (corner[1] - 0.02) / HEIGHT),
-        ncols=3, frameon=False, prop={"family": style.FONT, "size": 7.5}, borderpad=0.0,
-    )  # fmt: skip
-    legend.set_in_layout(False)
+    legend_top = corner[1] - 0.02
+    add_legend(figure, entries_of([drawing]), legend_top, LEGEND_COLUMNS, left=MARGIN, size=7.5)
 
 
 def _put_curves(figure: Figure, card: Card) -> None:
     """Draw efficiency and force along the stroke, upper right."""
     left = WIDTH - MARGIN - CURVES[0]
-    for place, (values, words) in enumerate(
-        ((card.efficiency, "efficiency"), (card.force, card.axes[1]))
-    ):
+    pair: list[Axes] = []
+    for place in range(2):
         bottom = HEIGHT - MARGIN - 0.75 - CURVES[1] - place * (CURVES[1] + 0.7)
-        axes = figure.add_axes(
-            (left / WIDTH, bottom / HEIGHT, CURVES[0] / WIDTH, CURVES[1] / HEIGHT)
-        )
-        axes.plot(
-            card.stroke, values, color=style.OUTPUT, marker="o", markersize=3.0, linewidth=1.4
-        )
-        dress(axes, card.axes[0], words)
+        place_of = (left / WIDTH, bottom / HEIGHT, CURVES[0] / WIDTH, CURVES[1] / HEIGHT)
+        pair.append(figure.add_axes(place_of))
+    draw_strokes((pair[0], pair[1]), [card.curve], card.axes)
 
 
 def _put_tables(figure: Figure, tables: list[Table]) -> None:

@@ -67,17 +67,35 @@ def _draw_arrow(
     )  # fmt: skip
 
 
-def add_legend(figure: Figure, entries: list[tuple[str, Any]], bottom: float, columns: int) -> None:
-    """Write a legend in the middle, `bottom` inches above the lower edge."""
+def add_legend(
+    figure: Figure,
+    entries: list[tuple[str, Any]],
+    at: float,
+    columns: int,
+    *,
+    left: float | None = None,
+    size: float = style.SMALL_SIZE,
+) -> None:
+    """Write a legend.
+
+    Parameters
+    ----------
+    at
+        Inches above the lower edge: of its foot, or of its head if `left` is given.
+    left
+        Inches from the left edge; by default it stands in the middle.
+    """
+    width, height = figure.get_size_inches()
+    across = 0.5 if left is None else left / width
     figure.legend(
         [handle for _, handle in entries],
         [label for label, _ in entries],
         handler_map={FancyArrow: HandlerPatch(patch_func=_draw_arrow)},
-        loc="lower center",
-        bbox_to_anchor=(0.5, bottom / figure.get_size_inches()[1]),
+        loc="lower center" if left is None else "upper left",
+        bbox_to_anchor=(across, at / height),
         ncols=columns,
         frameon=False,
-        prop={"family": style.FONT, "size": style.SMALL_SIZE},
+        prop={"family": style.FONT, "size": size},
         labelcolor=style.INK,
         handlelength=1.9,
         handletextpad=0.6,

@@ -33,6 +33,7 @@ from bellcrank.plots.motion import (
 )
 from bellcrank.plots.saving import check_target, save_figure
 from bellcrank.plots.scene import Motion, input_arrows, wanted_arrows
+from bellcrank.plots.strokes import StrokeAxes, StrokeCurve, draw_strokes
 
 if TYPE_CHECKING:
     import os
@@ -67,11 +68,10 @@ class Stressed:
         MPa, of elements or vertices.
     width
         Of the struts, lattice units.
-    title, note
+    note
         What stands over the drawing.
-    stroke, efficiency, force : (p,)
-        Input motion in mm, or force in N where that is given; efficiency; what stands against
-        it on the axis of the force.
+    curve
+        How it came there.
     """
 
     rest: NDArray[np.float64]
@@ -79,25 +79,8 @@ class Stressed:
     cells: NDArray[np.int64]
     stress: NDArray[np.float64]
     width: float
-    title: str
     note: str
-    stroke: NDArray[np.float64]
-    efficiency: NDArray[np.float64]
-    force: NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class StrokeAxes:
-    """Words on the axes of the curves.
-
-    Parameters
-    ----------
-    stroke, force
-        With units.
-    """
-
-    stroke: str = "input motion, mm"
-    force: str = "input force, N"
+    curve: StrokeCurve
 
 
 def draw_stress(
@@ -162,7 +145,7 @@ def _sheet(drawings: list[Drawing], parts: list[Stressed], words: StrokeAxes) ->
         problem = drawing.motion.design.problem
         style.write_heading(figure, drawing.title, drawing.note, at, MARGIN)
         fill(add_panel(figure, problem, (left, upper), scale, low, high), drawing)
-        style.write_heading(figure, part.title, part.note, at, top - upper + 0.18)
+        style.write_heading(figure, "", part.note, at, top - upper + 0.18)
         panel = add_panel(figure, problem, (left, lower), scale, low, high)
         _put_stressed(panel, part, colours, drawing)
         left += scale * float(size[0]) + GAP
@@ -220,28 +203,10 @@ def _put_curves(
     """Draw efficiency and force along the stroke."""
     across, up = figure.get_size_inches()
     wide = (across - 2 * MARGIN - 1.5) / 2.0
-    for place, label in enumerate(("efficiency", words.force)):
+    pair: list[Axes] = []
+    for place in range(2):
         left = MARGIN + 0.5 + place * (wide + 0.9)
-        axes = figure.add_axes(
-            (left / across, (at + 0.35) / up, wide / across, (CURVES - 0.35) / up)
-        )
-        shades = (style.HUMAN, style.OUTPUT) if len(parts) > 1 else (style.OUTPUT,)
-        for drawing, part, colour in zip(drawings, parts, shades, strict=True):
-            axes.plot(
-                part.stroke, part.efficiency if place == 0 else part.force,
-                color=colour, marker="o", markersize=3.0, linewidth=1.4, label=drawing.title,
-            )  # fmt: skip
-        dress(axes, words.stroke, label)
-        if len(parts) > 1:
-            axes.legend(frameon=False, prop={"family": style.FONT, "size": style.SMALL_SIZE})
-
-
-def dress(axes: Axes, below: str, beside: str) -> None:
-    """Label axes, quietly."""
-    looks: dict[str, Any] = {"family": style.FONT, "size": style.SMALL_SIZE, "color": style.INK}
-    axes.set_xlabel(below, **looks)
-    axes.set_ylabel(beside, **looks)
-    axes.set_xlim(left=0.0)
-    low, high = axes.get_ylim()
-    axes.set_ylim(min(low, 0.0), high + 0.06 * abs(high))
-    style.quieten(axes)
+        place_of = (left / across, (at + 0.35) / up, wide / across, (CURVES - 0.35) / up)
+        pair.append(figure.add_axes(place_of))
+    names = [drawing.title for drawing in drawings]
+    draw_strokes((pair[0], pair[1]), [part.curve for part in parts], words, names)

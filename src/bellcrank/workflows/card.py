@@ -79,19 +79,15 @@ def make_card(
     bundle = Export(part=spec.of(design))
     profile = profile_for(None, spec)
     part = bundle.part
-    frame = stressed(validation.analyses[0])
     response = validation.response
-    words = stroke_axes(validation)
     name = title or design.problem.name
     card = Card(
         title=name,
         note=f"efficiency {response.efficiency:.3f} by the discrete model · "
         f"{design.beam_count} beams · {design_hash(design)}",
         motion=Motion(design, response.displacement, response.efficiency),
-        stroke=frame.stroke,
-        efficiency=frame.efficiency,
-        force=frame.force,
-        axes=(words.stroke, words.force),
+        curve=stressed(validation.analyses[0]).curve,
+        axes=stroke_axes(validation),
         tables=[
             _part_table(bundle, part),
             _print_table(bundle, profile),

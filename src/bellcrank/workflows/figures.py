@@ -9,7 +9,7 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.fabricate.formats.vtu import mesh_to_bytes
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
-from bellcrank.plots import Motion, Stressed, StrokeAxes, draw_stress
+from bellcrank.plots import Motion, Stressed, StrokeAxes, StrokeCurve, draw_stress
 from bellcrank.plots.saving import check_target
 
 if TYPE_CHECKING:
@@ -93,11 +93,12 @@ def stressed(analysis: Analysis) -> Stressed:
         cells=field.cells,
         stress=field.stress,
         width=part.section.width / part.scale,
-        title="",
         note=f"{known} · {analysis.level}, {theory}",
-        stroke=load * part.stroke if moved else force,
-        efficiency=efficiency,
-        force=force if moved else output,
+        curve=StrokeCurve(
+            stroke=load * part.stroke if moved else force,
+            efficiency=efficiency,
+            force=force if moved else output,
+        ),
     )
 
 
