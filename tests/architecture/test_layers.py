@@ -9,13 +9,20 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+HELP = """
+from contextlib import suppress
+from bellcrank.cli import app
+import bellcrank.cli.main
+with suppress(SystemExit):
+    app.app(["--help"], standalone_mode=False)
+"""
 
 
 def imported_by(statement: str) -> set[str]:
     """Top-level modules that a fresh interpreter holds after a statement."""
     code = f"{statement}\nimport sys\nprint(' '.join({{m.split('.')[0] for m in sys.modules}}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    return set(done.stdout.splitlines()[-1].split())
 
 
 def test_imports_point_downward_only() -> None:
@@ -27,6 +34,21 @@ def test_imports_point_downward_only() -> None:
 def test_importing_the_package_loads_nothing_heavy() -> None:
     loaded = imported_by("import bellcrank")
     assert not loaded & {"numpy", "numba", "scipy", "matplotlib", "pyarrow", "torch", "pydantic"}
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import bellcrank.cli.main",
+        "import bellcrank.surrogate.predictor, bellcrank.surrogate.training",
+        "import bellcrank.surrogate.onnx",
+        "from bellcrank.surrogate.dataset import read_dataset",
+        HELP,
+    ],
+    ids=["cli", "surrogate", "onnx", "dataset", "help"],
+)
+def test_nothing_loads_pytorch_before_a_network_is_needed(statement: str) -> None:
+    assert not imported_by(statement) & {"torch", "onnx", "onnxruntime", "safetensors"}
 
 
 @pytest.mark.parametrize("module", ["bellcrank.cli", "bellcrank.model", "bellcrank.runs"])

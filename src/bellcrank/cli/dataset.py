@@ -8,10 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.progress import TextColumn, TimeRemainingColumn
 
 from bellcrank.cli.app import INTERRUPTED, app
 from bellcrank.cli.arguments import settings_of
-from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.cli.console import (
+    announce_compilation,
+    notes,
+    number_of,
+    plain,
+    print_json,
+    results,
+)
+from bellcrank.cli.live import Live
 
 if TYPE_CHECKING:
     from bellcrank.surrogate.dataset import Dataset
@@ -32,7 +41,7 @@ def build(
     out: Annotated[
         Path | None, typer.Option(help="Folder; default: NAME-dataset. Again to go on.")
     ] = None,
-    runs: Annotated[int, typer.Option(help="Searches, every other one backwards.")] = 2000,
+    runs: Annotated[int, typer.Option(help="Searches, half of them backwards.")] = 2000,
     steps: Annotated[int, typer.Option(help="Proposals of each.")] = 582,
     seed: Annotated[int, typer.Option(help="Of the first run.")] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes. \\[all cores]")] = None,
@@ -85,15 +94,29 @@ def export(
         str, typer.Option(help="fine, as networks here see them; paper, as the paper's did.")
     ] = "fine",
 ) -> None:
-    """Write pictures of 192 x 128 pixels, and a table that names each one's efficiency."""
-    from bellcrank.cli.live import Live
+    """Write pictures of 192 x 128 pixels, and a table that names each one's efficiency.
+
+    The same command goes on with what a stop or a kill left.
+    """
     from bellcrank.learning.exporting import export_pictures
     from bellcrank.surrogate.dataset import read_dataset
 
     data = read_dataset(file)
-    with Live("drawing", len(data) if count is None else min(count, len(data))) as live:
-        written = export_pictures(data, png, count=count, style=style, tell=live.tell)
-    results.print(f"{written} pictures and labels.csv written to {plain(png)}/")
+    with ExportProgress() as progress:
+        written = export_pictures(data, png, count=count, style=style, tell=progress)
+    results.print(f"{number_of(written, 'picture')} and labels.csv written to {plain(png)}/")
+
+
+class ExportProgress(Live):
+    """Shows how many pictures are drawn."""
+
+    def __init__(self) -> None:
+        super().__init__("drawing", None, TextColumn("left"), TimeRemainingColumn())
+
+    def __call__(self, done: int, total: int) -> None:
+        """Take in how many are drawn."""
+        figures = f"{done} / {total}"
+        self._show(done, total, figures, f"drawing {100.0 * done / total:3.0f} %  {figures}")
 
 
 def summary_of(data: Dataset) -> dict[str, Any]:

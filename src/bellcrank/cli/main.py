@@ -15,11 +15,13 @@ from bellcrank.cli import (
     dataset,
     design,
     evaluate,
+    explain,
     export,
     plot,
     predict,
     print_part,
     problems,
+    surrogate_search,
     train,
     validate,
 )
@@ -40,6 +42,8 @@ COMMANDS = (
     dataset,
     train,
     predict,
+    surrogate_search,
+    explain,
     problems,
 )
 """Modules that register a command."""

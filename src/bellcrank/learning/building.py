@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.campaign import EngineOptions, Spec, Store, Task, complete
-from bellcrank.errors import CorruptRun, InvalidDataset, InvalidSettings
-from bellcrank.mechanics import Status
+from bellcrank.errors import CorruptRun, InvalidDataset, InvalidSettings, OutputExists
+from bellcrank.mechanics import Status, objective_of
 from bellcrank.model import problem_to_dict
 from bellcrank.model.storage import check_folder
-from bellcrank.provenance import provenance
 from bellcrank.runs.description import plain
+from bellcrank.runs.files import make_folder
 from bellcrank.runs.shards import arrays_of, parquet_file
 from bellcrank.search import read_settings
 from bellcrank.surrogate.dataset import DATASET_FILE, Dataset
@@ -34,6 +34,12 @@ CAMPAIGN = "campaign"
 PAPER_RUNS = 2000
 PAPER_STEPS = 582
 """Of a run: 2000 of them make the paper's 1,163,733 configurations, within a few hundred."""
+ODD_EXPONENT = 2.0
+"""n of the only f_n(gamma) = 2 cos(gamma/2)^n - 1 that changes its sign with the motion."""
+OWN = ("steps", "seed", "chains")
+"""Settings of a search that a dataset decides about; the last two a campaign does."""
+LABELS: dict[str, Any] = {"objective": None, "dangling": "counted", "strokes": [1.0]}
+"""Settings of a search that decide what an efficiency is: those of `bellcrank evaluate`."""
 COLUMNS = ("seed", "step", "mask", "efficiency", "accepted", "status")
 
 
@@ -46,7 +52,7 @@ class DatasetSpec:
     problem
         What the designs are for.
     runs
-        Number of runs; every second one searches for the most negative efficiency.
+        Number of runs; the second half of them searches for the most negative efficiency.
     steps
         Proposals of a run.
     seed
@@ -57,6 +63,9 @@ class DatasetSpec:
     Raises
     ------
     InvalidSettings
+        If a number is too small, the search would see other efficiencies than the problem's, or
+        the efficiency of the reversed motion is not the negative one, so that runs backwards
+        would say nothing about the problem.
     """
 
     problem: Problem
@@ -71,12 +80,30 @@ class DatasetSpec:
                 raise InvalidSettings(
                     f"{name}: expected at least {least}, got {getattr(self, name)}"
                 )
+        exponent = objective_of(self.problem).exponent
+        if self.runs > 1 and exponent != ODD_EXPONENT:
+            raise InvalidSettings(
+                f"{self.problem.name!r}: by its objective with the exponent {exponent:g}, a motion "
+                f"and its reverse are not opposite; datasets need runs both ways, so use the "
+                f"objective 'displacement', or a single run"
+            )
+        if taken := [key for key in OWN if key in (self.search or {})]:
+            raise InvalidSettings(f"{taken[0]}: a dataset sets it for each run; leave it out here")
+        settings = self._settings()
+        for key, value in LABELS.items():
+            if settings[key] != value:
+                raise InvalidSettings(
+                    f"{key}: with {settings[key]!r} the search would see other efficiencies than "
+                    f"those of {self.problem.name!r}; a dataset needs {value!r}"
+                )
+
+    def _settings(self) -> dict[str, Any]:
+        given = {"search": "paper", **(self.search or {}), "steps": self.steps}
+        return plain("settings", read_settings(given).to_dict())
 
     def campaign(self) -> Spec:
         """Return the campaign: one task forward, one for the reversed output."""
-        given = {"search": "paper", **(self.search or {}), "steps": self.steps}
-        settings = read_settings(given).to_dict()
-        settings = {key: settings[key] for key in settings if key not in ("seed", "chains")}
+        settings = {key: value for key, value in self._settings().items() if key not in OWN[1:]}
         half = (self.runs + 1) // 2
         tasks = [_task(self.problem, "forward", settings, self.seed, half)]
         if self.runs > 1:
@@ -106,18 +133,22 @@ def build_dataset(
     spec: DatasetSpec,
     folder: str | os.PathLike[str],
     *,
+    engine: str = "local",
     workers: int | None = None,
     tell: Callable[[CampaignStatus], None] = lambda _status: None,
     stop: threading.Event | None = None,
 ) -> Dataset | None:
     """Run the campaign, or what is left of it, and gather what it found.
 
-    Called again after a stop or a kill, it goes on where it was.
+    Called again after a stop or a kill, it goes on where it was; called after its end, it leaves
+    the same bytes.
 
     Parameters
     ----------
     folder
         Gets ``dataset.parquet``, and the campaign in a folder of its own.
+    engine
+        Of the campaign; by default as many processes as there are workers.
     workers
         Processes; all cores by default.
     tell
@@ -133,14 +164,22 @@ def build_dataset(
     Raises
     ------
     InvalidSettings
-        If another dataset lies there.
+        If the campaign that lies there is another one.
+    OutputExists
+        If a dataset lies there without the campaign that it comes from.
     StorageError, CorruptRun
     """
     place = Path(folder)
-    place.mkdir(parents=True, exist_ok=True) if place.parent.exists() else None
+    make_folder(place)
     check_folder(place / DATASET_FILE)
+    if (place / DATASET_FILE).exists() and not (place / CAMPAIGN).exists():
+        raise OutputExists(
+            f"{place / DATASET_FILE}: exists already, without its campaign; choose another folder "
+            f"(--out)"
+        )
     store = Store.create(place / CAMPAIGN, spec.campaign())
-    if not complete(store, options=EngineOptions(workers=workers), tell=tell, stop=stop):
+    options = EngineOptions(workers=workers)
+    if not complete(store, engine, options, tell=tell, stop=stop):
         return None
     data = gather(store, spec.problem)
     data.write(place / DATASET_FILE, overwrite=True)
@@ -179,7 +218,7 @@ def gather(store: Store, problem: Problem) -> Dataset:
         "first_seed": forward.first_seed,
         "left_out": int(found["left"].sum()),
         "settings": forward.settings,
-        "provenance": provenance(),
+        "provenance": store.provenance,
     }
     return Dataset(
         problem,
@@ -202,7 +241,7 @@ def _tables(store: Store) -> Iterator[dict[str, NDArray[Any]]]:
 
 def _task(problem: Problem, name: str, settings: dict[str, Any], first: int, count: int) -> Task:
     told = plain("problem", problem_to_dict(problem))
-    return Task(name, told, plain("settings", settings), first, first + count - 1)
+    return Task(name, told, settings, first, first + count - 1)
 
 
 def _segment(steps: int) -> int:

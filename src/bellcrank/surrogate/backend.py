@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.surrogate.recipes import PRECISIONS
 
 if TYPE_CHECKING:
     import torch as torch_module
 
 INSTALL = "pip install 'bellcrank[ml]'"
+DEVICES = ("cpu", "cuda")
 
 
 def import_torch() -> Any:
@@ -41,6 +43,8 @@ def find_device(name: str) -> torch_module.device:
     torch = import_torch()
     if name == "auto":
         name = "cuda" if torch.cuda.is_available() else "cpu"
+    if name.partition(":")[0] not in DEVICES:
+        raise InvalidSettings(f"device: expected auto, cpu or cuda, got {name!r}")
     try:
         device = torch.device(name)
         torch.empty(1, device=device)
@@ -54,8 +58,16 @@ def find_device(name: str) -> torch_module.device:
 
 
 def find_precision(name: str, device: torch_module.device) -> str:
-    """Return ``float32`` or ``bfloat16``; ``auto`` is the latter where the hardware has it."""
+    """Return ``float32`` or ``bfloat16``; ``auto`` is the latter where the hardware has it.
+
+    Raises
+    ------
+    InvalidSettings
+        If it is neither.
+    """
     torch = import_torch()
+    if name not in PRECISIONS:
+        raise InvalidSettings(f"precision: expected {', '.join(PRECISIONS)}, got {name!r}")
     if name != "auto":
         return name
     if device.type == "cuda":
@@ -69,3 +81,9 @@ def autocast(device: torch_module.device, precision: str) -> Any:
     """Return a context in which networks compute in a precision."""
     torch = import_torch()
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
+
+
+def name_of(device: torch_module.device) -> str:
+    """Return what a device is called: a GPU by its make."""
+    torch = import_torch()
+    return str(torch.cuda.get_device_name(device)) if device.type == "cuda" else device.type

@@ -25,6 +25,7 @@ Examples
 
 from __future__ import annotations
 
+import hashlib
 import io
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
 DATASET_SCHEMA = "bellcrank/dataset/1"
 COLUMNS = ("run", "step", "mask", "efficiency", "accepted")
 ROW_GROUP = 2**17
+MOST = 2**31 - 1
+"""Number of a run or a step."""
 WRITER = {
     "compression": "zstd",
     "compression_level": 9,
@@ -71,7 +74,7 @@ class Dataset:
     efficiency : (n,) float64
         By the mechanics; each design has a unique, stable response.
     run : (n,) int64
-        Which run each comes from, from 0, in ascending order.
+        Which run each comes from, from 0.
     step : (n,) int64
         In its run; by default 0, 1, 2, ...
     accepted : (n,) bool
@@ -82,7 +85,8 @@ class Dataset:
     Raises
     ------
     InvalidDataset
-        If it is empty, columns are of different lengths, or an efficiency is no number.
+        If it is empty, columns are of different lengths, an efficiency is no number, or a run or
+        a step is no number of one.
     """
 
     problem: Problem
@@ -103,12 +107,15 @@ class Dataset:
             "accepted": (np.ones(count) if self.accepted is None else self.accepted, np.bool_),
         }
         for name, (column, kind) in given.items():
-            array: NDArray[Any] = np.array(column, dtype=kind)
+            try:
+                array: NDArray[Any] = np.array(column, dtype=kind)
+            except (TypeError, ValueError, OverflowError) as error:
+                raise InvalidDataset(f"{name}: {_first_line(error)}") from None
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-            if len(array) != count:
+            if len(array) != count or (array.ndim != 1 and name != "packed"):
                 raise InvalidDataset(
-                    f"{name}: expected {count} rows as in packed, got {len(array)}"
+                    f"{name}: expected {count} rows as in packed, got shape {array.shape}"
                 )
         _check(self)
 
@@ -150,6 +157,7 @@ class Dataset:
             "schema": DATASET_SCHEMA,
             "problem": problem_to_dict(self.problem),
             "origin": self.origin,
+            "digest": _digest(self),
         }
         buffer = io.BytesIO()
         with parquet_writer(buffer, table.schema, header, **WRITER) as writer:
@@ -166,6 +174,11 @@ def _check(data: Dataset) -> None:
             f"packed: expected masks of {width} bytes for the {data.problem.lattice.beam_count} "
             f"beams of {data.problem.name!r}, got an array of shape {data.packed.shape}"
         )
+    for name, column in (("run", data.run), ("step", data.step)):
+        wrong = np.flatnonzero((column < 0) | (column > MOST))
+        if len(wrong):
+            row = int(wrong[0])
+            raise InvalidDataset(f"{name}: row {row} is {column[row]}; expected 0 to {MOST}")
     wrong = np.flatnonzero(~np.isfinite(data.efficiency))
     if len(wrong):
         row = int(wrong[0])
@@ -197,8 +210,10 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
         raise InvalidFile(f"{path}: no such file; bellcrank dataset build makes datasets")
     try:
         named = pq.read_schema(place).names
-    except (OSError, pa.ArrowException) as error:
-        raise InvalidFile(f"{place}: not a Parquet file ({_first_line(error)})") from None
+    except (OSError, pa.ArrowException, ValueError) as error:
+        raise InvalidFile(
+            f"{place}: not a Parquet file, or damaged ({_first_line(error)})"
+        ) from None
     if missing := [name for name in COLUMNS if name not in named]:
         raise InvalidFile(
             f"{place}: not a dataset: it has no column {missing[0]!r}; bellcrank dataset build "
@@ -210,14 +225,27 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
                 f"{place}: expected schema {DATASET_SCHEMA!r}, got {header.get('schema')!r}"
             )
         columns = arrays_of(file.read(columns=list(COLUMNS)), COLUMNS)
-    problem = problem_from_dict(header["problem"], str(place))
+        told, origin = header["problem"], dict(header["origin"])
+    problem = problem_from_dict(told, str(place))
     try:
-        return Dataset(
+        found = Dataset(
             problem, columns["mask"], columns["efficiency"], columns["run"], columns["step"],
-            columns["accepted"], header["origin"],
+            columns["accepted"], origin,
         )  # fmt: skip
     except InvalidDataset as error:
         raise InvalidDataset(f"{place}: {error}") from None
+    # Parquet checks its pages, but not its footer, which says which rows there are.
+    if header.get("digest") not in (None, _digest(found)):
+        raise CorruptRun(f"{place}: damaged (its rows are not those it was written with)")
+    return found
+
+
+def _digest(data: Dataset) -> str:
+    """Return a checksum of all columns."""
+    digest = hashlib.sha256()
+    for column in (data.packed, data.efficiency, data.run, data.step, data.accepted):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.hexdigest()
 
 
 DATASET_FILE = "dataset.parquet"
@@ -234,8 +262,10 @@ def merge(parts: Sequence[Dataset]) -> Dataset:
     Raises
     ------
     InvalidDataset
-        If they are for different problems.
+        If there are none, or they are for different problems.
     """
+    if not parts:
+        raise InvalidDataset("expected at least one dataset to join, got none")
     first = parts[0]
     told = problem_to_dict(first.problem)
     runs, offset = [], 0

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import torch
 
+from bellcrank.surrogate.pictures import check_masks
 from bellcrank.surrogate.views import PictureView
 
 if TYPE_CHECKING:
@@ -54,11 +55,15 @@ class PictureFeeder:
         self.device = device
 
     def feed(self, packed: NDArray[np.uint8]) -> Tensor:
-        """Move the masks, and draw them there."""
-        masks = torch.from_numpy(np.ascontiguousarray(packed)).to(self.device)
+        """Move the masks, and draw them there, always in float32."""
+        checked = check_masks(packed, len(self.passed))
+        masks = torch.from_numpy(np.ascontiguousarray(checked)).to(self.device)
         bits = (masks[:, :, None] >> self.place) & 1
         chosen = bits.flatten(1)[:, : len(self.passed)].float()
-        ink = 1.0 - torch.exp(chosen @ self.passed)
+        # Whoever feeds a network may be in the middle of autocast: in bfloat16 sums of many
+        # logarithms would be off by several grey levels.
+        with torch.autocast(self.device.type, enabled=False):
+            ink = 1.0 - torch.exp(chosen @ self.passed)
         return _channels_last(ink.reshape(-1, *self.shape))
 
 

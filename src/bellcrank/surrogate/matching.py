@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bellcrank.errors import InvalidModel
-from bellcrank.surrogate.trained import lattice_hash
+from bellcrank.surrogate.identity import lattice_hash
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from bellcrank.model import Lattice, Problem
 
 TOLERANCE = 1e-4
-"""In lattice units: how far nodes that are the same may be apart."""
+"""How far nodes that are the same may be apart, in lattice units; of other numbers, a fraction."""
 
 
 def beams_between(known: Problem, given: Problem) -> NDArray[np.int64]:
@@ -59,7 +60,8 @@ def _nodes_between(
     if lattice_hash(known) == lattice_hash(given):
         return np.arange(known.node_count)
     shift = known.positions.min(axis=0) - given.positions.min(axis=0)
-    apart, node_of = cKDTree(known.positions).query(given.positions + shift)
+    apart, nearest = cKDTree(known.positions).query(given.positions + shift)
+    node_of = np.asarray(nearest, np.int64)
     far = np.flatnonzero(apart > TOLERANCE)
     if len(far) or len(np.unique(node_of)) < len(node_of):
         node = int(far[0]) if len(far) else 0
@@ -68,7 +70,7 @@ def _nodes_between(
             f"has node {node}: lattices must agree up to numbering and a shift, within "
             f"{TOLERANCE:g}"
         )
-    return np.asarray(node_of, np.int64)
+    return node_of
 
 
 def _beams_between(
@@ -92,33 +94,50 @@ def _require_same_task(known: Problem, given: Problem, node_of: NDArray[np.int64
     there, here = _task(known, np.arange(known.lattice.node_count)), _task(given, node_of)
     for name, value in there.items():
         other = here[name]
-        same = (
-            np.shape(value) == np.shape(other) and np.allclose(value, other, atol=TOLERANCE)
-            if isinstance(value, np.ndarray)
-            else value == other
-        )
-        if not same:
+        if not _same(value, other):
+            told = "" if isinstance(value, np.ndarray) else f" ({value} there, {other} here)"
             raise InvalidModel(
                 f"the model has learnt {known.name!r}, whose {name} is another than that of "
-                f"{given.name!r}"
+                f"{given.name!r}{told}"
             )
+
+
+def _same(there: Any, here: Any) -> bool:
+    """Whether what was learnt and what is asked are one: nodes exactly, numbers nearly."""
+    if isinstance(there, np.ndarray):
+        if there.shape != here.shape:
+            return False
+        nearly = TOLERANCE if there.dtype == np.float64 else 0.0
+        return bool((np.abs(there - here) <= nearly).all())
+    if isinstance(there, float) and isinstance(here, float):
+        return math.isclose(there, here, rel_tol=TOLERANCE)
+    return bool(there == here)
 
 
 def _task(problem: Problem, node_of: NDArray[np.int64]) -> dict[str, Any]:
     """Return what decides about efficiencies, besides the lattice, by known numbers of nodes."""
+    from bellcrank.mechanics.objectives import objective_of
+
     told: dict[str, Any] = {}
     for name in ("fixed", "fixed_x", "fixed_y"):
         nodes = node_of[getattr(problem.supports, name)]
-        told[f"support ({name})"] = np.sort(nodes).astype(float)
+        told[f"support ({name})"] = np.sort(nodes)
     for name, region in (("input", problem.input), ("output", problem.output)):
         nodes = node_of[region.nodes]
         order = np.argsort(nodes)
-        told[f"{name} region"] = nodes[order].astype(float)
+        told[f"{name} region"] = nodes[order]
         directions = np.broadcast_to(region.direction, (len(nodes), 2))
         told[f"{name} direction"] = np.asarray(directions)[order]
     told["drive"] = problem.input.drive
-    told["amount"] = np.array([problem.input.amount])
-    told["output spring"] = np.array([problem.output.spring or 0.0])
-    told["stiffness"] = np.array([problem.stiffness.bond, problem.stiffness.angle])
+    told["amount"] = problem.input.amount
+    told["output spring"] = problem.output.spring
+    told["spring_kind"] = problem.output.spring_kind
+    told["stiffness of beams"] = problem.stiffness.bond
+    told["stiffness of joints"] = problem.stiffness.angle
     told["aggregate"] = problem.aggregate
+    # None and the name of what it stands for are the same objective.
+    objective = objective_of(problem)
+    by_force = problem.input.drive == "force" and objective.denominator is not None
+    told["objective"] = "force" if by_force else "displacement"
+    told["exponent of the objective"] = objective.exponent
     return told

@@ -74,11 +74,16 @@ def correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> floa
 def recall(predicted: NDArray[np.float64], actual: NDArray[np.float64], count: int) -> float:
     """Fraction of the `count` largest actual values among the `count` largest predicted ones.
 
+    Where there are fewer, of all; nan where there are none.
+
     Examples
     --------
     >>> recall(np.array([3.0, 2.0, 1.0, 0.0]), np.array([3.0, 0.0, 1.0, 2.0]), 2)
     0.5
     """
-    best = np.argsort(-actual, kind="stable")[:count]
-    named = np.argsort(-predicted, kind="stable")[:count]
-    return len(np.intersect1d(best, named)) / count
+    wanted = min(count, len(actual))
+    if wanted < 1:
+        return float("nan")
+    best = np.argsort(-actual, kind="stable")[:wanted]
+    named = np.argsort(-predicted, kind="stable")[:wanted]
+    return len(np.intersect1d(best, named)) / wanted

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import InvalidDataset, InvalidSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 DOTS_PER_INCH = 72.0
 """At which a point is a pixel."""
+SMALLEST, LARGEST = 8, 4096
+"""Sides of a canvas, in pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +64,26 @@ class Canvas:
     margin: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.width < 8 or self.height < 8:
+        sides = (self.width, self.height)
+        if not all(isinstance(side, int) and SMALLEST <= side <= LARGEST for side in sides):
             raise InvalidSettings(
-                f"canvas: expected at least 8 x 8 pixels, got {self.width} x {self.height}"
+                f"canvas: expected whole numbers of {SMALLEST} to {LARGEST} pixels, got "
+                f"{self.width} x {self.height}"
             )
-        if not self.line > 0.0 or self.margin < 0.0:
+        if not (self.line > 0.0 and self.margin >= 0.0):
             raise InvalidSettings(
                 f"canvas: expected line > 0 and margin >= 0, got {self.line} and {self.margin}"
             )
+        if not self.border < min(sides):
+            raise InvalidSettings(
+                f"canvas: a line of {self.line} and margins of {self.margin} leave no room on "
+                f"{self.width} x {self.height} pixels"
+            )
+
+    @property
+    def border(self) -> float:
+        """Pixels that nodes stay away from two opposite sides, both together."""
+        return 2.0 * self.margin + self.line
 
     def to_dict(self) -> dict[str, Any]:
         """Return the canvas as plain data."""
@@ -84,9 +98,8 @@ class Canvas:
         """
         low, high = positions.min(axis=0), positions.max(axis=0)
         sheet = np.array([self.width, self.height], dtype=np.float64)
-        border = 2.0 * self.margin + self.line
         extent = np.maximum(high - low, 1e-9)
-        scale = float(((sheet - border) / extent).min())
+        scale = float(((sheet - self.border) / extent).min())
         return np.asarray((positions - 0.5 * (low + high)) * scale + 0.5 * sheet)
 
 
@@ -100,7 +113,14 @@ class Renderer:
     canvas
         What they are drawn on.
     usual : (M,) bool
-        Beams that most designs have: drawn once, which saves time and changes nothing.
+        Beams that most designs have: drawn first, and at once where a design has them all. That
+        changes no bit against drawing them first one by one; against another order of drawing,
+        products round differently, by one grey level at most.
+
+    Raises
+    ------
+    InvalidDataset
+        By `render`, if masks are not those of the lattice.
     """
 
     __slots__ = ("background", "canvas", "strokes")
@@ -137,13 +157,27 @@ class Renderer:
         -------
         (n, height, width) uint8
             Ink from 0 to 255, the uppermost row first.
+
+        Raises
+        ------
+        InvalidDataset
+            If masks have not one bit for each beam of the lattice.
+        InvalidSettings
+            If `out` is of another shape or kind, or not contiguous.
         """
         from bellcrank.surrogate.kernels.rendering import draw
 
-        shape = (len(packed), self.canvas.height, self.canvas.width)
+        # The kernel reads and writes where it is told, without looking.
+        masks = np.ascontiguousarray(check_masks(packed, len(self.strokes.start) - 1))
+        shape = (len(masks), self.canvas.height, self.canvas.width)
         ink = np.empty(shape, np.uint8) if out is None else out
+        if ink.shape != shape or ink.dtype != np.uint8 or not ink.flags.c_contiguous:
+            raise InvalidSettings(
+                f"out: expected a contiguous array of bytes of shape {shape}, got "
+                f"{ink.dtype} of shape {ink.shape}"
+            )
         picture = np.empty_like(self.background.passed)
-        draw(self.strokes, self.background, packed, picture, ink.reshape(len(packed), -1))
+        draw(self.strokes, self.background, masks, picture, ink.reshape(len(masks), picture.size))
         return ink
 
     def coverage(self) -> NDArray[np.float32]:
@@ -153,6 +187,26 @@ class Renderer:
         dense = np.zeros((len(start) - 1, self.canvas.height * self.canvas.width), np.float32)
         dense[beams, pixel] = 1.0 - passed
         return dense
+
+
+def check_masks(packed: NDArray[Any], beams: int) -> NDArray[np.uint8]:
+    """Return packed masks as they are, if they can be over so many beams.
+
+    Parameters
+    ----------
+    packed : (n, bytes) uint8
+
+    Raises
+    ------
+    InvalidDataset
+    """
+    width = (beams + 7) // 8
+    if packed.ndim != 2 or packed.shape[1] != width or packed.dtype != np.uint8:
+        raise InvalidDataset(
+            f"packed: expected masks of {width} bytes for {beams} beams, got {packed.dtype} of "
+            f"shape {packed.shape}"
+        )
+    return packed
 
 
 def _draw_each_beam(lattice: Lattice, canvas: Canvas) -> Strokes:
@@ -179,7 +233,8 @@ def draw_lines(
     lines : (m, 2, 2)
         Ends in pixels, from the lower left corner.
     snap
-        Whether Agg may move horizontal and vertical lines to whole pixels.
+        Whether Agg may move horizontal and vertical lines to whole pixels, as it does unless it
+        is told not to.
 
     Returns
     -------
@@ -195,7 +250,8 @@ def draw_lines(
     context.set_linewidth(canvas.line)
     context.set_capstyle("round")
     context.set_foreground("black")
-    context.set_snap(snap)
+    # True would move the ends of sloping lines too, which nobody's figures do.
+    context.set_snap(None if snap else False)
     for line in lines:
         renderer.draw_path(context, Path(line), IdentityTransform())
     return np.array(renderer.buffer_rgba())[:, :, 3]

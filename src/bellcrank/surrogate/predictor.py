@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidModel
+from bellcrank.errors import InvalidModel, InvalidProblem
 from bellcrank.surrogate.matching import beams_between
 from bellcrank.surrogate.trained import TrainedModel, read_model
 
@@ -93,13 +93,27 @@ class Predictor:
         ----------
         masks : (n, M) bool
             Over the beams of `problem`.
+
+        Raises
+        ------
+        InvalidProblem
+            If they are not that.
+        InvalidSettings
+            If the device or the precision makes no sense here.
         """
+        given = np.asarray(masks)
+        beams = self.problem.lattice.beam_count
+        if given.ndim != 2 or given.shape[1] != beams or given.dtype != np.bool_:
+            raise InvalidProblem(
+                f"masks: expected booleans of shape (n, {beams}), one for each beam of "
+                f"{self.problem.name!r}, got {given.dtype} of shape {given.shape}"
+            )
         said = np.array(
             [
                 member.predict(
-                    _renumbered(masks, beams), device=self.device, precision=self.precision
+                    _renumbered(given, order), device=self.device, precision=self.precision
                 )
-                for member, beams in zip(self.members, self._beams, strict=True)
+                for member, order in zip(self.members, self._beams, strict=True)
             ]
         )
         spread = said.std(axis=0, ddof=1) if len(said) > 1 else None

@@ -83,7 +83,7 @@ def flattening_chances(efficiency: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     low, high = np.quantile(efficiency, [TAILS, 1.0 - TAILS])
     place = (efficiency - low) / max(high - low, 1e-12) * BINS
-    bin_of = np.clip(place.astype(np.int64), 0, BINS - 1)
+    bin_of = np.clip(place, 0, BINS - 1).astype(np.int64)
     count = np.bincount(bin_of, minlength=BINS)
     chance = 1.0 / count[bin_of]
     return np.asarray(chance / chance.sum())

@@ -6,7 +6,6 @@ network did, and carry the whole problem, so that a mask numbered otherwise can 
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,12 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import InvalidFile, InvalidModel
-from bellcrank.model import problem_from_dict, problem_to_dict
+from bellcrank.errors import InvalidFile, InvalidModel, UnknownName
+from bellcrank.model import problem_to_dict
 from bellcrank.model.storage import write_bytes
-from bellcrank.surrogate.backend import autocast, find_device, import_torch
-from bellcrank.surrogate.models import models
-from bellcrank.surrogate.views import views
+from bellcrank.surrogate.backend import autocast, find_device, find_precision, import_torch
+from bellcrank.surrogate.identity import (
+    METADATA_KEY,
+    MODEL_SCHEMA,
+    Known,
+    architecture_of,
+    lattice_hash,
+    read_known,
+)
 
 if TYPE_CHECKING:
     import os
@@ -27,32 +32,14 @@ if TYPE_CHECKING:
     import torch
     from numpy.typing import NDArray
 
-    from bellcrank.model import Lattice, Problem
+    from bellcrank.model import Problem
     from bellcrank.surrogate.feeding import Feeder
     from bellcrank.surrogate.views import View
 
-MODEL_SCHEMA = "bellcrank/model/1"
-METADATA_KEY = "bellcrank"
+__all__ = ["BATCH", "TrainedModel", "lattice_hash", "read_model", "run_network"]
+
 BATCH = 256
 """Designs that a network looks at in one go."""
-DIGITS = 6
-"""Of positions, in a lattice's hash."""
-
-
-def lattice_hash(lattice: Lattice) -> str:
-    """Return the identity of a lattice: its nodes and beams in their order.
-
-    Examples
-    --------
-    >>> from bellcrank.model import find_problem
-    >>> crane, other = find_problem("crane"), find_problem("anti-parallel")
-    >>> lattice_hash(crane.lattice) == lattice_hash(other.lattice)
-    True
-    """
-    digest = hashlib.sha256()
-    digest.update(np.round(lattice.positions, DIGITS).astype("<f8").tobytes())
-    digest.update(lattice.beams.astype("<i8").tobytes())
-    return digest.hexdigest()[:16]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,34 +90,46 @@ class TrainedModel:
         Returns
         -------
         (n,) float64
+
+        Raises
+        ------
+        InvalidDataset
+            If masks have not one bit for each beam.
+        InvalidSettings
+            If there is no such device or precision.
         """
         from bellcrank.surrogate.feeding import feeder_of
 
         where = find_device(device)
-        network = self.network.to(where).eval()
-        found = run_network(network, feeder_of(self.view, where), packed, precision)
+        network = self.network.to(where)
+        exactness = find_precision(precision, where)
+        found = run_network(network, feeder_of(self.view, where), packed, exactness)
         return self.mean + self.deviation * found
 
-    def to_bytes(self) -> bytes:
-        """Return the content of a file: weights in safetensors, the rest in its metadata."""
-        import_torch()
-        from safetensors.torch import save
-
-        told = {
+    def describe(self) -> dict[str, Any]:
+        """Return all that is known about it but its weights, as plain data."""
+        return {
             "schema": MODEL_SCHEMA,
             "architecture": self.architecture,
             "lattice": lattice_hash(self.problem.lattice),
+            "looks_at": architecture_of(self.architecture).view,
             "view": self.view.to_dict(),
             "mean": self.mean,
             "deviation": self.deviation,
             "record": self.record,
             "problem": problem_to_dict(self.problem),
         }
+
+    def to_bytes(self) -> bytes:
+        """Return the content of a file: weights in safetensors, the rest in its metadata."""
+        import_torch()
+        from safetensors.torch import save
+
         tensors = {
             name: value.detach().cpu().contiguous()
             for name, value in self.network.state_dict().items()
         }
-        return save(tensors, {METADATA_KEY: json.dumps(told)})
+        return save(tensors, {METADATA_KEY: json.dumps(self.describe())})
 
     def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the model, whole or not at all.
@@ -145,16 +144,25 @@ class TrainedModel:
 def run_network(
     network: torch.nn.Module, feeder: Feeder, packed: NDArray[np.uint8], precision: str
 ) -> NDArray[np.float64]:
-    """Return what a network says of designs, batch by batch, without keeping gradients."""
+    """Return what a network says of designs, batch by batch, without keeping gradients.
+
+    A network in the middle of its training is left as it was found.
+    """
     import torch
 
     device = next(network.parameters()).device
     parts = []
-    with torch.inference_mode(), autocast(device, precision):
-        for first in range(0, len(packed), BATCH):
-            output = network(feeder.feed(packed[first : first + BATCH]))
-            parts.append(output.float().cpu())
-    joined = torch.cat(parts) if parts else torch.empty(0)
+    was_training = network.training
+    network.eval()
+    try:
+        with torch.inference_mode(), autocast(device, precision):
+            # No design makes an empty batch, so that its masks are looked at too.
+            for first in range(0, max(len(packed), 1), BATCH):
+                output = network(feeder.feed(packed[first : first + BATCH]))
+                parts.append(output.float().cpu())
+    finally:
+        network.train(was_training)
+    joined = torch.cat(parts)
     return np.asarray(joined.numpy(), np.float64)
 
 
@@ -181,35 +189,32 @@ def read_model(path: str | os.PathLike[str]) -> TrainedModel:
         raise InvalidFile(f"{path}: cannot be read ({error.strerror})") from None
     try:
         tensors = load(content)
-        told = json.loads(_metadata(content)[METADATA_KEY])
-    except (SafetensorError, ValueError, KeyError) as error:
+        text = _metadata(content).get(METADATA_KEY)
+    except (SafetensorError, ValueError) as error:
         raise InvalidModel(
-            f"{path}: not a trained model of bellcrank, or truncated ({_first_line(error)})"
+            f"{path}: not a trained model, or truncated ({_first_line(error)})"
         ) from None
-    if told.get("schema") != MODEL_SCHEMA:
-        raise InvalidModel(f"{path}: expected schema {MODEL_SCHEMA!r}, got {told.get('schema')!r}")
-    return _rebuild(told, tensors, str(path))
+    known = read_known(text, str(path))
+    return _rebuild(known, tensors, str(path))
 
 
-def _rebuild(told: dict[str, Any], tensors: dict[str, Any], source: str) -> TrainedModel:
-    problem = problem_from_dict(told["problem"], source)
-    if lattice_hash(problem.lattice) != told["lattice"]:
-        raise InvalidModel(f"{source}: the lattice in it is not the one that it was trained on")
-    architecture = models[told["architecture"]]
-    view = views[architecture.view](problem, **told["view"])
-    network = architecture.build(view.shape)
+def _rebuild(known: Known, tensors: dict[str, Any], source: str) -> TrainedModel:
+    try:
+        network = architecture_of(known.architecture).build(known.view.shape)
+    except UnknownName as error:
+        raise InvalidModel(f"{source}: {error}") from None
     try:
         network.load_state_dict(tensors)
     except RuntimeError as error:
         lines = str(error).splitlines()
         raise InvalidModel(
-            f"{source}: its weights are not those of {told['architecture']!r} "
+            f"{source}: its weights are not those of {known.architecture!r} "
             f"({lines[1 if len(lines) > 1 else 0].strip()})"
         ) from None
     network.eval()
     return TrainedModel(
-        told["architecture"], problem, view, network, float(told["mean"]),
-        float(told["deviation"]), told["record"],
+        known.architecture, known.problem, known.view, network, known.mean, known.deviation,
+        known.record,
     )  # fmt: skip
 
 
@@ -217,7 +222,7 @@ def _metadata(content: bytes) -> dict[str, str]:
     """Return the metadata in the header of safetensors: eight bytes of length, then JSON."""
     length = int.from_bytes(content[:8], "little")
     header: dict[str, dict[str, str]] = json.loads(content[8 : 8 + length])
-    return header["__metadata__"]
+    return header.get("__metadata__", {})
 
 
 def _first_line(error: BaseException) -> str:

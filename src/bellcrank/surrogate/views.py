@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from bellcrank.registry import Registry
-from bellcrank.surrogate.pictures import Canvas, Renderer
+from bellcrank.surrogate.pictures import Canvas, Renderer, check_masks
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -71,7 +71,7 @@ class BitsView:
 
     def look(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Unpack the bits."""
-        return np.unpackbits(packed, axis=1, count=self.shape[0])
+        return np.unpackbits(check_masks(packed, self.shape[0]), axis=1, count=self.shape[0])
 
     def to_dict(self) -> dict[str, Any]:
         """Return nothing: there is no choice."""
@@ -88,8 +88,9 @@ DIRECTIONS = 3
 class GridView:
     """The lattice in its own coordinates: a cell a node, a channel a direction of beams.
 
-    Exact on triangular lattices. On others, beams go to the cell of their middle and the
-    nearest direction, and to further channels where two would share one.
+    Exact on triangular lattices, where beams to the right and up from a node are in its cell,
+    and those to the upper left in the cell before. On others, beams go to the cell of their
+    middle and the nearest direction, and to further channels where two would share one.
     """
 
     scale = 1.0
@@ -99,7 +100,7 @@ class GridView:
         ends = lattice.positions[lattice.beams]
         along = ends[:, 1] - ends[:, 0]
         step = float(np.median(np.linalg.norm(along, axis=1)))
-        start = lattice.positions.min(axis=0)
+        start = lattice.positions[0]  # a node: beams that start in one share their cell
         middle = (ends.mean(axis=1) - start) / step @ np.linalg.inv(BASIS)
         cell = np.floor(middle + 1e-3).astype(np.int64)
         cell -= cell.min(axis=0)
@@ -115,7 +116,8 @@ class GridView:
     def look(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Put each bit into its cell."""
         cells = np.zeros((len(packed), int(np.prod(self.shape))), np.uint8)
-        cells[:, self.place] = np.unpackbits(packed, axis=1, count=len(self.place))
+        beams = len(self.place)
+        cells[:, self.place] = np.unpackbits(check_masks(packed, beams), axis=1, count=beams)
         return cells.reshape(len(packed), *self.shape)
 
     def to_dict(self) -> dict[str, Any]:

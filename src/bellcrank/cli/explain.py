@@ -1,0 +1,113 @@
+"""`bellcrank explain`: what a network sees in a design, beside what is there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.box import SIMPLE
+from rich.table import Table
+
+from bellcrank.cli.app import app
+from bellcrank.cli.arguments import DesignName
+from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+
+if TYPE_CHECKING:
+    from bellcrank.model import Design
+    from bellcrank.surrogate.explaining import Explanation
+
+ABOUT = {
+    "screening": "low-rank screening",
+    "network": "network, each flip",
+    "gradient": "network, gradient",
+    "occlusion": "network, fitting block",
+    "white": "network, white block",
+    "black": "network, black block",
+}
+
+
+@app.command()
+def explain(
+    what: DesignName,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            help="A trained model, or the folder of a training. "
+            "\\[the one that comes with bellcrank]"
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Picture to write (png, svg, pdf). \\[NAME-explained.png; with --json none]"
+        ),
+    ] = None,
+    block: Annotated[
+        int | None, typer.Option(help="Side of the block that hides, in pixels. \\[12]")
+    ] = None,
+    stride: Annotated[
+        int | None, typer.Option(help="From one place of the block to the next. \\[4]")
+    ] = None,
+    device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")] = False,
+) -> None:
+    """Say which beams matter, to a trained network and by mechanics, and how far they agree."""
+    from bellcrank.surrogate.backend import import_torch
+    from bellcrank.workflows import find_design
+
+    design = find_design(what)
+    import_torch()
+    from bellcrank.learning.explanation import explain_design
+    from bellcrank.surrogate.occlusion import Block
+
+    given = {
+        key: value for key, value in (("size", block), ("stride", stride)) if value is not None
+    }
+    target = out
+    if target is None and not as_json:
+        target = Path(f"{design.problem.name}-explained.png")
+    announce_compilation()
+    found = explain_design(
+        design, model, target,
+        block=Block(**given) if given else None, device=device, overwrite=overwrite,
+    )  # fmt: skip
+    _tell_of_stiffness(design, found.design)
+    if as_json:
+        print_json(json.dumps(found.to_dict(), indent=1))
+    else:
+        _print_agreements(found)
+    if target is not None:
+        notes.print(f"wrote {plain(target)}")
+
+
+def _tell_of_stiffness(given: Design, explained: Design) -> None:
+    """Say so if the design was explained with other springs than its own."""
+    own, learnt = given.problem.stiffness, explained.problem.stiffness
+    if (own.bond, own.angle) != (learnt.bond, learnt.angle):
+        notes.print(
+            f"[yellow]note:[/] the design's springs have stiffness {own.bond:g} and {own.angle:g}, "
+            f"for the part that it was made for; it is explained with {learnt.bond:g} and "
+            f"{learnt.angle:g}, which the network has learnt."
+        )
+
+
+def _print_agreements(found: Explanation) -> None:
+    results.print(
+        f"{plain(found.design.problem.name)}: efficiency {found.efficiency:.4f} by mechanics, "
+        f"{found.predicted:.4f} by {plain(found.architecture)}"
+    )
+    table = Table("foreseen by", "flips", "count", "Pearson", "Spearman", "top 30", box=SIMPLE)
+    for name, told in found.correlations().items():
+        for subset, one in told.items():
+            if one.count:
+                figures = [_figure(value) for value in (one.pearson, one.spearman, one.recall)]
+                table.add_row(ABOUT[name] if subset == "all" else "", subset, str(one.count),
+                              *figures)  # fmt: skip
+    results.print(table)
+
+
+def _figure(value: float) -> str:
+    return "-" if value != value else f"{value:.3f}"  # noqa: PLR0124  (nan)

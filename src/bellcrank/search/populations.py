@@ -1,0 +1,315 @@
+"""Many chains in lockstep, scored all at once: the paper's search for scorers that like batches.
+
+A network takes hardly longer over a hundred designs than over one, and a GPU over thousands. So
+all chains flip one beam each, the flipped designs are scored together, and each chain decides
+for itself. Rule, cost, schedule and random numbers are those of the search ``paper``: with the
+mechanics as scorer, chain k of a population goes where chain k of that search goes.
+
+Examples
+--------
+>>> from bellcrank.mechanics import Evaluator
+>>> from bellcrank.model import find_problem
+>>> from bellcrank.search import MetropolisSettings
+>>> problem = find_problem("scaling-8")
+>>> settings = MetropolisSettings(steps=20, chains=3)
+>>> scorer = MechanicsScorer(Evaluator(problem))
+>>> *_, (population, _) = population_steps(problem, scorer, settings)
+>>> population.step, population.masks.shape == (3, problem.lattice.beam_count)
+(20, True)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.search.blocks import BLOCK, random_numbers
+from bellcrank.search.costs import LARGEST_EXPONENT, costs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+    from bellcrank.search.metropolis import MetropolisSettings
+    from bellcrank.search.responder import Responder
+
+
+PLAIN = {
+    "moves": ("flip",),
+    "minimum_degree": 0,
+    "patience": None,
+    "goals": (),
+    "strokes": (1.0,),
+}
+"""Settings of the paper's search that these chains cannot have otherwise."""
+
+
+class Scorer(Protocol):
+    """Whatever can tell efficiencies, right or nearly so, of many designs at once."""
+
+    def score(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Return the efficiency (n,) of designs (n, M); nan for those to keep away from."""
+
+
+class MechanicsScorer:
+    """The mechanics as a scorer, one design after the other.
+
+    Parameters
+    ----------
+    responder
+        Who computes; designs without a unique, stable response are to keep away from.
+    """
+
+    def __init__(self, responder: Responder) -> None:
+        self.responder = responder
+
+    def score(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Return the efficiencies (n,) of designs (n, M), each loaded from rest."""
+        found = [self.responder.respond(mask) for mask in masks]
+        return np.array([each.score if each.counts else math.nan for each in found])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """The best different designs that each of n chains has had scored.
+
+    Parameters
+    ----------
+    score : (n, K) float64
+        In no order; -inf where there is none yet.
+    packed : (n, K, bytes) uint8
+    """
+
+    score: NDArray[np.float64]
+    packed: NDArray[np.uint8]
+
+    @classmethod
+    def nothing(cls, chains: int, count: int, width: int) -> Kept:
+        """Return room for so many designs of `width` bytes a chain."""
+        return cls(np.full((chains, count), -np.inf), np.zeros((chains, count, width), np.uint8))
+
+    def joined_by(self, score: NDArray[np.float64], masks: NDArray[np.bool_]) -> Kept:
+        """Return what is kept after one more design of each chain.
+
+        Parameters
+        ----------
+        score : (n,)
+        masks : (n, M) bool
+        """
+        if not self.score.shape[1]:
+            return self
+        rows = np.flatnonzero(score > self.score.min(axis=1))
+        packed = np.packbits(masks[rows], axis=1)
+        held = (self.packed[rows] == packed[:, None]).all(axis=2) & np.isfinite(self.score[rows])
+        new = ~held.any(axis=1)
+        rows, packed = rows[new], packed[new]
+        if not len(rows):
+            return self
+        after = Kept(self.score.copy(), self.packed.copy())
+        place = self.score[rows].argmin(axis=1)
+        after.score[rows, place] = score[rows]
+        after.packed[rows, place] = packed
+        return after
+
+    def ranked(self, chain: int) -> list[tuple[float, NDArray[np.uint8]]]:
+        """Return score and packed mask of what one chain keeps, best first."""
+        order = np.argsort(-self.score[chain], kind="stable")
+        return [
+            (float(self.score[chain, k]), self.packed[chain, k])
+            for k in order
+            if np.isfinite(self.score[chain, k])
+        ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Population:
+    """Where n chains stand after the same number of steps.
+
+    Parameters
+    ----------
+    step
+        Proposals of each so far.
+    masks : (n, M) bool
+        Current designs.
+    score, cost : (n,) float64
+        Of these.
+    accepted : (n,) int64
+        Accepted proposals so far; each chain's own temperature follows from it.
+    kept
+        The best designs that each has had scored, accepted or not.
+    """
+
+    step: int
+    masks: NDArray[np.bool_]
+    score: NDArray[np.float64]
+    cost: NDArray[np.float64]
+    accepted: NDArray[np.int64]
+    kept: Kept
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposed:
+    """What n chains proposed in one step.
+
+    Parameters
+    ----------
+    beam : (n,) int64
+        Flipped.
+    score : (n,) float64
+        Of the flipped designs.
+    temperature : (n,) float64
+    accepted : (n,) bool
+    """
+
+    beam: NDArray[np.int64]
+    score: NDArray[np.float64]
+    temperature: NDArray[np.float64]
+    accepted: NDArray[np.bool_]
+
+
+def start_population(
+    problem: Problem, scorer: Scorer, settings: MetropolisSettings, keep: int = 0
+) -> Population:
+    """Return `settings.chains` chains at the problem's initial design.
+
+    Parameters
+    ----------
+    keep
+        How many of the best designs to keep, a chain.
+
+    Raises
+    ------
+    InvalidSettings
+        If the settings ask for what these chains do not do, or the initial design has no score.
+    """
+    require_plain_flips(settings)
+    chains = settings.chains
+    masks = np.repeat(problem.initial[None], chains, axis=0)
+    first = float(scorer.score(masks[:1])[0])
+    if math.isnan(first):
+        raise InvalidSettings(
+            f"problem {problem.name!r}: the search cannot start from the initial design: the "
+            f"scorer gives it no efficiency"
+        )
+    score = np.full(chains, first)
+    kept = Kept.nothing(chains, keep, (masks.shape[1] + 7) // 8)
+    return Population(
+        0, masks, score, costs_of(settings.cost, score), np.zeros(chains, np.int64),
+        kept.joined_by(score, masks),
+    )  # fmt: skip
+
+
+def advance_population(
+    problem: Problem,
+    scorer: Scorer,
+    settings: MetropolisSettings,
+    here: Population,
+    uniforms: NDArray[np.float64],
+) -> tuple[Population, Proposed]:
+    """Let each chain make one proposal.
+
+    Parameters
+    ----------
+    uniforms : (n, 2)
+        Random numbers in [0, 1): which beam, and whether uphill.
+    """
+    designable, temperatures = problem.designable, settings.temperatures
+    beam = designable[(uniforms[:, 0] * len(designable)).astype(np.int64)]
+    every = np.arange(len(beam))
+    masks = here.masks.copy()
+    masks[every, beam] ^= True
+    score = np.asarray(scorer.score(masks), np.float64)
+    cost = costs_of(settings.cost, score)
+    temperature = temperatures[np.minimum(here.accepted, len(temperatures) - 1)]
+    rise = np.where(np.isnan(cost), np.inf, cost - here.cost)
+    accepted = uniforms[:, 1] < np.exp(np.minimum(-rise / temperature, 0.0))
+    kept = here.kept.joined_by(score, masks)
+    refused = ~accepted
+    masks[every[refused], beam[refused]] ^= True
+    after = Population(
+        here.step + 1, masks, np.where(accepted, score, here.score),
+        np.where(accepted, cost, here.cost), here.accepted + accepted, kept,
+    )  # fmt: skip
+    return after, Proposed(beam, score, temperature, accepted)
+
+
+def population_steps(
+    problem: Problem,
+    scorer: Scorer,
+    settings: MetropolisSettings,
+    *,
+    first: int = 0,
+    keep: int = 0,
+    review: Callable[[Population], Population] = lambda population: population,
+) -> Iterator[tuple[Population, Proposed]]:
+    """Yield where the chains stand after each step, and what they proposed in it.
+
+    A chain's random numbers are named by seed, chain and block, so that its course does not
+    depend on how many run beside it. (A network's last digits may depend on the batch, though,
+    and a chain that stands at a fork may feel them.)
+
+    Parameters
+    ----------
+    settings
+        Of the paper's search: steps, chains, seed, cost and schedule.
+    first
+        Number of the first chain.
+    keep
+        How many of the best designs to keep, a chain.
+    review
+        Called after each step; the chains go on from what it returns.
+
+    Raises
+    ------
+    InvalidSettings
+        If the settings ask for what these chains do not do, or the initial design has no score.
+    """
+    here = start_population(problem, scorer, settings, keep)
+    uniforms = np.empty((0, 0, 2))
+    while here.step < settings.steps:
+        block, row = divmod(here.step, BLOCK)
+        if row == 0:
+            uniforms = np.stack(
+                [
+                    random_numbers(settings.seed, first + chain, block).random((BLOCK, 2))
+                    for chain in range(settings.chains)
+                ],
+                axis=1,
+            )
+        here, proposed = advance_population(problem, scorer, settings, here, uniforms[row])
+        here = review(here)
+        yield here, proposed
+
+
+def costs_of(name: str, score: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return registered costs (n,) of efficiencies (n,); nan stays nan.
+
+    Examples
+    --------
+    >>> costs_of("exponential", np.array([0.0, -np.log(2.0)])).round(6)
+    array([1., 2.])
+    """
+    of = costs[name].of
+    return np.array([of(each) for each in np.maximum(score, -LARGEST_EXPONENT).tolist()])
+
+
+def require_plain_flips(settings: MetropolisSettings) -> None:
+    """Refuse settings of the paper's search that need the mechanics at each step.
+
+    Raises
+    ------
+    InvalidSettings
+    """
+    for name, plain in PLAIN.items():
+        given = getattr(settings, name)
+        if given != plain:
+            raise InvalidSettings(
+                f"{name}: chains that ask a stand-in for the mechanics know only {plain!r}, got "
+                f"{given!r}"
+            )

@@ -1,0 +1,314 @@
+"""Delayed acceptance: a cheap scorer screens what is proposed, the mechanics decides.
+
+A flip must first pass by what the scorer says of it; only then is its response computed, and a
+second rule sets right whatever the scorer got wrong (J. A. Christen and C. Fox, J. Comput.
+Graph. Stat. 14, 795, 2005). With a(x, y) the chance that a flip from x to y passes the first
+rule, the second accepts with probability
+
+    min(1, exp(-(cost(y) - cost(x)) / T) a(y, x) / a(x, y)),
+
+so that at a fixed temperature the chain visits each design with probability exp(-cost / T) / Z,
+however bad the scorer. A bad one costs time, never truth: it lets useless flips pass, or holds
+good ones back, which a floor under a(x, y) limits.
+
+What the scorer is asked does not depend on what the mechanics answers until a flip is accepted:
+the random numbers of the next few proposals are drawn ahead, and those are scored in one batch.
+That changes nothing in where the chain goes.
+
+Examples
+--------
+>>> from bellcrank.mechanics import Evaluator
+>>> from bellcrank.model import find_problem
+>>> from bellcrank.search.populations import MechanicsScorer
+>>> problem = find_problem("scaling-8")
+>>> evaluator = Evaluator(problem)
+>>> settings = ScreenedSettings(steps=300)
+>>> *_, (state, proposals) = screened_blocks(
+...     evaluator, MechanicsScorer(Evaluator(problem)), settings, chain=0
+... )
+>>> state.step, state.responses + state.saved
+(300, 300)
+>>> state.saved > 0
+True
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.model import pack_mask
+from bellcrank.search.blocks import (
+    BLOCK,
+    FORESEEN,
+    Rows,
+    initial_response,
+    random_numbers,
+    steps_ahead,
+)
+from bellcrank.search.metropolis import MetropolisSettings
+from bellcrank.search.place import Place, accepts, flipped
+from bellcrank.search.populations import Scorer, costs_of, require_plain_flips
+from bellcrank.search.settings import check_whole
+from bellcrank.search.walking import place_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from bellcrank.runs import Proposals
+    from bellcrank.search.responder import Responder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScreenedSettings(MetropolisSettings):
+    """Settings of a chain whose proposals are screened; for the rest, see `MetropolisSettings`.
+
+    Parameters
+    ----------
+    doubt
+        Error of the scorer's differences, in units of the cost: the first rule is that of a
+        temperature so much higher. 0 takes the scorer at its word.
+    least_chance
+        With which any flip passes the first rule, whatever the scorer says.
+    lookahead
+        Proposals scored in one batch; changes nothing but the time it takes.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+    """
+
+    name: ClassVar[str] = "screened"
+
+    doubt: float = 0.0
+    least_chance: float = 0.02
+    lookahead: int = 16
+
+    def __post_init__(self) -> None:
+        MetropolisSettings.__post_init__(self)
+        require_plain_flips(self)
+        check_whole("lookahead", self.lookahead, 1)
+        if isinstance(self.doubt, bool) or not 0.0 <= self.doubt < math.inf:
+            raise InvalidSettings(f"doubt: expected a cost of at least 0, got {self.doubt!r}")
+        if isinstance(self.least_chance, bool) or not 0.0 < self.least_chance <= 1.0:
+            raise InvalidSettings(
+                f"least_chance: expected a probability above 0, got {self.least_chance!r}; at 0 "
+                f"there may be designs that the chain never reaches"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenedState:
+    """Where a screened chain stands between two blocks.
+
+    Parameters
+    ----------
+    step
+        Proposals made so far.
+    mask
+        The current design in hexadecimal.
+    efficiency
+        Of the current design, by the mechanics.
+    best
+        Highest efficiency of an accepted design so far.
+    accepted
+        Accepted proposals so far.
+    responses
+        Proposals that the mechanics was asked about.
+    scored
+        Designs that the scorer was asked about.
+    """
+
+    step: int
+    mask: str
+    efficiency: float
+    best: float
+    accepted: int = 0
+    responses: int = 0
+    scored: int = 0
+
+    @property
+    def saved(self) -> int:
+        """Proposals that the mechanics was not asked about."""
+        return self.step - self.responses
+
+
+def start_screened(responder: Responder) -> ScreenedState:
+    """Return the state of a chain at the problem's initial design.
+
+    Raises
+    ------
+    InvalidSettings
+        If that has no unique, stable response.
+    """
+    efficiency = initial_response(responder).score
+    return ScreenedState(0, pack_mask(responder.problem.initial), efficiency, efficiency)
+
+
+def screened_blocks(
+    responder: Responder,
+    scorer: Scorer,
+    settings: ScreenedSettings,
+    chain: int,
+    state: ScreenedState | None = None,
+) -> Iterator[tuple[ScreenedState, Proposals]]:
+    """Yield state and proposals block by block until the chain is done.
+
+    Proposals that the scorer held back have the status `FORESEEN` and no efficiency.
+
+    Raises
+    ------
+    InvalidSettings
+        If the initial design has no unique, stable response.
+    """
+    state = state or start_screened(responder)
+    while state.step < settings.steps:
+        state, proposals = advance_screened(responder, scorer, settings, chain, state)
+        yield state, proposals
+
+
+def advance_screened(
+    responder: Responder,
+    scorer: Scorer,
+    settings: ScreenedSettings,
+    chain: int,
+    state: ScreenedState,
+) -> tuple[ScreenedState, Proposals]:
+    """Advance a chain by one block, or less if its steps end first."""
+    rng = random_numbers(settings.seed, chain, state.step // BLOCK)
+    count = steps_ahead(settings, state.step)
+    uniforms = rng.random((BLOCK, 3))[:count]
+    designable, temperatures = responder.problem.designable, settings.temperatures
+    beams = designable[(uniforms[:, 0] * len(designable)).astype(np.int64)]
+    here = place_of(responder, settings.cost, temperatures[0], state.mask)
+    screen = _Screen(scorer, settings, beams, here.mask)
+    rows = Rows()
+    for number in range(count):
+        here.temperature = float(temperatures[min(state.accepted, len(temperatures) - 1)])
+        rise = screen.rise(number)
+        there, asked = _step(here, rise, beams[number], uniforms[number, 1:], settings, rows)
+        state = replace(state, step=state.step + 1, responses=state.responses + asked)
+        if there is not here:
+            efficiency = there.response.score
+            state = replace(
+                state, efficiency=efficiency, best=max(state.best, efficiency),
+                accepted=state.accepted + 1,
+            )  # fmt: skip
+            screen.move(number, there.mask)
+        here = there
+    state = replace(state, mask=pack_mask(here.mask), scored=state.scored + screen.scored)
+    return state, rows.proposals(responder.problem)
+
+
+def _step(
+    here: Place,
+    rise: float,
+    beam: int,
+    uniforms: NDArray[np.float64],
+    settings: ScreenedSettings,
+    rows: Rows,
+) -> tuple[Place, bool]:
+    """Make one proposal; return where the chain is then, and whether the mechanics was asked."""
+    mask = flipped(here.mask, np.array([beam]))
+    there_passes = log_passes(rise, here.temperature, settings)
+    if uniforms[0] >= math.exp(there_passes):
+        rows.add(mask, math.nan, math.nan, here.temperature, False, FORESEEN)
+        return here, False
+    response = here.responder.respond_nearby(mask)
+    there = Place(here.responder, here.cost_function, here.temperature, mask, response)
+    accepted = False
+    if there.counts:
+        back_passes = log_passes(-rise, here.temperature, settings)
+        gain = (here.cost - there.cost) / here.temperature
+        accepted = accepts(corrected(gain, there_passes, back_passes), float(uniforms[1]))
+    rows.add(
+        mask, response.efficiency, there.cost, here.temperature, accepted, int(response.status)
+    )
+    if accepted:
+        here.responder.remember()
+        return there, True
+    return here, True
+
+
+def log_passes(rise: float, temperature: float, settings: ScreenedSettings) -> float:
+    """Log of the chance that a flip passes the first rule.
+
+    Parameters
+    ----------
+    rise
+        Of the cost, as the scorer has it; nan, of which it says nothing, passes always.
+
+    Examples
+    --------
+    >>> log_passes(-1.0, 0.01, ScreenedSettings()), log_passes(0.01, 0.01, ScreenedSettings())
+    (0.0, -1.0)
+    """
+    if math.isnan(rise):
+        return 0.0
+    gain = -rise / (temperature + settings.doubt)
+    return max(math.log(settings.least_chance), min(0.0, gain))
+
+
+def corrected(gain: float, there_passes: float, back_passes: float) -> float:
+    """Log of the second rule's ratio.
+
+    Parameters
+    ----------
+    gain
+        Log of the ratio of the designs' probabilities, by the mechanics.
+    there_passes, back_passes
+        Log of the chances that the flip, and that its reverse, pass the first rule.
+    """
+    return gain + back_passes - there_passes
+
+
+class _Screen:
+    """What the scorer says of the flips ahead, asked for a few of them at a time.
+
+    Parameters
+    ----------
+    beams : (count,)
+        To be flipped in the block at hand, each from wherever the chain is then.
+    mask : (M,) bool
+        Where it is now.
+    """
+
+    def __init__(
+        self,
+        scorer: Scorer,
+        settings: ScreenedSettings,
+        beams: NDArray[np.int64],
+        mask: NDArray[np.bool_],
+    ) -> None:
+        self.scorer = scorer
+        self.settings = settings
+        self.beams = beams
+        self.mask = mask
+        self.cost = float(self._costs(mask[None])[0])
+        self.scored = 1
+        self._ahead: dict[int, float] = {}
+
+    def rise(self, number: int) -> float:
+        """Return the change of the scorer's cost by the flip of that number."""
+        if number not in self._ahead:
+            beams = self.beams[number : number + self.settings.lookahead]
+            masks = np.repeat(self.mask[None], len(beams), axis=0)
+            masks[np.arange(len(beams)), beams] ^= True
+            self._ahead = dict(enumerate(self._costs(masks).tolist(), number))
+            self.scored += len(beams)
+        return self._ahead[number] - self.cost
+
+    def move(self, number: int, mask: NDArray[np.bool_]) -> None:
+        """Go where the flip of that number leads; nothing ahead is known from there."""
+        self.cost = self._ahead[number]
+        self.mask = mask
+        self._ahead = {}
+
+    def _costs(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
+        return costs_of(self.settings.cost, self.scorer.score(masks))

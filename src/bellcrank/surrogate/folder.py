@@ -1,0 +1,132 @@
+"""The folder of a training: what lies in it, and what it says about itself."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidFile, InvalidSettings, OutputExists
+from bellcrank.model.parsing import read_json
+from bellcrank.model.storage import write_text
+from bellcrank.provenance import provenance
+from bellcrank.runs.files import make_folder
+from bellcrank.surrogate.recipes import PRECISIONS, Recipe
+
+if TYPE_CHECKING:
+    import os
+
+    from bellcrank.surrogate.dataset import Dataset
+
+TRAINING_SCHEMA = "bellcrank/training/1"
+DESCRIPTION = "training.json"
+CHECKPOINT = "checkpoint.safetensors"
+LOG = "log.csv"
+MODEL = "model.safetensors"
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What a training's folder says about it.
+
+    Parameters
+    ----------
+    recipe
+        How it learns.
+    precision
+        Of the arithmetic, as it was chosen when it began.
+    data
+        Hash of what it learns from.
+    """
+
+    recipe: Recipe
+    precision: str
+    data: str
+
+
+def check_new(folder: str | os.PathLike[str]) -> None:
+    """Refuse a folder that holds anything of a training.
+
+    Raises
+    ------
+    OutputExists
+    """
+    place = Path(folder)
+    if (place / DESCRIPTION).exists():
+        raise OutputExists(
+            f"{place / DESCRIPTION}: a training lies there already; go on with it (--resume), or "
+            f"choose another folder (--out)"
+        )
+    for name in (CHECKPOINT, LOG, MODEL):
+        if (place / name).exists():
+            raise OutputExists(f"{place / name}: exists already; choose another folder (--out)")
+
+
+def write_description(folder: Path, told: Description) -> None:
+    """Make the folder of a training, and say in it what it is.
+
+    Raises
+    ------
+    OutputExists
+        If somebody else was faster.
+    StorageError
+        If that is impossible.
+    """
+    make_folder(folder)
+    data = {
+        "schema": TRAINING_SCHEMA,
+        "recipe": told.recipe.to_dict(),
+        "precision": told.precision,
+        "data": told.data,
+        "provenance": provenance(),
+    }
+    write_text(folder / DESCRIPTION, json.dumps(data, indent=1) + "\n")
+
+
+def read_description(folder: str | os.PathLike[str]) -> Description:
+    """Read what a training's folder says about it.
+
+    Raises
+    ------
+    InvalidFile
+        If no training lies there, or its description is damaged.
+    """
+    place = Path(folder) / DESCRIPTION
+    if not place.exists():
+        raise InvalidFile(f"{folder}: no training to go on with: it has no {DESCRIPTION}")
+    told = read_json(place)
+    if told.get("schema") != TRAINING_SCHEMA:
+        raise InvalidFile(
+            f"{place}: expected schema {TRAINING_SCHEMA!r}, got {told.get('schema')!r}"
+        )
+    try:
+        recipe = Recipe.from_dict(told["recipe"])
+        precision, data = str(told["precision"]), str(told["data"])
+    except (KeyError, TypeError, InvalidSettings) as error:
+        raise InvalidFile(f"{place}: damaged ({error}); restore it from a copy") from None
+    if precision not in PRECISIONS:
+        raise InvalidFile(f"{place}: damaged (precision {precision!r}); restore it from a copy")
+    return Description(recipe, precision, data)
+
+
+def read_recipe(folder: str | os.PathLike[str]) -> Recipe:
+    """Return the recipe of the training in a folder.
+
+    Raises
+    ------
+    InvalidFile
+        If there is none.
+    """
+    return read_description(folder).recipe
+
+
+def data_hash(data: Dataset) -> str:
+    """Return the identity of what is learnt from: masks, efficiencies and runs."""
+    digest = hashlib.sha256()
+    for column in (data.packed, data.efficiency, data.run):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.hexdigest()[:16]

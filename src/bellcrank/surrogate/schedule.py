@@ -1,0 +1,84 @@
+"""What a recipe says of each step: which rows, at what rate, and how the average follows."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.surrogate.splitting import flattening_chances
+
+if TYPE_CHECKING:
+    import torch
+    from numpy.typing import NDArray
+
+    from bellcrank.surrogate.recipes import Recipe
+
+
+def rows_of_epoch(
+    recipe: Recipe,
+    epoch: int,
+    rows: NDArray[np.int64],
+    efficiency: NDArray[np.float64],
+    wanted: int,
+) -> NDArray[np.int64]:
+    """Return the rows of an epoch, in the order in which they are seen.
+
+    Parameters
+    ----------
+    epoch
+        From 0. With the recipe's seed it names the stream of random numbers.
+    rows
+        To train with.
+    efficiency
+        Of these rows.
+    wanted
+        How many.
+
+    Examples
+    --------
+    >>> from bellcrank.surrogate.recipes import Recipe
+    >>> plain = Recipe(resampling=False)
+    >>> sorted(rows_of_epoch(plain, 0, np.arange(4), np.zeros(4), 4).tolist())
+    [0, 1, 2, 3]
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(recipe.seed, spawn_key=(epoch,)))
+    if recipe.resampling:
+        return np.asarray(rng.choice(rows, wanted, p=flattening_chances(efficiency)))
+    order = [rng.permutation(rows) for _ in range(-(-wanted // len(rows)))]
+    return np.concatenate(order)[:wanted]
+
+
+def rate_of(recipe: Recipe, step: int, total: int) -> float:
+    """Return the learning rate of a step, from 0, of so many in all.
+
+    Examples
+    --------
+    >>> from bellcrank.surrogate.recipes import Recipe
+    >>> recipe = Recipe(learning_rate=0.1, warm_up=10, schedule="cosine")
+    >>> [round(rate_of(recipe, step, 100), 4) for step in (0, 9, 50, 100)]
+    [0.01, 0.098, 0.05, 0.0]
+    """
+    rate = recipe.learning_rate
+    if recipe.warm_up:
+        rate *= min(1.0, (step + 1) / recipe.warm_up)
+    if recipe.schedule == "cosine":
+        rate *= 0.5 + 0.5 * math.cos(math.pi * step / total)
+    return rate
+
+
+def move_average(
+    average: torch.nn.Module, network: torch.nn.Module, decay: float, step: int
+) -> None:
+    """Move the running average of weights towards the network, faster at first."""
+    import torch
+
+    weight = 1.0 - min(decay, (1.0 + step) / (10.0 + step))
+    with torch.no_grad():
+        mine, theirs = average.state_dict(), network.state_dict()
+        moving = [name for name, value in mine.items() if value.is_floating_point()]
+        torch._foreach_lerp_([mine[n] for n in moving], [theirs[n] for n in moving], weight)
+        for name, value in mine.items():
+            if not value.is_floating_point():
+                value.copy_(theirs[name])

@@ -1,0 +1,142 @@
+"""Active learning: what is proposed, labelled and learnt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidDataset, InvalidSettings
+from bellcrank.learning import proposing
+from bellcrank.learning.active import Knowledge, begin_learning, learn_actively
+from bellcrank.learning.proposing import ActiveSettings, label_designs, propose_designs
+from bellcrank.mechanics import Evaluator, Response, Status
+from bellcrank.surrogate.predictor import Predictor
+
+from .tiny import RECIPE, tiny_dataset, tiny_model, tiny_problem
+
+SETTINGS = ActiveSettings(chains=5, steps=60, disputed=6, best=4, seed=9)
+
+
+def knowledge(members: int = 2) -> Knowledge:
+    return begin_learning(tiny_dataset(), RECIPE, [tiny_model(k) for k in range(members)])
+
+
+def predictor(members: int) -> Predictor:
+    return Predictor(tiny_problem(), [tiny_model(k) for k in range(members)], device="cpu")
+
+
+@pytest.mark.parametrize("members", [1, 3])
+def test_each_chain_proposes_different_designs(members: int) -> None:
+    chosen = propose_designs(predictor(members), SETTINGS)
+    assert [len(designs) for designs in chosen] == [10] * 5
+    assert all(len(np.unique(designs, axis=0)) == 10 for designs in chosen)
+
+
+def test_the_most_disputed_and_the_best_are_chosen() -> None:
+    beams = tiny_problem().lattice.beam_count
+    several = predictor(3)
+    (everything,) = propose_designs(several, replace(SETTINGS, chains=1, disputed=60, best=0))
+    (chosen,) = propose_designs(several, replace(SETTINGS, chains=1))
+    said = several.predict(np.unpackbits(everything, axis=1, count=beams).astype(bool))
+    place = {design.tobytes(): k for k, design in enumerate(everything)}
+    rows = [place[design.tobytes()] for design in chosen]
+    best = np.argsort(-said.efficiency)[:4]
+    assert set(best) <= set(rows)
+    left = np.setdiff1d(np.arange(len(everything)), best)
+    disputed = left[np.argsort(-said.spread[left])[:6]]
+    assert set(disputed) == set(rows) - set(best)
+
+
+def test_labels_are_those_of_the_mechanics_and_each_chain_is_a_run() -> None:
+    one = predictor(1)
+    data = label_designs(one, propose_designs(one, SETTINGS), SETTINGS)
+    evaluator = Evaluator(tiny_problem())
+    for packed, efficiency in zip(data.packed[::7], data.efficiency[::7], strict=True):
+        mask = np.unpackbits(packed, count=tiny_problem().lattice.beam_count)
+        assert evaluator.respond(mask.astype(bool)).efficiency == efficiency
+    assert data.run_count == 5
+    assert data.origin["active"]["seed"] == 9
+
+
+def test_rounds_extend_the_data_and_keep_the_sides_of_the_split() -> None:
+    first = knowledge()
+    told = set()
+    grown, found = learn_actively(
+        first, SETTINGS, device="cpu", tell=lambda what, _done, _total: told.add(what)
+    )
+    assert told == {"searching", "labelling", "training"}
+    again, _ = learn_actively(grown, replace(SETTINGS, seed=10), device="cpu")
+    assert (first.rounds, grown.rounds, again.rounds) == (0, 1, 2)
+    assert found.proposed == 50
+    assert found.surprise.count == found.labelled == len(grown.data) - len(first.data)
+    assert len(found.held_out) == len(grown.models) == 2
+    assert grown.data.run_count == first.data.run_count + 5
+    for before, after in ((first, grown), (grown, again)):
+        assert np.array_equal(after.data.packed[: len(before.data)], before.data.packed)
+        for side in ("training", "held_out"):
+            old, new = getattr(before.split, side), getattr(after.split, side)
+            assert np.array_equal(new[: len(old)], old)
+    runs = again.data.run
+    assert not set(runs[again.split.training]) & set(runs[again.split.held_out])
+    assert sorted(np.concatenate([again.split.training, again.split.held_out])) == list(
+        range(len(again.data))
+    )
+
+
+def test_a_warm_start_goes_on_from_the_weights() -> None:
+    known = knowledge(1)
+    barely = replace(known, recipe=replace(RECIPE, epochs=1, learning_rate=1e-12))
+    settings = replace(SETTINGS, share=0.5)
+    masks = known.data.packed[:50]
+    before = known.models[0].predict(masks, device="cpu")
+    warm, _ = learn_actively(barely, settings, device="cpu")
+    cold, _ = learn_actively(barely, replace(settings, warm=False), device="cpu")
+    close = np.abs(warm.models[0].predict(masks, device="cpu") - before).mean()
+    far = np.abs(cold.models[0].predict(masks, device="cpu") - before).mean()
+    assert close < 0.5 * far
+
+
+def test_a_warm_start_of_another_kind_of_network_is_refused() -> None:
+    known = replace(knowledge(1), recipe=replace(RECIPE, model="grid"))
+    with pytest.raises(InvalidSettings, match="'grid' cannot go on from the weights of a 'mlp'"):
+        learn_actively(known, SETTINGS, device="cpu")
+
+
+@pytest.mark.parametrize("what", ["searching", "training"])
+def test_a_stopped_round_is_none(what: str) -> None:
+    seen = []
+    ended = learn_actively(
+        knowledge(1), SETTINGS, device="cpu",
+        tell=lambda now, _done, _total: seen.append(now), stop=lambda: what in seen,
+    )  # fmt: skip
+    assert ended is None or what == "training"  # a short training may be over before it is asked
+
+
+class Snapping(Evaluator):
+    """Finds that everything snaps."""
+
+    def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
+        return replace(super().respond(mask, largest_increment), status=Status.SNAPPED)
+
+
+def test_designs_that_all_snap_are_no_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(proposing, "Evaluator", Snapping)
+    chosen = [tiny_dataset().packed[:3]]
+    with pytest.raises(InvalidDataset, match="none of 3 designs"):
+        label_designs(predictor(1), chosen, SETTINGS)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"disputed": -1}, "disputed: expected at least 0"),
+        ({"disputed": 0, "best": 0}, "expected at least one design to label"),
+        ({"share": 1.0}, "share: expected from 0 to below 1"),
+        ({"chains": 0}, "chains: "),
+    ],
+)
+def test_impossible_rounds_are_refused(given: dict[str, float], message: str) -> None:
+    with pytest.raises(InvalidSettings, match=message):
+        ActiveSettings(**given)

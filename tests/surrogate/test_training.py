@@ -1,0 +1,371 @@
+"""A training ends with the same weights whatever interrupts it, and it learns."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import torch
+
+from bellcrank.errors import (
+    InvalidFile,
+    InvalidModel,
+    InvalidSettings,
+    OutputExists,
+    RunFailed,
+    UnknownName,
+)
+from bellcrank.surrogate import training as module
+from bellcrank.surrogate.folder import CHECKPOINT, DESCRIPTION, LOG, MODEL
+from bellcrank.surrogate.metrics import accuracy
+from bellcrank.surrogate.progress import LossMeter
+from bellcrank.surrogate.recipes import Recipe, recipe_of
+from bellcrank.surrogate.trained import read_model
+from bellcrank.surrogate.training import begin, read_recipe, resume
+
+from .helpers import TINY, random_dataset, same_weights
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from bellcrank.model import Problem
+    from bellcrank.surrogate.dataset import Dataset
+    from bellcrank.surrogate.progress import EpochRecord
+    from bellcrank.surrogate.trained import TrainedModel
+    from bellcrank.surrogate.training import Training
+
+STEPS = 15
+AVERAGED = replace(
+    TINY, optimiser="adamw", schedule="cosine", warm_up=4, weight_decay=0.01, averaging=0.9
+)
+
+
+def to_the_end(training: Training) -> TrainedModel:
+    for _ in training.run():
+        pass
+    assert training.is_done
+    return training.finish()
+
+
+def after(steps: int) -> Callable[[], bool]:
+    """Stop when asked for the time of that number."""
+    asked = 0
+
+    def stop() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked >= steps
+
+    return stop
+
+
+def timeless(log: list[EpochRecord]) -> list[EpochRecord]:
+    return [replace(epoch, seconds=0.0) for epoch in log]
+
+
+@pytest.fixture(scope="module")
+def whole(data: Dataset, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Training]:
+    """The folder of a training that nothing interrupted."""
+    folder = tmp_path_factory.mktemp("whole") / "training"
+    training = begin(data, AVERAGED, folder, device="cpu")
+    to_the_end(training)
+    return folder, training
+
+
+@pytest.mark.parametrize("steps", [1, 2, 4, 5, 6, 14])
+def test_a_training_stopped_every_few_steps_ends_with_the_same_weights(
+    data: Dataset, whole: tuple[Path, Training], tmp_path: Path, steps: int
+) -> None:
+    training = begin(data, AVERAGED, tmp_path / "t", device="cpu")
+    sessions = 0
+    while not training.is_done:
+        sessions += 1
+        assert sessions <= 2 * STEPS
+        list(training.run(after(steps)))
+        training = resume(tmp_path / "t", data, device="cpu")
+    assert sessions >= STEPS // steps
+    model = training.finish()
+    assert same_weights(model, read_model(whole[0] / MODEL))
+    assert timeless(training.log) == timeless(whole[1].log)
+    assert model.record["held_out"] == read_model(whole[0] / MODEL).record["held_out"]
+
+
+def test_a_consumer_that_walks_away_costs_what_came_after_the_last_checkpoint(
+    data: Dataset, whole: tuple[Path, Training], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "TELL_SECONDS", -1.0)
+    training = begin(data, AVERAGED, tmp_path / "t", device="cpu")
+    story = training.run()
+    told = [next(story) for _ in range(8)]
+    story.close()
+    assert [each.done for each in told] == [16, 32, 48, 64, 80, 80, 96, 112]
+    assert told[5].epoch is not None
+    assert told[0].total == 16 * STEPS
+    again = resume(tmp_path / "t", data, device="cpu")
+    assert again.step == 5  # the end of the first epoch
+    assert same_weights(to_the_end(again), read_model(whole[0] / MODEL))
+
+
+def test_the_object_itself_goes_on_where_its_story_was_left(
+    data: Dataset, whole: tuple[Path, Training], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "TELL_SECONDS", -1.0)
+    training = begin(data, AVERAGED, device="cpu")
+    for number, _ in enumerate(training.run()):
+        if number == 7:
+            break
+    assert same_weights(to_the_end(training), read_model(whole[0] / MODEL))
+
+
+def test_asking_a_network_in_the_middle_of_its_training_does_not_change_what_it_learns(
+    data: Dataset, whole: tuple[Path, Training], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "TELL_SECONDS", -1.0)
+    training = begin(data, AVERAGED, device="cpu")
+    for _ in training.run():
+        training.model.predict(data.packed[:3], device="cpu")
+        training.finish()
+    assert same_weights(training.finish(), read_model(whole[0] / MODEL))
+
+
+def test_convolutions_resume_to_the_last_bit_too(problem: Problem, tmp_path: Path) -> None:
+    data = random_dataset(problem, runs=4, steps=10)
+    recipe = replace(AVERAGED, model="resnet18-w16", batch=2, epoch_size=6, epochs=2, tested=4)
+    expected = to_the_end(begin(data, recipe, device="cpu"))
+    training = begin(data, recipe, tmp_path / "t", device="cpu")
+    list(training.run(after(2)))
+    training = resume(tmp_path / "t", data, device="cpu")
+    list(training.run(after(2)))
+    assert same_weights(to_the_end(resume(tmp_path / "t", data, device="cpu")), expected)
+
+
+CHILD = """
+import sys, torch
+torch.set_num_threads(1)
+from bellcrank.surrogate import training
+from bellcrank.surrogate.dataset import read_dataset
+training.CHECKPOINT_SECONDS = training.TELL_SECONDS = 0.0
+data = read_dataset(sys.argv[1])
+running = training.begin(data, training.read_recipe(sys.argv[3]), sys.argv[2], device="cpu")
+print("start", running.step, flush=True)
+for progress in running.run():
+    print("done", progress.done, flush=True)
+"""
+
+
+def test_a_training_killed_without_warning_ends_with_the_same_weights(
+    data: Dataset, whole: tuple[Path, Training], tmp_path: Path
+) -> None:
+    data.write(tmp_path / "data.parquet")
+    words = [sys.executable, "-c", CHILD, tmp_path / "data.parquet", tmp_path / "t", whole[0]]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        told = [child.stdout.readline().split() for _ in range(5)]
+        os.kill(child.pid, signal.SIGKILL)
+    assert child.returncode == -signal.SIGKILL
+    assert told[-1] == ["done", "64"]
+    training = resume(tmp_path / "t", data, device="cpu")
+    assert 2 < training.step < STEPS
+    assert same_weights(to_the_end(training), read_model(whole[0] / MODEL))
+
+
+def test_the_log_has_a_line_for_each_epoch(whole: tuple[Path, Training]) -> None:
+    folder, training = whole
+    rows = list(csv.DictReader((folder / LOG).read_text().splitlines()))
+    assert [int(row["epoch"]) for row in rows] == [1, 2, 3]
+    assert [int(row["designs"]) for row in rows] == [80, 160, 240]
+    for row, epoch in zip(rows, training.log, strict=True):
+        assert {name: float(value) for name, value in row.items()} == {
+            name: float(getattr(epoch, name)) for name in row
+        }
+    seconds = [float(row["seconds"]) for row in rows]
+    assert seconds == sorted(seconds)
+    assert seconds[0] > 0.0
+
+
+def test_the_loss_of_an_epoch_is_the_mean_over_its_batches(
+    data: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bellcrank.surrogate.progress.FORGETTING", 1.0)  # the newest loss alone
+    monkeypatch.setattr(module, "TELL_SECONDS", -1.0)
+    training = begin(data, TINY, device="cpu")
+    losses: list[float] = []
+    for progress in training.run():
+        if progress.epoch is None:
+            losses.append(progress.loss)
+        else:
+            assert progress.epoch.loss == pytest.approx(np.mean(losses[-5:]))
+    assert len(losses) == STEPS
+
+
+def test_the_figures_of_the_last_epoch_are_those_of_the_model(
+    data: Dataset, whole: tuple[Path, Training]
+) -> None:
+    folder, training = whole
+    model, rows = read_model(folder / MODEL), training.split.held_out
+    found = accuracy(model.predict(data.packed[rows], device="cpu"), data.efficiency[rows])
+    last = training.log[-1]
+    assert last.r_squared == pytest.approx(found.r_squared, abs=1e-6)
+    assert last.determination == pytest.approx(found.determination, abs=1e-6)
+    assert model.record["held_out"]["rms_error"] == pytest.approx(found.rms_error, abs=1e-6)
+    assert model.record["data"]["designs"] == len(data)
+    assert [each["epoch"] for each in model.record["epochs"]] == [1, 2, 3]
+    assert Recipe.from_dict(model.record["recipe"]) == AVERAGED
+
+
+def test_a_network_learns_to_count_beams(problem: Problem) -> None:
+    data = random_dataset(problem, runs=20, steps=50)
+    recipe = Recipe(
+        model="mlp", epochs=6, batch=50, held_out=0.2, averaging=0.9, optimiser="adamw",
+        schedule="cosine", resampling=False, precision="float32",
+    )  # fmt: skip
+    model = to_the_end(begin(data, recipe, device="cpu"))
+    fresh = random_dataset(problem, runs=1, steps=100, seed=99)
+    predicted = model.predict(fresh.packed, device="cpu")
+    assert accuracy(predicted, fresh.efficiency).determination > 0.9
+
+
+def test_a_checkpoint_of_before_losses_were_summed_can_be_gone_on_with() -> None:
+    meter = LossMeter.from_dict({"step": 3, "seconds": 1.0, "loss": 0.25, "log": []})
+    assert meter == LossMeter(0.25, 0.0, 0)
+    meter.add(torch.tensor(0.5))
+    meter.settle()
+    assert meter.running == pytest.approx(0.98 * 0.25 + 0.02 * 0.5)
+    assert meter.end_epoch() == 0.5
+
+
+def test_it_does_not_matter_when_losses_are_asked_for() -> None:
+    losses = torch.rand(20)
+    often, rarely = LossMeter(), LossMeter()
+    for loss in losses:
+        often.add(loss)
+        often.settle()
+        rarely.add(loss)
+    rarely.settle()
+    assert often == rarely
+    assert often.end_epoch() == pytest.approx(float(losses.mean()))
+    assert math.isnan(LossMeter().running)
+
+
+def test_a_training_that_diverges_says_so(data: Dataset) -> None:
+    training = begin(data, replace(TINY, learning_rate=1e30), device="cpu")
+    with pytest.raises(RunFailed, match=r"diverged: its loss is .*; train again with a lower"):
+        list(training.run())
+
+
+def test_resuming_with_other_data_is_refused(
+    data: Dataset, whole: tuple[Path, Training], problem: Problem
+) -> None:
+    other = random_dataset(problem, seed=5)
+    with pytest.raises(InvalidSettings, match="was begun with other data"):
+        resume(whole[0], other, device="cpu")
+    with pytest.raises(InvalidSettings, match="was begun with other data"):
+        resume(whole[0], data.take(np.arange(len(data) - 1)), device="cpu")
+
+
+def test_a_folder_without_a_training_cannot_be_gone_on_with(data: Dataset, tmp_path: Path) -> None:
+    for folder in (tmp_path, tmp_path / "absent"):
+        with pytest.raises(InvalidFile, match=r"no training to go on with: it has no training\.js"):
+            resume(folder, data)
+
+
+@pytest.mark.parametrize("name", [DESCRIPTION, CHECKPOINT, LOG, MODEL])
+def test_a_folder_that_holds_anything_of_a_training_is_left_alone(
+    data: Dataset, tmp_path: Path, name: str
+) -> None:
+    (tmp_path / name).write_text("something")
+    with pytest.raises(OutputExists, match=name):
+        begin(data, TINY, tmp_path, device="cpu")
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "something"
+
+
+def half(data: Dataset, folder: Path) -> Path:
+    list(begin(data, AVERAGED, folder, device="cpu").run(after(3)))
+    return folder
+
+
+def test_a_damaged_checkpoint_is_named_and_training_begins_again_without_it(
+    data: Dataset, whole: tuple[Path, Training], tmp_path: Path
+) -> None:
+    file = half(data, tmp_path / "t") / CHECKPOINT
+    content = file.read_bytes()
+    for damaged in (b"", content[:7], content[:500], content[:-1], b"\x00" * 100):
+        file.write_bytes(damaged)
+        with pytest.raises(InvalidModel, match=r"checkpoint\.safetensors: damaged .*; delete it"):
+            resume(tmp_path / "t", data, device="cpu")
+    file.unlink()
+    again = resume(tmp_path / "t", data, device="cpu")
+    assert again.step == 0
+    assert same_weights(to_the_end(again), read_model(whole[0] / MODEL))
+
+
+def test_a_checkpoint_of_another_network_is_refused(data: Dataset, tmp_path: Path) -> None:
+    folder = half(data, tmp_path / "t")
+    list(begin(data, replace(TINY, model="grid"), tmp_path / "g", device="cpu").run(after(1)))
+    (folder / CHECKPOINT).write_bytes((tmp_path / "g" / CHECKPOINT).read_bytes())
+    with pytest.raises(InvalidModel, match="damaged"):
+        resume(folder, data, device="cpu")
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"schema": "other"}', '{"schema": "S"}'])
+def test_a_damaged_description_is_refused(data: Dataset, tmp_path: Path, text: str) -> None:
+    (tmp_path / DESCRIPTION).write_text(text.replace("S", "bellcrank/training/1"))
+    with pytest.raises(InvalidFile, match=r"training\.json"):
+        resume(tmp_path, data, device="cpu")
+
+
+def test_a_log_lost_between_checkpoint_and_end_is_written_again(
+    data: Dataset, tmp_path: Path
+) -> None:
+    to_the_end(begin(data, TINY, tmp_path / "t", device="cpu"))
+    expected = (tmp_path / "t" / LOG).read_text()
+    (tmp_path / "t" / LOG).write_text(expected.splitlines()[0] + "\n")
+    again = resume(tmp_path / "t", data, device="cpu")
+    assert again.is_done
+    to_the_end(again)
+    assert (tmp_path / "t" / LOG).read_text() == expected
+
+
+def test_what_cannot_be_learnt_from_is_refused(data: Dataset) -> None:
+    level = replace(data, efficiency=np.full(len(data), 0.1))
+    with pytest.raises(InvalidSettings, match=r"all efficiencies are 0\.1: there is nothing to"):
+        begin(level, TINY, device="cpu")
+    with pytest.raises(UnknownName, match="unknown model 'vgg'"):
+        begin(data, replace(TINY, model="vgg"), device="cpu")
+    with pytest.raises(InvalidSettings, match="device: "):
+        begin(data, TINY, device="abacus")
+    with pytest.raises(InvalidSettings, match="device: expected auto, cpu or cuda, got 'meta'"):
+        begin(data, TINY, device="meta")
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"epochs": 0}, {"batch": 1}, {"epochs": 1.5}, {"seed": -1}, {"warm_up": True},
+        {"learning_rate": 0.0}, {"learning_rate": float("nan")}, {"weight_decay": -1.0},
+        {"held_out": 0.0}, {"held_out": 1.0}, {"averaging": 1.0}, {"optimiser": "sgd"},
+        {"schedule": "step"}, {"precision": "float64"}, {"epoch_size": 3},
+    ],
+)  # fmt: skip
+def test_recipes_that_make_no_sense_are_refused(given: dict[str, Any]) -> None:
+    with pytest.raises(InvalidSettings, match=rf"^{next(iter(given))}: "):
+        recipe_of("paper", **given)
+    with pytest.raises(InvalidSettings, match="color: no such key in a recipe"):
+        Recipe.from_dict({"color": 1})
+
+
+def test_the_paper_s_recipe_is_the_paper_s(whole: tuple[Path, Training]) -> None:
+    paper = recipe_of("paper")
+    assert (paper.model, paper.epochs, paper.batch, paper.optimiser) == ("resnet50", 10, 32, "adam")
+    assert (paper.held_out, paper.resampling, paper.averaging) == (0.25, True, 0.0)
+    assert read_recipe(whole[0]) == AVERAGED
