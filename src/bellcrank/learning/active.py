@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
 from bellcrank.learning.proposing import ActiveSettings, label_designs, propose_designs
 from bellcrank.surrogate.dataset import Dataset, merge
 from bellcrank.surrogate.metrics import Accuracy, accuracy
@@ -197,18 +196,10 @@ def _train(
         knowledge.split.held_out,
     )
     if settings.warm:
-        if old.architecture != recipe.model:
-            raise InvalidSettings(
-                f"warm: a {recipe.model!r} cannot go on from the weights of a "
-                f"{old.architecture!r}; take the recipe that it was trained by, or begin afresh"
-            )
-        training.model = replace(training.model, mean=old.mean, deviation=old.deviation)
-        for network in (training.model.network, training.average):
-            if network is not None:
-                network.load_state_dict(old.network.state_dict())
+        training.go_on_from(old)
     for progress in training.run(stop):
         tell("training", progress.done, progress.total)
-    return training.finish() if training.is_done else None
+    return training.finish(recipe.tested) if training.is_done else None
 
 
 def _repeats(rows: int, extra: int, share: float) -> int:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidSettings
-from bellcrank.surrogate.training import DESCRIPTION, MODEL, Progress, begin, read_recipe, resume
+from bellcrank.surrogate.trained import read_model
+from bellcrank.surrogate.training import DESCRIPTION, MODEL, Progress, begin, resume
 
 if TYPE_CHECKING:
     import os
@@ -80,22 +81,20 @@ def fit(
         raise InvalidSettings(f"members: expected 1 to {MOST_MEMBERS}, got {members}")
     place = Path(folder)
     if recipe is None:
-        begun = sorted(path.parent for path in place.glob(f"member-*/{DESCRIPTION}"))
-        members = max(members, len(begun)) if begun else 1
-        recipe = _begun_recipe(place, begun)
-        going_on = True
+        folders = _begun(place)
     else:
-        going_on = False
+        folders = [place / f"member-{member}" for member in range(members)]
+        folders = folders if members > 1 else [place]
+        for member, own in enumerate(folders):  # all at once: whoever goes on finds them all
+            begin(data, replace(recipe, seed=recipe.seed + member), own, device=device)
     models = []
-    for member in range(members):
-        own = place if members == 1 else place / f"member-{member}"
-        if going_on and (own / DESCRIPTION).exists():
-            training = resume(own, data, device=device)
-        else:
-            seeded = replace(recipe, seed=recipe.seed + member)
-            training = begin(data, seeded, own, device=device)
+    for member, own in enumerate(folders):
+        if (own / MODEL).exists():
+            models.append(read_model(own / MODEL))
+            continue
+        training = resume(own, data, device=device)
         for progress in training.run(stop):
-            tell(FitProgress(member, members, progress))
+            tell(FitProgress(member, len(folders), progress))
         if not training.is_done:
             return None
         models.append(training.finish())
@@ -124,12 +123,12 @@ def _draw(training: Training, model: TrainedModel, path: Path, device: str) -> N
     draw_learnt(learnt, path, overwrite=True)
 
 
-def _begun_recipe(place: Path, begun: list[Path]) -> Recipe:
-    """Return the recipe of the first network that was begun in a folder."""
-    first = begun[0] if begun else place
-    if not (first / DESCRIPTION).exists():
+def _begun(place: Path) -> list[Path]:
+    """Return the folders of the networks that were begun in a folder."""
+    found = sorted(path.parent for path in place.glob(f"member-*/{DESCRIPTION}"))
+    if not found and not (place / DESCRIPTION).exists():
         raise InvalidFile(f"{place}: no training to go on with: it has no {DESCRIPTION}")
-    return read_recipe(first)
+    return found or [place]
 
 
 def model_files(path: str | os.PathLike[str]) -> list[Path]:

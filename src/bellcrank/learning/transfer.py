@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidDataset, InvalidModel, InvalidSettings
-from bellcrank.surrogate.feeding import feeder_of
 from bellcrank.surrogate.flips import FlipEffects, flip_accuracy, flip_effects, held_out_designs
 from bellcrank.surrogate.identity import architecture_of
 from bellcrank.surrogate.metrics import Accuracy, accuracy
@@ -251,12 +250,10 @@ def _learn(
     if going_on:
         recipe = replace(recipe, learning_rate=GENTLER * recipe.learning_rate)
     training = begin(known, recipe, device=device)
-    training.model = replace(training.model, view=carried.view)
-    training.feeder = feeder_of(carried.view, training.device)
     if going_on:
-        for network in (training.model.network, training.average):
-            if network is not None:
-                network.load_state_dict(carried.network.state_dict())
+        training.go_on_from(carried)
+    else:
+        training.look_through(carried.view)
     for _ in training.run():
         pass
     return training.finish()

@@ -7,7 +7,7 @@ metadata hold the counters, the losses and the log.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidModel
@@ -33,6 +33,8 @@ def checkpoint_bytes(training: Training) -> bytes:
     told = {
         "step": training.step,
         "seconds": training.seconds,
+        "mean": training.model.mean,
+        "deviation": training.model.deviation,
         **training.losses.to_dict(),
         "log": [asdict(epoch) for epoch in training.log],
     }
@@ -56,6 +58,11 @@ def restore(training: Training, path: Path) -> None:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         _load(training, tensors)
         training.step, training.seconds = int(told["step"]), float(told["seconds"])
+        training.model = replace(
+            training.model,
+            mean=float(told.get("mean", training.model.mean)),
+            deviation=float(told.get("deviation", training.model.deviation)),
+        )
         training.losses = LossMeter.from_dict(told)
         training.log = [EpochRecord(**epoch) for epoch in told["log"]]
     except (SafetensorError, OSError, RuntimeError, KeyError, TypeError, ValueError) as error:

@@ -6,6 +6,7 @@ bytes. On a GPU nothing but masks is moved: pictures come from one matrix produc
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -67,8 +68,9 @@ class PictureFeeder:
         return _channels_last(ink.reshape(-1, *self.shape))
 
 
+@lru_cache(maxsize=16)
 def feeder_of(view: View, device: torch.device) -> Feeder:
-    """Return what is fast on a device."""
+    """Return what is fast on a device; the same one for the same view, since it may be large."""
     if device.type != "cpu" and isinstance(view, PictureView):
         return PictureFeeder(view, device)
     return HostFeeder(view, device)

@@ -16,7 +16,7 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.surrogate.backend import find_device, import_torch
 from bellcrank.surrogate.identity import architecture_of
-from bellcrank.surrogate.trained import BATCH
+from bellcrank.surrogate.trained import batch_of
 from bellcrank.surrogate.views import PictureView
 
 if TYPE_CHECKING:
@@ -145,10 +145,11 @@ def _ask(
         return np.asarray(network(inputs).cpu().numpy(), np.float64)
 
     found = np.empty(len(spots))
+    batch = batch_of(where)
     with torch.inference_mode():
         plain = run(picture[None])[0]
-        for first in range(0, len(spots), BATCH):
-            chosen = spots[first : first + BATCH]
+        for first in range(0, len(spots), batch):
+            chosen = spots[first : first + batch]
             hidden = np.repeat(picture[None], len(chosen), axis=0)
             for one, spot in zip(hidden, chosen, strict=True):
                 one[spot] = ink

@@ -32,6 +32,10 @@ class Recipe:
         it rises from nothing.
     weight_decay
         Of ``adamw``.
+    differences
+        Weight of the error in the differences between designs that a run proposed one after
+        the other, which a flip or two tell apart; 0 leaves it out. Half of the designs of a
+        batch are then the neighbours of the other half.
     resampling
         Whether designs are drawn, with replacement, so that efficiencies are seen equally often.
     averaging
@@ -67,6 +71,7 @@ class Recipe:
     schedule: str = "constant"
     warm_up: int = 0
     weight_decay: float = 0.0
+    differences: float = 0.0
     resampling: bool = True
     averaging: float = 0.0
     epoch_size: int | None = None
@@ -90,6 +95,13 @@ class Recipe:
         _one_of("precision", self.precision, PRECISIONS)
         if not self.learning_rate > 0.0:
             raise InvalidSettings(f"learning_rate: expected more than 0, got {self.learning_rate}")
+        if not self.differences >= 0.0:
+            raise InvalidSettings(f"differences: expected at least 0, got {self.differences}")
+        if self.differences and self.batch % 2:
+            raise InvalidSettings(
+                f"batch: expected an even number, since designs come in pairs (differences), "
+                f"got {self.batch}"
+            )
         if not self.weight_decay >= 0.0:
             raise InvalidSettings(f"weight_decay: expected at least 0, got {self.weight_decay}")
         for name in ("held_out", "averaging"):

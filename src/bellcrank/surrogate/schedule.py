@@ -22,6 +22,7 @@ def rows_of_epoch(
     rows: NDArray[np.int64],
     efficiency: NDArray[np.float64],
     wanted: int,
+    neighbour: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """Return the rows of an epoch, in the order in which they are seen.
 
@@ -35,6 +36,8 @@ def rows_of_epoch(
         Of these rows.
     wanted
         How many.
+    neighbour
+        Of every row of the data, the one to show after it; None for no pairs.
 
     Examples
     --------
@@ -43,11 +46,33 @@ def rows_of_epoch(
     >>> sorted(rows_of_epoch(plain, 0, np.arange(4), np.zeros(4), 4).tolist())
     [0, 1, 2, 3]
     """
+    if neighbour is not None:
+        first = rows_of_epoch(recipe, epoch, rows, efficiency, wanted // 2)
+        return np.stack([first, neighbour[first]], axis=1).ravel()
     rng = np.random.default_rng(np.random.SeedSequence(recipe.seed, spawn_key=(epoch,)))
     if recipe.resampling:
         return np.asarray(rng.choice(rows, wanted, p=flattening_chances(efficiency)))
     order = [rng.permutation(rows) for _ in range(-(-wanted // len(rows)))]
     return np.concatenate(order)[:wanted]
+
+
+def neighbours_of(run: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return for each row the one before it in its run; for the first of a run the one after.
+
+    Parameters
+    ----------
+    run : (n,)
+        Of each row; rows of a run stand together.
+
+    Examples
+    --------
+    >>> neighbours_of(np.array([0, 0, 0, 1, 2, 2])).tolist()
+    [1, 0, 1, 3, 5, 4]
+    """
+    rows = np.arange(len(run))
+    same = np.append(run[1:] == run[:-1], False)
+    follows = np.insert(same[:-1], 0, False)
+    return np.where(follows, rows - 1, np.where(same, rows + 1, rows))
 
 
 def rate_of(recipe: Recipe, step: int, total: int) -> float:

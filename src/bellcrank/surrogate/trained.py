@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     from bellcrank.surrogate.feeding import Feeder
     from bellcrank.surrogate.views import View
 
-__all__ = ["BATCH", "TrainedModel", "lattice_hash", "read_model", "run_network"]
+__all__ = ["TrainedModel", "batch_of", "lattice_hash", "read_model", "run_network"]
 
-BATCH = 256
-"""Designs that a network looks at in one go."""
+BATCH = {"cpu": 256, "cuda": 4096}
+"""Designs that a network looks at in one go: what fits caches, or keeps a GPU busy."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,6 +141,11 @@ class TrainedModel:
         write_bytes(path, self.to_bytes(), overwrite=overwrite)
 
 
+def batch_of(device: torch.device) -> int:
+    """Return how many designs a network on a device looks at in one go."""
+    return BATCH.get(device.type, BATCH["cpu"])
+
+
 def run_network(
     network: torch.nn.Module, feeder: Feeder, packed: NDArray[np.uint8], precision: str
 ) -> NDArray[np.float64]:
@@ -152,17 +157,18 @@ def run_network(
 
     device = next(network.parameters()).device
     parts = []
+    batch = batch_of(device)
     was_training = network.training
     network.eval()
     try:
         with torch.inference_mode(), autocast(device, precision):
             # No design makes an empty batch, so that its masks are looked at too.
-            for first in range(0, max(len(packed), 1), BATCH):
-                output = network(feeder.feed(packed[first : first + BATCH]))
-                parts.append(output.float().cpu())
+            for first in range(0, max(len(packed), 1), batch):
+                output = network(feeder.feed(packed[first : first + batch]))
+                parts.append(output.float())
     finally:
         network.train(was_training)
-    joined = torch.cat(parts)
+    joined = torch.cat(parts).cpu()  # once: each time would wait for a GPU
     return np.asarray(joined.numpy(), np.float64)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,7 +41,12 @@ from bellcrank.surrogate.folder import (
 from bellcrank.surrogate.identity import architecture_of
 from bellcrank.surrogate.metrics import accuracy
 from bellcrank.surrogate.progress import EpochRecord, LossMeter, Progress, log_text
-from bellcrank.surrogate.schedule import move_average, rate_of, rows_of_epoch
+from bellcrank.surrogate.schedule import (
+    move_average,
+    neighbours_of,
+    rate_of,
+    rows_of_epoch,
+)
 from bellcrank.surrogate.splitting import Split, overlap, split_by_run
 from bellcrank.surrogate.trained import TrainedModel, run_network
 from bellcrank.surrogate.views import views
@@ -56,6 +61,7 @@ if TYPE_CHECKING:
     from bellcrank.surrogate.dataset import Dataset
     from bellcrank.surrogate.feeding import Feeder
     from bellcrank.surrogate.recipes import Recipe
+    from bellcrank.surrogate.views import View
 
 __all__ = [
     "DESCRIPTION",
@@ -139,24 +145,56 @@ class Training:
                 for _ in self._steps_of_epoch():
                     now = time.monotonic()
                     if now - saved > CHECKPOINT_SECONDS:
-                        self._save()
+                        self.save()
                         saved = time.monotonic()
                     if now - told > TELL_SECONDS:
                         yield self._progress()
                         told = now
                     if stop():
-                        self._save()
+                        self.save()
                         return
             self.losses.settle()
             self.log.append(self._test())
-            self._save()
+            self.save()
             saved = time.monotonic()
             yield self._progress(self.log[-1])
 
-    def finish(self) -> TrainedModel:
-        """Test on everything that is held out, and return the model; write it to the folder."""
-        predicted = self._predict(self.split.held_out)
-        found = accuracy(predicted, self.data.efficiency[self.split.held_out])
+    def go_on_from(self, model: TrainedModel) -> None:
+        """Begin with the weights of a trained network, its view and its normalisation.
+
+        Raises
+        ------
+        InvalidSettings
+            If it is of another architecture.
+        """
+        if model.architecture != self.recipe.model:
+            raise InvalidSettings(
+                f"a {self.recipe.model!r} cannot go on from the weights of a "
+                f"{model.architecture!r}; take the recipe that it was trained by, or begin afresh"
+            )
+        self.look_through(model.view)
+        self.model = replace(self.model, mean=model.mean, deviation=model.deviation)
+        for network in (self.model.network, self.average):
+            if network is not None:
+                network.load_state_dict(model.network.state_dict())
+
+    def look_through(self, view: View) -> None:
+        """Let the network see designs in another way, pictures of another size for example."""
+        from bellcrank.surrogate.feeding import feeder_of
+
+        self.model = replace(self.model, view=view)
+        self.feeder = feeder_of(view, self.device)
+
+    def finish(self, most: int | None = None) -> TrainedModel:
+        """Test on what is held out, and return the model; write it to the folder.
+
+        Parameters
+        ----------
+        most
+            Held-out designs to test on; by default all.
+        """
+        rows = self._tested(most)
+        found = accuracy(self._predict(rows), self.data.efficiency[rows])
         record = {
             "recipe": self.recipe.to_dict(),
             "precision": self.precision,
@@ -190,10 +228,13 @@ class Training:
         """Make the steps that are left of the epoch at hand; yield now and then."""
         import torch
 
+        from bellcrank.surrogate.losses import loss_of
+
         epoch, first = divmod(self.step, self.steps_per_epoch)
         training, wanted = self.split.training, self.steps_per_epoch * self.recipe.batch
         efficiency = self.data.efficiency[training]
-        rows = rows_of_epoch(self.recipe, epoch, training, efficiency, wanted)
+        paired = neighbours_of(self.data.run) if self.recipe.differences else None
+        rows = rows_of_epoch(self.recipe, epoch, training, efficiency, wanted, paired)
         network = self.model.network.train()
         labels = ((self.data.efficiency - self.model.mean) / self.model.deviation).astype("f4")
         breath = 1 if self.device.type == "cpu" else STEPS_AT_ONCE
@@ -206,7 +247,7 @@ class Training:
                 group["lr"] = rate_of(self.recipe, self.step, self.total_steps)
             with autocast(self.device, self.precision):
                 output = network(inputs)
-            loss = torch.mean((output.float() - target) ** 2)
+            loss = loss_of(output.float(), target, self.recipe.differences)
             self.optimiser.zero_grad(set_to_none=True)
             loss.backward()  # type: ignore[no-untyped-call]
             self.optimiser.step()
@@ -224,18 +265,24 @@ class Training:
         found = run_network(self._network(), self.feeder, self.data.packed[rows], self.precision)
         return self.model.mean + self.model.deviation * found
 
-    def _test(self) -> EpochRecord:
+    def _tested(self, most: int | None) -> NDArray[np.int64]:
+        """Return held-out rows, the same whenever so many are asked for."""
         rows = self.split.held_out
-        if len(rows) > self.recipe.tested:
-            rng = np.random.default_rng(self.recipe.split_seed)
-            rows = np.sort(rng.choice(rows, self.recipe.tested, replace=False))
+        if most is None or len(rows) <= most:
+            return rows
+        rng = np.random.default_rng(self.recipe.split_seed)
+        return np.sort(rng.choice(rows, most, replace=False))
+
+    def _test(self) -> EpochRecord:
+        rows = self._tested(self.recipe.tested)
         found = accuracy(self._predict(rows), self.data.efficiency[rows])
         return EpochRecord(
             len(self.log) + 1, self.step * self.recipe.batch, round(self.seconds, 2),
             self.losses.end_epoch(), found.r_squared, found.determination, found.rms_error,
         )  # fmt: skip
 
-    def _save(self) -> None:
+    def save(self) -> None:
+        """Write a checkpoint and the log, if there is a folder."""
         if self.folder is not None:
             self.losses.settle()
             write_bytes(self.folder / CHECKPOINT, checkpoint_bytes(self), overwrite=True)
@@ -251,15 +298,22 @@ def begin(
     folder: str | os.PathLike[str] | None = None,
     *,
     device: str = "auto",
+    initial: TrainedModel | None = None,
 ) -> Training:
     """Begin a training in a new folder.
+
+    Parameters
+    ----------
+    initial
+        A network to go on from; by default it begins with random weights.
 
     Raises
     ------
     InvalidDataset
         If the data come from a single run.
     InvalidSettings
-        If PyTorch or the device is missing, or all efficiencies are the same.
+        If PyTorch or the device is missing, all efficiencies are the same, or `initial` is of
+        another architecture.
     UnknownName
         If there is no such model.
     OutputExists
@@ -269,10 +323,14 @@ def begin(
         check_new(folder)
     where = find_device(device)
     training = _build(data, recipe, where, find_precision(recipe.precision, where))
+    if initial is not None:
+        training.go_on_from(initial)
     if folder is not None:
         training.folder = Path(folder)
         told = Description(recipe, training.precision, data_hash(data))
         write_description(training.folder, told)
+        if initial is not None:
+            training.save()  # the weights that it begins with are to be had nowhere else
     return training
 
 

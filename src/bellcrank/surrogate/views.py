@@ -6,6 +6,7 @@ moves bytes, and the numbers are made where the network is.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 
-class View(Protocol):
+class View(Hashable, Protocol):
     """What all views can do."""
 
     shape: tuple[int, ...]

@@ -5,9 +5,9 @@ Nothing is spent on white paper, and a convolution sees exactly the beams that m
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor, nn
 
+from bellcrank.surrogate.models.reading import read_out
 from bellcrank.surrogate.models.registry import Architecture, models
 from bellcrank.surrogate.models.resnet18 import BasicBlock
 
@@ -30,7 +30,7 @@ class GridNet(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """Map (n, channels, rows, columns) to (n,)."""
         y: Tensor = self.blocks(self.stem(x))
-        return torch.as_tensor(self.head(y.flatten(1))).squeeze(1)
+        return read_out(self.head, y.flatten(1))
 
 
 models.register("grid")(Architecture("grid", GridNet, "residual network on the lattice's own grid"))

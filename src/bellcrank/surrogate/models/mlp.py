@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor, nn
 
+from bellcrank.surrogate.models.reading import read_out
 from bellcrank.surrogate.models.registry import Architecture, models
 
 WIDTHS = (512, 512, 256)
@@ -20,11 +20,12 @@ class Perceptron(nn.Module):
         for outputs in WIDTHS:
             layers += [nn.Linear(inputs, outputs), nn.BatchNorm1d(outputs), nn.ReLU()]
             inputs = outputs
-        self.layers = nn.Sequential(*layers, nn.Linear(inputs, 1))
+        self.layers = nn.Sequential(*layers)
+        self.head = nn.Linear(inputs, 1)
 
     def forward(self, x: Tensor) -> Tensor:
         """Map (n, beams) to (n,)."""
-        return torch.as_tensor(self.layers(2.0 * x - 1.0)).squeeze(1)
+        return read_out(self.head, self.layers(2.0 * x - 1.0))
 
 
 models.register("mlp")(Architecture("bits", Perceptron, "perceptron on the bits of a mask"))

@@ -13,6 +13,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from bellcrank.surrogate.models.reading import read_out
 from bellcrank.surrogate.models.registry import Architecture, models
 
 WIDTH = 16
@@ -69,7 +70,7 @@ class SlimResNet(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """Map (n, 1, height, width) to (n,)."""
         y: Tensor = self.stages(self.stem(x))
-        return torch.as_tensor(self.head(y.mean(dim=(2, 3)))).squeeze(1)
+        return read_out(self.head, y.mean(dim=(2, 3)))
 
 
 models.register("resnet18-w16")(
