@@ -24,8 +24,9 @@ from bellcrank.errors import (
     UnknownName,
 )
 from bellcrank.surrogate import training as module
+from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.folder import CHECKPOINT, DESCRIPTION, LOG, MODEL
-from bellcrank.surrogate.metrics import accuracy
+from bellcrank.surrogate.metrics import accuracy, correlation
 from bellcrank.surrogate.progress import LossMeter
 from bellcrank.surrogate.recipes import Recipe, recipe_of
 from bellcrank.surrogate.trained import read_model
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.model import Problem
-    from bellcrank.surrogate.dataset import Dataset
     from bellcrank.surrogate.progress import EpochRecord
     from bellcrank.surrogate.trained import TrainedModel
     from bellcrank.surrogate.training import Training
@@ -369,3 +369,48 @@ def test_the_paper_s_recipe_is_the_paper_s(whole: tuple[Path, Training]) -> None
     assert (paper.model, paper.epochs, paper.batch, paper.optimiser) == ("resnet50", 10, 32, "adam")
     assert (paper.held_out, paper.resampling, paper.averaging) == (0.25, True, 0.0)
     assert read_recipe(whole[0]) == AVERAGED
+
+
+@pytest.mark.parametrize("stopped_at", [0, 7])
+def test_going_on_from_a_network_survives_a_stop_too(
+    data: Dataset, tmp_path: Path, stopped_at: int
+) -> None:
+    first = to_the_end(begin(data, AVERAGED, device="cpu"))
+    recipe = replace(AVERAGED, seed=5, differences=0.5)
+    whole = to_the_end(begin(data, recipe, device="cpu", initial=first))
+    training = begin(data, recipe, tmp_path / "on", device="cpu", initial=first)
+    if stopped_at:
+        list(training.run(after(stopped_at)))
+    again = to_the_end(resume(tmp_path / "on", data, device="cpu"))
+    assert same_weights(again, whole)
+    assert (again.mean, again.deviation) == (first.mean, first.deviation)
+
+
+def test_a_network_goes_on_only_from_its_own_kind(data: Dataset) -> None:
+    first = begin(data, TINY, device="cpu").model
+    with pytest.raises(InvalidSettings, match="cannot go on from the weights of a 'mlp'"):
+        begin(data, replace(TINY, model="grid"), device="cpu", initial=first)
+
+
+def test_minding_differences_tells_neighbours_apart(problem: Problem) -> None:
+    # Runs of single flips, labelled by how many beams there are and, much more, by their run:
+    # what a flip does is a small part of what there is to learn.
+    rng = np.random.default_rng(2)
+    masks, labels, runs = [], [], []
+    weight = rng.normal(size=problem.lattice.beam_count)
+    for run in range(12):
+        mask = rng.random(len(weight)) < rng.uniform(0.2, 0.8)
+        for _ in range(150):
+            mask[rng.integers(len(mask))] ^= True
+            masks.append(np.packbits(mask))
+            labels.append(0.02 * float(weight @ mask) + 2.0 * math.sin(0.1 * mask.sum()))
+            runs.append(run)
+    data = Dataset(problem, np.array(masks), np.array(labels), np.array(runs))
+    told = []
+    for weighted in (0.0, 0.3):
+        recipe = replace(TINY, epochs=12, resampling=False, differences=weighted)
+        model = to_the_end(begin(data, recipe, device="cpu"))
+        rows = np.flatnonzero(np.isin(data.run, data.run[begin(data, recipe).split.held_out]))
+        change, said = np.diff(data.efficiency[rows]), np.diff(model.predict(data.packed[rows]))
+        told.append(correlation(change, said))
+    assert told[1] > told[0] + 0.05

@@ -17,6 +17,7 @@ from bellcrank.cli import (
     evaluate,
     explain,
     export,
+    onnx,
     plot,
     predict,
     print_part,
@@ -42,8 +43,9 @@ COMMANDS = (
     dataset,
     train,
     predict,
-    surrogate_search,
     explain,
+    surrogate_search,
+    onnx,
     problems,
 )
 """Modules that register a command."""

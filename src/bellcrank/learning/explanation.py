@@ -15,7 +15,7 @@ from bellcrank.plots.explanation import Explained, draw_explanation
 from bellcrank.plots.saving import check_target
 from bellcrank.plots.shadings import HeatMap, Shading
 from bellcrank.surrogate.explaining import Explanation, explain
-from bellcrank.surrogate.predictor import load_predictor
+from bellcrank.surrogate.predictor import load_models
 from bellcrank.surrogate.regions import overlap_of_regions
 from bellcrank.surrogate.trained import read_model
 
@@ -103,7 +103,7 @@ def _learnt(design: Design, path: str | os.PathLike[str] | None) -> tuple[Traine
     else:
         as_built_in = builtin[problem.name]().stiffness if problem.name in builtin else None
         known = replace(problem, stiffness=as_built_in or problem.stiffness)
-        network = load_predictor(known).members[0]
+        network = load_models(known)[0]
     return network, Design(known, design.mask)
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
+    from bellcrank.surrogate.onnx import OnnxModel
 
 SHIPPED = ("crane",)
 """Problems that a trained network comes with bellcrank for."""
@@ -73,7 +75,7 @@ class Predictor:
     def __init__(
         self,
         problem: Problem,
-        members: Sequence[TrainedModel],
+        members: Sequence[TrainedModel | OnnxModel],
         *,
         device: str = "auto",
         precision: str = "float32",
@@ -149,19 +151,48 @@ def load_predictor(
     InvalidSettings
         If PyTorch is not installed.
     """
+    members = [_read(path) for path in paths] or load_models(problem)
+    return Predictor(problem, members, device=device, precision=precision)
+
+
+def load_models(
+    problem: Problem, paths: Sequence[str | os.PathLike[str]] = ()
+) -> list[TrainedModel]:
+    """Return trained networks for a problem: those in files, or the one that comes with bellcrank.
+
+    Raises
+    ------
+    InvalidModel
+        If none comes with bellcrank, or one of them has learnt another problem or is damaged.
+    InvalidFile, InvalidSettings
+        As `load_predictor`.
+    """
     if paths:
-        members = [read_model(path) for path in paths]
-        return Predictor(problem, members, device=device, precision=precision)
+        found = [read_model(path) for path in paths]
+        for model in found:
+            beams_between(model.problem, problem)
+        return found
     refusals = []
     for name in SHIPPED:
         source = resources.files("bellcrank.surrogate") / "pretrained" / f"{name}.safetensors"
         with resources.as_file(source) as path:
-            member = read_model(path)
+            model = read_model(path)
         try:
-            return Predictor(problem, [member], device=device, precision=precision)
+            beams_between(model.problem, problem)
         except InvalidModel as error:
             refusals.append(str(error))
+        else:
+            return [model]
     raise InvalidModel(
         f"no trained model for {problem.name!r} comes with bellcrank ({refusals[0]}); train one "
         f"(bellcrank dataset build, bellcrank train) and name it with --model"
     )
+
+
+def _read(path: str | os.PathLike[str]) -> TrainedModel | OnnxModel:
+    """Read a network for PyTorch, or for ONNX Runtime where the name says so."""
+    if Path(path).suffix == ".onnx":
+        from bellcrank.surrogate.onnx import read_onnx
+
+        return read_onnx(path)
+    return read_model(path)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields, replace
+import math
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
 from bellcrank.errors import InvalidSettings
@@ -93,21 +94,15 @@ class Recipe:
         _one_of("optimiser", self.optimiser, OPTIMISERS)
         _one_of("schedule", self.schedule, SCHEDULES)
         _one_of("precision", self.precision, PRECISIONS)
-        if not self.learning_rate > 0.0:
-            raise InvalidSettings(f"learning_rate: expected more than 0, got {self.learning_rate}")
-        if not self.differences >= 0.0:
-            raise InvalidSettings(f"differences: expected at least 0, got {self.differences}")
+        for name, least, below in _RANGES:
+            _in_range(name, getattr(self, name), least, below)
+        if not isinstance(self.resampling, bool):
+            raise InvalidSettings(f"resampling: expected true or false, got {self.resampling!r}")
         if self.differences and self.batch % 2:
             raise InvalidSettings(
                 f"batch: expected an even number, since designs come in pairs (differences), "
                 f"got {self.batch}"
             )
-        if not self.weight_decay >= 0.0:
-            raise InvalidSettings(f"weight_decay: expected at least 0, got {self.weight_decay}")
-        for name in ("held_out", "averaging"):
-            value = getattr(self, name)
-            if not 0.0 <= value < 1.0 or (name == "held_out" and value == 0.0):
-                raise InvalidSettings(f"{name}: expected a fraction below 1, got {value}")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the recipe as plain data."""
@@ -128,6 +123,26 @@ class Recipe:
                 f"{unknown[0]}: no such key in a recipe; it has: {', '.join(sorted(known))}"
             )
         return cls(**data)
+
+
+_TINY = 1e-300
+"""The least number above nothing that is worth telling from it."""
+_RANGES = (
+    ("learning_rate", _TINY, math.inf),
+    ("weight_decay", 0.0, math.inf),
+    ("differences", 0.0, math.inf),
+    ("held_out", _TINY, 1.0),
+    ("averaging", 0.0, 1.0),
+)
+"""Figures of a recipe, with the least that they may be and what they must stay below."""
+
+
+def _in_range(name: str, value: float, least: float, below: float) -> None:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not least <= value < below:
+        low = "at least 0" if least == 0.0 else "above 0"
+        high = "" if below == math.inf else f" and below {below:g}"
+        raise InvalidSettings(f"{name}: expected a number {low}{high}, got {value!r}")
 
 
 def _at_least(name: str, value: int, least: int) -> None:
@@ -170,6 +185,5 @@ def recipe_of(name: str, **changes: Any) -> Recipe:
     >>> recipe_of("paper", epochs=2).epochs, recipe_of("paper").epochs
     (2, 10)
     """
-    return replace(
-        recipes[name], **{key: value for key, value in changes.items() if value is not None}
-    )
+    told = {key: value for key, value in changes.items() if value is not None}
+    return Recipe.from_dict({**recipes[name].to_dict(), **told})
