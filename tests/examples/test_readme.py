@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bellcrank.cli import main
-from bellcrank.model import read_design
+from bellcrank.model import human_design, read_design, write_design
 
 README = Path(__file__).parents[2] / "README.md"
 START = "pip install . && bellcrank design crane"
@@ -107,6 +107,20 @@ def test_a_part_is_searched_for_and_validated(
     for command in commands:
         run(command, monkeypatch, capsys)
         assert Path(command.split()[3]).stat().st_size > 10_000, command
+
+
+def test_a_network_predicts_and_is_explained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    predict, explain = blocks("")[6].strip().splitlines()
+    Path("crane").mkdir()
+    human = human_design("crane")
+    assert human is not None
+    write_design(human, "crane/design.json")
+    assert str(human.beam_count) in run(predict, monkeypatch, capsys)
+    run(explain, monkeypatch, capsys)
+    assert Path("explained.png").stat().st_size > 50_000
 
 
 def test_the_validation_table_is_that_of_the_record() -> None:
