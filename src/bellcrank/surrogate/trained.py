@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TrainedModel", "batch_of", "lattice_hash", "read_model", "run_network"]
 
-BATCH = {"cpu": 256, "cuda": 4096}
+BATCH = {"cpu": 64, "cuda": 4096}
 """Designs that a network looks at in one go: what fits caches, or keeps a GPU busy."""
 
 
