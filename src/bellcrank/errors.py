@@ -57,3 +57,14 @@ class InvalidDataset(BellcrankError, ValueError):
 
 class InvalidModel(BellcrankError, ValueError):
     """A trained network cannot be read, or is not for the lattice it is asked about."""
+
+
+def first_line(error: BaseException) -> str:
+    r"""Return what an error of somebody else's says, in one line to go into a message of ours.
+
+    Examples
+    --------
+    >>> first_line(ValueError("too short\nsee the manual")), first_line(KeyError())
+    ('too short', 'KeyError()')
+    """
+    return (str(error).strip() or repr(error)).splitlines()[0]

@@ -89,7 +89,7 @@ def put_scatter(
         ticks = ticks_up_to(largest, linear)
         place(ticks, labels=[f"{tick:g}" for tick in ticks])
         place([], minor=True)
-    _label(axes, "change by mechanics", "change foreseen")
+    style.label(axes, "change by mechanics", "change foreseen", style.SMALL_SIZE)
     axes.legend(loc="lower right", **_legend_looks())
     style.quieten(axes)
 
@@ -109,7 +109,7 @@ def put_agreement(axes: Axes, measures: Sequence[Measure]) -> None:
     axes.set_xlim(min(0.0, float(least)) - 0.05, 1.05)
     axes.set_ylim(-0.6, len(measures) - 0.4)
     axes.axvline(0.0, color=style.IDLE, linewidth=1.0, zorder=0.5)
-    _label(axes, "", "")
+    style.label(axes, "", "", style.SMALL_SIZE)
     style.quieten(axes)
     axes.grid(axis="x", color=style.IDLE_REST, linewidth=0.8)
     axes.set_yticks(rows, labels=[measure.name for measure in measures])
@@ -128,9 +128,3 @@ def _legend_looks() -> dict[str, Any]:
         "handletextpad": 0.1,
         "borderaxespad": 0.1,
     }
-
-
-def _label(axes: Axes, below: str, beside: str) -> None:
-    looks: dict[str, Any] = {"family": style.FONT, "size": style.SMALL_SIZE, "color": style.INK}
-    axes.set_xlabel(below, **looks)
-    axes.set_ylabel(beside, **looks)

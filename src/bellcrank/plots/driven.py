@@ -202,7 +202,6 @@ def _put_key(axes: Axes, place: int, text: str, colour: str) -> None:
 
 def _dress(axes: Axes, across: str, up: str, heading: str) -> None:
     looks: dict[str, Any] = {"family": style.FONT, "color": style.INK}
-    axes.set_xlabel(across, size=style.LABEL_SIZE, **looks)
-    axes.set_ylabel(up, size=style.LABEL_SIZE, **looks)
+    style.label(axes, across, up)
     axes.set_title(heading, size=style.LABEL_SIZE, weight="bold", loc="left", pad=9.0, **looks)
     style.quieten(axes)

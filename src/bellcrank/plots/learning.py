@@ -99,7 +99,7 @@ def _draw_density(axes: Axes, learnt: Learnt) -> None:
     axes.plot(extent, extent, color=style.INPUT, linewidth=1.0, zorder=3)
     style.quieten(axes)
     axes.grid(axis="x", color=style.IDLE_REST, linewidth=0.8)
-    _label(axes, "efficiency by the mechanics", "efficiency predicted")
+    style.label(axes, "efficiency by the mechanics", "efficiency predicted")
     axes.text(
         0.04, 0.96,
         f"R² {learnt.r_squared:.4f}\ndetermination {learnt.determination:.4f}",
@@ -122,7 +122,7 @@ def _draw_curve(axes: Axes, learnt: Learnt) -> None:
     axes.set_xlim(0.0, float(learnt.designs.max()) * 1.04)
     axes.xaxis.set_major_formatter(lambda value, _: _short(value))
     style.quieten(axes)
-    _label(axes, "designs seen", "R² on held-out runs")
+    style.label(axes, "designs seen", "R² on held-out runs")
 
 
 _LEVELS = (0.0, 0.5, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.998)
@@ -145,8 +145,3 @@ def _short(value: float) -> str:
     if value >= 1e6:
         return f"{value / 1e6:g}M"
     return f"{value / 1e3:g}k" if value >= 1e3 else f"{value:g}"
-
-
-def _label(axes: Axes, across: str, up: str) -> None:
-    for setter, text in ((axes.set_xlabel, across), (axes.set_ylabel, up)):
-        setter(text, size=style.LABEL_SIZE, color=style.INK, family=style.FONT)

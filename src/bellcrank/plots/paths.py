@@ -190,8 +190,7 @@ def _frame(axes: Axes, shown: PathsStyle, longest: float, *, logarithmic: bool) 
             FuncFormatter(lambda x, _place: f"{x:,.0f}".replace(",", "\u202f"))
         )
     words = {"accepted": "accepted changes", "proposals": "proposals"}
-    axes.set_xlabel(words[shown.axis], family=style.FONT, size=style.LABEL_SIZE, color=style.INK)
-    axes.set_ylabel(shown.measure, family=style.FONT, size=style.LABEL_SIZE, color=style.INK)
+    style.label(axes, words[shown.axis], shown.measure)
     style.quieten(axes)
 
 

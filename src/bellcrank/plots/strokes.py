@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bellcrank.plots import style
 
@@ -76,9 +76,7 @@ def draw_strokes(
 
 def _dress(axes: Axes, below: str, beside: str) -> None:
     """Label axes, quietly."""
-    looks: dict[str, Any] = {"family": style.FONT, "size": style.SMALL_SIZE, "color": style.INK}
-    axes.set_xlabel(below, **looks)
-    axes.set_ylabel(beside, **looks)
+    style.label(axes, below, beside, style.SMALL_SIZE)
     axes.set_xlim(left=0.0)
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, 0.0), high + 0.06 * abs(high))

@@ -99,3 +99,9 @@ def quieten(axes: Axes) -> None:
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
         axes.spines[side].set_color(IDLE)
+
+
+def label(axes: Axes, across: str, up: str, size: float = LABEL_SIZE) -> None:
+    """Say what the two axes are."""
+    axes.set_xlabel(across, size=size, color=INK, family=FONT)
+    axes.set_ylabel(up, size=size, color=INK, family=FONT)

@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import CorruptRun, OutputExists
+from bellcrank.errors import CorruptRun, OutputExists, first_line
 from bellcrank.runs.files import make_folder, whole_file
 from bellcrank.runs.layout import shard_files, shard_path
 
@@ -153,7 +153,7 @@ def parquet_file(path: Path, what_to_do: str) -> Iterator[tuple[Any, dict[str, A
     except CorruptRun:
         raise
     except (OSError, pa.ArrowException, ValueError, KeyError) as error:
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else repr(error)
+        reason = first_line(error)
         raise CorruptRun(f"{path}: damaged ({reason}); {what_to_do}") from error
 
 

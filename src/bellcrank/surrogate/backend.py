@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import InvalidSettings, first_line
 from bellcrank.surrogate.recipes import PRECISIONS
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def find_device(name: str) -> torch_module.device:
         torch.empty(1, device=device)
     except (RuntimeError, AssertionError) as error:
         raise InvalidSettings(
-            f"device: {name!r} cannot be used here ({str(error).splitlines()[0]}); "
+            f"device: {name!r} cannot be used here ({first_line(error)}); "
             f"expected auto, cpu or cuda"
         ) from None
     found: torch_module.device = device

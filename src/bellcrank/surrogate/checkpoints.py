@@ -10,7 +10,7 @@ import json
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import InvalidModel
+from bellcrank.errors import InvalidModel, first_line
 from bellcrank.surrogate.progress import EpochRecord, LossMeter
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def restore(training: Training, path: Path) -> None:
         training.losses = LossMeter.from_dict(told)
         training.log = [EpochRecord(**epoch) for epoch in told["log"]]
     except (SafetensorError, OSError, RuntimeError, KeyError, TypeError, ValueError) as error:
-        reason = (str(error).strip() or repr(error)).splitlines()[0]
+        reason = first_line(error)
         raise InvalidModel(
             f"{path}: damaged ({reason}); delete it and resume: training begins again"
         ) from None

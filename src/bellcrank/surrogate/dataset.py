@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import CorruptRun, InvalidDataset, InvalidFile
+from bellcrank.errors import CorruptRun, InvalidDataset, InvalidFile, first_line
 from bellcrank.model import problem_from_dict, problem_to_dict
 from bellcrank.model.storage import write_bytes
 from bellcrank.runs.shards import arrays_of, parquet_file, parquet_writer
@@ -110,7 +110,7 @@ class Dataset:
             try:
                 array: NDArray[Any] = np.array(column, dtype=kind)
             except (TypeError, ValueError, OverflowError) as error:
-                raise InvalidDataset(f"{name}: {_first_line(error)}") from None
+                raise InvalidDataset(f"{name}: {first_line(error)}") from None
             array.flags.writeable = False
             object.__setattr__(self, name, array)
             if len(array) != count or (array.ndim != 1 and name != "packed"):
@@ -212,7 +212,7 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
         named = pq.read_schema(place).names
     except (OSError, pa.ArrowException, ValueError) as error:
         raise InvalidFile(
-            f"{place}: not a Parquet file, or damaged ({_first_line(error)})"
+            f"{place}: not a Parquet file, or damaged ({first_line(error)})"
         ) from None
     if missing := [name for name in COLUMNS if name not in named]:
         raise InvalidFile(
@@ -250,10 +250,6 @@ def _digest(data: Dataset) -> str:
 
 DATASET_FILE = "dataset.parquet"
 """Name of the dataset in the folder that it was built in."""
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip() or repr(error)).splitlines()[0]
 
 
 def merge(parts: Sequence[Dataset]) -> Dataset:

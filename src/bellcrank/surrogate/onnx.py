@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import InvalidFile, InvalidModel, InvalidSettings
+from bellcrank.errors import InvalidFile, InvalidModel, InvalidSettings, first_line
 from bellcrank.model.storage import write_bytes
 from bellcrank.surrogate.identity import METADATA_KEY, read_known
 
@@ -208,7 +208,7 @@ def load_onnx(content: bytes, source: str, *, threads: int | None = None) -> Onn
     try:
         session = runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime has no common class of its errors
-        reason = (str(error).strip() or repr(error)).splitlines()[0]
+        reason = first_line(error)
         raise InvalidModel(f"{source}: not an ONNX file, or truncated ({reason})") from None
     known = read_known(session.get_modelmeta().custom_metadata_map.get(METADATA_KEY), source)
     inputs = {each.name: tuple(each.shape[1:]) for each in session.get_inputs()}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import InvalidFile, InvalidModel, UnknownName
+from bellcrank.errors import InvalidFile, InvalidModel, UnknownName, first_line
 from bellcrank.model import problem_to_dict
 from bellcrank.model.storage import write_bytes
 from bellcrank.surrogate.backend import autocast, find_device, find_precision, import_torch
@@ -198,7 +198,7 @@ def read_model(path: str | os.PathLike[str]) -> TrainedModel:
         text = _metadata(content).get(METADATA_KEY)
     except (SafetensorError, ValueError) as error:
         raise InvalidModel(
-            f"{path}: not a trained model, or truncated ({_first_line(error)})"
+            f"{path}: not a trained model, or truncated ({first_line(error)})"
         ) from None
     known = read_known(text, str(path))
     return _rebuild(known, tensors, str(path))
@@ -229,7 +229,3 @@ def _metadata(content: bytes) -> dict[str, str]:
     length = int.from_bytes(content[:8], "little")
     header: dict[str, dict[str, str]] = json.loads(content[8 : 8 + length])
     return header.get("__metadata__", {})
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip() or repr(error)).splitlines()[0]
