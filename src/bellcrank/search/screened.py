@@ -51,10 +51,10 @@ from bellcrank.search.blocks import (
     steps_ahead,
 )
 from bellcrank.search.metropolis import MetropolisSettings
-from bellcrank.search.place import Place, accepts, flipped
+from bellcrank.search.place import Place, flipped
 from bellcrank.search.populations import Scorer, costs_of, require_plain_flips
 from bellcrank.search.settings import check_whole
-from bellcrank.search.walking import place_of
+from bellcrank.search.walking import consider, place_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -220,20 +220,12 @@ def _step(
     if uniforms[0] >= math.exp(there_passes):
         rows.add(mask, math.nan, math.nan, here.temperature, False, FORESEEN)
         return here, False
-    response = here.responder.respond_nearby(mask)
-    there = Place(here.responder, here.cost_function, here.temperature, mask, response)
-    accepted = False
-    if there.counts:
-        back_passes = log_passes(-rise, here.temperature, settings)
-        gain = (here.cost - there.cost) / here.temperature
-        accepted = accepts(corrected(gain, there_passes, back_passes), float(uniforms[1]))
-    rows.add(
-        mask, response.efficiency, there.cost, here.temperature, accepted, int(response.status)
-    )
-    if accepted:
-        here.responder.remember()
-        return there, True
-    return here, True
+    back_passes = log_passes(-rise, here.temperature, settings)
+
+    def log_ratio(_there: Place, gain: float) -> float:
+        return corrected(gain, there_passes, back_passes)
+
+    return consider(here, mask, log_ratio, float(uniforms[1]), rows), True
 
 
 def log_passes(rise: float, temperature: float, settings: ScreenedSettings) -> float:

@@ -13,6 +13,8 @@ from bellcrank.search.costs import costs
 from bellcrank.search.place import Place, accepts, flipped
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
@@ -45,14 +47,39 @@ def step(
     if minimum_degree and _is_forbidden(here.problem, minimum_degree, mask, beams):
         rows.add(mask, math.nan, math.nan, here.temperature, False, FORBIDDEN)
         return here
+
+    def log_ratio(there: Place, gain: float) -> float:
+        return gain + (move.log_chance(there, beams) - move.log_chance(here, beams))
+
+    return consider(here, mask, log_ratio, uniform, rows)
+
+
+def consider(
+    here: Place,
+    mask: NDArray[np.bool_],
+    log_ratio: Callable[[Place, float], float],
+    uniform: float,
+    rows: Rows,
+) -> Place:
+    """Ask for the response of a proposed design, decide, note it, and return where the chain is.
+
+    Parameters
+    ----------
+    mask : (M,) bool
+        The proposed design.
+    log_ratio
+        From the proposed design, with its response, and from the log of the ratio of the two
+        designs' probabilities to the log of the ratio that decides.
+    uniform
+        Random number in [0, 1).
+    """
     response = here.responder.respond_nearby(mask)
     here.is_last = False
     there = Place(here.responder, here.cost_function, here.temperature, mask, response)
     accepted = False
     if there.counts:
-        log_ratio = (here.cost - there.cost) / here.temperature
-        log_ratio += move.log_chance(there, beams) - move.log_chance(here, beams)
-        accepted = accepts(log_ratio, uniform)
+        gain = (here.cost - there.cost) / here.temperature
+        accepted = accepts(log_ratio(there, gain), uniform)
     rows.add(
         mask, response.efficiency, there.cost, here.temperature, accepted, int(response.status)
     )
