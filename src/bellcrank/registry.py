@@ -68,7 +68,7 @@ class Registry(Mapping[str, T]):
     def __getitem__(self, name: str) -> T:
         try:
             return self._entries[name]
-        except KeyError:
+        except (KeyError, TypeError):  # what cannot be hashed is no name either
             known = ", ".join(self._entries)
             raise UnknownName(f"unknown {self.kind} {name!r}; known: {known}") from None
 

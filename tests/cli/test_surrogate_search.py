@@ -11,7 +11,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from bellcrank.learning import driving
+from bellcrank.learning import finding
 from bellcrank.mechanics import CAREFUL, Evaluator
 from bellcrank.model import find_problem, read_design, write_problem
 from bellcrank.surrogate.dataset import Dataset
@@ -87,19 +87,51 @@ def test_the_record_is_printed_as_json(here: Path, model: Path) -> None:
     assert all(made["spread"] == 0.0 for made in outcome.data["by_network"])
 
 
-def test_an_interrupted_search_keeps_what_it_has(here: Path, model: Path) -> None:
-    steps = driving.population_steps
+def test_an_exact_search_says_what_the_mechanics_was_spared(here: Path, model: Path) -> None:
+    outcome = call(
+        "surrogate-search", PROBLEM, "--model", model, "--exact", "--set", "doubt=0.0002",
+        "--set", "least_chance=0.1", "--set", "hot=0.0002", *QUICK,
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    folder = here / f"{PROBLEM}-network"
+    assert sorted(path.name for path in folder.iterdir()) == RESULTS
+    record = json.loads((folder / "driven.json").read_text())
+    told = record["settings"]["search"]
+    assert (told["search"], told["doubt"], told["least_chance"]) == ("screened", 0.0002, 0.1)
+    efforts = record["effort"]
+    assert efforts["mechanics"]["responses"] == [25, 25, 25]
+    assert max(efforts["network"]["responses"]) < 25
+    for row, name in (
+        ("responses of the mechanics", "responses"),
+        ("looks by the network", "scored"),
+    ):
+        medians = [efforts[who]["medians"][name] for who in ("network", "mechanics")]
+        (line,) = (line for line in outcome.out.splitlines() if row in line)
+        assert line.split()[-2:] == [f"{median:.0f}" for median in medians]
+    for words in ("screened", "by mechanics", "as computed", "proposals accepted", "seconds, all"):
+        assert words in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("words", "steps"), [((), "population_steps"), (("--exact",), "screened_steps")]
+)
+def test_an_interrupted_search_keeps_what_it_has(
+    here: Path, model: Path, words: tuple[str, ...], steps: str
+) -> None:
+    made = getattr(finding, steps)
 
     def interrupted(*words, **options):
-        for number, step in enumerate(steps(*words, **options)):
+        for number, step in enumerate(made(*words, **options)):
             if number == 10:
                 os.kill(os.getpid(), signal.SIGINT)
             yield step
 
-    with mock.patch.object(driving, "population_steps", interrupted):
-        outcome = call("surrogate-search", PROBLEM, "--model", model, *QUICK, "--out", "cut")
+    with mock.patch.object(finding, steps, interrupted):
+        outcome = call(
+            "surrogate-search", PROBLEM, "--model", model, *QUICK, *words, "--out", "cut"
+        )
     assert outcome.code == 130
-    assert "Stopped after 11 of 25 steps; what the networks offered by then is" in outcome.err
+    assert "Stopped after 11 of 25 steps; what the chains offered by then is" in outcome.err
     assert sorted(path.name for path in (here / "cut").iterdir()) == RESULTS
     assert json.loads((here / "cut" / "driven.json").read_text())["stopped"] is True
     assert "Traceback" not in outcome.err
@@ -116,6 +148,13 @@ def test_an_interrupted_search_keeps_what_it_has(here: Path, model: Path) -> Non
         (("--dataset", "none.parquet"), "none.parquet: no such file"),
         (("--set", "moves=swap"), "moves: a search driven by networks can change only"),
         (("--set", "cost=dear"), "unknown cost 'dear'"),
+        (("--set", 'cost={"dear": 1}'), "unknown cost {'dear': 1}"),
+        (("--set", "doubt=0.1"), "doubt: how networks screen belongs to an exact search"),
+        (("--exact", "--confirm", 5), "confirm: in an exact search the mechanics decides on every"),
+        (("--exact", "--set", "doubt=much"), "doubt: expected a cost of at least 0, got 'much'"),
+        (("--exact", "--set", "least_chance=0"), "least_chance: expected a probability above 0"),
+        (("--exact", "--set", "lookahead=0"), "lookahead: expected a whole number of at least 1"),
+        (("--exact", "--set", "moves=swap"), "moves: a search driven by networks can change only"),
         (("--model", "none.safetensors"), "none.safetensors: cannot be read"),
     ],
 )

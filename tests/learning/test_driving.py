@@ -120,6 +120,8 @@ def test_the_folder_holds_record_design_and_picture(driven: Driven, tmp_path: Pa
     assert record == json.loads(json.dumps(driven.to_dict()))
     assert record["schema"] == "bellcrank/driven/1"
     assert record["settings"]["search"]["search"] == "paper"
+    assert record["effort"]["network"]["scored"] == [120] * 4
+    assert record["effort"]["mechanics"]["responses"] == [120] * 4
     assert set(record["provenance"]) >= {"version", "commit", "seed"}
     design = read_design(tmp_path / "made" / "design.json")
     assert design.efficiency == max(made.truth.rank for made in driven.by_network)
@@ -211,11 +213,11 @@ def test_stretches_that_lower_the_true_efficiency_are_taken_back() -> None:
     evaluator, problem = Evaluator(tiny_problem()), tiny_problem()
     at_start = evaluator.respond(problem.initial).efficiency
     driven = drive(problem, ensemble(), settings)
-    assert driven.responses == 4 * 12
+    assert driven.network.responses == (12,) * 4
     finals = [made.truth.rank for made in driven.offered("final")]
     assert min(finals) >= at_start - 1e-7
     unconfirmed = drive(problem, ensemble(), replace(settings, confirm=0))
-    assert unconfirmed.responses == 0
+    assert unconfirmed.network.responses == (0,) * 4
     assert median(finals) >= median(made.truth.rank for made in unconfirmed.offered("final"))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +35,7 @@ def search(count: int, *, failed: int = 0, compared: int = 30, known: bool = Tru
         search(5, failed=5, compared=0),
         search(20, known=False),
         search(20, compared=0, known=False),
+        replace(search(30, known=False), exact=True),
     ],
 )
 def test_whatever_was_found_can_be_drawn(drawn: DrivenSearch, tmp_path: Path) -> None:

@@ -41,11 +41,16 @@ def surrogate_search(
     dataset: Annotated[
         Path | None, typer.Option(help="What the networks learnt from: tells how new designs are.")
     ] = None,
+    exact: Annotated[
+        bool,
+        typer.Option("--exact", help="The network only screens, the mechanics decides."),
+    ] = False,
     compare: Annotated[
         bool, typer.Option("--compare/--no-compare", help="Search as long by mechanics too.")
     ] = True,
     settings: Annotated[
-        list[str] | None, typer.Option("--set", help="KEY=VALUE: cost, schedule, hot, cold, ...")
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE: cost, hot, cold, ...; --exact: doubt."),
     ] = None,
     device: Device = "auto",
     out: Annotated[Path | None, typer.Option(help="Result folder; default: NAME-network.")] = None,
@@ -64,8 +69,7 @@ def surrogate_search(
     task = find_problem(problem)
     told = Driving(
         chains=chains, steps=steps, seed=seed, caution=caution, checked=checked, confirm=confirm,
-        compare=compare,
-        search=settings_of("--set", settings),
+        exact=exact, compare=compare, search=settings_of("--set", settings),
     )  # fmt: skip
     folder = out or Path(f"{task.name}-network")
     check_free(folder)
@@ -73,7 +77,7 @@ def surrogate_search(
     predictor = load_predictor(task, paths, device=device)
     training = None if dataset is None else read_dataset(dataset)
     announce_compilation()
-    with stopping_on_interrupt() as stop, DrivingLive() as live:
+    with stopping_on_interrupt() as stop, DrivingLive("true" if exact else "predicted") as live:
         driven = drive(task, predictor, told, training=training, tell=live, stop=stop)
     keep_driven(driven, folder)
     if as_json:
@@ -82,44 +86,40 @@ def surrogate_search(
         _print_driven(driven, folder)
     if driven.stopped:
         notes.print(
-            f"Stopped after {driven.steps} of {told.steps} steps; what the networks offered by "
+            f"Stopped after {driven.steps} of {told.steps} steps; what the chains offered by "
             f"then is checked and kept in {plain(folder)}/."
         )
         sys.exit(INTERRUPTED)
 
 
 class DrivingLive(Live):
-    """Shows how a network-driven search goes: three jobs, one after the other."""
+    """Shows how a network-driven search goes: its jobs, one after the other.
+
+    Parameters
+    ----------
+    figure
+        What the figure is that comes while searching.
+    """
 
     UNITS = {"searching": "steps", "checking": "designs", "comparing": "chains"}  # noqa: RUF012
 
-    def __init__(self) -> None:
+    def __init__(self, figure: str) -> None:
         super().__init__("network", None)
+        self._figure = figure
 
     def __call__(self, progress: DrivingProgress) -> None:
         """Take in how far it is."""
-        figure = "" if progress.figure is None else f"  predicted {progress.figure:.3f}"
+        figure = "" if progress.figure is None else f"  {self._figure} {progress.figure:.3f}"
         unit = self.UNITS[progress.what]
         line = f"{progress.what}  {progress.done} / {progress.total} {unit}{figure}"
         self._show(progress.done, progress.total, line, line)
 
 
 def _print_driven(driven: Driven, folder: Path) -> None:
-    """Say in a short table what was made."""
-    from bellcrank.learning.driven import OFFERS
-
+    """Say in short tables what was made and what it took."""
     summary = driven.summary()
-    columns = {"predicted": "predicted", "network": "true"}
-    if driven.by_mechanics:
-        columns["mechanics"] = "by mechanics"
-    if any(row["distance"] is not None for row in summary.values()):
-        columns["distance"] = "beams from training"
-    table = Table("medians", box=SIMPLE)
-    for title in columns.values():
-        table.add_column(title, justify="right")
-    for offer, words in OFFERS.items():
-        table.add_row(words, *(_figure(name, summary[offer][name]) for name in columns))
-    results.print(table)
+    _print_offers(driven, summary)
+    _print_efforts(driven)
     for who in ("network", "mechanics"):
         if failed := summary["checked"][f"{who}_failed"]:
             notes.print(f"{failed} chains by {who} offer no design with a unique response.")
@@ -131,6 +131,41 @@ def _print_driven(driven: Driven, folder: Path) -> None:
             f"{driven.best.predicted:.4f}"
         )
     results.print(f"results: {plain(folder)}/")
+
+
+def _print_offers(driven: Driven, summary: dict[str, Any]) -> None:
+    """Print what the chains offer."""
+    columns = {"predicted": "predicted", "network": "screened" if driven.exact else "true"}
+    if driven.by_mechanics:
+        columns["mechanics"] = "by mechanics"
+    if any(row["distance"] is not None for row in summary.values()):
+        columns["distance"] = "beams from training"
+    table = Table("medians", box=SIMPLE)
+    for title in columns.values():
+        table.add_column(title, justify="right")
+    for offer, words in driven.offers.items():
+        table.add_row(words, *(_figure(name, summary[offer][name]) for name in columns))
+    results.print(table)
+
+
+def _print_efforts(driven: Driven) -> None:
+    """Print what it took the chains to get there."""
+    table = Table("medians of a chain", box=SIMPLE)
+    efforts = {"screened" if driven.exact else "by network": ("network", driven.network)}
+    if driven.mechanics is not None:
+        efforts["by mechanics"] = ("mechanics", driven.mechanics)
+    for title in efforts:
+        table.add_column(title, justify="right")
+    told = [(driven.seconds[name], effort.medians()) for name, effort in efforts.values()]
+    rows = {
+        "proposals accepted": [f"{medians['acceptance']:.1%}" for _, medians in told],
+        "responses of the mechanics": [f"{medians['responses']:.0f}" for _, medians in told],
+        "looks by the network": [f"{medians['scored']:.0f}" for _, medians in told],
+        "seconds, all chains": [f"{seconds:.1f}" for seconds, _ in told],
+    }
+    for words, figures in rows.items():
+        table.add_row(words, *figures)
+    results.print(table)
 
 
 def _figure(name: str, value: Any) -> str:

@@ -22,6 +22,8 @@ OFFERS = {
 }
 """Rules by which a chain offers one design. For chains of the mechanics, the last two are the
 best design that the chain saw, before and after it was loaded in small steps."""
+EXACT_OFFERS = {**OFFERS, "predicted": "the best of each chain, as computed"}
+"""The same for an exact search, whose chains know designs by the mechanics too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +63,51 @@ class Made:
         return {**told, "efficiency": truth["efficiency"], "status": truth["status"]}
 
 
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What it took n chains to get where they are; each entry is of one chain.
+
+    Parameters
+    ----------
+    steps
+        Proposals.
+    accepted
+        Of these.
+    responses
+        That the mechanics computed on the way, for proposals or to confirm stretches; that of
+        the initial design, and checks in the end, come on top.
+    scored
+        Designs that networks looked at on the way.
+    """
+
+    steps: tuple[int, ...]
+    accepted: tuple[int, ...]
+    responses: tuple[int, ...]
+    scored: tuple[int, ...]
+
+    def medians(self) -> dict[str, float | None]:
+        """Return medians over the chains; the acceptance is a share of the proposals.
+
+        Examples
+        --------
+        >>> Effort((10, 10), (4, 6), (8, 6), (20, 30)).medians()
+        {'acceptance': 0.5, 'responses': 7.0, 'scored': 25.0}
+        """
+        shares = [taken / made for taken, made in zip(self.accepted, self.steps, strict=True)]
+        return {
+            "acceptance": median(shares),
+            "responses": median(self.responses),
+            "scored": median(self.scored),
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all as plain data."""
+        return {**asdict(self), "medians": self.medians()}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Driven:
-    """Designs made by a network and, beside them, by the mechanics in as many steps.
+    """Designs made with a network and, beside them, by the mechanics in as many steps.
 
     Parameters
     ----------
@@ -77,12 +121,10 @@ class Driven:
         Whether it was.
     by_network, by_mechanics
         One for each chain and offer; the latter empty if not compared.
-    accepted
-        Accepted proposals of the network's chains, their median.
-    responses
-        Of the mechanics that the network's chains asked for on their way, all together.
+    network, mechanics
+        What the chains took; the latter None if not compared.
     seconds
-        That the parts took, by name.
+        That the parts took, by name: ``network`` and ``mechanics`` are their chains.
     provenance
         Of the record.
     """
@@ -93,10 +135,20 @@ class Driven:
     stopped: bool
     by_network: tuple[Made, ...]
     by_mechanics: tuple[Made, ...]
-    accepted: float
-    responses: int
+    network: Effort
+    mechanics: Effort | None
     seconds: dict[str, float]
     provenance: dict[str, Any]
+
+    @property
+    def exact(self) -> bool:
+        """Whether networks only screened, and the mechanics decided."""
+        return bool(self.settings["exact"])
+
+    @property
+    def offers(self) -> dict[str, str]:
+        """The rules by which chains offer designs, in words."""
+        return EXACT_OFFERS if self.exact else OFFERS
 
     @property
     def best(self) -> Made | None:
@@ -135,8 +187,10 @@ class Driven:
             "settings": self.settings,
             "steps": self.steps,
             "stopped": self.stopped,
-            "median_accepted": self.accepted,
-            "responses": self.responses,
+            "effort": {
+                "network": self.network.to_dict(),
+                "mechanics": None if self.mechanics is None else self.mechanics.to_dict(),
+            },
             "medians": self.summary(),
             "best": None if best is None else best.to_dict(),
             "by_network": [made.to_dict() for made in self.by_network],

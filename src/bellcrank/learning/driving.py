@@ -4,7 +4,9 @@ The paper's search with a network in place of the mechanics, as many chains at o
 machine likes. Networks err, and a search finds where: whatever a chain offers is loaded by the
 mechanics, in small steps, before a word is said about its efficiency. Beside it run as many
 chains of the mechanics, of as many steps, with the same rule; what they offer is chosen and
-checked in the same way.
+checked in the same way. In an *exact* search the networks only screen: the mechanics decides on
+whatever they let pass, so that the chains visit designs as often as chains of the mechanics do,
+however bad the networks (`bellcrank.search.screened`).
 
 Examples
 --------
@@ -18,8 +20,6 @@ Examples
 
 from __future__ import annotations
 
-import heapq
-import math
 import threading
 import time
 from dataclasses import asdict, dataclass, replace
@@ -28,18 +28,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.learning.driven import OFFERS, Driven, Made
+from bellcrank.learning.driven import OFFERS, Driven, Effort, Made
+from bellcrank.learning.finding import Chains, Found, by_mechanics, by_networks, by_screening
 from bellcrank.learning.scoring import Judge, NetworkScorer
-from bellcrank.learning.stretches import Confirmer
-from bellcrank.mechanics import Evaluator, Status
 from bellcrank.provenance import provenance
-from bellcrank.search import MetropolisSettings, chain_blocks
-from bellcrank.search.populations import Population, population_steps, start_population
+from bellcrank.search import MetropolisSettings
+from bellcrank.search.screened import ScreenedSettings
 from bellcrank.surrogate.distances import smallest_distances
 from bellcrank.surrogate.matching import beams_between
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -52,6 +51,12 @@ FIRST_CHAIN = 1
 
 CHANGEABLE = ("cost", "schedule", "hot", "cold", "annealing")
 """Settings of the chains; all others are the paper's."""
+
+SCREENING = ("doubt", "least_chance", "lookahead")
+"""Settings that an exact search has besides, see `bellcrank.search.screened.ScreenedSettings`."""
+
+LOOKAHEAD = 1
+"""Unless told otherwise: chains side by side fill the batches, and nothing is scored in vain."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,10 +75,13 @@ class Driving:
     confirm
         Steps after which the mechanics confirms a stretch of a chain or takes it back, see
         `bellcrank.learning.stretches`; 0 for never, as in the paper.
+    exact
+        Whether networks only screen what is proposed, and the mechanics decides.
     compare
         Whether to run as many chains of the mechanics.
     search
-        What of the search ``paper`` is to differ: `CHANGEABLE` settings.
+        What of the search ``paper`` is to differ: `CHANGEABLE` settings, and `SCREENING` ones of
+        an exact search.
 
     Raises
     ------
@@ -86,6 +94,7 @@ class Driving:
     caution: float = 0.0
     checked: int = 10
     confirm: int = 0
+    exact: bool = False
     compare: bool = True
     search: dict[str, Any] | None = None
 
@@ -94,18 +103,44 @@ class Driving:
             raise InvalidSettings(f"checked: expected at least 1 design, got {self.checked!r}")
         if isinstance(self.confirm, bool) or not isinstance(self.confirm, int) or self.confirm < 0:
             raise InvalidSettings(f"confirm: expected a number of steps, got {self.confirm!r}")
-        if unknown := sorted(set(self.search or {}) - set(CHANGEABLE)):
+        if self.exact and self.confirm:
+            raise InvalidSettings(
+                f"confirm: in an exact search the mechanics decides on every step already; leave "
+                f"it at 0, got {self.confirm!r}"
+            )
+        self._check_search()
+
+    def _check_search(self) -> None:
+        given = set(self.search or {})
+        if not self.exact and (foreign := sorted(given.intersection(SCREENING))):
+            raise InvalidSettings(
+                f"{foreign[0]}: how networks screen belongs to an exact search (--exact)"
+            )
+        known = (*CHANGEABLE, *(SCREENING if self.exact else ()))
+        if unknown := sorted(given.difference(known)):
             raise InvalidSettings(
                 f"{unknown[0]}: a search driven by networks can change only "
-                f"{', '.join(CHANGEABLE)}: efficiencies are what the networks have learnt"
+                f"{', '.join(known)}: efficiencies are what the networks have learnt"
             )
-        _ = self.rule  # refuses what makes no sense
+        _ = self.rule, self.screened_rule  # refuse what makes no sense
 
     @property
     def rule(self) -> MetropolisSettings:
-        """Settings of the chains, of the networks and of the mechanics."""
+        """Settings of the chains by networks, and of those of the mechanics."""
+        search = {key: self._all[key] for key in self._all if key not in SCREENING}
+        return MetropolisSettings.from_dict(search)
+
+    @property
+    def screened_rule(self) -> ScreenedSettings | None:
+        """Settings of the chains of an exact search; None if it is not."""
+        if not self.exact:
+            return None
+        return ScreenedSettings.from_dict({"lookahead": LOOKAHEAD, **self._all})
+
+    @property
+    def _all(self) -> dict[str, Any]:
         given = {"steps": self.steps, "chains": self.chains, "seed": self.seed}
-        return MetropolisSettings.from_dict({**given, **(self.search or {})})
+        return {**given, **(self.search or {})}
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +154,8 @@ class DrivingProgress:
     done, total
         Steps, designs or chains of it.
     figure
-        Median of what the networks say of the chains' designs, while searching.
+        While searching, the median of what is known of the chains' designs: their predicted
+        efficiency; in an exact search, the true one.
     """
 
     what: str
@@ -159,28 +195,43 @@ def drive(
     stop = stop or threading.Event()
     beams = None if training is None else beams_between(training.problem, problem)
     scorer = NetworkScorer(predictor, settings.caution)
-    seconds: dict[str, float] = {}
-    clock = time.monotonic()
-    population, responses = _search(problem, scorer, settings, tell, stop)
-    seconds["network"], clock = time.monotonic() - clock, time.monotonic()
-    made = _offers_of(problem, predictor, population, settings, tell)
-    seconds["checking"], clock = time.monotonic() - clock, time.monotonic()
+    clock = _Clock()
+    found = _search(problem, scorer, settings, tell, stop)
+    clock.note("network")
+    made = _offers_of(problem, found, settings, tell, predictor)
+    clock.note("checking")
     compared: tuple[Made, ...] = ()
+    effort: Effort | None = None
     if settings.compare and not stop.is_set():
-        compared = _by_mechanics(problem, settings, tell, stop)
-        seconds["mechanics"], clock = time.monotonic() - clock, time.monotonic()
+        other = by_mechanics(_chains(problem, settings, "comparing", tell, stop), settings.rule)
+        clock.note("mechanics")
+        compared, effort = _offers_of(problem, other, settings, tell), other.effort
+        clock.note("checking")
     if training is not None and beams is not None:
         made = _with_distances(made, training, beams)
-        seconds["distances"] = time.monotonic() - clock
+        clock.note("distances")
     told = {
-        **asdict(settings), "search": settings.rule.to_dict(),
+        **asdict(settings), "search": (settings.screened_rule or settings.rule).to_dict(),
         "networks": [member.architecture for member in predictor.members],
     }  # fmt: skip
     return Driven(
-        problem, told, population.step, stop.is_set(), made, compared,
-        float(np.median(population.accepted)), responses,
-        {name: round(taken, 3) for name, taken in seconds.items()}, provenance(seed=settings.seed),
+        problem, told, found.effort.steps[0], stop.is_set(), made, compared, found.effort, effort,
+        clock.seconds, provenance(seed=settings.seed),
     )  # fmt: skip
+
+
+class _Clock:
+    """Seconds that the parts of a job take, by name."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.monotonic()
+
+    def note(self, name: str) -> None:
+        """Add the time since the last note to what a part took."""
+        now = time.monotonic()
+        self.seconds[name] = round(self.seconds.get(name, 0.0) + now - self._last, 3)
+        self._last = now
 
 
 def _search(
@@ -189,98 +240,67 @@ def _search(
     settings: Driving,
     tell: Callable[[DrivingProgress], None],
     stop: threading.Event,
-) -> tuple[Population, int]:
-    """Let the networks search, until the end or until stopped; count responses asked for."""
-    rule = settings.rule
-    tell(DrivingProgress("searching", 0, rule.steps))
-    population = start_population(problem, scorer, rule, settings.checked)
-    confirmer = Confirmer.at(Evaluator(problem), rule, FIRST_CHAIN, population)
+) -> Found:
+    """Let the networks search or screen, until the end or until stopped."""
+    chains = _chains(problem, settings, "searching", tell, stop)
+    if (rule := settings.screened_rule) is not None:
+        return by_screening(chains, scorer, rule)
+    return by_networks(chains, scorer, settings.rule, settings.confirm)
 
-    def review(here: Population) -> Population:
-        due = settings.confirm and here.step % settings.confirm == 0
-        return confirmer.confirm(here) if due else here
 
-    steps = population_steps(
-        problem, scorer, rule, first=FIRST_CHAIN, keep=settings.checked, review=review
-    )
-    for population, _ in steps:
-        median = float(np.median(population.score))
-        tell(DrivingProgress("searching", population.step, rule.steps, median))
-        if stop.is_set():
-            break
-    if settings.confirm and population.step % settings.confirm:
-        population = confirmer.confirm(population)
-    return population, confirmer.asked
+def _chains(
+    problem: Problem,
+    settings: Driving,
+    what: str,
+    tell: Callable[[DrivingProgress], None],
+    stop: threading.Event,
+) -> Chains:
+    total = settings.steps if what == "searching" else settings.chains
+    return Chains(
+        problem, FIRST_CHAIN, settings.checked,
+        lambda done, figure: tell(DrivingProgress(what, done, total, figure)), stop,
+    )  # fmt: skip
 
 
 def _offers_of(
     problem: Problem,
-    predictor: Predictor,
-    population: Population,
+    found: Found,
     settings: Driving,
     tell: Callable[[DrivingProgress], None],
+    predictor: Predictor | None = None,
 ) -> tuple[Made, ...]:
-    """Check what each chain of the networks offers."""
-    total = len(population.masks) * (settings.checked + 1)
+    """Check what each chain offers, and ask networks what they say of it."""
+    total = len(found.final) * (settings.checked + 1)
     judge = Judge(problem, lambda done: tell(DrivingProgress("checking", done, total)))
-    chosen: list[tuple[int, str, NDArray[np.uint8]]] = []
-    for row, mask in enumerate(population.masks):
-        final = np.packbits(mask)
-        ranked = [packed for _, packed in population.kept.ranked(row)]
-        checked = max([*ranked, final], key=lambda packed: judge.truth(packed).rank)
-        for offer, packed in zip(OFFERS, (final, ranked[0], checked), strict=True):
-            chosen.append((FIRST_CHAIN + row, offer, packed))
-    beams = problem.lattice.beam_count
-    packed = np.array([each[2] for each in chosen])
-    said = predictor.predict(np.unpackbits(packed, axis=1, count=beams).astype(bool))
-    spread = [None] * len(chosen) if said.spread is None else said.spread.tolist()
+    made: list[Made] = []
+    for chain, (final, best) in enumerate(zip(found.final, found.best, strict=True), FIRST_CHAIN):
+        checked = max([*best, final], key=lambda packed: judge.truth(packed).rank)
+        for offer, packed in zip(OFFERS, (final, best[0], checked), strict=True):
+            made.append(Made(chain, offer, packed.tobytes().hex(), judge.truth(packed)))
+    return tuple(made) if predictor is None else _with_predictions(made, predictor)
+
+
+def _with_predictions(made: Sequence[Made], predictor: Predictor) -> tuple[Made, ...]:
+    """Return the designs with what networks say of them."""
+    said = predictor.predict(_masks_of(made, predictor.problem.lattice.beam_count))
+    spread = [None] * len(made) if said.spread is None else said.spread.tolist()
     return tuple(
-        Made(chain, offer, packed.tobytes().hex(), judge.truth(packed), predicted, dispute)
-        for (chain, offer, packed), predicted, dispute in zip(
-            chosen, said.efficiency.tolist(), spread, strict=True
-        )
+        replace(each, predicted=predicted, spread=dispute)
+        for each, predicted, dispute in zip(made, said.efficiency.tolist(), spread, strict=True)
     )
 
 
-def _by_mechanics(
-    problem: Problem,
-    settings: Driving,
-    tell: Callable[[DrivingProgress], None],
-    stop: threading.Event,
-) -> tuple[Made, ...]:
-    """Run as many chains of the mechanics; each offers and checks as those of the networks do."""
-    rule = settings.rule
-    evaluator, judge = Evaluator(problem), Judge(problem)
-    made: list[Made] = []
-    for chain in range(FIRST_CHAIN, FIRST_CHAIN + rule.chains):
-        best: dict[bytes, float] = {np.packbits(problem.initial).tobytes(): -math.inf}
-        last = ""
-        for state, proposals in chain_blocks(evaluator, rule, chain):
-            last = state.to_dict()["mask"]
-            sound = np.flatnonzero(proposals.status == int(Status.CONVERGED))
-            order = sound[np.argsort(-proposals.efficiency[sound], kind="stable")]
-            for row in order[: 4 * settings.checked]:  # the same design may come several times
-                best[proposals.mask[row].tobytes()] = float(proposals.efficiency[row])
-        final = np.frombuffer(bytes.fromhex(last), np.uint8)
-        ranked = [
-            np.frombuffer(mask, np.uint8)
-            for mask in heapq.nlargest(settings.checked, best, key=best.__getitem__)
-        ]
-        checked = max([*ranked, final], key=lambda packed: judge.truth(packed).rank)
-        for offer, packed in zip(OFFERS, (final, ranked[0], checked), strict=True):
-            made.append(Made(chain, offer, packed.tobytes().hex(), judge.truth(packed)))
-        tell(DrivingProgress("comparing", chain - FIRST_CHAIN + 1, rule.chains))
-        if stop.is_set():
-            break
-    return tuple(made)
+def _masks_of(made: Sequence[Made], beams: int) -> NDArray[np.bool_]:
+    """Return the masks (n, M) of designs."""
+    packed = np.array([np.frombuffer(bytes.fromhex(each.mask), np.uint8) for each in made])
+    return np.unpackbits(packed, axis=1, count=beams).astype(np.bool_)
 
 
 def _with_distances(
     made: tuple[Made, ...], training: Dataset, beams: NDArray[np.int64]
 ) -> tuple[Made, ...]:
     """Return the designs with their distances to what was learnt from."""
-    packed = np.array([np.frombuffer(bytes.fromhex(each.mask), np.uint8) for each in made])
-    masks = np.unpackbits(packed, axis=1, count=len(beams))
+    masks = _masks_of(made, len(beams))
     known = np.zeros_like(masks)
     known[:, beams] = masks
     distance, _ = smallest_distances(np.packbits(known, axis=1), training.packed)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.learning.driven import OFFERS
 from bellcrank.model import Design, unpack_mask, write_design
 from bellcrank.model.storage import write_text
 from bellcrank.runs import check_free
@@ -52,12 +51,16 @@ def keep_driven(driven: Driven, folder: Path) -> None:
 
 
 def best_design(driven: Driven, best: Made) -> Design:
-    """Return a design that a network made, with the efficiency that the mechanics gives it."""
+    """Return a design that was made, with the efficiency that the mechanics gives it."""
     found = {
-        "by": "search driven by a network, checked by the mechanics",
+        "by": (
+            "search by the mechanics, screened by a network"
+            if driven.exact
+            else "search driven by a network, checked by the mechanics"
+        ),
         "predicted": best.predicted,
         "chain": best.chain,
-        "offer": OFFERS[best.offer],
+        "offer": driven.offers[best.offer],
         "distance": best.distance,
         "settings": driven.settings,
     }
@@ -76,14 +79,16 @@ def picture_of(driven: Driven, offer: str = DRAWN) -> DrivenSearch:
     made = driven.offered(offer)
     compared = driven.offered(offer, by_network=False)
     networks = " + ".join(driven.settings["networks"])
+    made_by = "by mechanics, screened by" if driven.exact else "designed by"
     known = all(each.distance is not None for each in made)
     return DrivenSearch(
-        title=f"{driven.problem.name} designed by {networks}",
-        note=f"{len(made)} chains of {driven.steps} steps; {OFFERS[offer]}",
+        title=f"{driven.problem.name} {made_by} {networks}",
+        note=f"{len(made)} chains of {driven.steps} steps; {driven.offers[offer]}",
         true=np.array([_number(each.truth.efficiency) for each in made]),
         predicted=np.array([_number(each.predicted) for each in made]),
         mechanics=np.array([_number(each.truth.efficiency) for each in compared]),
         distance=np.array([each.distance for each in made], np.int64) if known else None,
+        exact=driven.exact,
     )
 
 

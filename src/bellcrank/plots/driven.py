@@ -50,6 +50,8 @@ class DrivenSearch:
         Efficiencies of designs made by the mechanics; empty if there are none.
     distance : (n,) int64 or None
         In how many beams each differs from the nearest training design.
+    exact
+        Whether networks only screened, and the mechanics decided.
     """
 
     title: str
@@ -58,6 +60,7 @@ class DrivenSearch:
     predicted: NDArray[np.float64]
     mechanics: NDArray[np.float64]
     distance: NDArray[np.int64] | None = None
+    exact: bool = False
 
 
 def draw_driven(
@@ -103,7 +106,7 @@ def _put_efficiencies(axes: Axes, search: DrivenSearch) -> None:
         (values, count, colour, name)
         for values, colour, name in (
             (search.mechanics, MECHANICS, "mechanics"),
-            (search.true, NETWORK, "network"),
+            (search.true, NETWORK, "screened" if search.exact else "network"),
         )
         if (count := int(np.isfinite(values).sum()))
     ]
@@ -145,7 +148,8 @@ def _put_predictions(axes: Axes, search: DrivenSearch) -> None:
     axes.set_ylim(low, high)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(6))
-    _dress(axes, "true efficiency", "predicted efficiency", "Are they what was promised?")
+    asked = "Does the network know them?" if search.exact else "Are they what was promised?"
+    _dress(axes, "true efficiency", "predicted efficiency", asked)
     axes.grid(axis="x", color=style.IDLE_REST, linewidth=0.8)
     lines = []
     if len(true):

@@ -57,7 +57,7 @@ from bellcrank.search.settings import check_whole
 from bellcrank.search.walking import consider, place_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -94,13 +94,17 @@ class ScreenedSettings(MetropolisSettings):
         MetropolisSettings.__post_init__(self)
         require_plain_flips(self)
         check_whole("lookahead", self.lookahead, 1)
-        if isinstance(self.doubt, bool) or not 0.0 <= self.doubt < math.inf:
+        if not (_is_number(self.doubt) and 0.0 <= self.doubt < math.inf):
             raise InvalidSettings(f"doubt: expected a cost of at least 0, got {self.doubt!r}")
-        if isinstance(self.least_chance, bool) or not 0.0 < self.least_chance <= 1.0:
+        if not (_is_number(self.least_chance) and 0.0 < self.least_chance <= 1.0):
             raise InvalidSettings(
                 f"least_chance: expected a probability above 0, got {self.least_chance!r}; at 0 "
                 f"there may be designs that the chain never reaches"
             )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,29 +185,98 @@ def advance_screened(
     state: ScreenedState,
 ) -> tuple[ScreenedState, Proposals]:
     """Advance a chain by one block, or less if its steps end first."""
-    rng = random_numbers(settings.seed, chain, state.step // BLOCK)
-    count = steps_ahead(settings, state.step)
-    uniforms = rng.random((BLOCK, 3))[:count]
-    designable, temperatures = responder.problem.designable, settings.temperatures
-    beams = designable[(uniforms[:, 0] * len(designable)).astype(np.int64)]
-    here = place_of(responder, settings.cost, temperatures[0], state.mask)
-    screen = _Screen(scorer, settings, beams, here.mask)
-    rows = Rows()
-    for number in range(count):
-        here.temperature = float(temperatures[min(state.accepted, len(temperatures) - 1)])
-        rise = screen.rise(number)
-        there, asked = _step(here, rise, beams[number], uniforms[number, 1:], settings, rows)
-        state = replace(state, step=state.step + 1, responses=state.responses + asked)
+    block = ScreenedBlock(responder, settings, chain, state)
+    for _ in block.beams:
+        score_ahead(scorer, [block])
+        block.step()
+    return block.state, block.rows.proposals(responder.problem)
+
+
+class ScreenedBlock:
+    """A block of a screened chain in the making: scored ahead, and made step by step.
+
+    Parameters
+    ----------
+    responder
+        Of this chain alone as long as the block lasts: it remembers where the chain is.
+    state
+        Of the chain before the block; of that name, the attribute is of now.
+
+    Attributes
+    ----------
+    beams : (count,) int64
+        To be flipped one after the other, each from wherever the chain is then.
+    rows
+        Of the proposals made so far.
+    """
+
+    def __init__(
+        self, responder: Responder, settings: ScreenedSettings, chain: int, state: ScreenedState
+    ) -> None:
+        rng = random_numbers(settings.seed, chain, state.step // BLOCK)
+        self._uniforms = rng.random((BLOCK, 3))[: steps_ahead(settings, state.step)]
+        designable = responder.problem.designable
+        self.beams = designable[(self._uniforms[:, 0] * len(designable)).astype(np.int64)]
+        self.settings = settings
+        self.state = state
+        self.rows = Rows()
+        self._temperatures = settings.temperatures
+        self._here = place_of(responder, settings.cost, self._temperatures[0], state.mask)
+        self._cost = math.nan
+        self._is_new = True
+        self._ahead: dict[int, float] = {}
+
+    def unscored(self) -> NDArray[np.bool_]:
+        """Return the designs (k, M) that must be scored before the next step; none if k is 0."""
+        number = len(self.rows)
+        last = number if number in self._ahead else number + self.settings.lookahead
+        beams = self.beams[number:last]
+        masks = np.repeat(self._here.mask[None], len(beams) + self._is_new, axis=0)
+        masks[np.arange(len(beams)), beams] ^= True
+        return masks
+
+    def take(self, costs: NDArray[np.float64]) -> None:
+        """Take in the scorer's costs (k,) of what is `unscored`."""
+        told = costs.tolist()
+        if self._is_new:
+            self._cost, self._is_new = told.pop(), False
+        self._ahead = dict(enumerate(told, len(self.rows)))
+        self.state = replace(self.state, scored=self.state.scored + len(costs))
+
+    def step(self) -> None:
+        """Make the next proposal; nothing must be `unscored`."""
+        number, here, state = len(self.rows), self._here, self.state
+        table = self._temperatures
+        here.temperature = float(table[min(state.accepted, len(table) - 1)])
+        there, asked = _step(
+            here, self._ahead[number] - self._cost, self.beams[number],
+            self._uniforms[number, 1:], self.settings, self.rows,
+        )  # fmt: skip
+        self.state = replace(state, step=state.step + 1, responses=state.responses + asked)
         if there is not here:
-            efficiency = there.response.score
-            state = replace(
-                state, efficiency=efficiency, best=max(state.best, efficiency),
-                accepted=state.accepted + 1,
-            )  # fmt: skip
-            screen.move(number, there.mask)
-        here = there
-    state = replace(state, mask=pack_mask(here.mask), scored=state.scored + screen.scored)
-    return state, rows.proposals(responder.problem)
+            self._move(there, self._ahead[number])
+
+    def _move(self, there: Place, cost: float) -> None:
+        """Go there; nothing ahead is known from there."""
+        efficiency = there.response.score
+        self.state = replace(
+            self.state, mask=pack_mask(there.mask), efficiency=efficiency,
+            best=max(self.state.best, efficiency), accepted=self.state.accepted + 1,
+        )  # fmt: skip
+        self._here, self._cost, self._ahead = there, cost, {}
+
+
+def score_ahead(scorer: Scorer, blocks: Sequence[ScreenedBlock]) -> None:
+    """Ask the scorer, in one batch, all that the next steps of some blocks have to know."""
+    asked = [block.unscored() for block in blocks]
+    masks = np.concatenate(asked)
+    if not len(masks):
+        return
+    told = costs_of(blocks[0].settings.cost, scorer.score(masks))
+    ends = np.cumsum([len(each) for each in asked])[:-1]
+    for block, part in zip(blocks, np.split(told, ends), strict=True):
+        if len(part):
+            block.take(part)
 
 
 def _step(
@@ -258,49 +331,3 @@ def corrected(gain: float, there_passes: float, back_passes: float) -> float:
         Log of the chances that the flip, and that its reverse, pass the first rule.
     """
     return gain + back_passes - there_passes
-
-
-class _Screen:
-    """What the scorer says of the flips ahead, asked for a few of them at a time.
-
-    Parameters
-    ----------
-    beams : (count,)
-        To be flipped in the block at hand, each from wherever the chain is then.
-    mask : (M,) bool
-        Where it is now.
-    """
-
-    def __init__(
-        self,
-        scorer: Scorer,
-        settings: ScreenedSettings,
-        beams: NDArray[np.int64],
-        mask: NDArray[np.bool_],
-    ) -> None:
-        self.scorer = scorer
-        self.settings = settings
-        self.beams = beams
-        self.mask = mask
-        self.cost = float(self._costs(mask[None])[0])
-        self.scored = 1
-        self._ahead: dict[int, float] = {}
-
-    def rise(self, number: int) -> float:
-        """Return the change of the scorer's cost by the flip of that number."""
-        if number not in self._ahead:
-            beams = self.beams[number : number + self.settings.lookahead]
-            masks = np.repeat(self.mask[None], len(beams), axis=0)
-            masks[np.arange(len(beams)), beams] ^= True
-            self._ahead = dict(enumerate(self._costs(masks).tolist(), number))
-            self.scored += len(beams)
-        return self._ahead[number] - self.cost
-
-    def move(self, number: int, mask: NDArray[np.bool_]) -> None:
-        """Go where the flip of that number leads; nothing ahead is known from there."""
-        self.cost = self._ahead[number]
-        self.mask = mask
-        self._ahead = {}
-
-    def _costs(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
-        return costs_of(self.settings.cost, self.scorer.score(masks))

@@ -1,0 +1,118 @@
+"""Screened chains in lockstep: what all of them ask the scorer next is asked in one batch.
+
+A network takes two to five times as long over a design alone as over one of many. So chains of
+delayed acceptance (`bellcrank.search.screened`) make their proposals side by side, and whatever
+their next proposals have to know is scored together. Each chain goes where it would go alone, to
+the last bit, if what the scorer says of a design does not depend on what stands beside it.
+
+Examples
+--------
+>>> from bellcrank.mechanics import Evaluator
+>>> from bellcrank.model import find_problem
+>>> from bellcrank.search.populations import MechanicsScorer
+>>> from bellcrank.search.screened import ScreenedSettings
+>>> problem = find_problem("scaling-8")
+>>> scorer = MechanicsScorer(Evaluator(problem))
+>>> settings = ScreenedSettings(steps=20, lookahead=1)
+>>> *_, last = screened_steps([Evaluator(problem) for _ in range(3)], scorer, settings, keep=2)
+>>> last.step, [state.responses + state.saved for state in last.states]
+(20, [20, 20, 20])
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import Status
+from bellcrank.search.populations import Kept
+from bellcrank.search.screened import ScreenedBlock, score_ahead, start_screened
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from bellcrank.search.populations import Scorer
+    from bellcrank.search.responder import Responder
+    from bellcrank.search.screened import ScreenedSettings, ScreenedState
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lockstep:
+    """Where n screened chains stand after the same number of steps.
+
+    Parameters
+    ----------
+    states
+        Of the chains.
+    kept
+        The best designs that each has had computed by the mechanics, accepted or not; scores
+        are efficiencies.
+    """
+
+    states: tuple[ScreenedState, ...]
+    kept: Kept
+
+    @property
+    def step(self) -> int:
+        """Proposals that each has made so far."""
+        return self.states[0].step
+
+
+def screened_steps(
+    responders: Sequence[Responder],
+    scorer: Scorer,
+    settings: ScreenedSettings,
+    *,
+    first: int = 0,
+    keep: int = 0,
+) -> Iterator[Lockstep]:
+    """Yield where the chains stand after each step.
+
+    Parameters
+    ----------
+    responders
+        One for each chain, at least one: it remembers where its chain is.
+    first
+        Number of the first chain; together with the seed it names a chain's random numbers.
+    keep
+        How many of the best designs to keep, a chain.
+
+    Raises
+    ------
+    InvalidSettings
+        If the initial design has no unique, stable response.
+    """
+    states = (start_screened(responders[0]),) * len(responders)
+    kept = _start_keeping(responders, states, keep)
+    while states[0].step < settings.steps:
+        blocks = [
+            ScreenedBlock(responder, settings, chain, state)
+            for chain, (responder, state) in enumerate(zip(responders, states, strict=True), first)
+        ]
+        for _ in blocks[0].beams:
+            score_ahead(scorer, blocks)
+            for block in blocks:
+                block.step()
+            states = tuple(block.state for block in blocks)
+            kept = _keep_proposed(kept, responders[0].problem.lattice.beam_count, blocks)
+            yield Lockstep(states, kept)
+
+
+def _start_keeping(
+    responders: Sequence[Responder], states: Sequence[ScreenedState], keep: int
+) -> Kept:
+    """Return what the chains keep before their first proposals: the initial design."""
+    masks = np.array([responder.problem.initial for responder in responders])
+    nothing = Kept.nothing(len(masks), keep, (masks.shape[1] + 7) // 8)
+    return nothing.joined_by(np.array([state.efficiency for state in states]), masks)
+
+
+def _keep_proposed(kept: Kept, beams: int, blocks: Sequence[ScreenedBlock]) -> Kept:
+    """Return what is kept after the last proposals, if they were computed and are sound."""
+    sound = [block.rows.status[-1] == int(Status.CONVERGED) for block in blocks]
+    efficiency = np.array([block.rows.efficiency[-1] for block in blocks])
+    packed = np.array([block.rows.mask[-1] for block in blocks])
+    masks = np.unpackbits(packed, axis=1, count=beams).astype(np.bool_)
+    return kept.joined_by(np.where(sound, efficiency, np.nan), masks)
