@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from tests.surrogate.helpers import moved
 
-from bellcrank.errors import InvalidDataset, InvalidSettings
+from bellcrank.errors import InvalidDataset, InvalidModel, InvalidSettings
 from bellcrank.learning import proposing
 from bellcrank.learning.active import Knowledge, begin_learning, learn_actively
 from bellcrank.learning.proposing import ActiveSettings, label_designs, propose_designs
@@ -131,12 +133,45 @@ def test_designs_that_all_snap_are_no_data(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"disputed": -1}, "disputed: expected at least 0"),
-        ({"disputed": 0, "best": 0}, "expected at least one design to label"),
+        ({"disputed": -1}, "disputed: expected a whole number of at least 0"),
+        ({"best": 1.5}, "best: expected a whole number"),
+        ({"best": "many"}, "best: expected a whole number"),
+        ({"disputed": 0, "best": 0}, "disputed, best: expected at least one design to label"),
         ({"share": 1.0}, "share: expected from 0 to below 1"),
+        ({"share": "half"}, "share: expected from 0 to below 1"),
+        ({"caution": -1.0}, "caution: expected at least 0"),
+        ({"caution": "some"}, "caution: expected at least 0"),
+        ({"warm": 1}, "warm: expected true or false"),
         ({"chains": 0}, "chains: "),
+        ({"steps": "all"}, "steps: "),
+        ({"seed": -1}, "seed: "),
+        ({"epochs": 0}, "epochs: "),
+        ({"epoch_size": 1}, "epoch_size: "),
+        ({"learning_rate": 0.0}, "learning_rate: "),
     ],
 )
-def test_impossible_rounds_are_refused(given: dict[str, float], message: str) -> None:
-    with pytest.raises(InvalidSettings, match=message):
+def test_impossible_rounds_are_refused(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidSettings, match=f"^{message}"):
         ActiveSettings(**given)
+
+
+def test_settings_come_back_from_plain_data_and_know_their_keys() -> None:
+    assert ActiveSettings.from_dict(SETTINGS.to_dict()) == SETTINGS
+    with pytest.raises(InvalidSettings, match=r"^stride: no such key in a round; it has: .*chains"):
+        ActiveSettings.from_dict({"stride": 2})
+
+
+def test_a_round_changes_of_the_recipe_what_its_settings_say() -> None:
+    changed = ActiveSettings(epochs=7, epoch_size=128, learning_rate=0.5).adapt(RECIPE)
+    assert changed == replace(RECIPE, epochs=7, epoch_size=128, learning_rate=0.5)
+    assert ActiveSettings().adapt(RECIPE) == RECIPE
+    with pytest.raises(InvalidSettings, match="epoch_size: expected a whole number of at least 64"):
+        ActiveSettings(epoch_size=32).adapt(RECIPE)
+
+
+def test_networks_that_number_beams_otherwise_cannot_learn_on() -> None:
+    given, old_beam = moved(tiny_problem())
+    masks = np.unpackbits(tiny_dataset().packed, axis=1, count=len(old_beam))[:, old_beam]
+    renumbered = replace(tiny_dataset(), problem=given, packed=np.packbits(masks, axis=1))
+    with pytest.raises(InvalidModel, match="with other numbers of the beams"):
+        begin_learning(renumbered, RECIPE, [tiny_model()])

@@ -25,14 +25,15 @@ from bellcrank.errors import (
 )
 from bellcrank.surrogate import training as module
 from bellcrank.surrogate.dataset import Dataset
-from bellcrank.surrogate.folder import CHECKPOINT, DESCRIPTION, LOG, MODEL
+from bellcrank.surrogate.folder import CHECKPOINT, DESCRIPTION, INITIAL, LOG, MODEL
 from bellcrank.surrogate.metrics import accuracy, correlation
 from bellcrank.surrogate.progress import LossMeter
 from bellcrank.surrogate.recipes import Recipe, recipe_of
+from bellcrank.surrogate.splitting import Split
 from bellcrank.surrogate.trained import read_model
 from bellcrank.surrogate.training import begin, read_recipe, resume
 
-from .helpers import TINY, random_dataset, same_weights
+from .helpers import TINY, moved, random_dataset, same_weights, untrained
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -384,6 +385,74 @@ def test_going_on_from_a_network_survives_a_stop_too(
     again = to_the_end(resume(tmp_path / "on", data, device="cpu"))
     assert same_weights(again, whole)
     assert (again.mean, again.deviation) == (first.mean, first.deviation)
+    assert again.record["before"]["designs"] == first.record["designs"]
+    assert again.seen["designs"] == 2 * first.record["designs"]
+
+
+def test_going_on_from_a_network_survives_the_loss_of_all_but_its_copy(
+    data: Dataset, tmp_path: Path
+) -> None:
+    first = to_the_end(begin(data, AVERAGED, device="cpu"))
+    whole = to_the_end(begin(data, AVERAGED, device="cpu", initial=first))
+    training = begin(data, AVERAGED, tmp_path / "on", device="cpu", initial=first)
+    list(training.run(after(7)))
+    (tmp_path / "on" / CHECKPOINT).unlink()
+    again = resume(tmp_path / "on", data, device="cpu")
+    assert again.step == 0
+    assert same_weights(to_the_end(again), whole)
+    for name in (DESCRIPTION, CHECKPOINT, LOG, MODEL):  # killed before it said what it is
+        (tmp_path / "on" / name).unlink()
+    begin(data, AVERAGED, tmp_path / "on", device="cpu", initial=first)
+    (tmp_path / "on" / INITIAL).unlink()
+    with pytest.raises(InvalidFile, match=r"initial\.safetensors: cannot be read"):
+        resume(tmp_path / "on", data, device="cpu")
+
+
+def test_what_a_network_looks_through_is_kept_when_it_goes_on(
+    problem: Problem, tmp_path: Path
+) -> None:
+    data = random_dataset(problem, runs=4, steps=10)
+    recipe = replace(TINY, model="resnet18-w16", batch=2, epoch_size=6, epochs=1, tested=4)
+    first = untrained(problem, "resnet18-w16", width=64, height=48)
+    whole = to_the_end(begin(data, recipe, device="cpu", initial=first))
+    begin(data, recipe, tmp_path / "on", device="cpu", initial=first)
+    again = to_the_end(resume(tmp_path / "on", data, device="cpu"))
+    assert again.view.shape == (1, 48, 64)
+    assert same_weights(again, whole)
+
+
+def test_a_network_goes_on_only_with_beams_as_it_knows_them(problem: Problem) -> None:
+    other, _ = moved(problem)
+    with pytest.raises(InvalidModel, match="not those of 'moved' in their order"):
+        begin(random_dataset(other), TINY, device="cpu", initial=untrained(problem))
+
+
+def test_a_split_of_one_s_own_is_set_up_again_or_refused(data: Dataset, tmp_path: Path) -> None:
+    held_out = np.flatnonzero(data.run == 3)
+    training = np.flatnonzero(data.run != 3)
+    split = Split(np.concatenate([training, training[:40]]), held_out)
+    whole = to_the_end(begin(data, TINY, device="cpu", split=split))
+    assert not same_weights(whole, to_the_end(begin(data, TINY, device="cpu")))
+    assert whole.mean == data.efficiency[split.training].mean()
+    list(begin(data, TINY, tmp_path / "t", device="cpu", split=split).run(after(7)))
+    for other in (None, Split(training, held_out), Split(split.training, training)):
+        with pytest.raises(InvalidSettings, match="holds out other designs"):
+            resume(tmp_path / "t", data, device="cpu", split=other)
+    again = to_the_end(resume(tmp_path / "t", data, device="cpu", split=split))
+    assert same_weights(again, whole)
+    list(begin(data, TINY, tmp_path / "usual", device="cpu").run(after(7)))
+    with pytest.raises(InvalidSettings, match="holds out other designs"):
+        resume(tmp_path / "usual", data, device="cpu", split=split)
+
+
+def test_what_a_killed_training_was_writing_is_removed(data: Dataset, tmp_path: Path) -> None:
+    folder = half(data, tmp_path / "t")
+    for name in (".checkpoint.safetensors.0123abcd", ".mine.0123abcd", "note"):
+        (folder / name).write_text("half")
+    resume(folder, data, device="cpu")
+    assert sorted(path.name for path in folder.iterdir()) == sorted(
+        [".mine.0123abcd", "note", CHECKPOINT, LOG, DESCRIPTION]
+    )
 
 
 def test_a_network_goes_on_only_from_its_own_kind(data: Dataset) -> None:

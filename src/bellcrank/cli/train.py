@@ -5,23 +5,26 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from bellcrank.cli.app import INTERRUPTED, app
 from bellcrank.cli.arguments import settings_of
-from bellcrank.cli.console import notes, plain, print_json, results
-from bellcrank.cli.live import Live
+from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from bellcrank.learning.fitting import FitProgress
+    from bellcrank.learning.active import Round
+    from bellcrank.learning.proposing import ActiveSettings
+    from bellcrank.surrogate.dataset import Dataset
+    from bellcrank.surrogate.recipes import Recipe
     from bellcrank.surrogate.trained import TrainedModel
+
+    Found = tuple[list[TrainedModel], list[Round] | None]
+    """Networks, and what each round has found if they learnt in rounds."""
 
 
 @app.command()
@@ -35,11 +38,32 @@ def train(
     ] = None,
     epochs: Annotated[int | None, typer.Option(help="Times through the data.")] = None,
     members: Annotated[
-        int, typer.Option(help="Networks that differ in their seeds; 3 to 5 tell uncertainty.")
-    ] = 1,
+        int | None,
+        typer.Option(help="Networks that differ in their seeds; 3 to 5 tell uncertainty. \\[1]"),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Of weights and order.")] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE: anything else in the recipe.")
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            help="Go on from trained networks: a file, a training's folder, or shipped (the one "
+            "that comes with bellcrank).",
+        ),
+    ] = None,
+    rounds: Annotated[
+        int | None,
+        typer.Option(help="Then let networks search, label what they propose, train again. \\[0]"),
+    ] = None,
+    of_round: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--round",
+            help="KEY=VALUE for each round: chains, steps, disputed, best, share, epochs, "
+            "epoch_size, learning_rate, ...",
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder; default: PROBLEM-MODEL.")] = None,
     resume: Annotated[
@@ -49,58 +73,95 @@ def train(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Train a network, and test it on runs that it has not seen."""
-    from bellcrank.cli.design import stopping_on_interrupt
-    from bellcrank.learning.fitting import fit
+    from bellcrank.learning.fitting import networks_to_go_on_from
+    from bellcrank.learning.rounds import begin_rounds
     from bellcrank.surrogate.dataset import read_dataset
-    from bellcrank.surrogate.recipes import Recipe, recipe_of
+    from bellcrank.surrogate.recipes import recipe_of
 
-    changes = {"model": model, "epochs": epochs, "seed": seed, **settings_of("--set", settings)}
-    asked = recipe is not None or any(value is not None for value in changes.values())
-    if resume is not None and (asked or out is not None):
-        raise InvalidSettings("--resume goes on as it was begun; leave out the other options")
-    chosen: Recipe | None = None if resume else recipe_of(recipe or "own", **changes)
-    data = read_dataset(dataset)
-    folder = resume or out or Path(f"{data.problem.name}-{chosen.model if chosen else ''}")
-    with stopping_on_interrupt() as stop, TrainingProgress() as progress:
-        trained = fit(
-            data, chosen, folder, members=members, device=device, tell=progress, stop=stop.is_set
-        )
-    if trained is None:
+    given = [model, recipe, epochs, members, seed, settings, start, rounds, of_round, out]
+    if resume is not None:
+        if any(value not in (None, []) for value in given):
+            raise InvalidSettings("--resume goes on as it was begun; leave out the other options")
+        data, folder = read_dataset(dataset), resume
+        found = _go_on(data, folder, device)
+    else:
+        changes = {"model": model, "epochs": epochs, "seed": seed, **settings_of("--set", settings)}
+        chosen = recipe_of(recipe or "own", **changes)
+        active = _rounds_of(rounds, of_round)
+        data = read_dataset(dataset)
+        folder = out or Path(f"{data.problem.name}-{chosen.model}")
+        initial = [] if start is None else networks_to_go_on_from(data.problem, start)
+        if active is None:
+            found = _fit(data, chosen, folder, device, members=members, initial=initial)
+        else:
+            begin_rounds(
+                data, chosen, folder, active, rounds or 0,
+                members=members, initial=initial, device=device,
+            )  # fmt: skip
+            found = _learn(data, folder, device)
+    if found is None:
         told = f"bellcrank train {shlex.quote(str(dataset))} --resume {shlex.quote(str(folder))}"
         notes.print(f"Stopped; what is done is kept. Go on with: {plain(told)}")
         sys.exit(INTERRUPTED)
+    trained, learnt = found
     if as_json:
-        print_json(json.dumps({"results": [each.record for each in trained]}, indent=1))
+        print_json(json.dumps(_record(trained, learnt), indent=1))
         return
     results.print(_table(trained))
     results.print(f"written to {plain(folder)}/")
 
 
-class TrainingProgress(Live):
-    """Shows how training goes, and keeps a line of each epoch."""
+def _rounds_of(rounds: int | None, texts: list[str] | None) -> ActiveSettings | None:
+    """Return what a round is told; None if there are to be none."""
+    from bellcrank.learning.proposing import ActiveSettings
 
-    def __init__(self) -> None:
-        super().__init__("training", None, TextColumn("left"), TimeRemainingColumn())
-        self._start = time.monotonic()
-        self._first: int | None = None
+    if rounds is not None and rounds < 0:
+        raise InvalidSettings(f"--rounds: expected at least 0, got {rounds}")
+    if texts and not rounds:
+        raise InvalidSettings("--round: there are no rounds; say how many (--rounds N)")
+    return ActiveSettings.from_dict(settings_of("--round", texts)) if rounds else None
 
-    def __call__(self, told: FitProgress) -> None:
-        """Take in where training is."""
-        progress = told.progress
-        done = told.member * progress.total + progress.done
-        total = told.members * progress.total
-        if self._first is None:
-            self._first = done
-        speed = (done - self._first) / max(time.monotonic() - self._start, 1e-9)
-        which = f"network {told.member + 1} of {told.members}  " if told.members > 1 else ""
-        figures = f"{which}loss {progress.loss:.4f}  {speed:.0f} designs/s"
-        self._show(done, total, figures, f"training {100.0 * done / total:3.0f} %  {figures}")
-        if (epoch := progress.epoch) is not None:
-            notes.print(
-                f"{which}epoch {epoch.epoch}: loss {epoch.loss:.4f}, held out R² "
-                f"{epoch.r_squared:.4f}, determination {epoch.determination:.4f}, error "
-                f"{epoch.rms_error:.3f}"
-            )
+
+def _go_on(data: Dataset, folder: Path, device: str) -> Found | None:
+    """Go on with what a folder has begun."""
+    from bellcrank.learning.round_files import is_course
+
+    if is_course(folder):
+        return _learn(data, folder, device)
+    return _fit(data, None, folder, device)
+
+
+def _fit(
+    data: Dataset, recipe: Recipe | None, folder: Path, device: str, **start: Any
+) -> Found | None:
+    from bellcrank.cli.design import stopping_on_interrupt
+    from bellcrank.cli.training_live import TrainingLive
+    from bellcrank.learning.fitting import fit
+
+    with stopping_on_interrupt() as stop, TrainingLive() as live:
+        trained = fit(data, recipe, folder, device=device, tell=live, stop=stop.is_set, **start)
+    return None if trained is None else (trained, None)
+
+
+def _learn(data: Dataset, folder: Path, device: str) -> Found | None:
+    from bellcrank.cli.design import stopping_on_interrupt
+    from bellcrank.cli.training_live import RoundsLive
+    from bellcrank.learning.rounds import learn_in_rounds
+
+    announce_compilation()
+    with stopping_on_interrupt() as stop, RoundsLive() as live:
+        learnt = learn_in_rounds(folder, data, device=device, tell=live.show, stop=stop.is_set)
+    return None if learnt is None else (learnt.models, learnt.rounds)
+
+
+def _record(trained: list[TrainedModel], rounds: list[Round] | None) -> dict[str, Any]:
+    """Return what is printed as JSON."""
+    found: dict[str, Any] = {"results": [each.record for each in trained]}
+    if rounds is not None:
+        found["rounds"] = [
+            {"round": number, **each.to_dict()} for number, each in enumerate(rounds, 1)
+        ]
+    return found
 
 
 def _table(trained: list[TrainedModel]) -> Table:
@@ -112,8 +173,8 @@ def _table(trained: list[TrainedModel]) -> Table:
         found: dict[str, Any] = each.record["held_out"]
         table.add_row(
             each.architecture,
-            str(each.record["designs"]),
-            f"{each.record['seconds']:.0f}",
+            f"{each.seen['designs']:.0f}",
+            f"{each.seen['seconds']:.0f}",
             f"{found['r_squared']:.4f}",
             f"{found['determination']:.4f}",
             f"{found['rms_error']:.4f}",

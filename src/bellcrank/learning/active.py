@@ -5,6 +5,9 @@ in the data of searches by mechanics. A round labels such designs, above all tho
 networks dispute, and goes on training with them. Each chain is a run of its own, so that
 designs which resemble each other stay on one side of the split; what was held out stays so.
 
+A round has two steps, `label_round` and the training by the `lesson` for each network;
+`learn_actively` makes both, and `bellcrank.learning.rounds` keeps what they make.
+
 Examples
 --------
 >>> knowledge = begin_learning(data, recipe, models)  # doctest: +SKIP
@@ -16,13 +19,14 @@ Examples
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from bellcrank.learning.proposing import ActiveSettings, label_designs, propose_designs
 from bellcrank.surrogate.dataset import Dataset, merge
+from bellcrank.surrogate.matching import require_same_numbers
 from bellcrank.surrogate.metrics import Accuracy, accuracy
 from bellcrank.surrogate.predictor import Predictor
 from bellcrank.surrogate.splitting import Split, split_by_run
@@ -31,8 +35,7 @@ from bellcrank.surrogate.training import begin
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from bellcrank.learning.heard import Heard
     from bellcrank.surrogate.recipes import Recipe
     from bellcrank.surrogate.trained import TrainedModel
 
@@ -65,6 +68,44 @@ class Knowledge:
     rounds: int = 0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Labelled:
+    """What a round has found before anything is learnt from it.
+
+    Parameters
+    ----------
+    data
+        Designs that the networks proposed and that have a unique response; a run a chain.
+    proposed
+        Designs that the mechanics was asked about.
+    surprise
+        How good the networks' predictions for `data` were.
+    """
+
+    data: Dataset
+    proposed: int
+    surprise: Accuracy
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lesson:
+    """How one network is to be trained in a round.
+
+    Parameters
+    ----------
+    recipe
+        With the member's own seed.
+    split
+        Rows to learn from, new ones repeated, and rows held out.
+    initial
+        The network to go on from; None begins afresh.
+    """
+
+    recipe: Recipe
+    split: Split
+    initial: TrainedModel | None
+
+
 @dataclass(frozen=True, slots=True)
 class Round:
     """What a round of active learning has found.
@@ -86,17 +127,39 @@ class Round:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the record as plain data."""
-        return asdict(self)
+        return {
+            "proposed": self.proposed,
+            "labelled": self.labelled,
+            "surprise": self.surprise.to_dict(),
+            "held_out": [each.to_dict() for each in self.held_out],
+        }
+
+    @classmethod
+    def from_dict(cls, told: dict[str, Any]) -> Self:
+        """Rebuild a record from `to_dict`; what else it says is left aside.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            If it is none.
+        """
+        held_out = tuple(Accuracy(**each) for each in told["held_out"])
+        surprise = Accuracy(**told["surprise"])
+        return cls(int(told["proposed"]), int(told["labelled"]), surprise, held_out)
 
 
 def begin_learning(data: Dataset, recipe: Recipe, models: Sequence[TrainedModel]) -> Knowledge:
-    """Begin with networks that were trained by a recipe on a dataset.
+    """Begin with networks that were trained by a recipe on a dataset, or on another of its problem.
 
     Raises
     ------
     InvalidDataset
         If all designs come from a single run.
+    InvalidModel
+        If a network has learnt another problem, or numbers beams otherwise.
     """
+    for model in models:
+        require_same_numbers(model.problem, data.problem)
     split = split_by_run(data, recipe.held_out, recipe.split_seed)
     return Knowledge(data, len(data), split, recipe, tuple(models))
 
@@ -109,7 +172,7 @@ def learn_actively(
     tell: Callable[[str, int, int], None] = lambda _what, _done, _total: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> tuple[Knowledge, Round] | None:
-    """Make one round: search, label, train.
+    """Make one round: search, label, train. Nothing is kept on disk.
 
     Parameters
     ----------
@@ -131,31 +194,75 @@ def learn_actively(
     InvalidDataset
         If no proposed design has a unique response.
     """
-    predictor = Predictor(knowledge.data.problem, knowledge.models, device=device)
-    chosen = propose_designs(predictor, settings, tell=tell, stop=stop)
-    if stop():
+    labelled = label_round(knowledge, settings, device=device, tell=tell, stop=stop)
+    if labelled is None or stop():
         return None
-    part = label_designs(predictor, chosen, settings, tell=tell)
-    said = predictor.predict(_masks(part.packed, part)).efficiency
-    grown = _grow(knowledge, part)
+    grown = grow(knowledge, labelled.data)
     models = []
     for member in range(len(knowledge.models)):
-        model = _train(grown, member, settings, device=device, tell=tell, stop=stop)
-        if model is None:
+        plan = lesson(grown, member, settings)
+        training = begin(
+            grown.data, plan.recipe, device=device, initial=plan.initial, split=plan.split
+        )
+        for progress in training.run(stop):
+            tell("training", progress.done, progress.total)
+        if not training.is_done:
             return None
-        models.append(model)
-    held_out = tuple(_test(grown, model, device) for model in models)
-    found = Round(sum(map(len, chosen)), len(part), accuracy(said, part.efficiency), held_out)
-    return replace(grown, models=tuple(models), rounds=knowledge.rounds + 1), found
+        models.append(training.finish(plan.recipe.tested))
+    learnt = replace(grown, models=tuple(models))
+    return learnt, conclude(learnt, labelled, device=device)
 
 
-def _grow(knowledge: Knowledge, part: Dataset) -> Knowledge:
-    """Return what is known together with newly labelled designs."""
+def label_round(
+    knowledge: Knowledge,
+    settings: ActiveSettings,
+    *,
+    heard: Heard | None = None,
+    device: str = "auto",
+    tell: Callable[[str, int, int], None] = lambda _what, _done, _total: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Labelled | None:
+    """Make the first step of a round: let the networks search, and label what they propose.
+
+    Parameters
+    ----------
+    heard
+        What the networks said before the search was stopped; gets what they say now.
+
+    Returns
+    -------
+    Labelled or None
+        None if the search was stopped; labelling, which is quick, goes to its end.
+
+    Raises
+    ------
+    InvalidSettings
+        If caution is asked of one network.
+    InvalidDataset
+        If no proposed design has a unique response.
+    """
+    predictor = Predictor(knowledge.data.problem, knowledge.models, device=device)
+    chosen = propose_designs(predictor, settings, heard=heard, tell=tell, stop=stop)
+    if not chosen:
+        return None
+    data = label_designs(predictor, chosen, settings, tell=tell)
+    beams = data.problem.lattice.beam_count
+    masks = np.unpackbits(data.packed, axis=1, count=beams).astype(bool)
+    said = predictor.predict(masks).efficiency
+    return Labelled(data, sum(map(len, chosen)), accuracy(said, data.efficiency))
+
+
+def grow(knowledge: Knowledge, part: Dataset) -> Knowledge:
+    """Return what is known together with the designs of one more round; networks are as before.
+
+    Some chains of the round are held out; what was on one side of the split stays there.
+    """
     before, count = knowledge.split, len(knowledge.data)
     data = merge([knowledge.data, part])
+    rounds = knowledge.rounds + 1
     if part.run_count > 1:
         recipe = knowledge.recipe
-        new = split_by_run(part, recipe.held_out, recipe.split_seed + knowledge.rounds + 1)
+        new = split_by_run(part, recipe.held_out, recipe.split_seed + rounds)
         split = Split(
             np.concatenate([before.training, new.training + count]),
             np.concatenate([before.held_out, new.held_out + count]),
@@ -163,7 +270,36 @@ def _grow(knowledge: Knowledge, part: Dataset) -> Knowledge:
     else:
         rows = np.arange(count, len(data))
         split = Split(np.concatenate([before.training, rows]), before.held_out)
-    return replace(knowledge, data=data, split=split)
+    return replace(knowledge, data=data, split=split, rounds=rounds)
+
+
+def lesson(grown: Knowledge, member: int, settings: ActiveSettings) -> Lesson:
+    """Return how a network is to be trained with what is known.
+
+    The split is not the one that the enlarged data would get: nothing that a network has learnt
+    from may be held out now.
+    """
+    recipe = settings.adapt(grown.recipe)
+    rows = grown.split.training
+    extra = rows[rows >= grown.original]
+    repeated = np.tile(extra, _repeats(len(rows), len(extra), settings.share))
+    return Lesson(
+        replace(recipe, seed=recipe.seed + member),
+        Split(np.concatenate([rows, repeated]), grown.split.held_out),
+        grown.models[member] if settings.warm else None,
+    )
+
+
+def conclude(learnt: Knowledge, labelled: Labelled, *, device: str = "auto") -> Round:
+    """Return what a round has found, after its networks were trained.
+
+    Parameters
+    ----------
+    learnt
+        With the networks of this round.
+    """
+    held_out = tuple(_test(learnt, model, device) for model in learnt.models)
+    return Round(labelled.proposed, len(labelled.data), labelled.surprise, held_out)
 
 
 def _test(knowledge: Knowledge, model: TrainedModel, device: str) -> Accuracy:
@@ -173,33 +309,6 @@ def _test(knowledge: Knowledge, model: TrainedModel, device: str) -> Accuracy:
     rows = rows[:: -(-len(rows) // knowledge.recipe.tested)]
     predicted = model.predict(knowledge.data.packed[rows], device=device)
     return accuracy(predicted, knowledge.data.efficiency[rows])
-
-
-def _train(
-    knowledge: Knowledge,
-    member: int,
-    settings: ActiveSettings,
-    *,
-    device: str,
-    tell: Callable[[str, int, int], None],
-    stop: Callable[[], bool],
-) -> TrainedModel | None:
-    """Train one network with what is known; None if stopped."""
-    recipe, old = knowledge.recipe, knowledge.models[member]
-    training = begin(knowledge.data, replace(recipe, seed=recipe.seed + member), device=device)
-    # Not the split that the enlarged data would get: nothing that a network has learnt from may
-    # be held out now.
-    rows = knowledge.split.training
-    extra = rows[rows >= knowledge.original]
-    training.split = Split(
-        np.concatenate([rows, np.tile(extra, _repeats(len(rows), len(extra), settings.share))]),
-        knowledge.split.held_out,
-    )
-    if settings.warm:
-        training.go_on_from(old)
-    for progress in training.run(stop):
-        tell("training", progress.done, progress.total)
-    return training.finish(recipe.tested) if training.is_done else None
 
 
 def _repeats(rows: int, extra: int, share: float) -> int:
@@ -214,7 +323,3 @@ def _repeats(rows: int, extra: int, share: float) -> int:
         return 0
     wanted = share / (1.0 - share) * (rows - extra)
     return max(math.ceil(wanted / extra) - 1, 0)
-
-
-def _masks(packed: NDArray[np.uint8], data: Dataset) -> NDArray[np.bool_]:
-    return np.unpackbits(packed, axis=1, count=data.problem.lattice.beam_count).astype(bool)

@@ -9,19 +9,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidSettings
+from bellcrank.learning.round_files import check_unused, last_finished
+from bellcrank.surrogate.folder import read_description, require_data
+from bellcrank.surrogate.matching import require_same_numbers
+from bellcrank.surrogate.predictor import load_models
 from bellcrank.surrogate.trained import read_model
 from bellcrank.surrogate.training import DESCRIPTION, MODEL, Progress, begin, resume
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Sequence
 
+    from bellcrank.model import Problem
     from bellcrank.surrogate.dataset import Dataset
     from bellcrank.surrogate.recipes import Recipe
     from bellcrank.surrogate.trained import TrainedModel
     from bellcrank.surrogate.training import Training
 
 MOST_MEMBERS = 100
+SHIPPED_WORD = "shipped"
+"""Stands for the network that comes with bellcrank."""
 PICTURE = "training.png"
 DRAWN = 20_000
 """Held-out designs in the picture, at most."""
@@ -49,7 +56,8 @@ def fit(
     recipe: Recipe | None,
     folder: str | os.PathLike[str],
     *,
-    members: int = 1,
+    members: int | None = None,
+    initial: Sequence[TrainedModel] = (),
     device: str = "auto",
     tell: Callable[[FitProgress], None] = lambda _progress: None,
     stop: Callable[[], bool] = lambda: False,
@@ -62,6 +70,11 @@ def fit(
         For a new training; each member has the next seed. None goes on with what is there.
     folder
         Gets the model, or for several members a folder of each.
+    members
+        Of a new training: by default as many as there are in `initial`, or one.
+    initial
+        Networks that the members go on from: one each, or one for all. By default they begin
+        with random weights.
 
     Returns
     -------
@@ -71,35 +84,103 @@ def fit(
     Raises
     ------
     InvalidSettings
-        If the number of members makes no sense or the data are others.
+        If the number of members makes no sense, networks are of another architecture than the
+        recipe's, or the data are others.
+    InvalidModel
+        If `initial` has learnt another problem.
     OutputExists
         If a training lies in the folder and a recipe was given.
     InvalidFile
         If none lies there and no recipe was given.
     """
-    if not 1 <= members <= MOST_MEMBERS:
-        raise InvalidSettings(f"members: expected 1 to {MOST_MEMBERS}, got {members}")
     place = Path(folder)
     if recipe is None:
         folders = _begun(place)
+        for own in folders:  # finished ones too, which nobody resumes
+            require_data(own, read_description(own), data)
     else:
-        folders = [place / f"member-{member}" for member in range(members)]
-        folders = folders if members > 1 else [place]
+        starts = starts_of(data.problem, recipe, members, initial)
+        check_unused(place)
+        folders = member_folders(place, len(starts))
         for member, own in enumerate(folders):  # all at once: whoever goes on finds them all
-            begin(data, replace(recipe, seed=recipe.seed + member), own, device=device)
-    models = []
+            mine = replace(recipe, seed=recipe.seed + member)
+            begin(data, mine, own, device=device, initial=starts[member])
+    return complete(
+        folders, lambda member: resume(folders[member], data, device=device),
+        device=device, tell=tell, stop=stop,
+    )  # fmt: skip
+
+
+def starts_of(
+    problem: Problem, recipe: Recipe, members: int | None, initial: Sequence[TrainedModel]
+) -> list[TrainedModel | None]:
+    """Return what each network of an ensemble goes on from; None is random weights.
+
+    Raises
+    ------
+    InvalidSettings
+        If the number of members makes no sense, or an architecture is not the recipe's.
+    InvalidModel
+        If one has learnt another problem, or numbers its beams otherwise.
+    """
+    count = (len(initial) or 1) if members is None else members
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_MEMBERS:
+        raise InvalidSettings(f"members: expected 1 to {MOST_MEMBERS}, got {count!r}")
+    if len(initial) > 1 and count != len(initial):
+        raise InvalidSettings(
+            f"members: {count} networks cannot go on from {len(initial)}; leave it out for one "
+            f"each, or give a single network to go on from"
+        )
+    for model in initial:
+        if model.architecture != recipe.model:
+            raise InvalidSettings(
+                f"a {recipe.model!r} cannot go on from the weights of a {model.architecture!r}; "
+                f"ask for that model (--model {model.architecture}), or begin afresh"
+            )
+        require_same_numbers(model.problem, problem)
+    return [initial[member % len(initial)] if initial else None for member in range(count)]
+
+
+def member_folders(place: Path, members: int) -> list[Path]:
+    """Return the folders of the networks of an ensemble: that of the whole, if there is one."""
+    if members == 1:
+        return [place]
+    return [place / f"member-{member}" for member in range(members)]
+
+
+def complete(
+    folders: Sequence[Path],
+    take_up: Callable[[int], Training],
+    *,
+    device: str = "auto",
+    tell: Callable[[FitProgress], None] = lambda _progress: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> list[TrainedModel] | None:
+    """Train to the end what is not trained yet, one network after the other.
+
+    Parameters
+    ----------
+    folders
+        Of the networks.
+    take_up
+        Begins or resumes the training of that number.
+
+    Returns
+    -------
+    list of TrainedModel or None
+        As they lie in the folders: the same, to the last bit, whoever trained them. None if it
+        was stopped.
+    """
     for member, own in enumerate(folders):
         if (own / MODEL).exists():
-            models.append(read_model(own / MODEL))
             continue
-        training = resume(own, data, device=device)
+        training = take_up(member)
         for progress in training.run(stop):
             tell(FitProgress(member, len(folders), progress))
         if not training.is_done:
             return None
-        models.append(training.finish())
-        _draw(training, models[-1], own / PICTURE, device)
-    return models
+        _draw(training, training.finish(), own / PICTURE, device)
+    return [read_model(own / MODEL) for own in folders]
 
 
 def _draw(training: Training, model: TrainedModel, path: Path, device: str) -> None:
@@ -125,14 +206,39 @@ def _draw(training: Training, model: TrainedModel, path: Path, device: str) -> N
 
 def _begun(place: Path) -> list[Path]:
     """Return the folders of the networks that were begun in a folder."""
-    found = sorted(path.parent for path in place.glob(f"member-*/{DESCRIPTION}"))
+    found = _in_order(path.parent for path in place.glob(f"member-*/{DESCRIPTION}"))
     if not found and not (place / DESCRIPTION).exists():
         raise InvalidFile(f"{place}: no training to go on with: it has no {DESCRIPTION}")
     return found or [place]
 
 
+def networks_to_go_on_from(problem: Problem, start: str | os.PathLike[str]) -> list[TrainedModel]:
+    """Return the networks that a word stands for.
+
+    Parameters
+    ----------
+    problem
+        That they are to go on learning.
+    start
+        A file, the folder of a training, or ``shipped`` for the network that comes with
+        bellcrank.
+
+    Raises
+    ------
+    InvalidModel
+        If they have learnt another problem or are damaged, or none comes with bellcrank.
+    InvalidFile
+        If there is no such file.
+    InvalidSettings
+        If PyTorch is not installed.
+    """
+    return load_models(problem, () if str(start) == SHIPPED_WORD else model_files(start))
+
+
 def model_files(path: str | os.PathLike[str]) -> list[Path]:
     """Return the model files that a path stands for: itself, or those in a training's folder.
+
+    Where learning went on in rounds, they are those of the last finished round.
 
     Raises
     ------
@@ -142,9 +248,15 @@ def model_files(path: str | os.PathLike[str]) -> list[Path]:
     place = Path(path)
     if not place.is_dir():
         return [place]
+    place = last_finished(place)
     if (place / MODEL).exists():
         return [place / MODEL]
-    found = sorted(place.glob(f"member-*/{MODEL}"))
+    found = _in_order(place.glob(f"member-*/{MODEL}"))
     if not found:
-        raise InvalidFile(f"{path}: no trained model in this folder; expected {MODEL}")
+        raise InvalidFile(f"{place}: no trained model in this folder; expected {MODEL}")
     return found
+
+
+def _in_order(paths: Iterable[Path]) -> list[Path]:
+    """Return paths by the numbers in their names: member-2 comes before member-10."""
+    return sorted(paths, key=lambda path: (len(str(path)), path))

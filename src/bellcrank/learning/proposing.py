@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+import math
+from dataclasses import asdict, dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from bellcrank.errors import InvalidDataset, InvalidSettings
 from bellcrank.learning.driving import FIRST_CHAIN, Driving
+from bellcrank.learning.heard import Heard
 from bellcrank.learning.scoring import NetworkScorer
 from bellcrank.mechanics import Evaluator, Status
 from bellcrank.provenance import provenance
 from bellcrank.search.populations import population_steps
+from bellcrank.search.settings import check_whole
 from bellcrank.surrogate.dataset import Dataset
+from bellcrank.surrogate.recipes import Recipe
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,6 +45,8 @@ class ActiveSettings:
         until they are so many. 0 repeats none.
     warm
         Whether networks go on from their weights, or begin afresh.
+    epochs, epoch_size, learning_rate
+        Of the training in a round, where it is to differ from the recipe; None does not.
 
     Raises
     ------
@@ -55,16 +61,65 @@ class ActiveSettings:
     best: int = 20
     share: float = 0.25
     warm: bool = True
+    epochs: int | None = None
+    epoch_size: int | None = None
+    learning_rate: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("disputed", "best"):
-            if not getattr(self, name) >= 0:
-                raise InvalidSettings(f"{name}: expected at least 0, got {getattr(self, name)!r}")
+            check_whole(name, getattr(self, name), 0)
         if self.disputed + self.best < 1:
             raise InvalidSettings("disputed, best: expected at least one design to label")
-        if not 0.0 <= self.share < 1.0:
+        if not _is_number(self.share) or not 0.0 <= self.share < 1.0:
             raise InvalidSettings(f"share: expected from 0 to below 1, got {self.share!r}")
-        _ = self.driving  # refuses what makes no sense
+        if not _is_number(self.caution) or not 0.0 <= self.caution < math.inf:
+            raise InvalidSettings(f"caution: expected at least 0, got {self.caution!r}")
+        if not isinstance(self.warm, bool):
+            raise InvalidSettings(f"warm: expected true or false, got {self.warm!r}")
+        _ = self.driving, self.adapt(Recipe(batch=2))  # refuse what makes no sense
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the settings as plain data."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Rebuild settings; what is not there is as by default.
+
+        Raises
+        ------
+        InvalidSettings
+            Also if there are keys that a round has not.
+
+        Examples
+        --------
+        >>> ActiveSettings.from_dict({"chains": 7}).chains
+        7
+        """
+        known = [each.name for each in fields(cls)]
+        if unknown := sorted(set(data) - set(known)):
+            raise InvalidSettings(
+                f"{unknown[0]}: no such key in a round; it has: {', '.join(sorted(known))}"
+            )
+        return cls(**data)
+
+    def adapt(self, recipe: Recipe) -> Recipe:
+        """Return a recipe as it is in a round.
+
+        Raises
+        ------
+        InvalidSettings
+            If an epoch is to be smaller than the recipe's batch.
+
+        Examples
+        --------
+        >>> adapted = ActiveSettings(epochs=1).adapt(Recipe())
+        >>> adapted.epochs, adapted.learning_rate
+        (1, 0.001)
+        """
+        given = {name: getattr(self, name) for name in ("epochs", "epoch_size", "learning_rate")}
+        changes: dict[str, Any] = {key: each for key, each in given.items() if each is not None}
+        return replace(recipe, **changes)
 
     @property
     def driving(self) -> Driving:
@@ -75,21 +130,35 @@ class ActiveSettings:
         )  # fmt: skip
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def propose_designs(
     predictor: Predictor,
     settings: ActiveSettings,
     *,
+    heard: Heard | None = None,
     tell: Callable[[str, int, int], None] = lambda _what, _done, _total: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> list[NDArray[np.uint8]]:
     """Let networks search, and choose of what they propose the designs worth labelling.
 
+    Parameters
+    ----------
+    heard
+        What the networks said before this search was stopped; gets what they say now.
+    tell, stop
+        See `bellcrank.learning.active.learn_actively`.
+
     Returns
     -------
     list of (k, bytes) uint8
         Packed masks, different ones, for each chain; in the order in which they were proposed.
+        Empty if it was stopped.
     """
-    scorer = _Watched(predictor, settings.caution)
+    heard = heard or Heard()
+    scorer = _Watched(predictor, settings.caution, heard)
     rule = settings.driving.rule
     steps = population_steps(predictor.problem, scorer, rule, first=FIRST_CHAIN)
     packed, said = [], []
@@ -97,7 +166,9 @@ def propose_designs(
         packed.append(np.packbits(scorer.masks, axis=1))
         said.append(scorer.said)
         tell("searching", population.step, rule.steps)
-        if stop():
+        stopped = stop()
+        heard.keep(now=stopped)
+        if stopped:
             return []
     designs = np.stack(packed, axis=1)
     predicted = np.stack([each.efficiency for each in said], axis=1)
@@ -116,9 +187,13 @@ class _Watched(NetworkScorer):
     masks: NDArray[np.bool_]
     said: Prediction
 
+    def __init__(self, predictor: Predictor, caution: float, heard: Heard) -> None:
+        super().__init__(predictor, caution)
+        self.heard = heard
+
     def score(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
         self.masks = masks.copy()
-        self.said = self.predictor.predict(masks)
+        self.said = self.heard.ask(self.predictor, masks)
         return self.judged(self.said)
 
 
@@ -177,7 +252,7 @@ def label_designs(
     if not packed:
         raise InvalidDataset(f"none of {total} designs that the networks propose is sound")
     origin = {
-        "active": asdict(settings),
+        "active": settings.to_dict(),
         "left_out": total - len(packed),
         "networks": [member.architecture for member in predictor.members],
         "provenance": provenance(seed=settings.seed),

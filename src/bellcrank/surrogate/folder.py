@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,19 +15,25 @@ from bellcrank.errors import InvalidFile, InvalidSettings, OutputExists
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
-from bellcrank.runs.files import make_folder
+from bellcrank.runs.files import make_folder, remove_temporaries
 from bellcrank.surrogate.recipes import PRECISIONS, Recipe
 
 if TYPE_CHECKING:
     import os
 
+    from numpy.typing import ArrayLike
+
     from bellcrank.surrogate.dataset import Dataset
+    from bellcrank.surrogate.splitting import Split
 
 TRAINING_SCHEMA = "bellcrank/training/1"
 DESCRIPTION = "training.json"
 CHECKPOINT = "checkpoint.safetensors"
 LOG = "log.csv"
 MODEL = "model.safetensors"
+INITIAL = "initial.safetensors"
+"""A copy of the network that a training goes on from."""
+_OURS = re.compile("|".join(map(re.escape, (DESCRIPTION, CHECKPOINT, LOG, MODEL, INITIAL))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +48,17 @@ class Description:
         Of the arithmetic, as it was chosen when it began.
     data
         Hash of what it learns from.
+    split
+        Hash of which rows are learnt from and which are held out; None if the recipe says it.
+    initial
+        Whether it goes on from a network, a copy of which lies in the folder.
     """
 
     recipe: Recipe
     precision: str
     data: str
+    split: str | None = None
+    initial: bool = False
 
 
 def check_new(folder: str | os.PathLike[str]) -> None:
@@ -82,6 +95,8 @@ def write_description(folder: Path, told: Description) -> None:
         "recipe": told.recipe.to_dict(),
         "precision": told.precision,
         "data": told.data,
+        "split": told.split,
+        "initial": told.initial,
         "provenance": provenance(),
     }
     write_text(folder / DESCRIPTION, json.dumps(data, indent=1) + "\n")
@@ -110,7 +125,28 @@ def read_description(folder: str | os.PathLike[str]) -> Description:
         raise InvalidFile(f"{place}: damaged ({error}); restore it from a copy") from None
     if precision not in PRECISIONS:
         raise InvalidFile(f"{place}: damaged (precision {precision!r}); restore it from a copy")
-    return Description(recipe, precision, data)
+    return Description(recipe, precision, data, told.get("split"), bool(told.get("initial")))
+
+
+def tidy(folder: Path) -> None:
+    """Remove the files that a killed training was writing.
+
+    Raises
+    ------
+    StorageError
+    """
+    remove_temporaries(folder, _OURS)
+
+
+def require_data(folder: str | os.PathLike[str], told: Description, data: Dataset) -> None:
+    """Refuse data that a training was not begun with.
+
+    Raises
+    ------
+    InvalidSettings
+    """
+    if told.data != data_hash(data):
+        raise InvalidSettings(f"{folder}: the training there was begun with other data")
 
 
 def read_recipe(folder: str | os.PathLike[str]) -> Recipe:
@@ -126,7 +162,16 @@ def read_recipe(folder: str | os.PathLike[str]) -> Recipe:
 
 def data_hash(data: Dataset) -> str:
     """Return the identity of what is learnt from: masks, efficiencies and runs."""
+    return _hash(data.packed, data.efficiency, data.run)
+
+
+def split_hash(split: Split) -> str:
+    """Return the identity of a split: its rows, in their order."""
+    return _hash([len(split.training)], split.training, split.held_out)
+
+
+def _hash(*columns: ArrayLike) -> str:
     digest = hashlib.sha256()
-    for column in (data.packed, data.efficiency, data.run):
+    for column in columns:
         digest.update(np.ascontiguousarray(column).tobytes())
     return digest.hexdigest()[:16]

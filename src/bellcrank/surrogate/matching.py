@@ -44,6 +44,31 @@ def beams_between(known: Problem, given: Problem) -> NDArray[np.int64]:
     return beam_of
 
 
+def require_same_numbers(known: Problem, given: Problem) -> None:
+    """Refuse a network that can tell about a problem, but not go on learning it.
+
+    Parameters
+    ----------
+    known
+        What it has learnt.
+    given
+        What it is to go on with: its beams must be numbered as the network knows them.
+
+    Raises
+    ------
+    InvalidModel
+        If they are not, or the problems differ.
+    """
+    beam_of = beams_between(known, given)
+    wrong = np.flatnonzero(beam_of != np.arange(len(beam_of)))
+    if len(wrong):
+        raise InvalidModel(
+            f"the model has learnt {known.name!r} with other numbers of the beams than those of "
+            f"{given.name!r} (beam {wrong[0]} is {beam_of[wrong[0]]} there); to go on learning, "
+            f"build the dataset for the problem as the model knows it"
+        )
+
+
 def _nodes_between(
     known: Lattice, given: Lattice, known_name: str, given_name: str
 ) -> NDArray[np.int64]:

@@ -185,7 +185,7 @@ def load_models(
             return [model]
     raise InvalidModel(
         f"no trained model for {problem.name!r} comes with bellcrank ({refusals[0]}); train one "
-        f"(bellcrank dataset build, bellcrank train) and name it with --model"
+        f"(bellcrank dataset build, bellcrank train) and name its file or folder"
     )
 
 

@@ -173,7 +173,7 @@ recipes.register("own")(
 )
 
 
-def recipe_of(name: str, **changes: Any) -> Recipe:
+def recipe_of(name: str, /, **changes: Any) -> Recipe:
     """Return a registered recipe, with changes; what is None stays as it is.
 
     Raises

@@ -106,6 +106,17 @@ class TrainedModel:
         found = run_network(network, feeder_of(self.view, where), packed, exactness)
         return self.mean + self.deviation * found
 
+    @property
+    def seen(self) -> dict[str, float]:
+        """Designs that it was trained with and seconds that this took, as its record says.
+
+        Both include what the networks that it went on from had seen and taken.
+        """
+        before = self.record.get("before", {})
+        return {
+            name: self.record.get(name, 0) + before.get(name, 0) for name in ("designs", "seconds")
+        }
+
     def describe(self) -> dict[str, Any]:
         """Return all that is known about it but its weights, as plain data."""
         return {

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import InvalidModel, InvalidSettings
 from bellcrank.model.storage import write_bytes, write_text
 from bellcrank.provenance import provenance
+from bellcrank.runs.files import make_folder
 from bellcrank.surrogate.backend import (
     autocast,
     find_device,
@@ -29,6 +30,7 @@ from bellcrank.surrogate.checkpoints import checkpoint_bytes, restore
 from bellcrank.surrogate.folder import (
     CHECKPOINT,
     DESCRIPTION,
+    INITIAL,
     LOG,
     MODEL,
     Description,
@@ -36,6 +38,9 @@ from bellcrank.surrogate.folder import (
     data_hash,
     read_description,
     read_recipe,
+    require_data,
+    split_hash,
+    tidy,
     write_description,
 )
 from bellcrank.surrogate.identity import architecture_of
@@ -48,7 +53,7 @@ from bellcrank.surrogate.schedule import (
     rows_of_epoch,
 )
 from bellcrank.surrogate.splitting import Split, overlap, split_by_run
-from bellcrank.surrogate.trained import TrainedModel, run_network
+from bellcrank.surrogate.trained import TrainedModel, read_model, run_network
 from bellcrank.surrogate.views import views
 
 if TYPE_CHECKING:
@@ -97,6 +102,8 @@ class Training:
         Where the network is.
     precision
         ``float32`` or ``bfloat16``.
+    before
+        Designs and seconds that the network had seen and taken before, if it goes on from one.
     """
 
     data: Dataset
@@ -113,6 +120,7 @@ class Training:
     seconds: float = 0.0
     losses: LossMeter = field(default_factory=LossMeter)
     log: list[EpochRecord] = field(default_factory=list)
+    before: dict[str, float] | None = None
 
     @property
     def epoch_size(self) -> int:
@@ -166,12 +174,21 @@ class Training:
         ------
         InvalidSettings
             If it is of another architecture.
+        InvalidModel
+            If it numbers beams otherwise than the data do.
         """
         if model.architecture != self.recipe.model:
             raise InvalidSettings(
                 f"a {self.recipe.model!r} cannot go on from the weights of a "
                 f"{model.architecture!r}; take the recipe that it was trained by, or begin afresh"
             )
+        there, here = model.problem, self.data.problem
+        if not np.array_equal(there.lattice.beams, here.lattice.beams):
+            raise InvalidModel(
+                f"the network knows the beams of {there.name!r}, which are not those of "
+                f"{here.name!r} in their order"
+            )
+        self.before = model.seen
         self.look_through(model.view)
         self.model = replace(self.model, mean=model.mean, deviation=model.deviation)
         for network in (self.model.network, self.average):
@@ -206,6 +223,8 @@ class Training:
             "epochs": [asdict(epoch) for epoch in self.log],
             "provenance": provenance(torch=import_torch().__version__),
         }
+        if self.before is not None:
+            record["before"] = self.before
         model = TrainedModel(
             self.model.architecture, self.data.problem, self.model.view, self._network(),
             self.model.mean, self.model.deviation, record,
@@ -299,6 +318,7 @@ def begin(
     *,
     device: str = "auto",
     initial: TrainedModel | None = None,
+    split: Split | None = None,
 ) -> Training:
     """Begin a training in a new folder.
 
@@ -306,6 +326,9 @@ def begin(
     ----------
     initial
         A network to go on from; by default it begins with random weights.
+    split
+        Rows to learn from, some perhaps more than once, and rows to hold out; by default as the
+        recipe says. Whoever resumes has to give the same again.
 
     Raises
     ------
@@ -314,6 +337,8 @@ def begin(
     InvalidSettings
         If PyTorch or the device is missing, all efficiencies are the same, or `initial` is of
         another architecture.
+    InvalidModel
+        If `initial` numbers beams otherwise.
     UnknownName
         If there is no such model.
     OutputExists
@@ -322,47 +347,76 @@ def begin(
     if folder is not None:
         check_new(folder)
     where = find_device(device)
-    training = _build(data, recipe, where, find_precision(recipe.precision, where))
+    training = _build(data, recipe, where, find_precision(recipe.precision, where), split)
     if initial is not None:
         training.go_on_from(initial)
     if folder is not None:
         training.folder = Path(folder)
-        told = Description(recipe, training.precision, data_hash(data))
+        tidy(training.folder)
+        if initial is not None:  # before the description: whoever finds that may go on
+            make_folder(training.folder)
+            initial.write(training.folder / INITIAL, overwrite=True)
+        told = Description(
+            recipe, training.precision, data_hash(data), _name_of(split), initial is not None
+        )
         write_description(training.folder, told)
-        if initial is not None:
-            training.save()  # the weights that it begins with are to be had nowhere else
     return training
 
 
-def resume(folder: str | os.PathLike[str], data: Dataset, *, device: str = "auto") -> Training:
+def resume(
+    folder: str | os.PathLike[str],
+    data: Dataset,
+    *,
+    device: str = "auto",
+    split: Split | None = None,
+) -> Training:
     """Go on with the training in a folder.
+
+    Parameters
+    ----------
+    split
+        As it was begun with.
 
     Raises
     ------
     InvalidFile
         If there is none, or its description is damaged.
     InvalidSettings
-        If it was begun with other data.
+        If it was begun with other data, or another split of them.
     InvalidModel
-        If its checkpoint is damaged.
+        If its checkpoint, or the network that it goes on from, is damaged.
     """
     place = Path(folder)
     told = read_description(place)
-    if told.data != data_hash(data):
-        raise InvalidSettings(f"{folder}: the training there was begun with other data")
-    training = _build(data, told.recipe, find_device(device), told.precision)
+    require_data(folder, told, data)
+    if told.split != _name_of(split):
+        raise InvalidSettings(f"{folder}: the training there holds out other designs")
+    training = _build(data, told.recipe, find_device(device), told.precision, split)
     training.folder = place
+    tidy(place)
+    if told.initial:
+        training.go_on_from(read_model(place / INITIAL))
     if (place / CHECKPOINT).exists():
         restore(training, place / CHECKPOINT)
     return training
 
 
-def _build(data: Dataset, recipe: Recipe, device: torch.device, precision: str) -> Training:
+def _name_of(split: Split | None) -> str | None:
+    return None if split is None else split_hash(split)
+
+
+def _build(
+    data: Dataset,
+    recipe: Recipe,
+    device: torch.device,
+    precision: str,
+    given: Split | None,
+) -> Training:
     import torch
 
     from bellcrank.surrogate.feeding import feeder_of
 
-    split = split_by_run(data, recipe.held_out, recipe.split_seed)
+    split = given or split_by_run(data, recipe.held_out, recipe.split_seed)
     seen = data.efficiency[split.training]
     if seen.min() == seen.max():  # their deviation may be a remnant of rounding
         raise InvalidSettings(f"all efficiencies are {seen[0]:g}: there is nothing to learn")
