@@ -25,13 +25,13 @@ from bellcrank.mechanics import Evaluator
 from bellcrank.model import find_problem
 from bellcrank.provenance import provenance
 from bellcrank.surrogate.backend import find_precision
+from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.identity import architecture_of
 from bellcrank.surrogate.models import models
 from bellcrank.surrogate.onnx import in_onnx
 from bellcrank.surrogate.recipes import Recipe
 from bellcrank.surrogate.trained import TrainedModel
-from bellcrank.surrogate.training import begin
 from bellcrank.surrogate.views import PictureView, views
 from benchmarks.chains import record
 
@@ -197,7 +197,7 @@ def network(name: str) -> TrainedModel:
     architecture = architecture_of(name)
     view = views[architecture.view](problem)
     built = architecture.build(view.shape).to(memory_format=torch.channels_last).eval()
-    return TrainedModel(name, problem, view, built, 0.0, 1.0)
+    return TrainedModel(name, problem, view, 0.0, 1.0, network=built)
 
 
 def measure_network(masks: NDArray[np.bool_], name: str, effort: Effort) -> list[Cost]:

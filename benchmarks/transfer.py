@@ -18,9 +18,10 @@ from bellcrank.learning.building import DatasetSpec, build_dataset
 from bellcrank.learning.transfer import FITS, TransferSettings, try_transfer
 from bellcrank.model import find_problem
 from bellcrank.provenance import provenance
+from bellcrank.surrogate.beginning import begin
+from bellcrank.surrogate.folder import MODEL
 from bellcrank.surrogate.recipes import recipe_of
 from bellcrank.surrogate.trained import TrainedModel, read_model
-from bellcrank.surrogate.training import MODEL, begin
 
 if TYPE_CHECKING:
     from bellcrank.surrogate.dataset import Dataset

@@ -35,7 +35,8 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> Path:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(0)
             network = architecture.build(view.shape)
-        TrainedModel(name, crane, view, network, 0.0, 1.0).write(folder / f"{name}.safetensors")
+        model = TrainedModel(name, crane, view, 0.0, 1.0, network=network)
+        model.write(folder / f"{name}.safetensors")
     return folder
 
 

@@ -14,9 +14,9 @@ import pytest
 from bellcrank.learning import finding
 from bellcrank.mechanics import CAREFUL, Evaluator
 from bellcrank.model import find_problem, read_design, write_problem
+from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.recipes import Recipe
-from bellcrank.surrogate.training import begin
 
 from .helpers import PROBLEM, call, refusal
 

@@ -11,7 +11,8 @@ from tests.surrogate.helpers import moved
 
 from bellcrank.errors import InvalidDataset, InvalidModel, InvalidSettings
 from bellcrank.learning import proposing
-from bellcrank.learning.active import Knowledge, begin_learning, learn_actively
+from bellcrank.learning.active import learn_actively
+from bellcrank.learning.knowledge import Knowledge, begin_learning
 from bellcrank.learning.proposing import ActiveSettings, label_designs, propose_designs
 from bellcrank.mechanics import Evaluator, Response, Status
 from bellcrank.surrogate.predictor import Predictor

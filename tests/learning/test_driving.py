@@ -13,13 +13,15 @@ import pytest
 
 from bellcrank.errors import InvalidModel, InvalidSettings, OutputExists, UnknownName
 from bellcrank.learning.driven import OFFERS, Driven, Made, median
-from bellcrank.learning.driving import Driving, DrivingProgress, drive
+from bellcrank.learning.driving import DrivingProgress, drive
 from bellcrank.learning.driving_files import keep_driven, picture_of
+from bellcrank.learning.driving_settings import Driving
 from bellcrank.learning.scoring import Judge, NetworkScorer, Truth
 from bellcrank.learning.stretches import Confirmer
 from bellcrank.mechanics import CAREFUL, Evaluator, Status
 from bellcrank.model import find_problem, read_design, unpack_mask
-from bellcrank.search.populations import MechanicsScorer, start_population
+from bellcrank.search.populations import start_population
+from bellcrank.search.scorers import MechanicsScorer
 from bellcrank.surrogate.predictor import Predictor
 
 from .tiny import tiny_dataset, tiny_model, tiny_problem

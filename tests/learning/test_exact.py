@@ -14,8 +14,9 @@ import pytest
 from bellcrank.errors import InvalidSettings
 from bellcrank.learning import driving
 from bellcrank.learning.driven import OFFERS, Driven, Effort
-from bellcrank.learning.driving import FIRST_CHAIN, Driving, DrivingProgress, drive
+from bellcrank.learning.driving import DrivingProgress, drive
 from bellcrank.learning.driving_files import keep_driven, picture_of
+from bellcrank.learning.driving_settings import FIRST_CHAIN, Driving
 from bellcrank.mechanics import CAREFUL, Evaluator, Status
 from bellcrank.model import read_design, unpack_mask
 from bellcrank.search import MetropolisSettings, chain_blocks

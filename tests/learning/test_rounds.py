@@ -26,19 +26,22 @@ from bellcrank.errors import (
     OutputExists,
 )
 from bellcrank.learning import fitting
-from bellcrank.learning.active import begin_learning, grow, label_round, learn_actively
-from bellcrank.learning.fitting import fit, model_files, starts_of
+from bellcrank.learning.active import label_round, learn_actively
+from bellcrank.learning.course import begin_rounds, read_course
+from bellcrank.learning.fitting import Ensemble, fit, model_files
 from bellcrank.learning.heard import Heard
+from bellcrank.learning.knowledge import begin_learning, grow
 from bellcrank.learning.proposing import ActiveSettings, propose_designs
-from bellcrank.learning.round_files import read_course, read_labelled, read_round
-from bellcrank.learning.rounds import RoundsProgress, begin_rounds, learn_in_rounds
+from bellcrank.learning.round_files import read_labelled, read_round
+from bellcrank.learning.rounds import RoundsProgress, learn_in_rounds
 from bellcrank.model import find_problem
+from bellcrank.surrogate import beginning
 from bellcrank.surrogate import training as training_module
+from bellcrank.surrogate.beginning import resume
 from bellcrank.surrogate.dataset import Dataset, read_dataset
 from bellcrank.surrogate.folder import data_hash
 from bellcrank.surrogate.predictor import Prediction, Predictor
 from bellcrank.surrogate.trained import read_model
-from bellcrank.surrogate.training import resume
 
 from .tiny import RECIPE, tiny_dataset, tiny_model
 
@@ -79,7 +82,7 @@ def no_pictures() -> Iterator[None]:
 
 
 def begun(folder: Path, rounds: int = ROUNDS) -> Path:
-    begin_rounds(tiny_dataset(), FAST, folder, SETTINGS, rounds, members=MEMBERS, device="cpu")
+    begin_rounds(tiny_dataset(), Ensemble(FAST, MEMBERS), folder, SETTINGS, rounds, device="cpu")
     return folder
 
 
@@ -161,7 +164,7 @@ def test_what_is_held_out_is_never_learnt_from(copy: Path) -> None:
         seen.append((data, options["split"]))
         return real(data, *words, **options)
 
-    real = training_module.begin
+    real = beginning.begin
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("bellcrank.learning.rounds.begin", begin)
         gone_on_with(copy)
@@ -362,7 +365,8 @@ def test_members_are_counted_as_people_count(tmp_path: Path) -> None:
 
 def test_given_networks_search_at_once_and_are_kept(tmp_path: Path) -> None:
     given = [tiny_model(0), tiny_model(1)]
-    begin_rounds(tiny_dataset(), FAST, tmp_path / "r", SETTINGS, 1, initial=given, device="cpu")
+    ensemble = Ensemble(FAST, initial=given)
+    begin_rounds(tiny_dataset(), ensemble, tmp_path / "r", SETTINGS, 1, device="cpu")
     assert read_course(tmp_path / "r").members == 2
     seen: list[RoundsProgress] = []
     learnt = gone_on_with(tmp_path / "r", tell=seen.append)
@@ -380,10 +384,8 @@ def test_given_networks_search_at_once_and_are_kept(tmp_path: Path) -> None:
 
 
 def test_one_network_can_become_several(tmp_path: Path) -> None:
-    begin_rounds(
-        tiny_dataset(), FAST, tmp_path / "r", SETTINGS, 1,
-        members=3, initial=[tiny_model(0)], device="cpu",
-    )  # fmt: skip
+    ensemble = Ensemble(FAST, 3, [tiny_model(0)])
+    begin_rounds(tiny_dataset(), ensemble, tmp_path / "r", SETTINGS, 1, device="cpu")
     learnt = gone_on_with(tmp_path / "r")
     assert len(learnt.models) == 3
     packed = tiny_dataset().packed[:50]
@@ -392,8 +394,8 @@ def test_one_network_can_become_several(tmp_path: Path) -> None:
 
 
 def test_a_training_can_go_on_from_given_networks(tmp_path: Path) -> None:
-    gently = replace(FAST, learning_rate=1e-12, epoch_size=64)
-    (after,) = fit(tiny_dataset(), gently, tmp_path / "on", initial=[tiny_model(0)], device="cpu")
+    gently = Ensemble(replace(FAST, learning_rate=1e-12, epoch_size=64), initial=[tiny_model(0)])
+    (after,) = fit(tiny_dataset(), gently, tmp_path / "on", device="cpu")
     packed = tiny_dataset().packed[:100]
     given, afresh = (tiny_model(k).predict(packed, device="cpu") for k in (0, 1))
     found = after.predict(packed, device="cpu")
@@ -495,22 +497,25 @@ def test_what_makes_no_sense_is_refused_before_anything_is_written(
     tmp_path: Path, given: dict[str, Any], kind: type[BellcrankError], message: str
 ) -> None:
     told = {"recipe": FAST, "settings": ActiveSettings(), "rounds": 1, "device": "cpu", **given}
-    told["initial"] = [tiny_model(seed) for seed in told.get("initial", [])]
-    first = [told.pop(name) for name in ("recipe", "settings", "rounds")]
+    initial = [tiny_model(seed) for seed in told.get("initial", [])]
     with pytest.raises(kind, match=message):
-        begin_rounds(tiny_dataset(), first[0], tmp_path / "new", *first[1:], **told)
+        begin_rounds(
+            tiny_dataset(), Ensemble(told["recipe"], told.get("members"), initial),
+            tmp_path / "new", told["settings"], told["rounds"], device=told["device"],
+        )  # fmt: skip
     assert not (tmp_path / "new").exists()
 
 
 def test_networks_of_another_lattice_and_data_of_one_run_are_refused(tmp_path: Path) -> None:
     stranger = untrained(find_problem("scaling-8"))
     one = tiny_dataset().take(tiny_dataset().run == 0)
+    strange = Ensemble(FAST, initial=[stranger])
     with pytest.raises(InvalidModel, match="has learnt 'scaling-8'"):
-        begin_rounds(tiny_dataset(), FAST, tmp_path / "n", SETTINGS, 1, initial=[stranger])
+        begin_rounds(tiny_dataset(), strange, tmp_path / "n", SETTINGS, 1)
     with pytest.raises(InvalidModel, match="has learnt 'scaling-8'"):
-        fit(tiny_dataset(), FAST, tmp_path / "n", initial=[stranger], device="cpu")
+        fit(tiny_dataset(), strange, tmp_path / "n", device="cpu")
     with pytest.raises(InvalidDataset, match="from one run"):
-        begin_rounds(one, FAST, tmp_path / "n", SETTINGS, 1, device="cpu")
+        begin_rounds(one, Ensemble(FAST), tmp_path / "n", SETTINGS, 1, device="cpu")
     assert not (tmp_path / "n").exists()
 
 
@@ -519,8 +524,10 @@ def test_a_folder_in_use_is_left_alone(whole: Path, tmp_path: Path) -> None:
     (tmp_path / "two" / "member-1").mkdir(parents=True)
     shutil.copy(whole / "member-1" / "training.json", tmp_path / "two" / "member-1")
     beginnings: list[Callable[[Path], object]] = [
-        lambda place: begin_rounds(tiny_dataset(), FAST, place, SETTINGS, 1, device="cpu"),
-        lambda place: fit(tiny_dataset(), FAST, place, device="cpu"),
+        lambda place: begin_rounds(
+            tiny_dataset(), Ensemble(FAST), place, SETTINGS, 1, device="cpu"
+        ),
+        lambda place: fit(tiny_dataset(), Ensemble(FAST), place, device="cpu"),
     ]
     for place in (whole, tmp_path / "old", tmp_path / "two"):
         before = sorted(place.rglob("*"))
@@ -532,7 +539,7 @@ def test_a_folder_in_use_is_left_alone(whole: Path, tmp_path: Path) -> None:
 
 def test_starts_are_one_for_each_or_one_for_all() -> None:
     problem, first, second = tiny_dataset().problem, tiny_model(0), tiny_model(1)
-    assert starts_of(problem, FAST, None, []) == [None]
-    assert starts_of(problem, FAST, 3, []) == [None] * 3
-    assert starts_of(problem, FAST, None, [first, second]) == [first, second]
-    assert starts_of(problem, FAST, 2, [first]) == [first, first]
+    assert Ensemble(FAST).starts(problem) == [None]
+    assert Ensemble(FAST, 3).starts(problem) == [None] * 3
+    assert Ensemble(FAST, initial=[first, second]).starts(problem) == [first, second]
+    assert Ensemble(FAST, 2, [first]).starts(problem) == [first, first]

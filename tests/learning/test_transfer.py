@@ -23,7 +23,8 @@ def ignorant(kind, **canvas):
     small = find_problem("scaling-8")
     view = views[models[kind].view](small, **canvas)
     torch.manual_seed(0)
-    return TrainedModel(kind, small, view, models[kind].build(view.shape).eval(), 0.0, 1.0)
+    network = models[kind].build(view.shape).eval()
+    return TrainedModel(kind, small, view, 0.0, 1.0, network=network)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def test_a_canvas_to_scale_has_as_many_pixels_to_a_beam(small):
     known, other = find_problem(small), find_problem("scaling-10")
     view = views["picture"](known)
     network = models["resnet18-w16"].build(view.shape)
-    model = TrainedModel("resnet18-w16", known, view, network, 0.0, 1.0)
+    model = TrainedModel("resnet18-w16", known, view, 0.0, 1.0, network=network)
 
     def pixels(view, problem):
         placed = view.renderer.canvas.place(problem.lattice.positions)

@@ -11,9 +11,9 @@ from bellcrank.learning.building import reverse
 from bellcrank.mechanics import Evaluator, Status
 from bellcrank.model import Input, Output, Problem, Supports, lattices
 from bellcrank.search import MetropolisSettings, chain_blocks
+from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.recipes import Recipe
-from bellcrank.surrogate.training import begin
 
 if TYPE_CHECKING:
     from bellcrank.surrogate.trained import TrainedModel

@@ -11,8 +11,9 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Evaluator, Response, Status
 from bellcrank.model import Problem, find_problem
 from bellcrank.search import BLOCK
+from bellcrank.search.delayed_acceptance import ScreenedSettings
 from bellcrank.search.lockstep import Lockstep, screened_steps
-from bellcrank.search.screened import ScreenedSettings, screened_blocks
+from bellcrank.search.screened import screened_blocks
 
 STEPS = BLOCK + 70
 CHAINS = 3

@@ -12,8 +12,10 @@ from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.mechanics import Evaluator, Status
 from bellcrank.model import Problem, find_problem
 from bellcrank.search import FORESEEN, MetropolisSettings, chain_blocks
-from bellcrank.search.populations import MechanicsScorer, population_steps
-from bellcrank.search.screened import ScreenedSettings, screened_blocks
+from bellcrank.search.delayed_acceptance import ScreenedSettings
+from bellcrank.search.populations import population_steps
+from bellcrank.search.scorers import MechanicsScorer
+from bellcrank.search.screened import screened_blocks
 
 STEPS = 300
 

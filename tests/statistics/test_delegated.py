@@ -14,8 +14,9 @@ import pytest
 
 from bellcrank.mechanics import Evaluator, Response, Status
 from bellcrank.search import MetropolisSettings, screened
+from bellcrank.search.delayed_acceptance import ScreenedSettings
 from bellcrank.search.populations import population_steps
-from bellcrank.search.screened import ScreenedSettings, screened_blocks
+from bellcrank.search.screened import screened_blocks
 
 from .lattice import (
     BURN_IN,

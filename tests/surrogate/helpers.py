@@ -81,7 +81,8 @@ def untrained(problem: Problem, name: str = "mlp", seed: int = 0, **view: Any) -
             each.momentum = 1.0  # one pass sets the running figures: predictions then differ
         packed = np.packbits(random_masks(problem, 8, seed=77), axis=1)
         network.train()(torch.from_numpy(looks.look(packed)).float() * looks.scale)
-    return TrainedModel(name, problem, looks, network.eval(), 0.25, 0.5, {"note": "untrained"})
+    record = {"note": "untrained"}
+    return TrainedModel(name, problem, looks, 0.25, 0.5, record, network=network.eval())
 
 
 def weights(model: TrainedModel) -> dict[str, Any]:

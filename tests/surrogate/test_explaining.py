@@ -46,7 +46,7 @@ def random_model(problem, kind, seed=0):
             if isinstance(module, torch.nn.BatchNorm1d | torch.nn.BatchNorm2d):
                 module.running_mean.normal_(0.0, 0.1)
                 module.running_var.uniform_(0.5, 1.5)
-    return TrainedModel(kind, problem, view, network.eval(), 0.3, 2.0)
+    return TrainedModel(kind, problem, view, 0.3, 2.0, network=network.eval())
 
 
 @pytest.fixture(scope="module")

@@ -24,14 +24,21 @@ from bellcrank.errors import (
     UnknownName,
 )
 from bellcrank.surrogate import training as module
+from bellcrank.surrogate.beginning import begin, resume
 from bellcrank.surrogate.dataset import Dataset
-from bellcrank.surrogate.folder import CHECKPOINT, DESCRIPTION, INITIAL, LOG, MODEL
+from bellcrank.surrogate.folder import (
+    CHECKPOINT,
+    DESCRIPTION,
+    INITIAL,
+    LOG,
+    MODEL,
+    read_description,
+)
 from bellcrank.surrogate.metrics import accuracy, correlation
 from bellcrank.surrogate.progress import LossMeter
 from bellcrank.surrogate.recipes import Recipe, recipe_of
 from bellcrank.surrogate.splitting import Split
 from bellcrank.surrogate.trained import read_model
-from bellcrank.surrogate.training import begin, read_recipe, resume
 
 from .helpers import TINY, moved, random_dataset, same_weights, untrained
 
@@ -153,10 +160,12 @@ CHILD = """
 import sys, torch
 torch.set_num_threads(1)
 from bellcrank.surrogate import training
+from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import read_dataset
+from bellcrank.surrogate.folder import read_description
 training.CHECKPOINT_SECONDS = training.TELL_SECONDS = 0.0
 data = read_dataset(sys.argv[1])
-running = training.begin(data, training.read_recipe(sys.argv[3]), sys.argv[2], device="cpu")
+running = begin(data, read_description(sys.argv[3]).recipe, sys.argv[2], device="cpu")
 print("start", running.step, flush=True)
 for progress in running.run():
     print("done", progress.done, flush=True)
@@ -369,7 +378,7 @@ def test_the_paper_s_recipe_is_the_paper_s(whole: tuple[Path, Training]) -> None
     paper = recipe_of("paper")
     assert (paper.model, paper.epochs, paper.batch, paper.optimiser) == ("resnet50", 10, 32, "adam")
     assert (paper.held_out, paper.resampling, paper.averaging) == (0.25, True, 0.0)
-    assert read_recipe(whole[0]) == AVERAGED
+    assert read_description(whole[0]).recipe == AVERAGED
 
 
 @pytest.mark.parametrize("stopped_at", [0, 7])

@@ -20,8 +20,8 @@ from bellcrank.errors import (
 )
 from bellcrank.model import problem_to_dict
 from bellcrank.surrogate.backend import find_precision
-from bellcrank.surrogate.identity import METADATA_KEY
-from bellcrank.surrogate.trained import lattice_hash, read_model
+from bellcrank.surrogate.identity import METADATA_KEY, lattice_hash
+from bellcrank.surrogate.trained import read_model
 
 from .helpers import random_masks, same_weights, untrained
 

@@ -58,8 +58,9 @@ def surrogate_search(
 ) -> None:
     """Search with a network in place of the mechanics, and check by mechanics what it makes."""
     from bellcrank.cli.design import stopping_on_interrupt
-    from bellcrank.learning.driving import Driving, drive
+    from bellcrank.learning.driving import drive
     from bellcrank.learning.driving_files import keep_driven
+    from bellcrank.learning.driving_settings import Driving
     from bellcrank.learning.fitting import model_files
     from bellcrank.model import find_problem
     from bellcrank.runs import check_free

@@ -14,13 +14,14 @@ from rich.table import Table
 from bellcrank.cli.app import INTERRUPTED, app
 from bellcrank.cli.arguments import settings_of
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.cli.predict import Device
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
     from bellcrank.learning.active import Round
+    from bellcrank.learning.fitting import Ensemble
     from bellcrank.learning.proposing import ActiveSettings
     from bellcrank.surrogate.dataset import Dataset
-    from bellcrank.surrogate.recipes import Recipe
     from bellcrank.surrogate.trained import TrainedModel
 
     Found = tuple[list[TrainedModel], list[Round] | None]
@@ -69,12 +70,12 @@ def train(
     resume: Annotated[
         Path | None, typer.Option(help="Go on with the training in this folder.")
     ] = None,
-    device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
+    device: Device = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Train a network, and test it on runs that it has not seen."""
-    from bellcrank.learning.fitting import networks_to_go_on_from
-    from bellcrank.learning.rounds import begin_rounds
+    from bellcrank.learning.course import begin_rounds
+    from bellcrank.learning.fitting import Ensemble, networks_to_go_on_from
     from bellcrank.surrogate.dataset import read_dataset
     from bellcrank.surrogate.recipes import recipe_of
 
@@ -91,13 +92,11 @@ def train(
         data = read_dataset(dataset)
         folder = out or Path(f"{data.problem.name}-{chosen.model}")
         initial = [] if start is None else networks_to_go_on_from(data.problem, start)
+        ensemble = Ensemble(chosen, members, initial)
         if active is None:
-            found = _fit(data, chosen, folder, device, members=members, initial=initial)
+            found = _fit(data, ensemble, folder, device)
         else:
-            begin_rounds(
-                data, chosen, folder, active, rounds or 0,
-                members=members, initial=initial, device=device,
-            )  # fmt: skip
+            begin_rounds(data, ensemble, folder, active, rounds or 0, device=device)
             found = _learn(data, folder, device)
     if found is None:
         told = f"bellcrank train {shlex.quote(str(dataset))} --resume {shlex.quote(str(folder))}"
@@ -124,26 +123,26 @@ def _rounds_of(rounds: int | None, texts: list[str] | None) -> ActiveSettings | 
 
 def _go_on(data: Dataset, folder: Path, device: str) -> Found | None:
     """Go on with what a folder has begun."""
-    from bellcrank.learning.round_files import is_course
+    from bellcrank.learning.course import is_course
 
     if is_course(folder):
         return _learn(data, folder, device)
     return _fit(data, None, folder, device)
 
 
-def _fit(
-    data: Dataset, recipe: Recipe | None, folder: Path, device: str, **start: Any
-) -> Found | None:
+def _fit(data: Dataset, ensemble: Ensemble | None, folder: Path, device: str) -> Found | None:
+    """Begin to train an ensemble, or go on with the one that a folder has begun."""
     from bellcrank.cli.design import stopping_on_interrupt
     from bellcrank.cli.training_live import TrainingLive
     from bellcrank.learning.fitting import fit
 
     with stopping_on_interrupt() as stop, TrainingLive() as live:
-        trained = fit(data, recipe, folder, device=device, tell=live, stop=stop.is_set, **start)
+        trained = fit(data, ensemble, folder, device=device, tell=live, stop=stop.is_set)
     return None if trained is None else (trained, None)
 
 
 def _learn(data: Dataset, folder: Path, device: str) -> Found | None:
+    """Make what is left of the learning in rounds that a folder has begun."""
     from bellcrank.cli.design import stopping_on_interrupt
     from bellcrank.cli.training_live import RoundsLive
     from bellcrank.learning.rounds import learn_in_rounds

@@ -5,11 +5,14 @@ in the data of searches by mechanics. A round labels such designs, above all tho
 networks dispute, and goes on training with them. Each chain is a run of its own, so that
 designs which resemble each other stay on one side of the split; what was held out stays so.
 
-A round has two steps, `label_round` and the training by the `lesson` for each network;
-`learn_actively` makes both, and `bellcrank.learning.rounds` keeps what they make.
+A round has two steps, `label_round` and the training by the `lesson` for each network (see
+`bellcrank.learning.knowledge`); `learn_actively` makes both, and `bellcrank.learning.rounds`
+keeps what they make.
 
 Examples
 --------
+>>> from bellcrank.learning.knowledge import begin_learning
+>>> from bellcrank.learning.proposing import ActiveSettings
 >>> knowledge = begin_learning(data, recipe, models)  # doctest: +SKIP
 >>> for _ in range(3):  # doctest: +SKIP
 ...     knowledge, found = learn_actively(knowledge, ActiveSettings(seed=knowledge.rounds))
@@ -18,54 +21,26 @@ Examples
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from bellcrank.learning.proposing import ActiveSettings, label_designs, propose_designs
-from bellcrank.surrogate.dataset import Dataset, merge
-from bellcrank.surrogate.matching import require_same_numbers
+from bellcrank.learning.knowledge import grow, lesson
+from bellcrank.learning.proposing import label_designs, propose_designs
+from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.metrics import Accuracy, accuracy
 from bellcrank.surrogate.predictor import Predictor
-from bellcrank.surrogate.splitting import Split, split_by_run
-from bellcrank.surrogate.training import begin
+from bellcrank.surrogate.splitting import thinned
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from bellcrank.learning.heard import Heard
-    from bellcrank.surrogate.recipes import Recipe
+    from bellcrank.learning.knowledge import Knowledge
+    from bellcrank.learning.proposing import ActiveSettings
+    from bellcrank.surrogate.dataset import Dataset
     from bellcrank.surrogate.trained import TrainedModel
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Knowledge:
-    """Where active learning stands between two rounds.
-
-    Parameters
-    ----------
-    data
-        All labelled designs.
-    original
-        How many of them, the first ones, were there before.
-    split
-        Which of them are learnt from and which are held out; nothing ever changes sides.
-    recipe
-        Of the training; member k has the recipe's seed + k.
-    models
-        The networks.
-    rounds
-        Made so far.
-    """
-
-    data: Dataset
-    original: int
-    split: Split
-    recipe: Recipe
-    models: tuple[TrainedModel, ...]
-    rounds: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,25 +60,6 @@ class Labelled:
     data: Dataset
     proposed: int
     surprise: Accuracy
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Lesson:
-    """How one network is to be trained in a round.
-
-    Parameters
-    ----------
-    recipe
-        With the member's own seed.
-    split
-        Rows to learn from, new ones repeated, and rows held out.
-    initial
-        The network to go on from; None begins afresh.
-    """
-
-    recipe: Recipe
-    split: Split
-    initial: TrainedModel | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,22 +102,6 @@ class Round:
         held_out = tuple(Accuracy(**each) for each in told["held_out"])
         surprise = Accuracy(**told["surprise"])
         return cls(int(told["proposed"]), int(told["labelled"]), surprise, held_out)
-
-
-def begin_learning(data: Dataset, recipe: Recipe, models: Sequence[TrainedModel]) -> Knowledge:
-    """Begin with networks that were trained by a recipe on a dataset, or on another of its problem.
-
-    Raises
-    ------
-    InvalidDataset
-        If all designs come from a single run.
-    InvalidModel
-        If a network has learnt another problem, or numbers beams otherwise.
-    """
-    for model in models:
-        require_same_numbers(model.problem, data.problem)
-    split = split_by_run(data, recipe.held_out, recipe.split_seed)
-    return Knowledge(data, len(data), split, recipe, tuple(models))
 
 
 def learn_actively(
@@ -252,44 +192,6 @@ def label_round(
     return Labelled(data, sum(map(len, chosen)), accuracy(said, data.efficiency))
 
 
-def grow(knowledge: Knowledge, part: Dataset) -> Knowledge:
-    """Return what is known together with the designs of one more round; networks are as before.
-
-    Some chains of the round are held out; what was on one side of the split stays there.
-    """
-    before, count = knowledge.split, len(knowledge.data)
-    data = merge([knowledge.data, part])
-    rounds = knowledge.rounds + 1
-    if part.run_count > 1:
-        recipe = knowledge.recipe
-        new = split_by_run(part, recipe.held_out, recipe.split_seed + rounds)
-        split = Split(
-            np.concatenate([before.training, new.training + count]),
-            np.concatenate([before.held_out, new.held_out + count]),
-        )
-    else:
-        rows = np.arange(count, len(data))
-        split = Split(np.concatenate([before.training, rows]), before.held_out)
-    return replace(knowledge, data=data, split=split, rounds=rounds)
-
-
-def lesson(grown: Knowledge, member: int, settings: ActiveSettings) -> Lesson:
-    """Return how a network is to be trained with what is known.
-
-    The split is not the one that the enlarged data would get: nothing that a network has learnt
-    from may be held out now.
-    """
-    recipe = settings.adapt(grown.recipe)
-    rows = grown.split.training
-    extra = rows[rows >= grown.original]
-    repeated = np.tile(extra, _repeats(len(rows), len(extra), settings.share))
-    return Lesson(
-        replace(recipe, seed=recipe.seed + member),
-        Split(np.concatenate([rows, repeated]), grown.split.held_out),
-        grown.models[member] if settings.warm else None,
-    )
-
-
 def conclude(learnt: Knowledge, labelled: Labelled, *, device: str = "auto") -> Round:
     """Return what a round has found, after its networks were trained.
 
@@ -305,21 +207,6 @@ def conclude(learnt: Knowledge, labelled: Labelled, *, device: str = "auto") -> 
 def _test(knowledge: Knowledge, model: TrainedModel, device: str) -> Accuracy:
     """Test a network on some of what is held out of the original data."""
     rows = knowledge.split.held_out
-    rows = rows[rows < knowledge.original]
-    rows = rows[:: -(-len(rows) // knowledge.recipe.tested)]
+    rows = thinned(rows[rows < knowledge.original], knowledge.recipe.tested)
     predicted = model.predict(knowledge.data.packed[rows], device=device)
     return accuracy(predicted, knowledge.data.efficiency[rows])
-
-
-def _repeats(rows: int, extra: int, share: float) -> int:
-    """Return how often to repeat new rows, beyond once, to make a share of all.
-
-    Examples
-    --------
-    >>> _repeats(rows=1000, extra=100, share=0.25), _repeats(rows=1000, extra=500, share=0.25)
-    (2, 0)
-    """
-    if not extra:
-        return 0
-    wanted = share / (1.0 - share) * (rows - extra)
-    return max(math.ceil(wanted / extra) - 1, 0)

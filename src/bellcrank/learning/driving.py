@@ -10,6 +10,7 @@ however bad the networks (`bellcrank.search.screened`).
 
 Examples
 --------
+>>> from bellcrank.learning.driving_settings import Driving
 >>> from bellcrank.model import find_problem
 >>> from bellcrank.surrogate.predictor import load_predictor
 >>> crane = find_problem("crane")
@@ -23,19 +24,17 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
 from bellcrank.learning.driven import OFFERS, Driven, Effort, Made
+from bellcrank.learning.driving_settings import FIRST_CHAIN, Driving
 from bellcrank.learning.finding import Chains, Found, by_mechanics, by_networks, by_screening
 from bellcrank.learning.scoring import Judge, NetworkScorer
 from bellcrank.provenance import provenance
-from bellcrank.search import MetropolisSettings
-from bellcrank.search.screened import ScreenedSettings
 from bellcrank.surrogate.distances import smallest_distances
-from bellcrank.surrogate.matching import beams_between
+from bellcrank.surrogate.matching import beams_between, renumbered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -45,102 +44,6 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
     from bellcrank.surrogate.dataset import Dataset
     from bellcrank.surrogate.predictor import Predictor
-
-FIRST_CHAIN = 1
-"""Runs of a dataset are all chain 0, each of its own seed: none of ours repeats one of them."""
-
-CHANGEABLE = ("cost", "schedule", "hot", "cold", "annealing")
-"""Settings of the chains; all others are the paper's."""
-
-SCREENING = ("doubt", "least_chance", "lookahead")
-"""Settings that an exact search has besides, see `bellcrank.search.screened.ScreenedSettings`."""
-
-LOOKAHEAD = 1
-"""Unless told otherwise: chains side by side fill the batches, and nothing is scored in vain."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Driving:
-    """What a network-driven search is told; the defaults are the paper's.
-
-    Parameters
-    ----------
-    chains, steps, seed
-        Independent chains, proposals of each, and what names their random numbers.
-    caution
-        How many standard deviations between the networks to take off their mean.
-    checked
-        How many of the best different designs of each chain, as predicted, the mechanics checks
-        besides the last.
-    confirm
-        Steps after which the mechanics confirms a stretch of a chain or takes it back, see
-        `bellcrank.learning.stretches`; 0 for never, as in the paper.
-    exact
-        Whether networks only screen what is proposed, and the mechanics decides.
-    compare
-        Whether to run as many chains of the mechanics.
-    search
-        What of the search ``paper`` is to differ: `CHANGEABLE` settings, and `SCREENING` ones of
-        an exact search.
-
-    Raises
-    ------
-    InvalidSettings, UnknownName
-    """
-
-    chains: int = 100
-    steps: int = 582
-    seed: int = 0
-    caution: float = 0.0
-    checked: int = 10
-    confirm: int = 0
-    exact: bool = False
-    compare: bool = True
-    search: dict[str, Any] | None = None
-
-    def __post_init__(self) -> None:
-        if isinstance(self.checked, bool) or not isinstance(self.checked, int) or self.checked < 1:
-            raise InvalidSettings(f"checked: expected at least 1 design, got {self.checked!r}")
-        if isinstance(self.confirm, bool) or not isinstance(self.confirm, int) or self.confirm < 0:
-            raise InvalidSettings(f"confirm: expected a number of steps, got {self.confirm!r}")
-        if self.exact and self.confirm:
-            raise InvalidSettings(
-                f"confirm: in an exact search the mechanics decides on every step already; leave "
-                f"it at 0, got {self.confirm!r}"
-            )
-        self._check_search()
-
-    def _check_search(self) -> None:
-        given = set(self.search or {})
-        if not self.exact and (foreign := sorted(given.intersection(SCREENING))):
-            raise InvalidSettings(
-                f"{foreign[0]}: how networks screen belongs to an exact search (--exact)"
-            )
-        known = (*CHANGEABLE, *(SCREENING if self.exact else ()))
-        if unknown := sorted(given.difference(known)):
-            raise InvalidSettings(
-                f"{unknown[0]}: a search driven by networks can change only "
-                f"{', '.join(known)}: efficiencies are what the networks have learnt"
-            )
-        _ = self.rule, self.screened_rule  # refuse what makes no sense
-
-    @property
-    def rule(self) -> MetropolisSettings:
-        """Settings of the chains by networks, and of those of the mechanics."""
-        search = {key: self._all[key] for key in self._all if key not in SCREENING}
-        return MetropolisSettings.from_dict(search)
-
-    @property
-    def screened_rule(self) -> ScreenedSettings | None:
-        """Settings of the chains of an exact search; None if it is not."""
-        if not self.exact:
-            return None
-        return ScreenedSettings.from_dict({"lookahead": LOOKAHEAD, **self._all})
-
-    @property
-    def _all(self) -> dict[str, Any]:
-        given = {"steps": self.steps, "chains": self.chains, "seed": self.seed}
-        return {**given, **(self.search or {})}
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,8 +203,6 @@ def _with_distances(
     made: tuple[Made, ...], training: Dataset, beams: NDArray[np.int64]
 ) -> tuple[Made, ...]:
     """Return the designs with their distances to what was learnt from."""
-    masks = _masks_of(made, len(beams))
-    known = np.zeros_like(masks)
-    known[:, beams] = masks
+    known = renumbered(_masks_of(made, len(beams)), beams)
     distance, _ = smallest_distances(np.packbits(known, axis=1), training.packed)
     return tuple(replace(each, distance=int(far)) for each, far in zip(made, distance, strict=True))

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Problem
     from bellcrank.search import MetropolisSettings
-    from bellcrank.search.populations import Scorer
-    from bellcrank.search.screened import ScreenedSettings
+    from bellcrank.search.delayed_acceptance import ScreenedSettings
+    from bellcrank.search.scorers import Scorer
 
 
 @dataclass(frozen=True, slots=True, eq=False)

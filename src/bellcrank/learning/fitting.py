@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,11 +10,12 @@ import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.learning.round_files import check_unused, last_finished
-from bellcrank.surrogate.folder import read_description, require_data
+from bellcrank.surrogate.beginning import begin, resume
+from bellcrank.surrogate.folder import DESCRIPTION, MODEL, read_description, require_data
 from bellcrank.surrogate.matching import require_same_numbers
 from bellcrank.surrogate.predictor import load_models
+from bellcrank.surrogate.splitting import thinned
 from bellcrank.surrogate.trained import read_model
-from bellcrank.surrogate.training import DESCRIPTION, MODEL, Progress, begin, resume
 
 if TYPE_CHECKING:
     import os
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Problem
     from bellcrank.surrogate.dataset import Dataset
+    from bellcrank.surrogate.progress import Progress
     from bellcrank.surrogate.recipes import Recipe
     from bellcrank.surrogate.trained import TrainedModel
     from bellcrank.surrogate.training import Training
@@ -32,6 +34,67 @@ SHIPPED_WORD = "shipped"
 PICTURE = "training.png"
 DRAWN = 20_000
 """Held-out designs in the picture, at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ensemble:
+    """Networks to be trained by one recipe, each with the next seed.
+
+    Parameters
+    ----------
+    recipe
+        Of the first of them.
+    members
+        How many; by default as many as there are in `initial`, or one.
+    initial
+        Networks that they go on from: one each, or one for all. By default they begin with
+        random weights.
+
+    Raises
+    ------
+    InvalidSettings
+        If the number of members makes no sense, or an architecture is not the recipe's.
+    """
+
+    recipe: Recipe
+    members: int | None = None
+    initial: Sequence[TrainedModel] = ()
+
+    def __post_init__(self) -> None:
+        count, initial = self.count, self.initial
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_MEMBERS:
+            raise InvalidSettings(f"members: expected 1 to {MOST_MEMBERS}, got {count!r}")
+        if len(initial) > 1 and count != len(initial):
+            raise InvalidSettings(
+                f"members: {count} networks cannot go on from {len(initial)}; leave it out for one "
+                f"each, or give a single network to go on from"
+            )
+        for model in initial:
+            if model.architecture != self.recipe.model:
+                raise InvalidSettings(
+                    f"a {self.recipe.model!r} cannot go on from the weights of a "
+                    f"{model.architecture!r}; ask for that model (--model {model.architecture}), "
+                    f"or begin afresh"
+                )
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return (len(self.initial) or 1) if self.members is None else self.members
+
+    def starts(self, problem: Problem) -> list[TrainedModel | None]:
+        """Return what each network goes on from; None is random weights.
+
+        Raises
+        ------
+        InvalidModel
+            If one has learnt another problem, or numbers its beams otherwise.
+        """
+        for model in self.initial:
+            require_same_numbers(model.problem, problem)
+        if not self.initial:
+            return [None] * self.count
+        return [self.initial[member % len(self.initial)] for member in range(self.count)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +116,9 @@ class FitProgress:
 
 def fit(
     data: Dataset,
-    recipe: Recipe | None,
+    ensemble: Ensemble | None,
     folder: str | os.PathLike[str],
     *,
-    members: int | None = None,
-    initial: Sequence[TrainedModel] = (),
     device: str = "auto",
     tell: Callable[[FitProgress], None] = lambda _progress: None,
     stop: Callable[[], bool] = lambda: False,
@@ -66,15 +127,10 @@ def fit(
 
     Parameters
     ----------
-    recipe
-        For a new training; each member has the next seed. None goes on with what is there.
+    ensemble
+        To be begun; None goes on with what is there.
     folder
         Gets the model, or for several members a folder of each.
-    members
-        Of a new training: by default as many as there are in `initial`, or one.
-    initial
-        Networks that the members go on from: one each, or one for all. By default they begin
-        with random weights.
 
     Returns
     -------
@@ -84,61 +140,30 @@ def fit(
     Raises
     ------
     InvalidSettings
-        If the number of members makes no sense, networks are of another architecture than the
-        recipe's, or the data are others.
+        If the data are others than those that it was begun with.
     InvalidModel
-        If `initial` has learnt another problem.
+        If networks to go on from have learnt another problem.
     OutputExists
-        If a training lies in the folder and a recipe was given.
+        If a training lies in the folder and an ensemble was given.
     InvalidFile
-        If none lies there and no recipe was given.
+        If none lies there and no ensemble was given.
     """
     place = Path(folder)
-    if recipe is None:
+    if ensemble is None:
         folders = _begun(place)
         for own in folders:  # finished ones too, which nobody resumes
             require_data(own, read_description(own), data)
     else:
-        starts = starts_of(data.problem, recipe, members, initial)
+        starts = ensemble.starts(data.problem)
         check_unused(place)
         folders = member_folders(place, len(starts))
         for member, own in enumerate(folders):  # all at once: whoever goes on finds them all
-            mine = replace(recipe, seed=recipe.seed + member)
-            begin(data, mine, own, device=device, initial=starts[member])
+            recipe = ensemble.recipe.of_member(member)
+            begin(data, recipe, own, device=device, initial=starts[member])
     return complete(
         folders, lambda member: resume(folders[member], data, device=device),
         device=device, tell=tell, stop=stop,
     )  # fmt: skip
-
-
-def starts_of(
-    problem: Problem, recipe: Recipe, members: int | None, initial: Sequence[TrainedModel]
-) -> list[TrainedModel | None]:
-    """Return what each network of an ensemble goes on from; None is random weights.
-
-    Raises
-    ------
-    InvalidSettings
-        If the number of members makes no sense, or an architecture is not the recipe's.
-    InvalidModel
-        If one has learnt another problem, or numbers its beams otherwise.
-    """
-    count = (len(initial) or 1) if members is None else members
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_MEMBERS:
-        raise InvalidSettings(f"members: expected 1 to {MOST_MEMBERS}, got {count!r}")
-    if len(initial) > 1 and count != len(initial):
-        raise InvalidSettings(
-            f"members: {count} networks cannot go on from {len(initial)}; leave it out for one "
-            f"each, or give a single network to go on from"
-        )
-    for model in initial:
-        if model.architecture != recipe.model:
-            raise InvalidSettings(
-                f"a {recipe.model!r} cannot go on from the weights of a {model.architecture!r}; "
-                f"ask for that model (--model {model.architecture}), or begin afresh"
-            )
-        require_same_numbers(model.problem, problem)
-    return [initial[member % len(initial)] if initial else None for member in range(count)]
 
 
 def member_folders(place: Path, members: int) -> list[Path]:
@@ -188,7 +213,7 @@ def _draw(training: Training, model: TrainedModel, path: Path, device: str) -> N
     from bellcrank.plots.learning import Learnt, draw_learnt
 
     record, data = model.record, training.data
-    rows = training.split.held_out[:: -(-len(training.split.held_out) // DRAWN)]
+    rows = thinned(training.split.held_out, DRAWN)
     held_out = len(np.unique(data.run[training.split.held_out]))
     learnt = Learnt(
         name=f"{data.problem.name} by {model.architecture}",

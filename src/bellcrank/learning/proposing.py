@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from bellcrank.errors import InvalidDataset, InvalidSettings
-from bellcrank.learning.driving import FIRST_CHAIN, Driving
+from bellcrank.learning.driving_settings import FIRST_CHAIN, Driving
 from bellcrank.learning.heard import Heard
 from bellcrank.learning.scoring import NetworkScorer
 from bellcrank.mechanics import Evaluator, Status
 from bellcrank.provenance import provenance
 from bellcrank.search.populations import population_steps
-from bellcrank.search.settings import check_whole
+from bellcrank.search.settings import check_whole, is_number
 from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.recipes import Recipe
 
@@ -34,8 +34,8 @@ class ActiveSettings:
     Parameters
     ----------
     chains, steps, seed, caution
-        Of the search by networks, see `bellcrank.learning.driving.Driving`. Give each round
-        another seed.
+        Of the search by networks, see `bellcrank.learning.driving_settings.Driving`. Give each
+        round another seed.
     disputed, best
         Designs of each chain to label: those on which the networks differ most (of a single
         network, which differs from nobody, designs evenly spread along the chain), and those of
@@ -70,9 +70,9 @@ class ActiveSettings:
             check_whole(name, getattr(self, name), 0)
         if self.disputed + self.best < 1:
             raise InvalidSettings("disputed, best: expected at least one design to label")
-        if not _is_number(self.share) or not 0.0 <= self.share < 1.0:
+        if not is_number(self.share) or not 0.0 <= self.share < 1.0:
             raise InvalidSettings(f"share: expected from 0 to below 1, got {self.share!r}")
-        if not _is_number(self.caution) or not 0.0 <= self.caution < math.inf:
+        if not is_number(self.caution) or not 0.0 <= self.caution < math.inf:
             raise InvalidSettings(f"caution: expected at least 0, got {self.caution!r}")
         if not isinstance(self.warm, bool):
             raise InvalidSettings(f"warm: expected true or false, got {self.warm!r}")
@@ -128,10 +128,6 @@ class ActiveSettings:
             chains=self.chains, steps=self.steps, seed=self.seed, caution=self.caution,
             compare=False,
         )  # fmt: skip
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def propose_designs(

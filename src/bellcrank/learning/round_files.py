@@ -1,22 +1,21 @@
 """What learning in rounds leaves in its folder, and how it is read again.
 
-``rounds.json`` says what was asked for. ``round-1/``, ``round-2/``, ... hold the labelled designs,
-the trainings with their checkpoints and models, and at last a record: a round that has one is
-finished. Networks to begin with are kept beside ``rounds.json``: those of the first training, or
-copies of those that were given.
+``rounds.json`` says what was asked for (`bellcrank.learning.course`). ``round-1/``, ``round-2/``,
+... hold the labelled designs, the trainings with their checkpoints and models, and at last a
+record: a round that has one is finished. Networks to begin with are kept beside ``rounds.json``:
+those of the first training, or copies of those that were given.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import BellcrankError, CorruptRun, InvalidFile, OutputExists, first_line
 from bellcrank.learning.active import Labelled, Round
-from bellcrank.learning.proposing import ActiveSettings
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
@@ -24,7 +23,6 @@ from bellcrank.runs.files import make_folder, remove_temporaries
 from bellcrank.surrogate.dataset import read_dataset
 from bellcrank.surrogate.folder import check_new
 from bellcrank.surrogate.metrics import Accuracy
-from bellcrank.surrogate.recipes import Recipe
 
 if TYPE_CHECKING:
     import os
@@ -34,92 +32,8 @@ RECORD = "round.json"
 DESIGNS = "designs.parquet"
 SEARCH = "search.npz"
 """What the networks have said so far, while they are searching."""
-ROUNDS_SCHEMA = "bellcrank/rounds/1"
 ROUND_SCHEMA = "bellcrank/round/1"
 _OURS = re.compile("|".join(map(re.escape, (DESIGNS, RECORD, SEARCH))))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Course:
-    """What learning in rounds was asked for.
-
-    Parameters
-    ----------
-    rounds
-        How many.
-    members
-        Networks.
-    recipe
-        Of the first training; in a round some of it may differ, as the settings say.
-    settings
-        Of the first round; each has the next seed.
-    data
-        Hash of the dataset.
-    given
-        Whether networks to begin with were given; else they are trained first.
-    """
-
-    rounds: int
-    members: int
-    recipe: Recipe
-    settings: ActiveSettings
-    data: str
-    given: bool
-
-    def settings_of(self, number: int) -> ActiveSettings:
-        """Return the settings of a round, from 1."""
-        return replace(self.settings, seed=self.settings.seed + number - 1)
-
-
-def is_course(folder: str | os.PathLike[str]) -> bool:
-    """Whether a folder is one of learning in rounds."""
-    return (Path(folder) / ROUNDS).exists()
-
-
-def write_course(folder: Path, course: Course) -> None:
-    """Make the folder, and say in it what is asked for.
-
-    Raises
-    ------
-    OutputExists, StorageError
-    """
-    make_folder(folder)
-    told = {
-        "schema": ROUNDS_SCHEMA,
-        "rounds": course.rounds,
-        "members": course.members,
-        "recipe": course.recipe.to_dict(),
-        "settings": course.settings.to_dict(),
-        "data": course.data,
-        "given": course.given,
-        "provenance": provenance(seed=course.settings.seed),
-    }
-    write_text(folder / ROUNDS, json.dumps(told, indent=1) + "\n")
-
-
-def read_course(folder: str | os.PathLike[str]) -> Course:
-    """Read what was asked for.
-
-    Raises
-    ------
-    InvalidFile
-        If it is not there, or damaged.
-    """
-    place = Path(folder) / ROUNDS
-    told = _read(place, ROUNDS_SCHEMA)
-    try:
-        return Course(
-            rounds=_count(told["rounds"]),
-            members=_count(told["members"]),
-            recipe=Recipe.from_dict(told["recipe"]),
-            settings=ActiveSettings.from_dict(told["settings"]),
-            data=str(told["data"]),
-            given=bool(told["given"]),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidFile(
-            f"{place}: damaged ({first_line(error)}); restore it from a copy"
-        ) from None
 
 
 def round_folder(folder: Path, number: int) -> Path:
@@ -256,7 +170,7 @@ def read_round(place: Path, number: int, data: str) -> Round | None:
         return None
     what_to_do = "delete it and resume: it is made again"
     try:
-        told = _read(path, ROUND_SCHEMA)
+        told = read_record(path, ROUND_SCHEMA)
         found = Round.from_dict(told)
         if told["round"] != number:
             raise InvalidFile(f"it is of round {told['round']}")
@@ -271,14 +185,15 @@ def read_round(place: Path, number: int, data: str) -> Round | None:
     return found
 
 
-def _read(path: Path, schema: str) -> dict[str, Any]:
+def read_record(path: Path, schema: str) -> dict[str, Any]:
+    """Read a JSON file that says by a schema what it is.
+
+    Raises
+    ------
+    InvalidFile
+        If it cannot be read, or is something else.
+    """
     told = read_json(path)
     if told.get("schema") != schema:
         raise InvalidFile(f"{path}: expected schema {schema!r}, got {told.get('schema')!r}")
     return told
-
-
-def _count(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise ValueError(f"expected a whole number of at least 1, got {value!r}")
-    return value

@@ -8,9 +8,11 @@ Between two steps everything is read back from the folder, so that nothing depen
 
 Examples
 --------
+>>> from bellcrank.learning.course import begin_rounds
+>>> from bellcrank.learning.fitting import Ensemble
 >>> from bellcrank.learning.proposing import ActiveSettings
 >>> settings = ActiveSettings(chains=200, epochs=1)
->>> begin_rounds(data, recipe, "crane-rounds", settings, rounds=3)  # doctest: +SKIP
+>>> begin_rounds(data, Ensemble(recipe, 3), "crane-rounds", settings, rounds=3)  # doctest: +SKIP
 >>> learnt = learn_in_rounds("crane-rounds", data)  # doctest: +SKIP
 >>> [found.surprise.r_squared for found in learnt.rounds]  # doctest: +SKIP
 [0.71, 0.88, 0.93]
@@ -23,47 +25,37 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bellcrank.errors import InvalidFile, InvalidSettings
-from bellcrank.learning.active import (
-    Knowledge,
-    Labelled,
-    Round,
-    begin_learning,
-    conclude,
-    grow,
-    label_round,
-    lesson,
-)
-from bellcrank.learning.fitting import FitProgress, complete, member_folders, starts_of
+from bellcrank.learning.active import conclude, label_round
+from bellcrank.learning.course import is_course, read_course
+from bellcrank.learning.fitting import complete, member_folders
 from bellcrank.learning.heard import Heard
+from bellcrank.learning.knowledge import Lesson, begin_learning, grow, lesson
 from bellcrank.learning.round_files import (
     DESIGNS,
     ROUNDS,
     SEARCH,
-    Course,
-    check_unused,
-    is_course,
-    read_course,
     read_labelled,
     read_round,
     round_folder,
     tidy_round,
-    write_course,
     write_labelled,
     write_round,
 )
 from bellcrank.runs.files import make_folder
-from bellcrank.surrogate.folder import DESCRIPTION, INITIAL
+from bellcrank.surrogate.beginning import begin, resume
+from bellcrank.surrogate.folder import DESCRIPTION, INITIAL, data_hash
 from bellcrank.surrogate.trained import read_model
-from bellcrank.surrogate.training import begin, data_hash, resume
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Sequence
 
+    from bellcrank.learning.active import Labelled, Round
+    from bellcrank.learning.course import Course
+    from bellcrank.learning.fitting import FitProgress
+    from bellcrank.learning.knowledge import Knowledge
     from bellcrank.learning.proposing import ActiveSettings
     from bellcrank.surrogate.dataset import Dataset
-    from bellcrank.surrogate.recipes import Recipe
-    from bellcrank.surrogate.splitting import Split
     from bellcrank.surrogate.trained import TrainedModel
     from bellcrank.surrogate.training import Training
 
@@ -109,69 +101,6 @@ class Learnt:
 
     models: list[TrainedModel]
     rounds: list[Round]
-
-
-def begin_rounds(
-    data: Dataset,
-    recipe: Recipe,
-    folder: str | os.PathLike[str],
-    settings: ActiveSettings,
-    rounds: int,
-    *,
-    members: int | None = None,
-    initial: Sequence[TrainedModel] = (),
-    device: str = "auto",
-) -> Course:
-    """Begin to learn in rounds, in a new folder; `learn_in_rounds` does the work.
-
-    Parameters
-    ----------
-    recipe
-        Of the first training, and of the rounds as far as the settings do not differ.
-    settings
-        Of the first round; each has the next seed.
-    rounds
-        How many, at least 1.
-    members, initial
-        As `bellcrank.learning.fitting.fit` has them. With networks to go on from, the first
-        training is left out.
-
-    Raises
-    ------
-    InvalidSettings
-        If a number makes no sense, caution is asked of one network, an architecture is not the
-        recipe's, the device is missing or there is nothing to learn.
-    InvalidModel
-        If `initial` has learnt another problem.
-    InvalidDataset
-        If the data come from a single run.
-    UnknownName
-        If there is no such model.
-    OutputExists, StorageError
-        If the folder holds something of trainings already, or cannot be written.
-    """
-    if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
-        raise InvalidSettings(f"rounds: expected a whole number of at least 1, got {rounds!r}")
-    starts = starts_of(data.problem, recipe, members, initial)
-    if settings.caution and len(starts) < 2:
-        raise InvalidSettings(
-            "caution: takes off what several networks dispute, and there is only one; train more "
-            "(--members 3), or leave it at 0"
-        )
-    place = Path(folder)
-    check_unused(place)
-    # Kept nowhere: refuses whatever could not be trained.
-    begin(data, settings.adapt(recipe), device=device, initial=starts[0])
-    course = Course(
-        rounds=rounds, members=len(starts), recipe=recipe, settings=settings,
-        data=data_hash(data), given=bool(initial),
-    )  # fmt: skip
-    for own, start in zip(member_folders(place, len(starts)), starts, strict=True):
-        if start is not None:
-            make_folder(own)
-            start.write(own / INITIAL, overwrite=True)
-    write_course(place, course)
-    return course
 
 
 def learn_in_rounds(
@@ -245,11 +174,10 @@ class _Work:
         folders = member_folders(self.folder, self.course.members)
         if self.course.given:
             return [read_model(own / INITIAL) for own in folders]
-        recipe = self.course.recipe
 
         def take_up(member: int) -> Training:
-            mine = replace(recipe, seed=recipe.seed + member)
-            return self._take_up(data, mine, folders[member])
+            plan = Lesson(self.course.recipe.of_member(member))
+            return self._take_up(data, plan, folders[member])
 
         return self._complete(folders, take_up, 0)
 
@@ -269,8 +197,7 @@ class _Work:
         folders = member_folders(place, self.course.members)
 
         def take_up(member: int) -> Training:
-            plan = lesson(grown, member, settings)
-            return self._take_up(grown.data, plan.recipe, folders[member], plan.initial, plan.split)
+            return self._take_up(grown.data, lesson(grown, member, settings), folders[member])
 
         models = self._complete(folders, take_up, number)
         if models is None:
@@ -300,18 +227,13 @@ class _Work:
         (place / SEARCH).unlink(missing_ok=True)
         return read_labelled(place)
 
-    def _take_up(
-        self,
-        data: Dataset,
-        recipe: Recipe,
-        folder: Path,
-        initial: TrainedModel | None = None,
-        split: Split | None = None,
-    ) -> Training:
+    def _take_up(self, data: Dataset, plan: Lesson, folder: Path) -> Training:
         """Begin a training, or go on with it."""
         if (folder / DESCRIPTION).exists():
-            return resume(folder, data, device=self.device, split=split)
-        return begin(data, recipe, folder, device=self.device, initial=initial, split=split)
+            return resume(folder, data, device=self.device, split=plan.split)
+        return begin(
+            data, plan.recipe, folder, device=self.device, initial=plan.initial, split=plan.split
+        )
 
     def _complete(
         self, folders: Sequence[Path], take_up: Callable[[int], Training], number: int

@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.search.populations import MechanicsScorer, Population, costs_of
+from bellcrank.search.scorers import MechanicsScorer, costs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.search import MetropolisSettings
+    from bellcrank.search.populations import Population
     from bellcrank.search.responder import Responder
 
 CONFIRMING = 0x5C4EC

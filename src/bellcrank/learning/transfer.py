@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidDataset, InvalidModel, InvalidSettings
+from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.flips import FlipEffects, flip_accuracy, flip_effects, held_out_designs
 from bellcrank.surrogate.identity import architecture_of
 from bellcrank.surrogate.metrics import Accuracy, accuracy
 from bellcrank.surrogate.occlusion import picture_view
 from bellcrank.surrogate.recipes import Recipe, recipe_of
 from bellcrank.surrogate.splitting import split_by_run
-from bellcrank.surrogate.trained import TrainedModel
-from bellcrank.surrogate.training import begin
 from bellcrank.surrogate.views import views
 
 if TYPE_CHECKING:
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from bellcrank.surrogate.dataset import Dataset
     from bellcrank.surrogate.flips import FlipAccuracy
     from bellcrank.surrogate.pictures import Canvas
+    from bellcrank.surrogate.trained import TrainedModel
 
 FITS = ("canvas", "scale")
 """Ways to look at another lattice: on the same canvas, or at the same scale."""
@@ -150,10 +150,11 @@ def carry_over(model: TrainedModel, problem: Problem, fit: str = "canvas") -> Tr
     --------
     >>> from bellcrank.model import find_problem
     >>> from bellcrank.surrogate.models import models
+    >>> from bellcrank.surrogate.trained import TrainedModel
     >>> small, large = find_problem("scaling-8"), find_problem("scaling-12")
     >>> view = views["picture"](small)
     >>> network = models["resnet18-w16"].build(view.shape)
-    >>> model = TrainedModel("resnet18-w16", small, view, network, 0.0, 1.0)
+    >>> model = TrainedModel("resnet18-w16", small, view, 0.0, 1.0, network=network)
     >>> carry_over(model, large, "canvas").view.shape
     (1, 128, 192)
     >>> carry_over(model, large, "scale").view.shape
@@ -174,9 +175,7 @@ def carry_over(model: TrainedModel, problem: Problem, fit: str = "canvas") -> Tr
             f"{model.architecture!r}: its weights depend on the size of the pictures, so that it "
             f"cannot look at others"
         ) from None
-    return TrainedModel(
-        model.architecture, problem, view, network.eval(), model.mean, model.deviation
-    )
+    return replace(model, problem=problem, view=view, network=network.eval(), record={})
 
 
 def _canvas_to_scale(canvas: Canvas, known: Problem, other: Problem) -> Canvas:
@@ -249,11 +248,8 @@ def _learn(
     recipe = replace(recipe, model=carried.architecture)
     if going_on:
         recipe = replace(recipe, learning_rate=GENTLER * recipe.learning_rate)
-    training = begin(known, recipe, device=device)
-    if going_on:
-        training.go_on_from(carried)
-    else:
-        training.look_through(carried.view)
+    training = begin(known, recipe, device=device, initial=carried if going_on else None)
+    training.look_through(carried.view)
     for _ in training.run():
         pass
     return training.finish()

@@ -9,8 +9,8 @@ Examples
 --------
 >>> from bellcrank.mechanics import Evaluator
 >>> from bellcrank.model import find_problem
->>> from bellcrank.search.populations import MechanicsScorer
->>> from bellcrank.search.screened import ScreenedSettings
+>>> from bellcrank.search.delayed_acceptance import ScreenedSettings
+>>> from bellcrank.search.scorers import MechanicsScorer
 >>> problem = find_problem("scaling-8")
 >>> scorer = MechanicsScorer(Evaluator(problem))
 >>> settings = ScreenedSettings(steps=20, lookahead=1)
@@ -27,15 +27,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import Status
-from bellcrank.search.populations import Kept
+from bellcrank.search.kept import Kept
 from bellcrank.search.screened import ScreenedBlock, score_ahead, start_screened
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from bellcrank.search.populations import Scorer
+    from bellcrank.search.delayed_acceptance import ScreenedSettings
     from bellcrank.search.responder import Responder
-    from bellcrank.search.screened import ScreenedSettings, ScreenedState
+    from bellcrank.search.scorers import Scorer
+    from bellcrank.search.screened import ScreenedState
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,6 +10,7 @@ Examples
 >>> from bellcrank.mechanics import Evaluator
 >>> from bellcrank.model import find_problem
 >>> from bellcrank.search import MetropolisSettings
+>>> from bellcrank.search.scorers import MechanicsScorer
 >>> problem = find_problem("scaling-8")
 >>> settings = MetropolisSettings(steps=20, chains=3)
 >>> scorer = MechanicsScorer(Evaluator(problem))
@@ -22,13 +23,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.search.blocks import BLOCK, random_numbers
-from bellcrank.search.costs import LARGEST_EXPONENT, costs
+from bellcrank.search.kept import Kept
+from bellcrank.search.scorers import costs_of, require_plain_flips
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -37,94 +39,7 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Problem
     from bellcrank.search.metropolis import MetropolisSettings
-    from bellcrank.search.responder import Responder
-
-
-PLAIN = {
-    "moves": ("flip",),
-    "minimum_degree": 0,
-    "patience": None,
-    "goals": (),
-    "strokes": (1.0,),
-}
-"""Settings of the paper's search that these chains cannot have otherwise."""
-
-
-class Scorer(Protocol):
-    """Whatever can tell efficiencies, right or nearly so, of many designs at once."""
-
-    def score(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return the efficiency (n,) of designs (n, M); nan for those to keep away from."""
-
-
-class MechanicsScorer:
-    """The mechanics as a scorer, one design after the other.
-
-    Parameters
-    ----------
-    responder
-        Who computes; designs without a unique, stable response are to keep away from.
-    """
-
-    def __init__(self, responder: Responder) -> None:
-        self.responder = responder
-
-    def score(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return the efficiencies (n,) of designs (n, M), each loaded from rest."""
-        found = [self.responder.respond(mask) for mask in masks]
-        return np.array([each.score if each.counts else math.nan for each in found])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Kept:
-    """The best different designs that each of n chains has had scored.
-
-    Parameters
-    ----------
-    score : (n, K) float64
-        In no order; -inf where there is none yet.
-    packed : (n, K, bytes) uint8
-    """
-
-    score: NDArray[np.float64]
-    packed: NDArray[np.uint8]
-
-    @classmethod
-    def nothing(cls, chains: int, count: int, width: int) -> Kept:
-        """Return room for so many designs of `width` bytes a chain."""
-        return cls(np.full((chains, count), -np.inf), np.zeros((chains, count, width), np.uint8))
-
-    def joined_by(self, score: NDArray[np.float64], masks: NDArray[np.bool_]) -> Kept:
-        """Return what is kept after one more design of each chain.
-
-        Parameters
-        ----------
-        score : (n,)
-        masks : (n, M) bool
-        """
-        if not self.score.shape[1]:
-            return self
-        rows = np.flatnonzero(score > self.score.min(axis=1))
-        packed = np.packbits(masks[rows], axis=1)
-        held = (self.packed[rows] == packed[:, None]).all(axis=2) & np.isfinite(self.score[rows])
-        new = ~held.any(axis=1)
-        rows, packed = rows[new], packed[new]
-        if not len(rows):
-            return self
-        after = Kept(self.score.copy(), self.packed.copy())
-        place = self.score[rows].argmin(axis=1)
-        after.score[rows, place] = score[rows]
-        after.packed[rows, place] = packed
-        return after
-
-    def ranked(self, chain: int) -> list[tuple[float, NDArray[np.uint8]]]:
-        """Return score and packed mask of what one chain keeps, best first."""
-        order = np.argsort(-self.score[chain], kind="stable")
-        return [
-            (float(self.score[chain, k]), self.packed[chain, k])
-            for k in order
-            if np.isfinite(self.score[chain, k])
-        ]
+    from bellcrank.search.scorers import Scorer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -285,31 +200,3 @@ def population_steps(
         here, proposed = advance_population(problem, scorer, settings, here, uniforms[row])
         here = review(here)
         yield here, proposed
-
-
-def costs_of(name: str, score: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return registered costs (n,) of efficiencies (n,); nan stays nan.
-
-    Examples
-    --------
-    >>> costs_of("exponential", np.array([0.0, -np.log(2.0)])).round(6)
-    array([1., 2.])
-    """
-    of = costs[name].of
-    return np.array([of(each) for each in np.maximum(score, -LARGEST_EXPONENT).tolist()])
-
-
-def require_plain_flips(settings: MetropolisSettings) -> None:
-    """Refuse settings of the paper's search that need the mechanics at each step.
-
-    Raises
-    ------
-    InvalidSettings
-    """
-    for name, plain in PLAIN.items():
-        given = getattr(settings, name)
-        if given != plain:
-            raise InvalidSettings(
-                f"{name}: chains that ask a stand-in for the mechanics know only {plain!r}, got "
-                f"{given!r}"
-            )

@@ -1,15 +1,4 @@
-"""Delayed acceptance: a cheap scorer screens what is proposed, the mechanics decides.
-
-A flip must first pass by what the scorer says of it; only then is its response computed, and a
-second rule sets right whatever the scorer got wrong (J. A. Christen and C. Fox, J. Comput.
-Graph. Stat. 14, 795, 2005). With a(x, y) the chance that a flip from x to y passes the first
-rule, the second accepts with probability
-
-    min(1, exp(-(cost(y) - cost(x)) / T) a(y, x) / a(x, y)),
-
-so that at a fixed temperature the chain visits each design with probability exp(-cost / T) / Z,
-however bad the scorer. A bad one costs time, never truth: it lets useless flips pass, or holds
-good ones back, which a floor under a(x, y) limits.
+"""Chains whose proposals a scorer screens, by the rule of `bellcrank.search.delayed_acceptance`.
 
 What the scorer is asked does not depend on what the mechanics answers until a flip is accepted:
 the random numbers of the next few proposals are drawn ahead, and those are scored in one batch.
@@ -19,7 +8,7 @@ Examples
 --------
 >>> from bellcrank.mechanics import Evaluator
 >>> from bellcrank.model import find_problem
->>> from bellcrank.search.populations import MechanicsScorer
+>>> from bellcrank.search.scorers import MechanicsScorer
 >>> problem = find_problem("scaling-8")
 >>> evaluator = Evaluator(problem)
 >>> settings = ScreenedSettings(steps=300)
@@ -36,11 +25,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
 from bellcrank.model import pack_mask
 from bellcrank.search.blocks import (
     BLOCK,
@@ -50,10 +38,9 @@ from bellcrank.search.blocks import (
     random_numbers,
     steps_ahead,
 )
-from bellcrank.search.metropolis import MetropolisSettings
+from bellcrank.search.delayed_acceptance import ScreenedSettings, corrected, log_passes
 from bellcrank.search.place import Place, flipped
-from bellcrank.search.populations import Scorer, costs_of, require_plain_flips
-from bellcrank.search.settings import check_whole
+from bellcrank.search.scorers import costs_of
 from bellcrank.search.walking import consider, place_of
 
 if TYPE_CHECKING:
@@ -63,48 +50,7 @@ if TYPE_CHECKING:
 
     from bellcrank.runs import Proposals
     from bellcrank.search.responder import Responder
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScreenedSettings(MetropolisSettings):
-    """Settings of a chain whose proposals are screened; for the rest, see `MetropolisSettings`.
-
-    Parameters
-    ----------
-    doubt
-        Error of the scorer's differences, in units of the cost: the first rule is that of a
-        temperature so much higher. 0 takes the scorer at its word.
-    least_chance
-        With which any flip passes the first rule, whatever the scorer says.
-    lookahead
-        Proposals scored in one batch; changes nothing but the time it takes.
-
-    Raises
-    ------
-    InvalidSettings, UnknownName
-    """
-
-    name: ClassVar[str] = "screened"
-
-    doubt: float = 0.0
-    least_chance: float = 0.02
-    lookahead: int = 16
-
-    def __post_init__(self) -> None:
-        MetropolisSettings.__post_init__(self)
-        require_plain_flips(self)
-        check_whole("lookahead", self.lookahead, 1)
-        if not (_is_number(self.doubt) and 0.0 <= self.doubt < math.inf):
-            raise InvalidSettings(f"doubt: expected a cost of at least 0, got {self.doubt!r}")
-        if not (_is_number(self.least_chance) and 0.0 < self.least_chance <= 1.0):
-            raise InvalidSettings(
-                f"least_chance: expected a probability above 0, got {self.least_chance!r}; at 0 "
-                f"there may be designs that the chain never reaches"
-            )
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    from bellcrank.search.scorers import Scorer
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,35 +245,3 @@ def _step(
         return corrected(gain, there_passes, back_passes)
 
     return consider(here, mask, log_ratio, float(uniforms[1]), rows), True
-
-
-def log_passes(rise: float, temperature: float, settings: ScreenedSettings) -> float:
-    """Log of the chance that a flip passes the first rule.
-
-    Parameters
-    ----------
-    rise
-        Of the cost, as the scorer has it; nan, of which it says nothing, passes always.
-
-    Examples
-    --------
-    >>> log_passes(-1.0, 0.01, ScreenedSettings()), log_passes(0.01, 0.01, ScreenedSettings())
-    (0.0, -1.0)
-    """
-    if math.isnan(rise):
-        return 0.0
-    gain = -rise / (temperature + settings.doubt)
-    return max(math.log(settings.least_chance), min(0.0, gain))
-
-
-def corrected(gain: float, there_passes: float, back_passes: float) -> float:
-    """Log of the second rule's ratio.
-
-    Parameters
-    ----------
-    gain
-        Log of the ratio of the designs' probabilities, by the mechanics.
-    there_passes, back_passes
-        Log of the chances that the flip, and that its reverse, pass the first rule.
-    """
-    return gain + back_passes - there_passes

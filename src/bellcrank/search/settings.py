@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, fields
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeGuard
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Dangling, minimisers
@@ -91,6 +91,11 @@ class SearchSettings:
         return cls(**given)
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether something is a whole or a real number; true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def check_whole(name: str, value: object, least: int, most: int = NO_LIMIT) -> None:
     """Refuse what is not a whole number between two bounds.
 
@@ -111,7 +116,7 @@ def check_positive(name: str, value: object, what: str = "a number") -> None:
     ------
     InvalidSettings
     """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+    if not is_number(value) or not 0.0 < value < math.inf:
         raise InvalidSettings(f"{name}: expected {what} above 0, got {value!r}")
 
 
@@ -151,5 +156,5 @@ def check_part(name: str, value: object) -> None:
     ------
     InvalidSettings
     """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
+    if not is_number(value) or not 0.0 <= value <= 1.0:
         raise InvalidSettings(f"{name}: expected a part from 0 to 1, got {value!r}")

@@ -17,7 +17,7 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Status
 from bellcrank.surrogate.agreement import Agreement, agreement, finite
 from bellcrank.surrogate.flips import flip_effects, foreseen_by
-from bellcrank.surrogate.matching import beams_between
+from bellcrank.surrogate.matching import beams_between, renumbered
 from bellcrank.surrogate.occlusion import BLACK, WHITE, Block, occlude, picture_view, sample_map
 from bellcrank.surrogate.predictor import Predictor
 from bellcrank.surrogate.regions import Region, overlap_of_regions, regions_of
@@ -222,7 +222,8 @@ def explain(
     >>> from bellcrank.surrogate.views import views
     >>> crane = find_problem("crane")
     >>> view = views["bits"](crane)
-    >>> ignorant = TrainedModel("mlp", crane, view, models["mlp"].build(view.shape), 0.0, 1.0)
+    >>> network = models["mlp"].build(view.shape)
+    >>> ignorant = TrainedModel("mlp", crane, view, 0.0, 1.0, network=network)
     >>> found = explain(ignorant, crane.full_design())
     >>> found.correlations()["screening"]["all"].pearson > 0.9
     True
@@ -235,8 +236,7 @@ def explain(
     beams_there = beams_between(model.problem, problem)
     effects = flip_effects(problem, design.mask[None])
     predictor = Predictor(problem, [model], device=device)
-    known = np.zeros(problem.lattice.beam_count, np.bool_)
-    known[beams_there] = design.mask
+    (known,) = renumbered(design.mask[None], beams_there)
     predicted = predictor.predict(design.mask[None]).efficiency[0]
     _, gradient = value_and_gradient(model, known, device=device)
     occlusion = None

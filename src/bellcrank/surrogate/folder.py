@@ -149,17 +149,6 @@ def require_data(folder: str | os.PathLike[str], told: Description, data: Datase
         raise InvalidSettings(f"{folder}: the training there was begun with other data")
 
 
-def read_recipe(folder: str | os.PathLike[str]) -> Recipe:
-    """Return the recipe of the training in a folder.
-
-    Raises
-    ------
-    InvalidFile
-        If there is none.
-    """
-    return read_description(folder).recipe
-
-
 def data_hash(data: Dataset) -> str:
     """Return the identity of what is learnt from: masks, efficiencies and runs."""
     return _hash(data.packed, data.efficiency, data.run)

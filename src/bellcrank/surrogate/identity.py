@@ -1,20 +1,22 @@
-"""What a trained network is for, as its file says it: architecture, problem, view, scale."""
+"""What a trained network is, besides its weights, whatever computes with it."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bellcrank.errors import BellcrankError, InvalidModel
-from bellcrank.model import problem_from_dict
+from bellcrank.model import problem_from_dict, problem_to_dict
 from bellcrank.surrogate.backend import import_torch
 from bellcrank.surrogate.views import views
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from bellcrank.model import Lattice, Problem
     from bellcrank.surrogate.models import Architecture
     from bellcrank.surrogate.views import View
@@ -61,19 +63,72 @@ def architecture_of(name: str) -> Architecture:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Known:
-    """What the file of a model says besides its weights; see `TrainedModel` for the fields."""
+class Identity:
+    """What a trained network is: what it looks at, what it says, and what for.
+
+    Parameters
+    ----------
+    architecture
+        Name in the registry of models.
+    problem
+        What it has learnt.
+    view
+        What it looks at.
+    mean, deviation
+        Of the efficiencies that it was trained with; the network's output is in units of
+        the latter, from the former.
+    record
+        How it was trained and how well it does, as plain data.
+    """
 
     architecture: str
     problem: Problem
     view: View
     mean: float
     deviation: float
-    record: dict[str, Any]
+    record: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def looks_at(self) -> str:
+        """Name of its view in the registry."""
+        return architecture_of(self.architecture).view
+
+    @property
+    def seen(self) -> dict[str, float]:
+        """Designs that it was trained with and seconds that this took, as its record says.
+
+        Both include what the networks that it went on from had seen and taken.
+        """
+        before = self.record.get("before", {})
+        return {
+            name: self.record.get(name, 0) + before.get(name, 0) for name in ("designs", "seconds")
+        }
+
+    def efficiencies(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the efficiencies (n,) that an output (n,) of the network stands for."""
+        return self.mean + self.deviation * output
+
+    def describe(self) -> dict[str, Any]:
+        """Return all of it as plain data, as the files of models carry it."""
+        return {
+            "schema": MODEL_SCHEMA,
+            "architecture": self.architecture,
+            "lattice": lattice_hash(self.problem.lattice),
+            "looks_at": self.looks_at,
+            "view": self.view.to_dict(),
+            "mean": self.mean,
+            "deviation": self.deviation,
+            "record": self.record,
+            "problem": problem_to_dict(self.problem),
+        }
+
+    def arguments(self) -> dict[str, Any]:
+        """Return its fields by name: what a model is made of, besides its network."""
+        return {each.name: getattr(self, each.name) for each in fields(Identity)}
 
 
-def read_known(text: str | None, source: str) -> Known:
-    """Read what `TrainedModel.describe` wrote. Needs no PyTorch.
+def read_identity(text: str | None, source: str) -> Identity:
+    """Read what `Identity.describe` told. Needs no PyTorch.
 
     Parameters
     ----------
@@ -96,7 +151,8 @@ def read_known(text: str | None, source: str) -> Known:
         looks_at = told.get("looks_at") or architecture_of(told["architecture"]).view
         view = views[looks_at](problem, **told["view"])
         mean, deviation = float(told["mean"]), float(told["deviation"])
-        known = Known(told["architecture"], problem, view, mean, deviation, dict(told["record"]))
+        record = dict(told["record"])
+        identity = Identity(told["architecture"], problem, view, mean, deviation, record)
         lattice = told["lattice"]
     except BellcrankError as error:
         raise InvalidModel(f"{source}: {error}") from None
@@ -106,7 +162,7 @@ def read_known(text: str | None, source: str) -> Known:
         raise InvalidModel(f"{source}: the lattice in it is not the one that it was trained on")
     if not (np.isfinite(mean) and 0.0 < deviation < np.inf):
         raise InvalidModel(f"{source}: mean {mean} and deviation {deviation} make no efficiencies")
-    return known
+    return identity
 
 
 def _check_schema(name: str) -> None:

@@ -44,6 +44,25 @@ def beams_between(known: Problem, given: Problem) -> NDArray[np.int64]:
     return beam_of
 
 
+def renumbered(masks: NDArray[np.bool_], beams: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return designs (n, M) of the problem at hand as the problem that is known numbers them.
+
+    Parameters
+    ----------
+    masks : (n, M) bool
+    beams : (M,) int64
+        As `beams_between` gives them.
+
+    Examples
+    --------
+    >>> renumbered(np.array([[True, False, False]]), np.array([2, 0, 1])).tolist()
+    [[False, False, True]]
+    """
+    known = np.zeros(masks.shape, np.bool_)
+    known[:, beams] = masks
+    return known
+
+
 def require_same_numbers(known: Problem, given: Problem) -> None:
     """Refuse a network that can tell about a problem, but not go on learning it.
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.surrogate.backend import find_device, import_torch
-from bellcrank.surrogate.identity import architecture_of
 from bellcrank.surrogate.trained import batch_of
 from bellcrank.surrogate.views import PictureView
 
@@ -168,8 +167,7 @@ def picture_view(model: TrainedModel) -> PictureView:
     if not isinstance(model.view, PictureView):
         raise InvalidSettings(
             f"blocks can hide parts of pictures only; {model.architecture!r} looks at "
-            f"{architecture_of(model.architecture).view}: leave out the block, or take a network "
-            f"that looks at pictures"
+            f"{model.looks_at}: leave out the block, or take a network that looks at pictures"
         )
     return model.view
 

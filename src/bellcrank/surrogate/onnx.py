@@ -20,7 +20,7 @@ import json
 import logging
 import os
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,16 +28,14 @@ import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidModel, InvalidSettings, first_line
 from bellcrank.model.storage import write_bytes
-from bellcrank.surrogate.identity import METADATA_KEY, read_known
+from bellcrank.surrogate.identity import METADATA_KEY, Identity, read_identity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from bellcrank.model import Problem
     from bellcrank.surrogate.trained import TrainedModel
-    from bellcrank.surrogate.views import View
 
 INSTALL = "pip install 'bellcrank[onnx]'"
 INPUT, OUTPUT = "design", "efficiency"
@@ -45,52 +43,31 @@ BATCH = 64
 """Designs that a network looks at in one go: more only leave the processor's caches."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class OnnxModel:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class OnnxModel(Identity):
     """A network in ONNX Runtime; takes the place of a `TrainedModel` wherever one predicts.
 
     Parameters
     ----------
     architecture, problem, view, mean, deviation, record
-        As in `bellcrank.surrogate.trained.TrainedModel`.
+        As in `bellcrank.surrogate.identity.Identity`.
     session
         Of ONNX Runtime.
     """
 
-    architecture: str
-    problem: Problem
-    view: View
     session: Any
-    mean: float
-    deviation: float
-    record: dict[str, Any] = field(default_factory=dict)
 
     def predict(
-        self,
-        packed: NDArray[np.uint8],
-        *,
-        device: str = "auto",
-        precision: str = "float32",
+        self, packed: NDArray[np.uint8], *, device: str = "auto", precision: str = "float32"
     ) -> NDArray[np.float64]:
-        """Predict efficiencies.
-
-        Parameters
-        ----------
-        packed : (n, bytes) uint8
-            Masks over the beams of `problem`.
-        device, precision
-            There is only the processor, and float32.
-
-        Returns
-        -------
-        (n,) float64
+        """Predict efficiencies as `TrainedModel.predict` does, but only on the processor.
 
         Raises
         ------
         InvalidDataset
             If masks have not one bit for each beam.
         InvalidSettings
-            If another device or precision is asked for.
+            If another device, or another precision than float32, is asked for.
         """
         if device not in ("auto", "cpu") or precision not in ("auto", "float32"):
             raise InvalidSettings(
@@ -104,7 +81,7 @@ class OnnxModel:
                 inputs = seen.astype(np.float32) * np.float32(self.view.scale)
                 parts.append(self.session.run([OUTPUT], {INPUT: inputs})[0])
         found = np.concatenate(parts) if parts else np.empty(0)
-        return np.asarray(self.mean + self.deviation * found.astype(np.float64))
+        return self.efficiencies(found.astype(np.float64))
 
 
 def onnx_bytes(model: TrainedModel) -> bytes:
@@ -210,17 +187,15 @@ def load_onnx(content: bytes, source: str, *, threads: int | None = None) -> Onn
     except Exception as error:  # ONNX Runtime has no common class of its errors
         reason = first_line(error)
         raise InvalidModel(f"{source}: not an ONNX file, or truncated ({reason})") from None
-    known = read_known(session.get_modelmeta().custom_metadata_map.get(METADATA_KEY), source)
+    told = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
+    identity = read_identity(told, source)
     inputs = {each.name: tuple(each.shape[1:]) for each in session.get_inputs()}
-    if inputs != {INPUT: known.view.shape}:
+    if inputs != {INPUT: identity.view.shape}:
         raise InvalidModel(
             f"{source}: the network in it looks at {inputs}, not at what it says: "
-            f"{known.view.shape}"
+            f"{identity.view.shape}"
         )
-    return OnnxModel(
-        known.architecture, known.problem, known.view, session, known.mean, known.deviation,
-        known.record,
-    )  # fmt: skip
+    return OnnxModel(**identity.arguments(), session=session)
 
 
 @contextlib.contextmanager

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidModel, InvalidProblem
-from bellcrank.surrogate.matching import beams_between
+from bellcrank.surrogate.matching import beams_between, renumbered
 from bellcrank.surrogate.trained import TrainedModel, read_model
 
 if TYPE_CHECKING:
@@ -113,19 +113,15 @@ class Predictor:
         said = np.array(
             [
                 member.predict(
-                    _renumbered(given, order), device=self.device, precision=self.precision
+                    np.packbits(renumbered(given, beams_there), axis=1),
+                    device=self.device,
+                    precision=self.precision,
                 )
-                for member, order in zip(self.members, self._beams, strict=True)
+                for member, beams_there in zip(self.members, self._beams, strict=True)
             ]
         )
         spread = said.std(axis=0, ddof=1) if len(said) > 1 else None
         return Prediction(said.mean(axis=0), spread)
-
-
-def _renumbered(masks: NDArray[np.bool_], beams: NDArray[np.int64]) -> NDArray[np.uint8]:
-    known = np.zeros(masks.shape, np.bool_)
-    known[:, beams] = masks
-    return np.packbits(known, axis=1)
 
 
 def load_predictor(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Self
 
 from bellcrank.errors import InvalidSettings
@@ -107,6 +107,10 @@ class Recipe:
     def to_dict(self) -> dict[str, Any]:
         """Return the recipe as plain data."""
         return asdict(self)
+
+    def of_member(self, member: int) -> Self:
+        """Return the recipe of a network of several, from 0: each has the next seed."""
+        return replace(self, seed=self.seed + member)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:

@@ -14,7 +14,6 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.registry import Registry
 from bellcrank.surrogate.backend import find_device, import_torch
-from bellcrank.surrogate.identity import architecture_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -154,7 +153,8 @@ def value_and_gradient(
     >>> from bellcrank.surrogate.views import views
     >>> crane = find_problem("crane")
     >>> view = views["bits"](crane)
-    >>> model = TrainedModel("mlp", crane, view, models["mlp"].build(view.shape), 0.0, 1.0)
+    >>> network = models["mlp"].build(view.shape)
+    >>> model = TrainedModel("mlp", crane, view, 0.0, 1.0, network=network)
     >>> value, gradient = value_and_gradient(model, crane.initial)
     >>> gradient.shape
     (352,)
@@ -167,7 +167,7 @@ def value_and_gradient(
             f"presence: expected {beams} numbers from 0 to 1, one for each beam of "
             f"{model.problem.name!r}"
         )
-    relaxation = relaxations[architecture_of(model.architecture).view](model.view)
+    relaxation = relaxations[model.looks_at](model.view)
     where = find_device(device)
     network = model.network.to(where).eval()
     kind = next(network.parameters()).dtype

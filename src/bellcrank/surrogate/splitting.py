@@ -33,6 +33,21 @@ class Split:
     training: NDArray[np.int64]
     held_out: NDArray[np.int64]
 
+    def some_held_out(self, most: int | None, seed: int) -> NDArray[np.int64]:
+        """Return held-out rows, at most so many: the same whenever as many are asked for.
+
+        Parameters
+        ----------
+        most
+            None for all.
+        seed
+            Names which.
+        """
+        if most is None or len(self.held_out) <= most:
+            return self.held_out
+        rng = np.random.default_rng(seed)
+        return np.sort(rng.choice(self.held_out, most, replace=False))
+
 
 def split_by_run(data: Dataset, fraction: float, seed: int) -> Split:
     """Hold out a fraction of the runs, at least one.
@@ -67,6 +82,17 @@ def split_by_run(data: Dataset, fraction: float, seed: int) -> Split:
     chosen = np.random.default_rng(seed).permutation(runs)[:count]
     is_held_out = np.isin(data.run, chosen)
     return Split(np.flatnonzero(~is_held_out), np.flatnonzero(is_held_out))
+
+
+def thinned(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    """Return every second, third, ... of some rows, so that they are not too many.
+
+    Examples
+    --------
+    >>> thinned(np.arange(7), 3).tolist()
+    [0, 3, 6]
+    """
+    return rows[:: -(-len(rows) // most)]
 
 
 def flattening_chances(efficiency: NDArray[np.float64]) -> NDArray[np.float64]:

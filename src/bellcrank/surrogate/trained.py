@@ -7,24 +7,16 @@ network did, and carry the whole problem, so that a mask numbered otherwise can 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidModel, UnknownName, first_line
-from bellcrank.model import problem_to_dict
 from bellcrank.model.storage import write_bytes
 from bellcrank.surrogate.backend import autocast, find_device, find_precision, import_torch
-from bellcrank.surrogate.identity import (
-    METADATA_KEY,
-    MODEL_SCHEMA,
-    Known,
-    architecture_of,
-    lattice_hash,
-    read_known,
-)
+from bellcrank.surrogate.identity import METADATA_KEY, Identity, architecture_of, read_identity
 
 if TYPE_CHECKING:
     import os
@@ -32,44 +24,25 @@ if TYPE_CHECKING:
     import torch
     from numpy.typing import NDArray
 
-    from bellcrank.model import Problem
     from bellcrank.surrogate.feeding import Feeder
-    from bellcrank.surrogate.views import View
-
-__all__ = ["TrainedModel", "batch_of", "lattice_hash", "read_model", "run_network"]
 
 BATCH = {"cpu": 64, "cuda": 4096}
 """Designs that a network looks at in one go: what fits caches, or keeps a GPU busy."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TrainedModel:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class TrainedModel(Identity):
     """A network that predicts the efficiency of designs on one lattice.
 
     Parameters
     ----------
-    architecture
-        Name in the registry of models.
-    problem
-        What it has learnt.
-    view
-        What it looks at.
+    architecture, problem, view, mean, deviation, record
+        As in `bellcrank.surrogate.identity.Identity`.
     network
         With its weights, ready to predict.
-    mean, deviation
-        Of the efficiencies that it was trained with; the network's output is in units of
-        the latter, from the former.
-    record
-        How it was trained and how well it does, as plain data.
     """
 
-    architecture: str
-    problem: Problem
-    view: View
     network: torch.nn.Module
-    mean: float
-    deviation: float
-    record: dict[str, Any] = field(default_factory=dict)
 
     def predict(
         self,
@@ -104,32 +77,7 @@ class TrainedModel:
         network = self.network.to(where)
         exactness = find_precision(precision, where)
         found = run_network(network, feeder_of(self.view, where), packed, exactness)
-        return self.mean + self.deviation * found
-
-    @property
-    def seen(self) -> dict[str, float]:
-        """Designs that it was trained with and seconds that this took, as its record says.
-
-        Both include what the networks that it went on from had seen and taken.
-        """
-        before = self.record.get("before", {})
-        return {
-            name: self.record.get(name, 0) + before.get(name, 0) for name in ("designs", "seconds")
-        }
-
-    def describe(self) -> dict[str, Any]:
-        """Return all that is known about it but its weights, as plain data."""
-        return {
-            "schema": MODEL_SCHEMA,
-            "architecture": self.architecture,
-            "lattice": lattice_hash(self.problem.lattice),
-            "looks_at": architecture_of(self.architecture).view,
-            "view": self.view.to_dict(),
-            "mean": self.mean,
-            "deviation": self.deviation,
-            "record": self.record,
-            "problem": problem_to_dict(self.problem),
-        }
+        return self.efficiencies(found)
 
     def to_bytes(self) -> bytes:
         """Return the content of a file: weights in safetensors, the rest in its metadata."""
@@ -211,13 +159,12 @@ def read_model(path: str | os.PathLike[str]) -> TrainedModel:
         raise InvalidModel(
             f"{path}: not a trained model, or truncated ({first_line(error)})"
         ) from None
-    known = read_known(text, str(path))
-    return _rebuild(known, tensors, str(path))
+    return _rebuild(read_identity(text, str(path)), tensors, str(path))
 
 
-def _rebuild(known: Known, tensors: dict[str, Any], source: str) -> TrainedModel:
+def _rebuild(identity: Identity, tensors: dict[str, Any], source: str) -> TrainedModel:
     try:
-        network = architecture_of(known.architecture).build(known.view.shape)
+        network = architecture_of(identity.architecture).build(identity.view.shape)
     except UnknownName as error:
         raise InvalidModel(f"{source}: {error}") from None
     try:
@@ -225,14 +172,11 @@ def _rebuild(known: Known, tensors: dict[str, Any], source: str) -> TrainedModel
     except RuntimeError as error:
         lines = str(error).splitlines()
         raise InvalidModel(
-            f"{source}: its weights are not those of {known.architecture!r} "
+            f"{source}: its weights are not those of {identity.architecture!r} "
             f"({lines[1 if len(lines) > 1 else 0].strip()})"
         ) from None
     network.eval()
-    return TrainedModel(
-        known.architecture, known.problem, known.view, network, known.mean, known.deviation,
-        known.record,
-    )  # fmt: skip
+    return TrainedModel(**identity.arguments(), network=network)
 
 
 def _metadata(content: bytes) -> dict[str, str]:
