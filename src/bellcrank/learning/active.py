@@ -54,7 +54,7 @@ class Labelled:
     proposed
         Designs that the mechanics was asked about.
     surprise
-        How good the networks' predictions for `data` were.
+        How good the networks' predictions for `data`, or some of it, were.
     """
 
     data: Dataset
@@ -71,7 +71,7 @@ class Round:
     proposed, labelled
         Designs that the mechanics was asked about, and those with a unique response.
     surprise
-        How good the predictions for these were before training.
+        How good the predictions for these, or some of them, were before training.
     held_out
         For each network, how good it is afterwards on what is held out of the original data.
     """
@@ -186,10 +186,11 @@ def label_round(
     if not chosen:
         return None
     data = label_designs(predictor, chosen, settings, tell=tell)
+    some = thinned(np.arange(len(data)), knowledge.recipe.tested)
     beams = data.problem.lattice.beam_count
-    masks = np.unpackbits(data.packed, axis=1, count=beams).astype(bool)
-    said = predictor.predict(masks).efficiency
-    return Labelled(data, sum(map(len, chosen)), accuracy(said, data.efficiency))
+    masks = np.unpackbits(data.packed[some], axis=1, count=beams).astype(bool)
+    surprise = accuracy(predictor.predict(masks).efficiency, data.efficiency[some])
+    return Labelled(data, sum(map(len, chosen)), surprise)
 
 
 def conclude(learnt: Knowledge, labelled: Labelled, *, device: str = "auto") -> Round:

@@ -177,6 +177,7 @@ def complete(
     folders: Sequence[Path],
     take_up: Callable[[int], Training],
     *,
+    most: int | None = None,
     device: str = "auto",
     tell: Callable[[FitProgress], None] = lambda _progress: None,
     stop: Callable[[], bool] = lambda: False,
@@ -189,6 +190,8 @@ def complete(
         Of the networks.
     take_up
         Begins or resumes the training of that number.
+    most
+        Held-out designs to test each on in the end; by default all.
 
     Returns
     -------
@@ -204,7 +207,7 @@ def complete(
             tell(FitProgress(member, len(folders), progress))
         if not training.is_done:
             return None
-        _draw(training, training.finish(), own / PICTURE, device)
+        _draw(training, training.finish(most), own / PICTURE, device)
     return [read_model(own / MODEL) for own in folders]
 
 
@@ -213,8 +216,8 @@ def _draw(training: Training, model: TrainedModel, path: Path, device: str) -> N
     from bellcrank.plots.learning import Learnt, draw_learnt
 
     record, data = model.record, training.data
-    rows = thinned(training.split.held_out, DRAWN)
     held_out = len(np.unique(data.run[training.split.held_out]))
+    rows = thinned(training.split.held_out, min(DRAWN, record["held_out"]["count"]))
     learnt = Learnt(
         name=f"{data.problem.name} by {model.architecture}",
         note=f"{record['designs']:,} designs seen, of {data.run_count - held_out:,} runs, in "

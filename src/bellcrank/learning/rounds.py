@@ -241,7 +241,8 @@ class _Work:
         def tell(fit: FitProgress) -> None:
             self._say(number, "training", fit.progress.done, fit.progress.total, fit=fit)
 
-        return complete(folders, take_up, device=self.device, tell=tell, stop=self.stop)
+        most = self.course.recipe.tested if number else None
+        return complete(folders, take_up, most=most, device=self.device, tell=tell, stop=self.stop)
 
     def _say(
         self,

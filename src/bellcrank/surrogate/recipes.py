@@ -47,7 +47,8 @@ class Recipe:
     held_out
         Fraction of the runs to test on.
     tested
-        Most held-out designs that each epoch is tested on; the end is tested on all.
+        Most held-out designs that each epoch is tested on, and each round of learning from its
+        own searches; the end of a plain training is tested on all.
     seed
         Of the initial weights and of the order of designs.
     split_seed
