@@ -223,6 +223,7 @@ def main() -> None:
     print(f"R2 {told['r_squared']:.4f}, determination {told['determination']:.4f}, "
           f"{told['count']} designs")  # fmt: skip
     found_here = {"provenance": provenance(), **asked, **told}
+    options.out.parent.mkdir(parents=True, exist_ok=True)
     write_text(options.out, json.dumps(found_here, indent=1) + "\n", overwrite=True)
 
 

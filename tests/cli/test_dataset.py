@@ -69,6 +69,7 @@ def test_bad_words_are_refused_in_one_line(built: Path, here: Path) -> None:
     assert "count: expected" in refusal("dataset", "export", built, "--png", "p", "--count", 0)
     assert "is a file" in refusal("dataset", "export", built, "--png", "text")
     assert "runs: expected at least 1" in refusal("dataset", "build", PROBLEM, "--runs", 0)
+    assert "workers: expected at least 1" in refusal("dataset", "build", PROBLEM, "--workers", 0)
     words = ("dataset", "build", PROBLEM, "--set", "dangling=ignored")
     assert "dangling: with 'ignored'" in refusal(*words)
     assert "expected KEY=VALUE" in refusal("dataset", "build", PROBLEM, "--set", "x")

@@ -63,7 +63,7 @@ def test_a_search_leaves_record_design_and_picture(here: Path, model: Path, data
     assert outcome.code == 0, outcome.err
     folder = here / f"{PROBLEM}-network"
     assert sorted(path.name for path in folder.iterdir()) == RESULTS
-    for words in ("as predicted", "as checked", "by mechanics", "beams from training", "best: "):
+    for words in ("as predicted", "as checked", "by mechanics", "beams from the dataset", "best: "):
         assert words in outcome.out
     design = read_design(folder / "design.json")
     response = Evaluator(design.problem).respond(design.mask, CAREFUL)

@@ -151,6 +151,37 @@ def test_a_killed_ensemble_goes_on_with_all_its_members(data: Path, tmp_path: Pa
     assert all((folder / f"member-{k}" / "model.safetensors").exists() for k in range(2))
 
 
+def test_an_ensemble_killed_while_it_begins_loses_no_member(data: Path, tmp_path: Path) -> None:
+    whole = tmp_path / "whole"
+    options = (*TRAINING, "--epochs", "1", "--members", "3")
+    assert call("train", data, *options, "--out", whole).code == 0
+    folder = tmp_path / "killed"
+    assert call("train", data, *options, "--out", folder).code == 0
+    for member in (0, 2):  # as if the second had been the only one to be begun so far
+        shutil.rmtree(folder / f"member-{member}")
+    for name in ("model.safetensors", "checkpoint.safetensors", "log.csv", "training.png"):
+        (folder / "member-1" / name).unlink()
+    outcome = call("train", data, "--resume", folder)
+    assert outcome.code == 0, outcome.err
+    for member in range(3):
+        one, other = (
+            read_model(each / f"member-{member}" / "model.safetensors") for each in (whole, folder)
+        )
+        assert same_weights(one, other)
+
+
+def test_a_kill_before_the_picture_costs_no_more_than_the_picture(
+    data: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "network"
+    assert call("train", data, *TRAINING, "--epochs", "1", "--out", folder).code == 0
+    written = (folder / "model.safetensors").read_bytes()
+    (folder / "training.png").unlink()
+    assert call("train", data, "--resume", folder).code == 0
+    assert (folder / "training.png").exists()
+    assert (folder / "model.safetensors").read_bytes() == written
+
+
 def test_rounds_tell_what_they_found(in_rounds: tuple[Path, Outcome], data: Path) -> None:
     folder, outcome = in_rounds
     lines = [line for line in outcome.err.splitlines() if "labelled" in line]

@@ -102,7 +102,7 @@ def test_a_single_run_cannot_be_split(data: Dataset) -> None:
 def test_what_is_no_dataset_is_refused(tmp_path: Path, data: Dataset) -> None:
     with pytest.raises(InvalidFile, match="no such file; bellcrank dataset build makes"):
         read_dataset(tmp_path / "absent.parquet")
-    with pytest.raises(InvalidFile, match="no such file"):
+    with pytest.raises(InvalidFile, match=r"no dataset\.parquet in this folder"):
         read_dataset(tmp_path)
     text = tmp_path / "text.parquet"
     text.write_text("not a Parquet file at all")

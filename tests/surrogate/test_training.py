@@ -34,10 +34,11 @@ from bellcrank.surrogate.folder import (
     MODEL,
     read_description,
 )
-from bellcrank.surrogate.metrics import accuracy, correlation
+from bellcrank.surrogate.metrics import Accuracy, accuracy, correlation
 from bellcrank.surrogate.progress import LossMeter
 from bellcrank.surrogate.recipes import Recipe, recipe_of
-from bellcrank.surrogate.splitting import Split
+from bellcrank.surrogate.schedule import rows_of_epoch
+from bellcrank.surrogate.splitting import Split, split_by_run
 from bellcrank.surrogate.trained import read_model
 
 from .helpers import TINY, moved, random_dataset, same_weights, untrained
@@ -476,7 +477,7 @@ def test_minding_differences_tells_neighbours_apart(problem: Problem) -> None:
     rng = np.random.default_rng(2)
     masks, labels, runs = [], [], []
     weight = rng.normal(size=problem.lattice.beam_count)
-    for run in range(12):
+    for run in range(24):
         mask = rng.random(len(weight)) < rng.uniform(0.2, 0.8)
         for _ in range(150):
             mask[rng.integers(len(mask))] ^= True
@@ -486,9 +487,41 @@ def test_minding_differences_tells_neighbours_apart(problem: Problem) -> None:
     data = Dataset(problem, np.array(masks), np.array(labels), np.array(runs))
     told = []
     for weighted in (0.0, 0.3):
-        recipe = replace(TINY, epochs=12, resampling=False, differences=weighted)
-        model = to_the_end(begin(data, recipe, device="cpu"))
-        rows = np.flatnonzero(np.isin(data.run, data.run[begin(data, recipe).split.held_out]))
+        recipe = replace(
+            TINY, epochs=25, epoch_size=None, batch=32, resampling=False, differences=weighted
+        )
+        training = begin(data, recipe, device="cpu")
+        model, rows = to_the_end(training), np.sort(training.split.training)
         change, said = np.diff(data.efficiency[rows]), np.diff(model.predict(data.packed[rows]))
-        told.append(correlation(change, said))
-    assert told[1] > told[0] + 0.05
+        told.append(1.0 - correlation(change, said))
+    assert told[1] < 0.6 * told[0]
+
+
+def test_short_epochs_go_through_all_designs_before_any_comes_again() -> None:
+    recipe = Recipe(resampling=False, seed=3)
+    rows, nothing = np.arange(10, 110), np.zeros(100)
+    seen = [rows_of_epoch(recipe, epoch, rows, nothing, 30) for epoch in range(7)]
+    every = np.concatenate(seen)
+    assert np.array_equal(np.sort(every[:100]), rows)
+    assert np.array_equal(np.sort(every[100:200]), rows)
+    assert not np.array_equal(every[:100], every[100:200])
+    assert np.array_equal(rows_of_epoch(recipe, 4, rows, nothing, 30), seen[4])
+
+
+def test_nothing_to_test_with_is_refused(data: Dataset) -> None:
+    split = split_by_run(data, TINY.held_out, TINY.split_seed)
+    flat = data.efficiency.copy()
+    flat[split.held_out] = 0.1
+    with pytest.raises(InvalidSettings, match=r"all efficiencies that are held out are 0\.1"):
+        begin(replace(data, efficiency=flat), TINY, device="cpu")
+
+
+def test_a_network_that_says_the_same_of_all_has_no_correlation() -> None:
+    found = accuracy(np.full(5, 0.3), np.arange(5.0))
+    assert math.isnan(found.r_squared)
+    assert found.determination < 0.0
+    told = found.to_dict()
+    assert told["r_squared"] is None
+    assert math.isnan(Accuracy.from_dict(told).r_squared)
+    constant = accuracy(np.arange(3.0), np.full(3, 0.1))
+    assert math.isnan(constant.determination)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import math
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,6 +110,17 @@ def test_truncated_and_other_files_are_refused(
         read_model(tmp_path / "absent.safetensors")
     with pytest.raises(InvalidFile, match="cannot be read"):
         read_model(tmp_path)
+
+
+def test_weights_that_are_no_numbers_are_refused(model: TrainedModel, tmp_path: Path) -> None:
+    broken = copy.deepcopy(model.network)
+    name, weights = next(iter(broken.named_parameters()))
+    with torch.no_grad():
+        weights.view(-1)[0] = math.nan
+    path = tmp_path / "model.safetensors"
+    path.write_bytes(replace(model, network=broken).to_bytes())
+    with pytest.raises(InvalidModel, match=f"not all weights in '{name}' are numbers"):
+        read_model(path)
 
 
 @pytest.mark.parametrize(

@@ -133,8 +133,6 @@ def _options(
 ) -> EngineOptions:
     from bellcrank.campaign import EngineOptions
 
-    if workers is not None and workers < 1:
-        raise InvalidSettings(f"workers: expected at least 1, got {workers}")
     return EngineOptions(
         workers=workers,
         host=host,

@@ -39,7 +39,8 @@ def surrogate_search(
         int, typer.Option(help="Steps after which the mechanics may send a chain back; 0: never.")
     ] = 0,
     dataset: Annotated[
-        Path | None, typer.Option(help="What the networks learnt from: tells how new designs are.")
+        Path | None,
+        typer.Option(help="A dataset: tells how new designs are beside it."),
     ] = None,
     exact: Annotated[
         bool,
@@ -140,7 +141,7 @@ def _print_offers(driven: Driven, summary: dict[str, Any]) -> None:
     if driven.by_mechanics:
         columns["mechanics"] = "by mechanics"
     if any(row["distance"] is not None for row in summary.values()):
-        columns["distance"] = "beams from training"
+        columns["distance"] = "beams from the dataset"
     table = Table("medians", box=SIMPLE)
     for title in columns.values():
         table.add_column(title, justify="right")

@@ -164,18 +164,20 @@ def _record(trained: list[TrainedModel], rounds: list[Round] | None) -> dict[str
 
 
 def _table(trained: list[TrainedModel]) -> Table:
+    from bellcrank.surrogate.metrics import Accuracy
+
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("model")
     for name in ("designs seen", "seconds", "R²", "determination", "rms error"):
         table.add_column(name, justify="right")
     for each in trained:
-        found: dict[str, Any] = each.record["held_out"]
+        found = Accuracy.from_dict(each.record["held_out"])
         table.add_row(
             each.architecture,
             f"{each.seen['designs']:.0f}",
             f"{each.seen['seconds']:.0f}",
-            f"{found['r_squared']:.4f}",
-            f"{found['determination']:.4f}",
-            f"{found['rms_error']:.4f}",
+            f"{found.r_squared:.4f}",
+            f"{found.determination:.4f}",
+            f"{found.rms_error:.4f}",
         )
     return table

@@ -37,10 +37,16 @@ class TrainingLive(Live):
         total = told.members * progress.total
         if self._first is None:
             self._first = done
-        speed = (done - self._first) / max(time.monotonic() - self._start, 1e-9)
+        passed = time.monotonic() - self._start
+        speed = f"  {(done - self._first) / passed:.0f} designs/s" if done > self._first else ""
         which = f"network {told.member + 1} of {told.members}  " if told.members > 1 else ""
         which = prefix + which
-        figures = f"{which}loss {progress.loss:.4f}  {speed:.0f} designs/s"
+        if progress.testing is not None:
+            tested, held_out = progress.testing
+            line = f"{which}testing  {tested} / {held_out} designs held out"
+            self._show(done, total, line, line)
+            return
+        figures = f"{which}loss {progress.loss:.4f}{speed}"
         self._show(done, total, figures, f"training {100.0 * done / total:3.0f} %  {figures}")
         if (epoch := progress.epoch) is not None:
             notes.print(

@@ -99,8 +99,8 @@ class Round:
         KeyError, TypeError, ValueError
             If it is none.
         """
-        held_out = tuple(Accuracy(**each) for each in told["held_out"])
-        surprise = Accuracy(**told["surprise"])
+        held_out = tuple(map(Accuracy.from_dict, told["held_out"]))
+        surprise = Accuracy.from_dict(told["surprise"])
         return cls(int(told["proposed"]), int(told["labelled"]), surprise, held_out)
 
 

@@ -164,11 +164,12 @@ def build_dataset(
     Raises
     ------
     InvalidSettings
-        If the campaign that lies there is another one.
+        If the campaign that lies there is another one, or there is to be no worker.
     OutputExists
         If a dataset lies there without the campaign that it comes from.
     StorageError, CorruptRun
     """
+    options = EngineOptions(workers=workers)
     place = Path(folder)
     make_folder(place)
     check_folder(place / DATASET_FILE)
@@ -178,7 +179,6 @@ def build_dataset(
             f"(--out)"
         )
     store = Store.create(place / CAMPAIGN, spec.campaign())
-    options = EngineOptions(workers=workers)
     if not complete(store, engine, options, tell=tell, stop=stop):
         return None
     data = gather(store, spec.problem)

@@ -45,7 +45,7 @@ class Made:
     spread
         How much they dispute; None for one network.
     distance
-        In how many beams it differs from the nearest training design; None if not asked for.
+        In how many beams it differs from the nearest design of the dataset; None if not asked for.
     """
 
     chain: int

@@ -81,7 +81,7 @@ def drive(
     Parameters
     ----------
     training
-        What the networks have learnt from: the distance to it is told.
+        For example what the networks have learnt from: the distance to it is told.
     tell
         Called now and then with how far it is.
     stop
@@ -202,7 +202,7 @@ def _masks_of(made: Sequence[Made], beams: int) -> NDArray[np.bool_]:
 def _with_distances(
     made: tuple[Made, ...], training: Dataset, beams: NDArray[np.int64]
 ) -> tuple[Made, ...]:
-    """Return the designs with their distances to what was learnt from."""
+    """Return the designs with their distances to those of a dataset."""
     known = renumbered(_masks_of(made, len(beams)), beams)
     distance, _ = smallest_distances(np.packbits(known, axis=1), training.packed)
     return tuple(replace(each, distance=int(far)) for each, far in zip(made, distance, strict=True))

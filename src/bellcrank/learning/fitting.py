@@ -10,9 +10,17 @@ import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.learning.round_files import check_unused, last_finished
+from bellcrank.runs.files import make_folder
 from bellcrank.surrogate.beginning import begin, resume
-from bellcrank.surrogate.folder import DESCRIPTION, MODEL, read_description, require_data
+from bellcrank.surrogate.folder import (
+    DESCRIPTION,
+    INITIAL,
+    MODEL,
+    read_description,
+    require_data,
+)
 from bellcrank.surrogate.matching import require_same_numbers
+from bellcrank.surrogate.metrics import Accuracy
 from bellcrank.surrogate.predictor import load_models
 from bellcrank.surrogate.splitting import thinned
 from bellcrank.surrogate.trained import read_model
@@ -150,16 +158,20 @@ def fit(
     """
     place = Path(folder)
     if ensemble is None:
-        folders = _begun(place)
-        for own in folders:  # finished ones too, which nobody resumes
-            require_data(own, read_description(own), data)
+        folders = _begun(place, data, device)
     else:
         starts = ensemble.starts(data.problem)
         check_unused(place)
         folders = member_folders(place, len(starts))
-        for member, own in enumerate(folders):  # all at once: whoever goes on finds them all
-            recipe = ensemble.recipe.of_member(member)
-            begin(data, recipe, own, device=device, initial=starts[member])
+        for own, start in zip(folders, starts, strict=True):  # for whoever goes on to find
+            if start is not None:
+                make_folder(own)
+                start.write(own / INITIAL, overwrite=True)
+        for member, own in enumerate(folders):
+            begin(
+                data, ensemble.recipe.of_member(member), own, device=device,
+                initial=starts[member], members=len(folders),
+            )  # fmt: skip
     return complete(
         folders, lambda member: resume(folders[member], data, device=device),
         device=device, tell=tell, stop=stop,
@@ -191,7 +203,7 @@ def complete(
     take_up
         Begins or resumes the training of that number.
     most
-        Held-out designs to test each on in the end; by default all.
+        Held-out designs to test each on in the end; by default as its recipe says.
 
     Returns
     -------
@@ -200,14 +212,20 @@ def complete(
         was stopped.
     """
     for member, own in enumerate(folders):
-        if (own / MODEL).exists():
+        if (own / PICTURE).exists():  # which is made last
             continue
+
+        def say(progress: Progress, member: int = member) -> None:
+            tell(FitProgress(member, len(folders), progress))
+
         training = take_up(member)
         for progress in training.run(stop):
-            tell(FitProgress(member, len(folders), progress))
+            say(progress)
         if not training.is_done:
             return None
-        _draw(training, training.finish(most), own / PICTURE, device)
+        finished = (own / MODEL).exists()
+        model = read_model(own / MODEL) if finished else training.finish(most, say)
+        _draw(training, model, own / PICTURE, device)
     return [read_model(own / MODEL) for own in folders]
 
 
@@ -216,28 +234,45 @@ def _draw(training: Training, model: TrainedModel, path: Path, device: str) -> N
     from bellcrank.plots.learning import Learnt, draw_learnt
 
     record, data = model.record, training.data
+    tested = Accuracy.from_dict(record["held_out"])
     held_out = len(np.unique(data.run[training.split.held_out]))
-    rows = thinned(training.split.held_out, min(DRAWN, record["held_out"]["count"]))
+    rows = thinned(training.split.held_out, min(DRAWN, tested.count))
     learnt = Learnt(
         name=f"{data.problem.name} by {model.architecture}",
         note=f"{record['designs']:,} designs seen, of {data.run_count - held_out:,} runs, in "
         f"{record['seconds'] / 60.0:.0f} minutes; tested on {held_out:,} other runs",
         predicted=model.predict(data.packed[rows], device=device),
         actual=data.efficiency[rows],
-        r_squared=record["held_out"]["r_squared"],
-        determination=record["held_out"]["determination"],
+        r_squared=tested.r_squared,
+        determination=tested.determination,
         designs=np.array([epoch["designs"] for epoch in record["epochs"]], np.float64),
-        accuracy=np.array([epoch["r_squared"] for epoch in record["epochs"]]),
+        accuracy=np.array([epoch["r_squared"] for epoch in record["epochs"]], np.float64),
     )
     draw_learnt(learnt, path, overwrite=True)
 
 
-def _begun(place: Path) -> list[Path]:
-    """Return the folders of the networks that were begun in a folder."""
+def _begun(place: Path, data: Dataset, device: str) -> list[Path]:
+    """Return the folders of the networks that are trained in a folder.
+
+    A kill in the beginning may have left some of an ensemble without one; they are begun here.
+    """
     found = _in_order(path.parent for path in place.glob(f"member-*/{DESCRIPTION}"))
     if not found and not (place / DESCRIPTION).exists():
         raise InvalidFile(f"{place}: no training to go on with: it has no {DESCRIPTION}")
-    return found or [place]
+    for own in found or [place]:  # finished ones too, which nobody resumes
+        told = read_description(own)
+        require_data(own, told, data)
+    if not found:
+        return [place]
+    first = int(own.name.removeprefix("member-"))
+    folders = member_folders(place, max(told.members, first + 1))
+    for member, own in enumerate(folders):
+        if own not in found:
+            begin(
+                data, told.recipe.of_member(member - first), own, device=device,
+                initial=read_model(own / INITIAL) if told.initial else None, members=len(folders),
+            )  # fmt: skip
+    return folders
 
 
 def networks_to_go_on_from(problem: Problem, start: str | os.PathLike[str]) -> list[TrainedModel]:

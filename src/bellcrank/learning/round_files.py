@@ -117,7 +117,7 @@ def read_labelled(place: Path) -> Labelled:
     path = place / DESIGNS
     try:
         data = read_dataset(path)
-        surprise = Accuracy(**data.origin["surprise"])
+        surprise = Accuracy.from_dict(data.origin["surprise"])
         return Labelled(data, int(data.origin["proposed"]), surprise)
     except BellcrankError as error:
         reason = str(error).removeprefix(f"{path}: ").partition("; bellcrank")[0]

@@ -2,7 +2,7 @@
 
 Three panels, after figures 6 b and c of the paper: true efficiencies of designs made by networks
 and by mechanics; what was predicted of the former against the truth; in how many beams they
-differ from the nearest training design.
+differ from the nearest design of the dataset.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NETWORK = style.BEST
 MECHANICS = style.INPUT
 PANEL = 3.35
 """Inches of width and height of a panel."""
-LEFT, RIGHT, GAP, BOTTOM, TOP = 0.62, 0.3, 0.78, 0.62, 0.42
+LEFT, RIGHT, GAP, BOTTOM, TOP = 0.62, 0.3, 0.95, 0.62, 0.42
 """Inches: around and between panels; TOP is for the panel's own heading."""
 MARGIN = 0.28
 MOST_BINS = 16
@@ -49,7 +49,7 @@ class DrivenSearch:
     mechanics : (m,) float64
         Efficiencies of designs made by the mechanics; empty if there are none.
     distance : (n,) int64 or None
-        In how many beams each differs from the nearest training design.
+        In how many beams each differs from the nearest design of the dataset.
     exact
         Whether networks only screened, and the mechanics decided.
     """
@@ -155,7 +155,7 @@ def _put_predictions(axes: Axes, search: DrivenSearch) -> None:
     if len(true):
         above = float(np.median(predicted - true))
         way = "too high" if above > 0.0 else "too low"
-        lines.append(f"predicted {abs(above):.2f} {way}, median")
+        lines.append(f"predicted {abs(above):.2g} {way}, median")
     if failed := int((~sound).sum()):
         lines.append(f"{failed} without a unique response")
     # Searches go where networks are too hopeful: above the diagonal. Below it there is room.
@@ -166,7 +166,7 @@ def _put_predictions(axes: Axes, search: DrivenSearch) -> None:
 
 
 def _put_distances(axes: Axes, distance: NDArray[np.int64]) -> None:
-    """Draw how far from all training designs the made ones are."""
+    """Draw how far from all designs of a dataset the made ones are."""
     middle = float(np.median(distance))
     edges = _edges(distance.astype(np.float64), whole=True)
     looks: dict[str, Any] = {"bins": edges, "weights": np.full(len(distance), 100 / len(distance))}
@@ -175,7 +175,7 @@ def _put_distances(axes: Axes, distance: NDArray[np.int64]) -> None:
     axes.set_xlim(0.0, edges[-1])
     low, high = axes.get_ylim()
     axes.set_ylim(low, high * 1.2)
-    _dress(axes, "beams unlike the nearest training design", "designs, %", "Are they new?")
+    _dress(axes, "beams unlike the nearest design of the dataset", "designs, %", "Are they new?")
     _put_key(axes, 0, f"median {middle:.0f} beams", style.BUILT)
 
 

@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 BINS = 120
-SIZE = (9.6, 4.9)
+SIZE = (9.8, 4.9)
 """Of the figure, in inches."""
+LEFT = 0.95
+"""Inches left of it: for numbers with three decimals too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,11 +69,11 @@ def draw_learnt(learnt: Learnt, path: str | os.PathLike[str], *, overwrite: bool
     target = check_target(path, overwrite=overwrite)
     width, height = SIZE
     figure = style.new_figure(width, height)
-    style.write_heading(figure, learnt.name, learnt.note, 0.75, 0.25)
+    style.write_heading(figure, learnt.name, learnt.note, LEFT, 0.25)
     top = height - 0.95
     side = top - 0.6
-    scatter = figure.add_axes((0.75 / width, 0.6 / height, side / width, side / height))
-    left = 0.75 + side + 1.15
+    scatter = figure.add_axes((LEFT / width, 0.6 / height, side / width, side / height))
+    left = LEFT + side + 1.15
     curve = figure.add_axes(
         (left / width, 0.6 / height, (width - left - 0.3) / width, side / height)
     )
@@ -110,8 +112,13 @@ def _draw_density(axes: Axes, learnt: Learnt) -> None:
 
 def _draw_curve(axes: Axes, learnt: Learnt) -> None:
     """Draw the accuracy after each epoch; near 1, what is missing is what matters."""
-    missing = np.maximum(1.0 - learnt.accuracy, 1e-6)
-    axes.plot(learnt.designs, missing, "o-", color=style.BEST, markersize=4.0, linewidth=1.6)
+    known = np.isfinite(learnt.accuracy)
+    style.label(axes, "designs seen", "R² on held-out runs")
+    style.quieten(axes)
+    if not known.any():  # a network that says the same of all designs
+        return
+    missing = np.maximum(1.0 - learnt.accuracy[known], 1e-6)
+    axes.plot(learnt.designs[known], missing, "o-", color=style.BEST, markersize=4.0, linewidth=1.6)
     axes.set_yscale("log")
     levels = [
         level for level in _LEVELS if missing.min() * 0.6 <= 1.0 - level <= missing.max() * 1.6
@@ -121,8 +128,6 @@ def _draw_curve(axes: Axes, learnt: Learnt) -> None:
     axes.set_ylim(max(missing.max() * 1.3, 1e-5), missing.min() * 0.75)
     axes.set_xlim(0.0, float(learnt.designs.max()) * 1.04)
     axes.xaxis.set_major_formatter(lambda value, _: _short(value))
-    style.quieten(axes)
-    style.label(axes, "designs seen", "R² on held-out runs")
 
 
 _LEVELS = (0.0, 0.5, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.998)

@@ -158,6 +158,8 @@ def parquet_file(path: Path, what_to_do: str) -> Iterator[tuple[Any, dict[str, A
 
 
 def _header(metadata: Mapping[bytes, bytes]) -> dict[str, Any]:
+    if METADATA_KEY.encode() not in metadata:
+        raise ValueError("bellcrank's own header is missing")
     text = metadata[METADATA_KEY.encode()]
     if metadata[DIGEST_KEY.encode()] != _digest(text).encode():
         raise ValueError("its footer was changed")
@@ -260,13 +262,23 @@ def table_of(first_step: int, rows: Proposals) -> Any:
 
 
 def arrays_of(table: Any, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """Return columns of an Arrow table as arrays; masks as rows of bytes."""
-    return {name: _array_of(table.column(name)) for name in columns}
+    """Return columns of an Arrow table as arrays; masks as rows of bytes.
+
+    Raises
+    ------
+    ValueError
+        If a value is missing, or masks are not all of one width.
+    """
+    return {name: _array_of(name, table.column(name)) for name in columns}
 
 
-def _array_of(column: Any) -> NDArray[Any]:
+def _array_of(name: str, column: Any) -> NDArray[Any]:
     import pyarrow as pa
 
+    if column.null_count:
+        raise ValueError(f"{name}: {column.null_count} values are missing")
+    if pa.types.is_binary(column.type) or pa.types.is_string(column.type):
+        raise ValueError(f"{name}: expected bytes of one width, got {column.type}")
     if not pa.types.is_fixed_size_binary(column.type):
         array: NDArray[Any] = column.to_numpy()
         return array

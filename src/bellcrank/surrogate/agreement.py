@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.surrogate.metrics import correlation, recall
+from bellcrank.surrogate.metrics import correlation, finite, recall
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 TOP = 30
 """Flips that a search would try first."""
+ENOUGH = 4 * TOP
+"""Flips from which on it means something to find the `TOP` best: a guess finds a quarter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,7 @@ class Agreement:
         Correlation of the values, and of their ranks; nan where one side is constant.
     recall
         Fraction of the `TOP` most favourable flips among as many that were foreseen to be; nan
-        if there are no more flips than that.
+        if there are fewer than `ENOUGH` flips.
     count
         Flips that were looked at.
     """
@@ -45,11 +47,6 @@ class Agreement:
             "recall": finite(self.recall),
             "count": self.count,
         }
-
-
-def finite(value: float) -> float | None:
-    """Return a number as JSON can have it: None if it is nan or infinite."""
-    return float(value) if math.isfinite(value) else None
 
 
 def rank_correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
@@ -83,5 +80,5 @@ def agreement(foreseen: NDArray[np.float64], exact: NDArray[np.float64]) -> Agre
     count = len(truth)
     if count < 2:
         return Agreement(math.nan, math.nan, math.nan, count)
-    named = recall(guess, truth, TOP) if count > TOP else math.nan
+    named = recall(guess, truth, TOP) if count >= ENOUGH else math.nan
     return Agreement(correlation(guess, truth), rank_correlation(guess, truth), named, count)

@@ -57,6 +57,7 @@ def begin(
     device: str = "auto",
     initial: TrainedModel | None = None,
     split: Split | None = None,
+    members: int = 1,
 ) -> Training:
     """Begin a training in a new folder.
 
@@ -67,14 +68,16 @@ def begin(
     split
         Rows to learn from, some perhaps more than once, and rows to hold out; by default as the
         recipe says. Whoever resumes has to give the same again.
+    members
+        Networks of the ensemble that it belongs to, for whoever goes on with that.
 
     Raises
     ------
     InvalidDataset
         If the data come from a single run.
     InvalidSettings
-        If PyTorch or the device is missing, all efficiencies are the same, or `initial` is of
-        another architecture.
+        If PyTorch or the device is missing, all efficiencies to learn from or to test on are the
+        same, or `initial` is of another architecture.
     InvalidModel
         If `initial` numbers beams otherwise.
     UnknownName
@@ -95,8 +98,9 @@ def begin(
             make_folder(training.folder)
             initial.write(training.folder / INITIAL, overwrite=True)
         told = Description(
-            recipe, training.precision, data_hash(data), _name_of(split), initial is not None
-        )
+            recipe, training.precision, data_hash(data), _name_of(split), initial is not None,
+            members,
+        )  # fmt: skip
         write_description(training.folder, told)
     return training
 
@@ -152,9 +156,14 @@ def _build(
     from bellcrank.surrogate.feeding import feeder_of
 
     split = given or split_by_run(data, recipe.held_out, recipe.split_seed)
-    seen = data.efficiency[split.training]
+    seen, held_out = data.efficiency[split.training], data.efficiency[split.held_out]
     if seen.min() == seen.max():  # their deviation may be a remnant of rounding
         raise InvalidSettings(f"all efficiencies are {seen[0]:g}: there is nothing to learn")
+    if held_out.min() == held_out.max():
+        raise InvalidSettings(
+            f"all efficiencies that are held out are {held_out[0]:g}: nothing can be tested with "
+            f"them; take more runs, or longer ones"
+        )
     architecture = architecture_of(recipe.model)
     view = views[architecture.view](data.problem)
     with torch.random.fork_rng(devices=[]):

@@ -206,6 +206,8 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     place = Path(path)
     if place.is_dir() and (place / DATASET_FILE).exists():
         place /= DATASET_FILE
+    if place.is_dir():
+        raise InvalidFile(f"{path}: no {DATASET_FILE} in this folder")
     if not place.is_file():
         raise InvalidFile(f"{path}: no such file; bellcrank dataset build makes datasets")
     try:

@@ -15,9 +15,10 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Status
-from bellcrank.surrogate.agreement import Agreement, agreement, finite
+from bellcrank.surrogate.agreement import Agreement, agreement
 from bellcrank.surrogate.flips import flip_effects, foreseen_by
 from bellcrank.surrogate.matching import beams_between, renumbered
+from bellcrank.surrogate.metrics import finite
 from bellcrank.surrogate.occlusion import BLACK, WHITE, Block, occlude, picture_view, sample_map
 from bellcrank.surrogate.predictor import Predictor
 from bellcrank.surrogate.regions import Region, overlap_of_regions, regions_of

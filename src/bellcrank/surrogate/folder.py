@@ -52,6 +52,8 @@ class Description:
         Hash of which rows are learnt from and which are held out; None if the recipe says it.
     initial
         Whether it goes on from a network, a copy of which lies in the folder.
+    members
+        Networks of the ensemble that it belongs to, itself included.
     """
 
     recipe: Recipe
@@ -59,6 +61,7 @@ class Description:
     data: str
     split: str | None = None
     initial: bool = False
+    members: int = 1
 
 
 def check_new(folder: str | os.PathLike[str]) -> None:
@@ -97,6 +100,7 @@ def write_description(folder: Path, told: Description) -> None:
         "data": told.data,
         "split": told.split,
         "initial": told.initial,
+        "members": told.members,
         "provenance": provenance(),
     }
     write_text(folder / DESCRIPTION, json.dumps(data, indent=1) + "\n")
@@ -121,11 +125,13 @@ def read_description(folder: str | os.PathLike[str]) -> Description:
     try:
         recipe = Recipe.from_dict(told["recipe"])
         precision, data = str(told["precision"]), str(told["data"])
+        members = int(told.get("members", 1))
     except (KeyError, TypeError, InvalidSettings) as error:
         raise InvalidFile(f"{place}: damaged ({error}); restore it from a copy") from None
     if precision not in PRECISIONS:
         raise InvalidFile(f"{place}: damaged (precision {precision!r}); restore it from a copy")
-    return Description(recipe, precision, data, told.get("split"), bool(told.get("initial")))
+    initial = bool(told.get("initial"))
+    return Description(recipe, precision, data, told.get("split"), initial, members)
 
 
 def tidy(folder: Path) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -19,9 +20,10 @@ class Accuracy:
     ----------
     r_squared
         Of the linear regression of predicted on actual: the square of their correlation. The
-        paper's measure; it forgives a wrong scale and a wrong zero.
+        paper's measure; it forgives a wrong scale and a wrong zero. nan if one is constant.
     determination
-        1 - (mean squared error) / (variance of the truth); forgives nothing.
+        1 - (mean squared error) / (variance of the truth); forgives nothing. nan if the truth is
+        constant.
     rms_error
         Root of the mean squared error, in units of the efficiency.
     count
@@ -34,8 +36,22 @@ class Accuracy:
     count: int
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the measures as plain data."""
-        return asdict(self)
+        """Return the measures as plain data; what is not a number becomes None."""
+        return {name: finite(value) for name, value in asdict(self).items()}
+
+    @classmethod
+    def from_dict(cls, told: dict[str, Any]) -> Self:
+        """Rebuild the measures from `to_dict`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If they are none.
+        """
+        numbers: dict[str, Any] = {
+            name: math.nan if each is None else each for name, each in told.items()
+        }
+        return cls(**numbers)
 
 
 def accuracy(predicted: NDArray[np.floating[Any]], actual: NDArray[np.floating[Any]]) -> Accuracy:
@@ -55,10 +71,10 @@ def accuracy(predicted: NDArray[np.floating[Any]], actual: NDArray[np.floating[A
     truth = np.asarray(actual, np.float64)
     guess = np.asarray(predicted, np.float64)
     error = float(np.mean((guess - truth) ** 2))
-    variance = float(truth.var())
+    varies = truth.min() < truth.max()  # a variance may be a remnant of rounding
     return Accuracy(
         correlation(guess, truth) ** 2,
-        1.0 - error / variance if variance > 0.0 else float("nan"),
+        1.0 - error / float(truth.var()) if varies else math.nan,
         error**0.5,
         len(truth),
     )
@@ -66,9 +82,16 @@ def accuracy(predicted: NDArray[np.floating[Any]], actual: NDArray[np.floating[A
 
 def correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
     """Pearson's correlation; nan where one of them is constant."""
+    if first.min() == first.max() or second.min() == second.max():
+        return math.nan
     a, b = first - first.mean(), second - second.mean()
     scale = float(np.sqrt((a * a).sum() * (b * b).sum()))
-    return float((a * b).sum()) / scale if scale > 0.0 else float("nan")
+    return float((a * b).sum()) / scale if scale > 0.0 else math.nan
+
+
+def finite(value: float) -> float | None:
+    """Return a number as JSON can have it: None if it is nan or infinite."""
+    return value if math.isfinite(value) else None
 
 
 def recall(predicted: NDArray[np.float64], actual: NDArray[np.float64], count: int) -> float:
@@ -83,7 +106,7 @@ def recall(predicted: NDArray[np.float64], actual: NDArray[np.float64], count: i
     """
     wanted = min(count, len(actual))
     if wanted < 1:
-        return float("nan")
+        return math.nan
     best = np.argsort(-actual, kind="stable")[:wanted]
     named = np.argsort(-predicted, kind="stable")[:wanted]
     return len(np.intersect1d(best, named)) / wanted

@@ -102,6 +102,8 @@ class Predictor:
             If they are not that.
         InvalidSettings
             If the device or the precision makes no sense here.
+        InvalidModel
+            If a network says something that is no number.
         """
         given = np.asarray(masks)
         beams = self.problem.lattice.beam_count
@@ -120,6 +122,13 @@ class Predictor:
                 for member, beams_there in zip(self.members, self._beams, strict=True)
             ]
         )
+        wrong = np.argwhere(~np.isfinite(said))
+        if len(wrong):
+            member, design = wrong[0].tolist()
+            raise InvalidModel(
+                f"network {member + 1} of {len(said)}, a {self.members[member].architecture}, says "
+                f"{said[member, design]} of design {design}; its file may be damaged"
+            )
         spread = said.std(axis=0, ddof=1) if len(said) > 1 else None
         return Prediction(said.mean(axis=0), spread)
 

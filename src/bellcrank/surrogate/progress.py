@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import RunFailed
+from bellcrank.surrogate.metrics import finite
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,6 +47,10 @@ class EpochRecord:
     determination: float
     rms_error: float
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the record as plain data; what is not a number becomes None."""
+        return {name: finite(value) for name, value in asdict(self).items()}
+
 
 @dataclass(frozen=True, slots=True)
 class Progress:
@@ -59,12 +64,15 @@ class Progress:
         Running mean squared error, in units of the variance; nan before the first batch.
     epoch
         The record of the epoch that has just ended, if one has.
+    testing
+        In the end: how many held-out designs were tested so far, of how many.
     """
 
     done: int
     total: int
     loss: float
     epoch: EpochRecord | None = None
+    testing: tuple[int, int] | None = None
 
 
 @dataclass(slots=True)

@@ -43,12 +43,15 @@ class Recipe:
         Decay, a step, of the running average of the weights that is kept in the end; 0 keeps
         the last weights themselves.
     epoch_size
-        Designs in an epoch; None for all there are to train with.
+        Designs in an epoch; None for all there are to train with. An epoch of fewer goes on
+        where the last one left off.
     held_out
         Fraction of the runs to test on.
     tested
         Most held-out designs that each epoch is tested on, and each round of learning from its
-        own searches; the end of a plain training is tested on all.
+        own searches.
+    tested_last
+        Most that the end of a training is tested on; None for all.
     seed
         Of the initial weights and of the order of designs.
     split_seed
@@ -79,6 +82,7 @@ class Recipe:
     epoch_size: int | None = None
     held_out: float = 0.25
     tested: int = 20_000
+    tested_last: int | None = None
     seed: int = 0
     split_seed: int = 0
     precision: str = "auto"
@@ -88,6 +92,8 @@ class Recipe:
         _at_least("batch", self.batch, 2)
         _at_least("warm_up", self.warm_up, 0)
         _at_least("tested", self.tested, 2)
+        if self.tested_last is not None:
+            _at_least("tested_last", self.tested_last, 2)
         _at_least("seed", self.seed, 0)
         _at_least("split_seed", self.split_seed, 0)
         if self.epoch_size is not None:

@@ -26,6 +26,9 @@ def rows_of_epoch(
 ) -> NDArray[np.int64]:
     """Return the rows of an epoch, in the order in which they are seen.
 
+    Without resampling, epochs go through the rows in a random order, each where the last one
+    left off, and through all of them before any comes again.
+
     Parameters
     ----------
     epoch
@@ -43,17 +46,23 @@ def rows_of_epoch(
     --------
     >>> from bellcrank.surrogate.recipes import Recipe
     >>> plain = Recipe(resampling=False)
-    >>> sorted(rows_of_epoch(plain, 0, np.arange(4), np.zeros(4), 4).tolist())
+    >>> halves = [rows_of_epoch(plain, epoch, np.arange(4), np.zeros(4), 2) for epoch in (0, 1)]
+    >>> sorted(np.concatenate(halves).tolist())
     [0, 1, 2, 3]
     """
     if neighbour is not None:
         first = rows_of_epoch(recipe, epoch, rows, efficiency, wanted // 2)
         return np.stack([first, neighbour[first]], axis=1).ravel()
-    rng = np.random.default_rng(np.random.SeedSequence(recipe.seed, spawn_key=(epoch,)))
+
+    def stream(number: int) -> np.random.Generator:
+        return np.random.default_rng(np.random.SeedSequence(recipe.seed, spawn_key=(number,)))
+
     if recipe.resampling:
-        return np.asarray(rng.choice(rows, wanted, p=flattening_chances(efficiency)))
-    order = [rng.permutation(rows) for _ in range(-(-wanted // len(rows)))]
-    return np.concatenate(order)[:wanted]
+        return np.asarray(stream(epoch).choice(rows, wanted, p=flattening_chances(efficiency)))
+    start, stop = epoch * wanted, (epoch + 1) * wanted
+    begun, ended = start // len(rows), (stop - 1) // len(rows)
+    passes = np.concatenate([stream(each).permutation(rows) for each in range(begun, ended + 1)])
+    return passes[start - begun * len(rows) :][:wanted]
 
 
 def neighbours_of(run: NDArray[np.int64]) -> NDArray[np.int64]:

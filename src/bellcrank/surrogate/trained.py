@@ -20,6 +20,7 @@ from bellcrank.surrogate.identity import METADATA_KEY, Identity, architecture_of
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Callable
 
     import torch
     from numpy.typing import NDArray
@@ -106,11 +107,16 @@ def batch_of(device: torch.device) -> int:
 
 
 def run_network(
-    network: torch.nn.Module, feeder: Feeder, packed: NDArray[np.uint8], precision: str
+    network: torch.nn.Module,
+    feeder: Feeder,
+    packed: NDArray[np.uint8],
+    precision: str,
+    tell: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> NDArray[np.float64]:
     """Return what a network says of designs, batch by batch, without keeping gradients.
 
-    A network in the middle of its training is left as it was found.
+    A network in the middle of its training is left as it was found. `tell` is called with how
+    many designs it has looked at, of how many.
     """
     import torch
 
@@ -125,6 +131,7 @@ def run_network(
             for first in range(0, max(len(packed), 1), batch):
                 output = network(feeder.feed(packed[first : first + batch]))
                 parts.append(output.float())
+                tell(min(first + batch, len(packed)), len(packed))
     finally:
         network.train(was_training)
     joined = torch.cat(parts).cpu()  # once: each time would wait for a GPU
@@ -139,7 +146,8 @@ def read_model(path: str | os.PathLike[str]) -> TrainedModel:
     InvalidFile
         If there is no such file.
     InvalidModel
-        If it is not one of ours, is truncated, or its weights do not fit what it says.
+        If it is not one of ours, is truncated, or its weights are no numbers or do not fit what
+        it says.
     InvalidSettings
         If PyTorch is not installed.
     """
@@ -173,8 +181,10 @@ def _rebuild(identity: Identity, tensors: dict[str, Any], source: str) -> Traine
         lines = str(error).splitlines()
         raise InvalidModel(
             f"{source}: its weights are not those of {identity.architecture!r} "
-            f"({lines[1 if len(lines) > 1 else 0].strip()})"
+            f"({lines[1 if len(lines) > 1 else 0].split(',')[0].strip()})"
         ) from None
+    if wrong := [name for name, each in tensors.items() if not each.isfinite().all()]:
+        raise InvalidModel(f"{source}: damaged: not all weights in {wrong[0]!r} are numbers")
     network.eval()
     return TrainedModel(**identity.arguments(), network=network)
 

@@ -130,15 +130,25 @@ class Training:
         self.model = replace(self.model, view=view)
         self.feeder = feeder_of(view, self.device)
 
-    def finish(self, most: int | None = None) -> TrainedModel:
+    def finish(
+        self,
+        most: int | None = None,
+        tell: Callable[[Progress], None] = lambda _progress: None,
+    ) -> TrainedModel:
         """Test on what is held out, and return the model; write it to the folder.
 
         Parameters
         ----------
         most
-            Held-out designs to test on; by default all.
+            Held-out designs to test on; by default as the recipe says.
+        tell
+            Called now and then with where the test is.
         """
-        record = self._record(self._test(most))
+
+        def tested(done: int, total: int) -> None:
+            tell(replace(self._progress(), testing=(done, total)))
+
+        record = self._record(self._test(most or self.recipe.tested_last, tested))
         model = replace(self.model, network=self._kept, record=record)
         if self.folder is not None:
             self._write_log(self.folder)  # a kill may have come between checkpoint and log
@@ -155,7 +165,7 @@ class Training:
             "seconds": round(self.seconds, 1),
             "data": {**asdict(overlap(self.data, self.split)), "runs": self.data.run_count},
             "held_out": found.to_dict(),
-            "epochs": [asdict(epoch) for epoch in self.log],
+            "epochs": [epoch.to_dict() for epoch in self.log],
             "provenance": provenance(torch=import_torch().__version__),
         }
         return record if self.before is None else {**record, "before": self.before}
@@ -207,10 +217,12 @@ class Training:
             if self.step % breath == 0:
                 yield
 
-    def _test(self, most: int | None) -> Accuracy:
+    def _test(
+        self, most: int | None, tell: Callable[[int, int], None] = lambda _done, _total: None
+    ) -> Accuracy:
         """Test the network that is kept on held-out rows, at most so many."""
         rows = self.split.some_held_out(most, self.recipe.split_seed)
-        found = run_network(self._kept, self.feeder, self.data.packed[rows], self.precision)
+        found = run_network(self._kept, self.feeder, self.data.packed[rows], self.precision, tell)
         return accuracy(self.model.efficiencies(found), self.data.efficiency[rows])
 
     def _end_epoch(self) -> EpochRecord:

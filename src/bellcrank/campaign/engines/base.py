@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from bellcrank.errors import BellcrankError
+from bellcrank.errors import BellcrankError, InvalidSettings
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
@@ -84,6 +84,11 @@ class EngineOptions:
         Seconds to wait for a connection.
     slurm
         Options of dask-jobqueue's ``SLURMCluster``.
+
+    Raises
+    ------
+    InvalidSettings
+        If there is to be no worker.
     """
 
     workers: int | None = None
@@ -94,6 +99,10 @@ class EngineOptions:
     tls_key: Path | None = None
     timeout: float = 15.0
     slurm: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.workers is not None and self.workers < 1:
+            raise InvalidSettings(f"workers: expected at least 1, got {self.workers}")
 
 
 engines: Registry[Callable[[Store, EngineOptions], AbstractContextManager[Engine]]] = Registry(
