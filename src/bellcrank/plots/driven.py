@@ -28,7 +28,7 @@ NETWORK = style.BEST
 MECHANICS = style.INPUT
 PANEL = 3.35
 """Inches of width and height of a panel."""
-LEFT, RIGHT, GAP, BOTTOM, TOP = 0.62, 0.3, 0.95, 0.62, 0.42
+LEFT, RIGHT, GAP, BOTTOM, TOP = 0.78, 0.3, 0.95, 0.62, 0.42
 """Inches: around and between panels; TOP is for the panel's own heading."""
 MARGIN = 0.28
 MOST_BINS = 16
