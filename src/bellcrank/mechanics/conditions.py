@@ -102,7 +102,8 @@ class Linear:
         loaded = self._loaded()
         fixed = self.measures[self.conditions.prescribed]
         if len(fixed):
-            free = np.linalg.svd(fixed)[2][np.linalg.matrix_rank(fixed) :]
+            _, sizes, directions = np.linalg.svd(fixed)
+            free = directions[np.count_nonzero(sizes > SMALLEST * sizes[0]) :]
             loaded = free @ loaded @ free.T
         if not len(loaded):
             return np.inf, 0.0

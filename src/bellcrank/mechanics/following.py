@@ -23,10 +23,13 @@ SETTLED = 1e-7
 TOLERANCE = 1e-9
 """What that last one may still move."""
 LONGEST_STEP = 0.5
-LARGEST_DEPARTURE = 0.2
+LARGEST_DEPARTURE = 0.05
 """Of an increment from the mean of the tangents at its ends, as a part of the movement, beyond
-which the two states may not be on one path (as in `mechanics.kernels.tangents`)."""
-SMALLEST_INCREMENT = 1.0 / 1024.0
+which the two states may not be on one path."""
+LARGEST_SOFTENING = 0.7
+"""Least ratio of the lowest stiffnesses at the ends of an increment, in either direction: a
+stability that is lost between them would have been seen to fade."""
+SMALLEST_INCREMENT = 1.0 / 4096.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,8 +54,9 @@ class Arrival:
 def follow(element: Superelement, state: State, conditions: Conditions) -> Arrival:
     """Go from a state to new conditions in increments that stay on one stable path.
 
-    An increment counts if it ends in a stable equilibrium, and if the tangents at both of its
-    ends account for the way between them; else it is halved. Conditions may be of another kind
+    An increment counts if it ends in a stable equilibrium, if the tangents at both of its ends
+    account for the way between them, and if the lowest stiffness, of the interior and against what
+    the conditions leave free, changes little; else it is halved. Conditions may be of another kind
     than those the state was reached under, which is what makes it possible to hold an output
     where it is, and then to push.
 
@@ -110,7 +114,8 @@ def follow(element: Superelement, state: State, conditions: Conditions) -> Arriv
                 _tangent(element, before, conditions, part)
                 + _tangent(element, found, conditions, part)
             )
-            if _is_way(mean, after.displacement - state.displacement):
+            moved = after.displacement - state.displacement
+            if _is_way(mean, moved) and _is_near(element, conditions, before, found):
                 state, before, fraction = after, found, end
                 increment *= 2.0
                 continue
@@ -155,6 +160,22 @@ def _is_way(mean: NDArray[np.float64], moved: NDArray[np.float64]) -> bool:
     """Whether the mean of the tangents accounts for a movement."""
     departure = float(np.abs(moved - mean).max())
     return departure <= LARGEST_DEPARTURE * max(float(np.abs(moved).max()), SETTLED)
+
+
+def _is_near(
+    element: Superelement, conditions: Conditions, before: Condensed, after: Condensed
+) -> bool:
+    """Whether the lowest stiffnesses of two states are alike."""
+    pairs = [(before.lowest, after.lowest)]
+    both = [
+        Linear(found.stiffness, element.measures, conditions).lowest()[0]
+        for found in (before, after)
+    ]
+    pairs.append((both[0], both[1]))
+    return all(
+        first == last or (last > LARGEST_SOFTENING * first and first > LARGEST_SOFTENING * last)
+        for first, last in pairs
+    )
 
 
 def settle(

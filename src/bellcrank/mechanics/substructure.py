@@ -38,6 +38,9 @@ class Condensed:
         Newton step of the interior with the gripped nodes held; zero in equilibrium.
     nodal_force : (N, 2)
         Gradient of the energy.
+    lowest
+        Stiffness of the interior's softest motion while the gripped nodes are held, estimated;
+        infinite if there is no interior.
     """
 
     stiffness: NDArray[np.float64]
@@ -45,6 +48,7 @@ class Condensed:
     responses: NDArray[np.float64]
     settling: NDArray[np.float64]
     nodal_force: NDArray[np.float64]
+    lowest: float
 
 
 class Substructure:
@@ -110,6 +114,8 @@ class Substructure:
         self._held[self.gripped] = HELD
         self._free = np.flatnonzero(self.system.block >= 0)
         self._order = self.system.block[self._free]
+        blocks = np.arange(len(self.scratch.step))
+        self._mode = np.cos(1.0 + np.stack([3.0 * blocks, 3.0 * blocks + 1.0], axis=1))
         self._find_structure(get_args(Dangling).index(dangling))
 
     def _find_structure(self, core: int) -> None:
@@ -165,11 +171,11 @@ class Substructure:
         ordered = np.zeros((count, blocks, 2))
         ordered[:, self._order] = motions[:, self._free]
         forcing, responses = np.zeros_like(ordered), np.zeros_like(ordered)
-        stable = condense(
+        lowest = condense(
             self.system, self.structure, self._held, displacement, 1.0 if softened else 0.0,
-            foreseen, ordered, forcing, responses, self.scratch,
+            foreseen, ordered, forcing, responses, self._mode, self.scratch,
         )  # fmt: skip
-        if not stable:
+        if lowest < 0.0:
             return None
         whole = np.zeros((count, *displacement.shape))
         whole[:, self._free] = responses[:, self._order]
@@ -178,7 +184,7 @@ class Substructure:
         gradient = self.scratch.gradient.copy()
         stiffness = forcing.reshape(count, -1) @ responses.reshape(count, -1).T
         force = whole.reshape(count, -1) @ gradient.ravel()
-        return Condensed(stiffness, force, whole, settling, gradient)
+        return Condensed(stiffness, force, whole, settling, gradient, lowest)
 
     def foresee(self, step: NDArray[np.float64]) -> None:
         """Tell the tension after a step (N, 2) from where the stiffness was condensed last.

@@ -99,6 +99,7 @@ class Superelement:
     ) -> None:
         gripped = np.concatenate([grip.nodes for grip in grips])
         self.design = design
+        self.dangling: Dangling = dangling
         self.grips = tuple(grips)
         self.count = sum(grip.count for grip in grips)
         self.cut = Substructure(design, gripped, dangling, springs=springs)

@@ -11,6 +11,7 @@ For responses r = (m, w) the condensed stiffness is r_a.K m_b and the condensed 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from bellcrank.mechanics.kernels._compile import entry, kernel
@@ -31,7 +32,9 @@ from bellcrank.mechanics.kernels.energy import (
     hold_coordinates,
     measure_held_beams,
 )
+from bellcrank.mechanics.kernels.fields import copy, dot
 from bellcrank.mechanics.kernels.structure import ACTIVE, build_structure
+from bellcrank.mechanics.kernels.tangents import SWEEPS
 from bellcrank.mechanics.kernels.tension import find_tension, foresee_tension
 
 if TYPE_CHECKING:
@@ -99,6 +102,32 @@ def interior_step(system: System, structure: Structure, gripped: Bytes, scratch:
     solve(structure, scratch)
 
 
+@kernel
+def interior_stiffness(
+    system: System, structure: Structure, gripped: Bytes, mode: Floats, scratch: Scratch
+) -> float:
+    """Estimate the lowest eigenvalue of the interior's factorised stiffness.
+
+    By inverse iteration; `mode` (n, 2) holds the current guess of the eigenvector.
+    """
+    step = scratch.step
+    lowest = math.inf
+    for _ in range(SWEEPS):
+        size = math.sqrt(dot(mode, mode))
+        for block in range(len(step)):
+            step[block, 0] = mode[block, 0] / size
+            step[block, 1] = mode[block, 1] / size
+        interior_step(system, structure, gripped, scratch)
+        copy(step, mode)
+        size = math.sqrt(dot(mode, mode))
+        if size == 0.0:
+            for block in range(len(step)):
+                mode[block, 0] = mode[block, 1] = 1.0
+            return math.inf
+        lowest = 1.0 / size
+    return lowest
+
+
 @entry
 def condense(
     system: System,
@@ -110,12 +139,14 @@ def condense(
     motions: NDArray[np.float64],
     forcing: NDArray[np.float64],
     responses: NDArray[np.float64],
+    mode: Floats,
     scratch: Scratch,
-) -> bool:
+) -> float:
     """Condense the stiffness at `u` to motions of the gripped nodes.
 
     Leaves the gradient by node in `scratch.gradient` and the interior's own step d in
-    `scratch.step`. False if the interior is not stable with the gripped nodes held.
+    `scratch.step`. Returns the lowest stiffness of the interior while the gripped nodes are held,
+    infinite if there is no interior; -1 if it is not stable.
 
     Parameters
     ----------
@@ -131,6 +162,8 @@ def condense(
         (m, n, 2) of the gripped nodes, by elimination index.
     forcing, responses
         (m, n, 2) filled: the stiffness times each motion, and the motion with the interior's.
+    mode
+        (n, 2) guess of the interior's softest motion; improved.
     """
     measure_held_beams(system, structure, u, scratch)
     find_gradient(system, structure, 0.0, u, scratch)
@@ -141,7 +174,8 @@ def condense(
         multiply(structure, motions[number], forcing[number], scratch)
     hold_coordinates(system, gripped, structure, scratch)
     if not factorise(structure, scratch):
-        return False
+        return -1.0
+    lowest = interior_stiffness(system, structure, gripped, mode, scratch)
     step = scratch.step
     for number in range(len(motions)):
         for block in range(len(step)):
@@ -157,4 +191,4 @@ def condense(
             step[block, 0] = -scratch.gradient[node, 0]
             step[block, 1] = -scratch.gradient[node, 1]
     interior_step(system, structure, gripped, scratch)
-    return True
+    return lowest
