@@ -123,6 +123,16 @@ def test_a_network_predicts_and_is_explained(
     assert Path("explained.png").stat().st_size > 50_000
 
 
+def test_an_actuator_is_characterised(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (command,) = blocks("")[7].strip().splitlines()
+    printed = run(command, monkeypatch, capsys)
+    assert "spring:0.1" in printed
+    assert "0.8178" in printed
+
+
 def test_the_validation_table_is_that_of_the_record() -> None:
     record = json.loads((README.parent / "docs" / "validation" / "levels.json").read_text())
     text = README.read_text(encoding="utf-8")

@@ -12,6 +12,7 @@ from bellcrank.cli import (
     animate,
     campaign,
     card,
+    characterise,
     dataset,
     design,
     evaluate,
@@ -33,6 +34,7 @@ from bellcrank.errors import BellcrankError, CorruptRun, RunFailed, StorageError
 COMMANDS = (
     design,
     evaluate,
+    characterise,
     validate,
     export,
     print_part,

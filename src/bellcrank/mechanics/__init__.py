@@ -10,6 +10,7 @@ The work flow, in four lines:
 """
 
 from bellcrank.mechanics.carrying import Core, foresee_stiffness, output_stiffness
+from bellcrank.mechanics.conditions import Conditions, Linear
 from bellcrank.mechanics.evaluator import (
     CAREFUL,
     Dangling,
@@ -19,20 +20,36 @@ from bellcrank.mechanics.evaluator import (
     Status,
     load_bearing_core,
 )
+from bellcrank.mechanics.following import Arrival, follow
+from bellcrank.mechanics.grips import Grip, Loose, Rigid, Sliding
 from bellcrank.mechanics.minimisers import Minimiser, minimisers
 from bellcrank.mechanics.objectives import Objective, efficiency_of, objective_of, objectives
+from bellcrank.mechanics.substructure import Condensed, Substructure
+from bellcrank.mechanics.superelement import State, Superelement
 
 __all__ = [
     "CAREFUL",
+    "Arrival",
+    "Condensed",
+    "Conditions",
     "Core",
     "Dangling",
     "Evaluator",
+    "Grip",
+    "Linear",
+    "Loose",
     "Minimiser",
     "Objective",
     "Response",
+    "Rigid",
     "Screening",
+    "Sliding",
+    "State",
     "Status",
+    "Substructure",
+    "Superelement",
     "efficiency_of",
+    "follow",
     "foresee_stiffness",
     "load_bearing_core",
     "minimisers",

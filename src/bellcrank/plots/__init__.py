@@ -7,7 +7,8 @@ thread. The suffix of a path (png, svg, pdf) chooses the format.
 - `draw_motion`, `draw_comparison`, `draw_design` draw designs, given as `Motion` or Design;
 - `draw_paths` draws efficiency against accepted steps, given as `ChainPath`;
 - `draw_front` draws a Pareto front;
-- `draw_stress` draws parts in the colours of their stress, given as `Stressed`.
+- `draw_stress` draws parts in the colours of their stress, given as `Stressed`;
+- `draw_two_port` draws an actuator's answers to loads, given as `LoadedCurve`.
 """
 
 from bellcrank.plots.chains import ChainPath, PathsStyle
@@ -17,9 +18,12 @@ from bellcrank.plots.paths import draw_paths
 from bellcrank.plots.scene import Motion
 from bellcrank.plots.stress import Stressed, draw_stress
 from bellcrank.plots.strokes import StrokeAxes, StrokeCurve
+from bellcrank.plots.two_port import LoadedCurve, LoadLine, draw_two_port
 
 __all__ = [
     "ChainPath",
+    "LoadLine",
+    "LoadedCurve",
     "Motion",
     "PathsStyle",
     "Stressed",
@@ -31,4 +35,5 @@ __all__ = [
     "draw_motion",
     "draw_paths",
     "draw_stress",
+    "draw_two_port",
 ]

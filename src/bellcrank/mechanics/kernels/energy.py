@@ -20,6 +20,7 @@ from bellcrank.mechanics.kernels.arrays import (
     HELD,
     HELD_X,
     HELD_Y,
+    Bytes,
     Floats,
     Scratch,
     Structure,
@@ -239,18 +240,26 @@ def find_stiffness(
                 scratch.diagonal[block, 0] = 1.0
                 scratch.diagonal[block, 3] = 1.0
     if rollers:
-        hold_rollers(system, structure, scratch)
+        hold_coordinates(system, system.held, structure, scratch)
 
 
 @kernel
-def hold_rollers(system: System, structure: Structure, scratch: Scratch) -> None:
-    """Replace the equations of coordinates held by rollers with the identity."""
+def hold_coordinates(
+    system: System, coordinates: Bytes, structure: Structure, scratch: Scratch
+) -> None:
+    """Replace the equations of some coordinates with the identity.
+
+    Parameters
+    ----------
+    coordinates
+        (N,) bits HELD_X, HELD_Y: those of rollers, or of nodes that are moved from outside.
+    """
     diagonal, off_diagonal = scratch.diagonal, scratch.off_diagonal
     held = scratch.link[:, 0]
-    for node in range(len(system.held)):
+    for node in range(len(coordinates)):
         block = system.block[node]
         if block >= 0:
-            held[block] = system.held[node]
+            held[block] = coordinates[node]
     for column in range(len(diagonal)):
         if held[column]:
             diagonal[column, 1] = 0.0
