@@ -1,0 +1,1 @@
+"""Actuators as others meet them, and machines made of them."""
