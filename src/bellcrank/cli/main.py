@@ -17,6 +17,7 @@ from bellcrank.cli import (
     evaluate,
     explain,
     export,
+    machine,
     onnx,
     plot,
     predict,
@@ -46,6 +47,7 @@ COMMANDS = (
     explain,
     surrogate_search,
     onnx,
+    machine,
     problems,
 )
 """Modules that register a command."""
