@@ -18,6 +18,7 @@ from bellcrank.cli import (
     evaluate,
     explain,
     export,
+    machine,
     onnx,
     plot,
     predict,
@@ -48,6 +49,7 @@ COMMANDS = (
     explain,
     surrogate_search,
     onnx,
+    machine,
     problems,
 )
 """Modules that register a command."""

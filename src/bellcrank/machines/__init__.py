@@ -1,4 +1,4 @@
-"""Actuators as others meet them: two-ports, at rest and along the stroke.
+"""Actuators as others meet them, two-ports at rest and along the stroke, and machines of them.
 
 The work flow, in four lines:
 
@@ -9,9 +9,12 @@ The work flow, in four lines:
 0.818 free, 0.456 loaded
 """
 
+from bellcrank.machines.assembly import Machine, assemble
 from bellcrank.machines.characterise import Characterisation, characterise, usual_loads
 from bellcrank.machines.curves import PortCurve, trace
+from bellcrank.machines.elementary import elementary
 from bellcrank.machines.loads import Load
+from bellcrank.machines.plan import Plan, read_plan
 from bellcrank.machines.ports import INPUT, OUTPUT, Port, block_ports, mean_ports, ports_of
 from bellcrank.machines.potential import Potential, fit_potential
 from bellcrank.machines.record import (
@@ -29,20 +32,25 @@ __all__ = [
     "Characterisation",
     "Fit",
     "Load",
+    "Machine",
+    "Plan",
     "Port",
     "PortCurve",
     "Potential",
     "Reach",
     "TwoPort",
+    "assemble",
     "block_ports",
     "characterisation_from_dict",
     "characterisation_to_dict",
     "characterise",
+    "elementary",
     "fit",
     "fit_potential",
     "mean_ports",
     "ports_of",
     "read_characterisation",
+    "read_plan",
     "sample",
     "trace",
     "two_port_at",

@@ -1,0 +1,92 @@
+"""`bellcrank machine`: actuators that push each other, as one design."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Table
+
+from bellcrank.cli.app import app
+from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+
+if TYPE_CHECKING:
+    from bellcrank.machines.assembly import Machine
+    from bellcrank.mechanics import Response
+
+machine = typer.Typer(
+    name="machine",
+    help="Machines: actuators that push each other.",
+    rich_markup_mode="rich",
+)
+app.add_typer(machine)
+
+PlanFile = Annotated[Path, typer.Argument(help="A machine's plan, TOML.")]
+
+
+@machine.command()
+def build(
+    plan: PlanFile,
+    out: Annotated[
+        Path | None, typer.Option(help="Design to write; default: NAME.json beside the plan.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Make one lattice of a machine's parts, and say what it does."""
+    from dataclasses import replace
+
+    from bellcrank.machines.assembly import assemble
+    from bellcrank.machines.plan import read_plan
+    from bellcrank.mechanics import CAREFUL, Evaluator
+    from bellcrank.model import write_design
+    from bellcrank.model.storage import already_exists, check_folder
+    from bellcrank.workflows import find_design
+
+    target = out or plan.with_suffix(".json")
+    check_folder(target)
+    if target.exists() and not overwrite:
+        raise already_exists(target)
+    start = time.perf_counter()
+    built = assemble(read_plan(plan), find_design)
+    announce_compilation()
+    response = Evaluator(built.design.problem).respond(built.design.mask, CAREFUL)
+    seconds = time.perf_counter() - start
+    efficiency = response.efficiency if math.isfinite(response.efficiency) else None
+    write_design(replace(built.design, efficiency=efficiency), target, overwrite=overwrite)
+    if as_json:
+        print_json(json.dumps({**_record(built, response), "seconds": round(seconds, 3)}, indent=1))
+    else:
+        results.print(_table(built, response))
+    notes.print(f"wrote {plain(target)}")
+
+
+def _record(built: Machine, response: Response) -> dict[str, Any]:
+    """Return what is told about a machine, as plain data."""
+    problem = built.design.problem
+    sound = math.isfinite(response.efficiency)
+    return {
+        "name": problem.name,
+        "parts": list(built.parts),
+        "nodes": problem.lattice.node_count,
+        "beams": built.design.beam_count,
+        "designable": len(problem.designable),
+        "efficiency": response.efficiency if sound else None,
+        "status": response.status.label,
+    }
+
+
+def _table(built: Machine, response: Response) -> Table:
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    told = _record(built, response)
+    for name in ("name", "nodes", "beams", "designable"):
+        table.add_row(name, plain(told[name]))
+    table.add_row("parts", plain(", ".join(told["parts"])))
+    value = "-" if told["efficiency"] is None else f"{told['efficiency']:.4f}"
+    status = "" if response.counts else f" ({response.status.message})"
+    table.add_row("efficiency", f"{value}{status}")
+    return table

@@ -1,0 +1,147 @@
+"""What holds a machine, what drives it, what it moves, and what a search may change."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from bellcrank.errors import InvalidFile
+from bellcrank.model import Input, Output, Supports
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.machines.placing import Part
+    from bellcrank.machines.plan import Plan, PortName
+
+
+def supports(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Supports:
+    """Return the supports of all parts that hold.
+
+    Raises
+    ------
+    InvalidFile
+        If a part on rollers is turned out of its axes.
+    """
+    fixed: list[NDArray[np.int64]] = []
+    rollers: dict[str, list[NDArray[np.int64]]] = {"x": [], "y": []}
+    for name, part in parts.items():
+        if not part.supported:
+            continue
+        own = part.design.problem.supports
+        fixed.append(nodes[name][own.fixed])
+        for axis, given in (("x", own.fixed_x), ("y", own.fixed_y)):
+            if len(given) and part.placement.rotate % 180:
+                raise InvalidFile(
+                    f"{plan.source}: part {name} stands on rollers along an axis and cannot be "
+                    f"turned by {part.placement.rotate} degrees"
+                )
+            rollers[axis].append(nodes[name][given])
+    return Supports(
+        fixed=_together(fixed), fixed_x=_together(rollers["x"]), fixed_y=_together(rollers["y"])
+    )
+
+
+def drive(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Input:
+    """Return the machine's input; what the plan leaves open is as in its first part."""
+    table = plan.table.input
+    ids, directions = _region(plan.inputs, parts, nodes, table.direction)
+    first = parts[plan.inputs[0].part]
+    own = first.design.problem.input
+    amount = table.amount or own.amount * first.placement.scale
+    return Input(ids, directions, table.drive or own.drive, amount)
+
+
+def moved(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Output:
+    """Return the machine's output."""
+    ids, directions = _region(plan.outputs, parts, nodes, plan.table.output.direction)
+    return Output(ids, directions)
+
+
+def designable(
+    plan: Plan,
+    parts: dict[str, Part],
+    nodes: dict[str, NDArray[np.int64]],
+    beams: NDArray[np.int64],
+    regions: tuple[Supports, Input, Output],
+) -> NDArray[np.int64]:
+    """Return what a search may change: all but what touches a region or lies within a port."""
+    taken = np.concatenate([region.nodes for region in regions])
+    free = ~np.isin(beams, taken).any(axis=1)
+    for link in plan.links:
+        for port in (link.first, link.second):
+            own = nodes[port.part][parts[port.part].region(port.port).nodes]
+            free &= ~np.isin(beams, own).all(axis=1)
+    return np.flatnonzero(free)
+
+
+def check_drive(plan: Plan) -> None:
+    """Refuse to drive by hand what another part drives.
+
+    Raises
+    ------
+    InvalidFile
+    """
+    for port in plan.inputs:
+        for link in plan.links:
+            others = {link.first: link.second, link.second: link.first}
+            if port in others and others[port].port == "output":
+                raise InvalidFile(
+                    f"{plan.source}: port {port} is driven by hand and by {others[port]} at once"
+                )
+
+
+def check_held(
+    plan: Plan,
+    nodes: dict[str, NDArray[np.int64]],
+    beams: NDArray[np.int64],
+    held: Supports,
+    count: int,
+) -> None:
+    """Refuse parts that hang together with nothing that holds them.
+
+    Raises
+    ------
+    InvalidFile
+    """
+    links = coo_array((np.ones(len(beams)), (beams[:, 0], beams[:, 1])), shape=(count, count))
+    _, piece = connected_components(links, directed=False)
+    firm = set(piece[held.nodes].tolist())
+    loose = [name for name in nodes if not firm.intersection(piece[nodes[name]].tolist())]
+    if loose:
+        raise InvalidFile(
+            f"{plan.source}: nothing holds {', '.join(loose)}: no part that hangs together with "
+            f"it has a support"
+        )
+
+
+def _together(lists: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+    return np.unique(np.concatenate([np.empty(0, np.int64), *lists]))
+
+
+def _region(
+    ports: Iterable[PortName],
+    parts: dict[str, Part],
+    nodes: dict[str, NDArray[np.int64]],
+    direction: list[float] | None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the nodes of ports, each once, with their directions."""
+    ids, directions = [], []
+    for port in ports:
+        part = parts[port.part]
+        own = nodes[port.part][part.region(port.port).nodes]
+        ids.append(own)
+        if direction is None:
+            directions.append(part.direction(port.port))
+        else:
+            unit = np.array(direction) / np.linalg.norm(direction)
+            directions.append(np.tile(unit, (len(own), 1)))
+    every = np.concatenate(ids)
+    _, first = np.unique(every, return_index=True)
+    first.sort()
+    return every[first], np.concatenate(directions)[first]

@@ -1,0 +1,191 @@
+"""Plans and assemblies: parts in their places make one ordinary design, or one clear error."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import BellcrankError, InvalidFile, InvalidSettings
+from bellcrank.machines.assembly import Machine, assemble
+from bellcrank.machines.elementary import elementary
+from bellcrank.machines.plan import MachineTable, PortName, plan_of, read_plan
+from bellcrank.mechanics import Evaluator
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bellcrank.model import Design
+
+ENDS: dict[str, Any] = {"input": {"ports": ["a.input"]}, "output": {"ports": ["b.output"]}}
+
+
+def thinned(columns: int = 7, seed: int = 0) -> Design:
+    """Return an actuator without some of its beams."""
+    full = elementary(columns, "down").full_design()
+    mask = full.mask.copy()
+    chosen = np.random.default_rng(seed).choice(full.problem.designable, 20, replace=False)
+    mask[chosen] = False
+    return full.with_mask(mask)
+
+
+def find(name: str) -> Design:
+    return {"full": elementary(7, "down").full_design(), "thin": thinned()}[name]
+
+
+def build(parts: dict[str, Any], links: list[Any] | None = None, **ends: Any) -> Machine:
+    told = {"name": "trial", "parts": parts, "links": links or [], **ENDS, **ends}
+    return assemble(plan_of(MachineTable.model_validate(told), "trial.toml"), find)
+
+
+PAIR = {"a": {"entry": "full"}, "b": {"entry": "full", "join": "a.output"}}
+
+
+def test_two_parts_share_the_nodes_of_their_ports_and_nothing_else() -> None:
+    machine = build(PAIR)
+    one = elementary(7, "down")
+    count = one.lattice.node_count
+    assert machine.design.problem.lattice.node_count == 2 * count - 7
+    shared = np.intersect1d(machine.nodes["a"], machine.nodes["b"])
+    assert np.array_equal(shared, np.sort(machine.port_nodes(PortName("a", "output"))))
+    assert np.array_equal(shared, np.sort(machine.port_nodes(PortName("b", "input"))))
+    inside = 12  # beams of a hexagon of seven nodes
+    assert machine.design.problem.lattice.beam_count == 2 * one.lattice.beam_count - inside
+
+
+def test_a_machine_is_an_ordinary_design() -> None:
+    machine = build(PAIR)
+    response = Evaluator(machine.design.problem).respond(machine.design.mask)
+    assert response.counts
+    assert np.isfinite(response.efficiency)
+    again = Evaluator(machine.design.problem).respond(machine.design.mask)
+    assert again.efficiency == response.efficiency
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize("rotate", [0, 60, 120, 180, 240, 300])
+def test_a_machine_of_one_part_does_what_the_part_does(rotate: int, mirror: bool) -> None:
+    placed = {"a": {"entry": "thin", "rotate": rotate, "mirror": mirror, "at": [3.0, -2.0]}}
+    machine = build(placed, output={"ports": ["a.output"]})
+    alone, here = thinned(), machine.design
+    expected = Evaluator(alone.problem).respond(alone.mask).efficiency
+    found = Evaluator(here.problem).respond(here.mask).efficiency
+    assert found == pytest.approx(expected, abs=1e-9)
+    centre = here.problem.lattice.positions[machine.port_nodes(PortName("a", "input"))].mean(axis=0)
+    assert centre == pytest.approx([3.0, -2.0], abs=1e-12)
+
+
+def test_turned_and_mirrored_parts_fit_their_ports() -> None:
+    for rotate, mirror in ((0, False), (300, False), (180, True), (240, True)):
+        second = {"entry": "thin", "join": "a.output", "rotate": rotate, "mirror": mirror}
+        machine = build({"a": {"entry": "thin"}, "b": second})
+        count = elementary(7, "down").lattice.node_count
+        assert machine.design.problem.lattice.node_count == 2 * count - 7
+
+
+def test_masks_of_parts_become_the_mask_of_the_machine() -> None:
+    machine = build({"a": {"entry": "thin"}, "b": {"entry": "full", "join": "a.output"}})
+    mask = machine.design.mask
+    missing = ~mask[machine.beams["a"]]
+    assert np.array_equal(missing, ~thinned().mask)
+    assert mask[machine.beams["b"]].all()
+    beams = machine.design.problem.lattice.beams
+    assert np.array_equal(
+        machine.nodes["b"][elementary(7, "down").lattice.beams], beams[machine.beams["b"]]
+    )
+
+
+def test_a_bridge_joins_ports_that_are_apart() -> None:
+    parts = {"a": {"entry": "full"}, "b": {"entry": "full", "at": [-13.0, 0.0]}}
+    machine = build(parts, [{"from": "a.output", "to": "b.input", "kind": "bridge"}])
+    ends = machine.design.problem.lattice.beams[machine.bridges]
+    assert len(ends) > 10
+    length = np.linalg.norm(
+        np.diff(machine.design.problem.lattice.positions[ends], axis=1)[:, 0], axis=1
+    )
+    assert length == pytest.approx(np.ones(len(ends)))  # one grid: the lattice goes on
+    response = Evaluator(machine.design.problem).respond(machine.design.mask)
+    assert abs(response.efficiency) > 1e-6
+
+
+def test_designable_is_all_but_ports_and_supports() -> None:
+    problem = build(PAIR).design.problem
+    port = set(build(PAIR).port_nodes(PortName("a", "output")).tolist())
+    beams = problem.lattice.beams[problem.designable]
+    taken = {*problem.supports.nodes.tolist(), *problem.input.nodes.tolist()}
+    assert not any(taken.intersection(pair) for pair in beams.tolist())
+    assert not any(port.issuperset(pair) for pair in beams.tolist())
+    assert any(port.intersection(pair) for pair in beams.tolist())
+
+
+@pytest.mark.parametrize(
+    ("parts", "links", "ends", "told"),
+    [
+        (
+            {"a": {"entry": "full"}, "b": {"entry": "full", "at": [-20.0, 0.0]}},
+            [{"from": "a.output", "to": "b.input"}],
+            {},
+            "ports a.output and b.input do not meet",
+        ),
+        (
+            {"a": {"entry": "full"}, "b": {"entry": "full", "at": [1.0, 0.0]}},
+            [],
+            {},
+            "parts a and b overlap near",
+        ),
+        (
+            {"a": {"entry": "full"}, "b": {"entry": "full", "at": [0.5, 0.29]}},
+            [],
+            {},
+            "parts a and b overlap",
+        ),
+        (PAIR, [], {"input": {"ports": ["b.input"]}}, "driven by hand and by a.output"),
+        (
+            {name: {**part, "supports": False} for name, part in PAIR.items()},
+            [],
+            {},
+            "nothing holds a, b",
+        ),
+        (PAIR, [], {"output": {"ports": ["b.exit"]}}, "no port 'b.exit'"),
+        (PAIR, [{"from": "a.output", "to": "c.input"}], {}, "no port 'c.input'"),
+        (PAIR, [{"from": "a.output", "to": "a.output"}], {}, "linked to itself"),
+        ({"a": {"entry": "full"}, "b": {"entry": "full"}}, [], {}, "parts.b: placed nowhere"),
+        (
+            {"a": {"entry": "full", "join": "b.output"}, "b": {"entry": "full", "join": "a.input"}},
+            [],
+            {},
+            "placed on one another in a circle",
+        ),
+        ({"a": {"entry": "full", "rotate": 45}}, [], {}, "expected a multiple of 60 degrees"),
+        ({"a": {"entry": "full", "join": "z.output"}}, [], {}, "no part 'z'"),
+        ({"a": {"entry": "full", "join": "a.output"}}, [], {}, "cannot join itself"),
+    ],
+)
+def test_bad_plans_get_one_clear_error(
+    parts: dict[str, Any], links: list[Any], ends: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(InvalidFile, match=told.replace(".", r"\.")):
+        build(parts, links, **ends)
+
+
+def test_files_are_checked_too(tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    path.write_text('name = "x"\nengine = 3\n[parts.a]\nentry = "e"\n')
+    with pytest.raises(BellcrankError, match=r"machine\.toml: .*'(input|engine)'"):
+        read_plan(path)
+    path.write_text(
+        'name = "x"\n[parts.a]\nentry = "full"\n'
+        '[input]\nports = ["a.input"]\n[output]\nports = ["a.output"]\n'
+    )
+    assert read_plan(path).order == ("a",)
+
+
+def test_elementary_tasks_refuse_what_makes_no_sense() -> None:
+    with pytest.raises(InvalidSettings, match="direction: expected one of right"):
+        elementary(9, "north")
+    with pytest.raises(InvalidSettings, match="columns: expected at least 5"):
+        elementary(4, "up")
+    for columns in (5, 6, 9, 12):
+        problem = elementary(columns, "up-left")
+        assert len(problem.input.nodes) == len(problem.output.nodes) == 7
