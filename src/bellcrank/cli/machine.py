@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +18,7 @@ from bellcrank.cli.console import announce_compilation, notes, plain, print_json
 if TYPE_CHECKING:
     from bellcrank.machines.assembly import Machine
     from bellcrank.mechanics import Response
+    from bellcrank.model import Design
 
 machine = typer.Typer(
     name="machine",
@@ -45,14 +47,13 @@ def build(
     from bellcrank.mechanics import CAREFUL, Evaluator
     from bellcrank.model import write_design
     from bellcrank.model.storage import already_exists, check_folder
-    from bellcrank.workflows import find_design
 
     target = out or plan.with_suffix(".json")
     check_folder(target)
     if target.exists() and not overwrite:
         raise already_exists(target)
     start = time.perf_counter()
-    built = assemble(read_plan(plan), find_design)
+    built = assemble(read_plan(plan), partial(_find, plan.parent))
     announce_compilation()
     response = Evaluator(built.design.problem).respond(built.design.mask, CAREFUL)
     seconds = time.perf_counter() - start
@@ -63,6 +64,14 @@ def build(
     else:
         results.print(_table(built, response))
     notes.print(f"wrote {plain(target)}")
+
+
+def _find(folder: Path, entry: str) -> Design:
+    """Return the design of a part: a file beside the plan, or what is known by that name."""
+    from bellcrank.workflows import find_design
+
+    beside = folder / entry
+    return find_design(str(beside) if beside.exists() else entry)
 
 
 def _record(built: Machine, response: Response) -> dict[str, Any]:

@@ -1,0 +1,79 @@
+"""`bellcrank machine`: from a plan to one design, or to one line that says what is wrong."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bellcrank.machines import elementary
+from bellcrank.mechanics import Evaluator
+from bellcrank.model import read_design, write_design
+
+from .helpers import call, refusal
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PLAN = """
+name = "pair"
+
+[parts.first]
+entry = "lever.json"
+
+[parts.second]
+entry = "lever.json"
+join = "first.output"
+rotate = 300
+
+[input]
+ports = ["first.input"]
+
+[output]
+ports = ["second.output"]
+"""
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    """Write a plan and the design that it is made of, in a folder of their own."""
+    write_design(elementary(7, "down").full_design(), tmp_path / "lever.json")
+    path = tmp_path / "pair.toml"
+    path.write_text(PLAN)
+    return path
+
+
+def test_a_plan_becomes_a_design_that_every_command_takes(plan: Path) -> None:
+    told = call("machine", "build", plan, "--json").data
+    assert told["parts"] == ["first", "second"]
+    design = read_design(plan.with_suffix(".json"))
+    assert design.problem.name == "pair"
+    assert (told["beams"], told["nodes"]) == (
+        design.beam_count, design.problem.lattice.node_count,
+    )  # fmt: skip
+    found = Evaluator(design.problem).respond(design.mask).efficiency
+    assert told["efficiency"] == pytest.approx(found, abs=1e-8)
+    evaluated = call("evaluate", plan.with_suffix(".json"), "--json").data["results"][0]
+    assert evaluated["efficiency"] == told["efficiency"]
+    assert evaluated["mask"] == design.mask_hex
+
+
+def test_it_says_what_it_made(plan: Path, tmp_path: Path) -> None:
+    outcome = call("machine", "build", plan, "--out", tmp_path / "made.json")
+    assert outcome.code == 0, outcome.err
+    for words in ("pair", "first, second", "efficiency", "designable"):
+        assert words in outcome.out
+    assert (tmp_path / "made.json").exists()
+
+
+def test_what_is_wrong_is_said_in_one_line(plan: Path, tmp_path: Path) -> None:
+    call("machine", "build", plan)
+    assert "exists" in refusal("machine", "build", plan)
+    assert call("machine", "build", plan, "--overwrite").code == 0
+    assert "no such file" in refusal("machine", "build", tmp_path / "absent.toml")
+    plan.write_text(PLAN.replace("lever.json", "absent.json"))
+    assert "absent.json" in refusal("machine", "build", plan, "--overwrite")
+    plan.write_text(PLAN.replace("rotate = 300", "rotate = 60"))
+    assert "parts first and second overlap near" in refusal("machine", "build", plan, "--overwrite")
+    plan.write_text(PLAN.replace("rotate", "turn"))
+    assert "unknown key" in refusal("machine", "build", plan, "--overwrite")
