@@ -66,6 +66,15 @@ def test_it_says_what_it_made(plan: Path, tmp_path: Path) -> None:
     assert (tmp_path / "made.json").exists()
 
 
+def test_its_answer_is_foretold(plan: Path) -> None:
+    told = call("machine", "predict", plan, "--json").data
+    built = call("machine", "build", plan, "--json").data
+    assert told["efficiency"] == pytest.approx(built["efficiency"], rel=0.1)
+    assert told["input_stiffness"] > 0.0
+    outcome = call("machine", "predict", plan)
+    assert "efficiency, small strokes" in outcome.out
+
+
 def test_what_is_wrong_is_said_in_one_line(plan: Path, tmp_path: Path) -> None:
     call("machine", "build", plan)
     assert "exists" in refusal("machine", "build", plan)

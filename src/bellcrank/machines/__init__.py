@@ -10,6 +10,7 @@ The work flow, in four lines:
 """
 
 from bellcrank.machines.assembly import Machine, assemble
+from bellcrank.machines.chaining import Prediction, predict
 from bellcrank.machines.characterise import Characterisation, characterise, usual_loads
 from bellcrank.machines.curves import PortCurve, trace
 from bellcrank.machines.elementary import elementary
@@ -37,6 +38,7 @@ __all__ = [
     "Port",
     "PortCurve",
     "Potential",
+    "Prediction",
     "Reach",
     "TwoPort",
     "assemble",
@@ -49,6 +51,7 @@ __all__ = [
     "fit_potential",
     "mean_ports",
     "ports_of",
+    "predict",
     "read_characterisation",
     "read_plan",
     "sample",

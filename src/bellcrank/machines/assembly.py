@@ -15,6 +15,7 @@ from bellcrank.machines.boundary import check_drive, check_held, designable, dri
 from bellcrank.machines.bridges import bridge
 from bellcrank.machines.crossings import first_crossing
 from bellcrank.machines.placing import place_parts
+from bellcrank.machines.plan import PORTS, PortName
 from bellcrank.machines.union import unite
 from bellcrank.model import Design, Lattice, Problem
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.machines.placing import Part
-    from bellcrank.machines.plan import Plan, PortName
+    from bellcrank.machines.plan import Plan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +52,11 @@ class Machine:
     nodes: dict[str, NDArray[np.int64]]
     beams: dict[str, NDArray[np.int64]]
     bridges: NDArray[np.int64]
+
+    @property
+    def ports(self) -> list[PortName]:
+        """All ports of all parts."""
+        return [PortName(name, port) for name in self.parts for port in PORTS]
 
     def port_nodes(self, port: PortName) -> NDArray[np.int64]:
         """Return the nodes of a port, by their numbers in the machine."""

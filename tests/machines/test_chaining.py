@@ -1,0 +1,85 @@
+"""Chains of condensed parts move as the one lattice of all of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidFile
+from bellcrank.machines import assemble, elementary
+from bellcrank.machines.chaining import predict
+from bellcrank.machines.plan import MachineTable, plan_of
+from bellcrank.mechanics import Evaluator
+from bellcrank.model import Design
+
+STROKE = 1e-5
+"""Of the input: so small that all is linear."""
+
+
+def actuator(seed: int, columns: int = 7) -> Design:
+    """Some actuator: beams are missing anywhere outside the ports."""
+    task = elementary(columns, "down")
+    small = replace(task, input=replace(task.input, amount=STROKE))
+    mask = small.initial.copy()
+    rng = np.random.default_rng(seed)
+    mask[rng.choice(small.designable, len(small.designable) // 4, replace=False)] = False
+    return Design(small, mask)
+
+
+def build(parts: dict[str, Any], links: list[Any] | None = None, **ends: Any) -> Any:
+    told = {
+        "name": "chain", "parts": parts, "links": links or [],
+        "input": {"ports": ["a.input"]}, "output": {"ports": ["b.output"]}, **ends,
+    }  # fmt: skip
+    plan = plan_of(MachineTable.model_validate(told), "chain.toml")
+    return assemble(plan, lambda entry: actuator(int(entry)))
+
+
+def whole(machine: Any) -> float:
+    return Evaluator(machine.design.problem).respond(machine.design.mask).efficiency
+
+
+@pytest.mark.parametrize(("rotate", "within"), [(0, 1e-3), (300, 0.03)])
+@pytest.mark.parametrize("seeds", [("1", "2"), ("3", "4"), ("5", "6")])
+def test_two_parts_chained_move_as_their_lattice(
+    seeds: tuple[str, str], rotate: int, within: float
+) -> None:
+    # Turned by 300 degrees, both parts have beams in one gap: its springs are not foreseen.
+    first, second = seeds
+    machine = build(
+        {"a": {"entry": first}, "b": {"entry": second, "join": "a.output", "rotate": rotate}}
+    )
+    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=within)
+
+
+def test_one_part_alone_is_what_it_is() -> None:
+    machine = build({"a": {"entry": "1"}}, output={"ports": ["a.output"]})
+    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
+
+
+def test_a_longer_chain_too() -> None:
+    parts: dict[str, Any] = {"a": {"entry": "1"}}
+    for before, name, seed in (("a", "c", "2"), ("c", "d", "3"), ("d", "b", "4")):
+        parts[name] = {"entry": seed, "join": f"{before}.output"}
+    for port in ("a", "c", "d", "b"):
+        alone = build(parts, output={"ports": [f"{port}.output"]})
+        expected, found = whole(alone), predict(alone).efficiency
+        assert found == pytest.approx(expected, rel=1e-3, abs=1e-9)
+
+
+def test_a_bridge_is_an_element_too() -> None:
+    machine = build(
+        {"a": {"entry": "1"}, "b": {"entry": "2", "at": [-13.0, 0.0]}},
+        [{"from": "a.output", "to": "b.input", "kind": "bridge"}],
+    )
+    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
+
+
+def test_forces_are_not_chained_yet() -> None:
+    machine = build({"a": {"entry": "1"}}, input={"ports": ["a.input"], "drive": "force"},
+                    output={"ports": ["a.output"]})  # fmt: skip
+    with pytest.raises(InvalidFile, match="driven by a displacement"):
+        predict(machine)
