@@ -55,7 +55,7 @@ def elementary(columns: int, direction: str, spring: float | None = None) -> Pro
     --------
     >>> problem = elementary(9, "down")
     >>> problem.lattice.beam_count, len(problem.designable), len(problem.input.nodes)
-    (238, 177, 7)
+    (249, 189, 7)
     """
     if direction not in DIRECTIONS:
         raise InvalidSettings(
