@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from bellcrank.errors import BellcrankError, InvalidFile, InvalidSettings
+from bellcrank.errors import BellcrankError, InvalidFile, InvalidSettings, UnknownName
 from bellcrank.machines.assembly import Machine, assemble
 from bellcrank.machines.elementary import elementary
 from bellcrank.machines.plan import MachineTable, PortName, plan_of, read_plan
@@ -31,7 +31,10 @@ def thinned(columns: int = 7, seed: int = 0) -> Design:
 
 
 def find(name: str) -> Design:
-    return {"full": elementary(7, "down").full_design(), "thin": thinned()}[name]
+    known = {"full": elementary(7, "down").full_design(), "thin": thinned()}
+    if name not in known:
+        raise UnknownName(f"no design {name!r}")
+    return known[name]
 
 
 def build(parts: dict[str, Any], links: list[Any] | None = None, **ends: Any) -> Machine:
@@ -148,6 +151,8 @@ def test_designable_is_all_but_ports_and_supports() -> None:
             "nothing holds a, b",
         ),
         (PAIR, [], {"output": {"ports": ["b.exit"]}}, "no port 'b.exit'"),
+        (PAIR, [], {"output": {"ports": ["a.input"]}}, "port 'a.input' is input and output"),
+        ({"a": {"entry": "absent"}}, [], {"output": {"ports": ["a.output"]}}, "parts.a.entry: no"),
         (PAIR, [{"from": "a.output", "to": "c.input"}], {}, "no port 'c.input'"),
         (PAIR, [{"from": "a.output", "to": "a.output"}], {}, "linked to itself"),
         ({"a": {"entry": "full"}, "b": {"entry": "full"}}, [], {}, "parts.b: placed nowhere"),
@@ -173,6 +178,12 @@ def test_files_are_checked_too(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_text('name = "x"\nengine = 3\n[parts.a]\nentry = "e"\n')
     with pytest.raises(BellcrankError, match=r"machine\.toml: .*'(input|engine)'"):
+        read_plan(path)
+    path.write_text(
+        'name = "x"\n[parts.a]\nentry = "full"\n[output]\nports = ["a.output"]\n'
+        '[input]\nports = ["a.input"]\ndirection = [0.0, 0.0]\n'
+    )
+    with pytest.raises(InvalidFile, match=r"input\.direction: .*a vector of some length"):
         read_plan(path)
     path.write_text(
         'name = "x"\n[parts.a]\nentry = "full"\n'

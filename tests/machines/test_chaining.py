@@ -78,6 +78,29 @@ def test_a_bridge_is_an_element_too() -> None:
     assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
 
 
+@pytest.mark.parametrize("by", ["input", "output"])
+def test_what_a_cut_part_still_holds_counts_and_no_more(by: str) -> None:
+    # Nothing leads from the input of b to the rest of it, which hangs on a where joined by output.
+    joined = {"entry": "2", "join": "a.output", "by": by, "mirror": by == "output"}
+    ends = {"output": {"ports": ["a.output"]}}
+    whole_part = build({"a": {"entry": "1"}, "b": joined}, **ends)
+    part = whole_part.parts["b"].design
+    touching = np.isin(part.problem.lattice.beams, part.problem.input.nodes).sum(axis=1)
+    cut = part.with_mask(part.mask & (touching != 1))
+    machine = assemble(whole_part.plan, lambda entry: actuator(1) if entry == "1" else cut)
+    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
+    alone = build({"a": {"entry": "1"}}, **ends)
+    free = predict(machine).efficiency == pytest.approx(predict(alone).efficiency, rel=1e-6)
+    assert free == (by == "input")
+
+
+def test_a_part_can_be_driven_by_its_output() -> None:
+    parts = {"a": {"entry": "1"}, "b": {"entry": "2", "join": "a.output", "by": "output",
+                                        "mirror": True}}  # fmt: skip
+    machine = build(parts, output={"ports": ["b.input"]})
+    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
+
+
 def test_forces_are_not_chained_yet() -> None:
     machine = build({"a": {"entry": "1"}}, input={"ports": ["a.input"], "drive": "force"},
                     output={"ports": ["a.output"]})  # fmt: skip

@@ -16,7 +16,7 @@ from bellcrank.machines.bridges import bridge
 from bellcrank.machines.crossings import first_crossing
 from bellcrank.machines.placing import place_parts
 from bellcrank.machines.plan import PORTS, PortName
-from bellcrank.machines.union import unite
+from bellcrank.machines.union import numbered, unite
 from bellcrank.model import Design, Lattice, Problem
 
 if TYPE_CHECKING:
@@ -88,14 +88,19 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
     positions, beams = _bridged(plan, parts, nodes, positions, beams)
     present = np.concatenate([present, np.ones(len(beams) - count, np.bool_)])
     held = supports(plan, parts, nodes)
-    check_held(plan, nodes, beams, held, len(positions))
     driven, wanted = drive(plan, parts, nodes), moved(plan, parts, nodes)
     try:
+        lattice = Lattice(positions, beams)
+        check_held(plan, nodes, lattice, held)
         problem = Problem(
-            name=plan.table.name, lattice=Lattice(positions, beams), supports=held, input=driven,
-            output=wanted, stiffness=next(iter(parts.values())).design.problem.stiffness,
+            name=plan.table.name,
+            lattice=lattice,
+            supports=held,
+            input=driven,
+            output=wanted,
+            stiffness=next(iter(parts.values())).design.problem.stiffness,
             designable=designable(plan, parts, nodes, beams, (held, driven, wanted)),
-        )  # fmt: skip
+        )
     except InvalidProblem as error:
         raise InvalidFile(f"{plan.source}: {error}") from None
     origin = {"plan": plan.table.model_dump(by_alias=True, exclude_defaults=True)}
@@ -113,11 +118,9 @@ def _beams(
 ) -> tuple[NDArray[np.int64], dict[str, NDArray[np.int64]], NDArray[np.bool_]]:
     """Return the beams of all parts, the numbers of each part's, and which are present."""
     given = [nodes[name][part.design.problem.lattice.beams] for name, part in parts.items()]
-    every = np.sort(np.concatenate(given), axis=1)
-    _, first, inverse = np.unique(every, axis=0, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    beams, number = np.concatenate(given)[np.sort(first)], rank[inverse.ravel()]
+    every = np.concatenate(given)
+    first, number = numbered(np.sort(every, axis=1))
+    beams = every[first]
     ends = np.cumsum([0, *map(len, given)])
     names = list(parts)
     numbers = {name: number[ends[k] : ends[k + 1]] for k, name in enumerate(names)}

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from bellcrank.errors import InvalidFile
 from bellcrank.model import Input, Output, Supports
@@ -18,6 +16,7 @@ if TYPE_CHECKING:
 
     from bellcrank.machines.placing import Part
     from bellcrank.machines.plan import Plan, PortName
+    from bellcrank.model import Lattice
 
 
 def supports(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Supports:
@@ -99,9 +98,8 @@ def check_drive(plan: Plan) -> None:
 def check_held(
     plan: Plan,
     nodes: dict[str, NDArray[np.int64]],
-    beams: NDArray[np.int64],
+    lattice: Lattice,
     held: Supports,
-    count: int,
 ) -> None:
     """Refuse parts that hang together with nothing that holds them.
 
@@ -109,11 +107,8 @@ def check_held(
     ------
     InvalidFile
     """
-    links = coo_array((np.ones(len(beams)), (beams[:, 0], beams[:, 1])), shape=(count, count))
-    _, piece = connected_components(links, directed=False)
-    firm = set(piece[held.nodes].tolist())
-    loose = [name for name in nodes if not firm.intersection(piece[nodes[name]].tolist())]
-    if loose:
+    firm = lattice.reachable(held.nodes)
+    if loose := [name for name in nodes if not firm[nodes[name]].any()]:
         raise InvalidFile(
             f"{plan.source}: nothing holds {', '.join(loose)}: no part that hangs together with "
             f"it has a support"

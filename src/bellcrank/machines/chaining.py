@@ -10,26 +10,25 @@ are not foreseen.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidFile
+from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings
 from bellcrank.mechanics import Loose, Superelement
-from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports
+from bellcrank.model import Input, Lattice, Output, Problem, Supports
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.machines.assembly import Machine
-    from bellcrank.machines.placing import Part
 
 LOOSE = 1e-12
 """Stiffness of the softest motion, beside the stiffest, of what counts as held."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Prediction:
     """The linear answer of a machine, around rest.
 
@@ -39,13 +38,10 @@ class Prediction:
         Mean output motion over mean input motion.
     input_stiffness
         Force on all input nodes along their directions, over the input motion; lattice units.
-    motion : dict of (2,)
-        Of each node in a port, by its number in the machine, for an input of 1.
     """
 
     efficiency: float
     input_stiffness: float
-    motion: dict[int, NDArray[np.float64]]
 
 
 def predict(machine: Machine) -> Prediction:
@@ -59,45 +55,86 @@ def predict(machine: Machine) -> Prediction:
     problem, source = machine.design.problem, machine.plan.source
     if problem.input.drive != "displacement":
         raise InvalidFile(f"{source}: only machines driven by a displacement are chained")
-    ports = [machine.port_nodes(port) for port in machine.ports]
-    nodes = np.unique(np.concatenate(ports))
+    present, beams = machine.design.mask, problem.lattice.beams
+    nodes = np.unique(np.concatenate([machine.port_nodes(port) for port in machine.ports]))
     stiffness = np.zeros((2 * len(nodes), 2 * len(nodes)))
 
-    def add(sign: float, design: Design, grips: list[NDArray[np.int64]], names: NDArray[np.int64]
-            ) -> None:  # fmt: skip
-        """Add an element by the nodes that it is gripped at, which `names` calls the machine's."""
-        own = Superelement(design, [Loose(grip) for grip in grips]).rest().stiffness
-        place = np.searchsorted(nodes, names[np.concatenate(grips)])
-        rows = (2 * place[:, None] + np.arange(2)).ravel()
-        np.add.at(stiffness, np.ix_(rows, rows), sign * own)
+    def add(
+        sign: float, chosen: NDArray[np.bool_], gripped: NDArray[np.int64], what: object
+    ) -> None:
+        """Add some beams of the machine, condensed to some nodes; errors say what they are."""
+        rows = np.searchsorted(nodes, gripped)
+        rows = (2 * rows[:, None] + np.arange(2)).ravel()
+        try:
+            stiffness[np.ix_(rows, rows)] += sign * _condensed(problem, chosen, gripped)
+        except (InvalidProblem, InvalidSettings) as error:
+            raise InvalidFile(f"{source}: {what} cannot be chained: {error}") from None
+
+    def within(gripped: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return the present beams that begin and end in a port."""
+        return present & np.isin(beams, gripped).all(axis=1)
 
     for name, part in machine.parts.items():
-        regions = [part.region(port).nodes for port in ("input", "output")]
-        add(1.0, placed(part), regions, machine.nodes[name])
+        own = np.zeros(len(present), np.bool_)
+        own[machine.beams[name][part.design.mask]] = True
+        ends = [machine.nodes[name][part.region(port).nodes] for port in ("input", "output")]
+        add(1.0, own, np.concatenate(ends), name)
     for link in machine.plan.links:
         ends = [machine.port_nodes(port) for port in (link.first, link.second)]
+        shared = [np.intersect1d(ends[0], ends[1])]
         if link.kind == "bridge":
-            design, names = _piece(machine, ends, bridged=True)
-            add(1.0, design, [np.searchsorted(names, end) for end in ends], names)
             shared = ends
-        else:
-            shared = [np.intersect1d(ends[0], ends[1])]
+            own = within(ends[0]) | within(ends[1])
+            own[machine.bridges] = True
+            add(1.0, own, np.concatenate(ends), f"the bridge to {link.second}")
         for each in shared:
-            design, names = _piece(machine, [each])
-            add(-1.0, design, [np.arange(len(names))], names)
+            add(-1.0, within(each), each, link.first)
     return _answer(machine, nodes, stiffness)
+
+
+def _condensed(
+    problem: Problem, chosen: NDArray[np.bool_], gripped: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(2 n, 2 n) stiffness of some beams by the motions of n gripped nodes; the rest follows."""
+    if not chosen.any():
+        return np.zeros((2 * len(gripped), 2 * len(gripped)))
+    lattice, supports = problem.lattice, problem.supports
+    kept = np.union1d(lattice.beams[chosen], gripped)
+    grip = np.searchsorted(kept, gripped)
+    held = {
+        name: np.searchsorted(kept, np.intersect1d(getattr(supports, name), kept))
+        for name in ("fixed", "fixed_x", "fixed_y")
+    }
+    # A superelement is what the input reaches: all gripped nodes but one, which is the output.
+    along = np.array([1.0, 0.0])
+    piece = Problem(
+        name=problem.name,
+        lattice=Lattice(lattice.positions[kept], np.searchsorted(kept, lattice.beams[chosen])),
+        supports=Supports(**held),
+        input=Input(grip[:-1], along, "displacement", 1.0),
+        output=Output(grip[-1:], along),
+        stiffness=problem.stiffness,
+        designable=np.array([0]),
+    )
+    element = Superelement(piece.full_design(), [Loose(grip)])
+    reached = element.reached.astype(np.float64)
+    found: NDArray[np.float64] = element.rest().stiffness * np.outer(reached, reached)
+    return found
 
 
 def _answer(
     machine: Machine, nodes: NDArray[np.int64], stiffness: NDArray[np.float64]
 ) -> Prediction:
-    """Move the input by 1, and solve for all other nodes."""
-    drive, wanted = machine.design.problem.input, machine.design.problem.output
+    """Move the input by 1, and solve for all other nodes that hang together with something held."""
+    problem, lattice = machine.design.problem, machine.design.problem.lattice
+    drive, wanted = problem.input, problem.output
+    joined = Lattice(lattice.positions, lattice.beams[machine.design.mask])
+    reached = joined.reachable(np.concatenate([problem.supports.nodes, drive.nodes]))[nodes]
     moved = np.repeat(np.isin(nodes, drive.nodes), 2)
     motion = np.zeros((len(nodes), 2))
     motion[np.searchsorted(nodes, drive.nodes)] = drive.direction
     flat = motion.reshape(-1)
-    live = stiffness.any(axis=1) & ~moved
+    live = stiffness.any(axis=1) & np.repeat(reached, 2) & ~moved
     own = stiffness[np.ix_(live, live)]
     if live.any():
         softest, *_, stiffest = np.linalg.eigvalsh(own)
@@ -107,45 +144,6 @@ def _answer(
     given = np.where(moved, flat, 0.0)
     travel = motion[np.searchsorted(nodes, wanted.nodes)]
     return Prediction(
-        float((travel * wanted.direction).sum(axis=1).mean()),
-        float(given @ stiffness @ flat),
-        dict(zip(nodes.tolist(), motion, strict=True)),
+        efficiency=float((travel * wanted.direction).sum(axis=1).mean()),
+        input_stiffness=float(given @ stiffness @ flat),
     )
-
-
-def placed(part: Part) -> Design:
-    """Return a part in its place as a design of its own."""
-    problem = part.design.problem
-    there = Problem(
-        name=f"{problem.name} as {part.name}",
-        lattice=Lattice(part.positions, problem.lattice.beams),
-        supports=problem.supports if part.supported else Supports(),
-        input=replace(problem.input, direction=part.direction("input"), drive="displacement"),
-        output=Output(problem.output.nodes, part.direction("output")),
-        stiffness=problem.stiffness,
-        designable=problem.designable,
-    )
-    return Design(there, part.design.mask)
-
-
-def _piece(
-    machine: Machine, ends: list[NDArray[np.int64]], *, bridged: bool = False
-) -> tuple[Design, NDArray[np.int64]]:
-    """Return the beams within ports, with a bridge's, as a design; and its nodes' numbers."""
-    problem = machine.design.problem
-    beams, nodes = problem.lattice.beams, np.unique(np.concatenate(ends))
-    own = np.any([np.isin(beams, end).all(axis=1) for end in ends], axis=0) & machine.design.mask
-    if bridged:
-        own[machine.bridges] = True
-        nodes = np.union1d(nodes, beams[machine.bridges])
-    along = np.array([1.0, 0.0])  # whatever: this piece is only condensed
-    there = Problem(
-        name="link",
-        lattice=Lattice(problem.lattice.positions[nodes], np.searchsorted(nodes, beams[own])),
-        supports=Supports(),
-        input=Input(np.array([0]), along, "displacement", 1.0),
-        output=Output(np.array([len(nodes) - 1]), along),
-        stiffness=problem.stiffness,
-        designable=np.array([0]),
-    )
-    return there.full_design(), nodes

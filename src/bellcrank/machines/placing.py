@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidFile
-from bellcrank.machines.plan import port_name
+from bellcrank.errors import BellcrankError, InvalidFile
+from bellcrank.machines.plan import TURN, port_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,7 +56,7 @@ class Placement:
     @property
     def turn(self) -> NDArray[np.float64]:
         """(2, 2) orthogonal matrix that directions are multiplied by."""
-        number = self.rotate // 60 % 6
+        number = self.rotate // TURN % 6
         cosine, sine = COSINE[number], SINE[number]
         turned = np.array([[cosine, -sine], [sine, cosine]])
         return turned @ np.diag([-1.0, 1.0]) if self.mirror else turned
@@ -133,7 +133,11 @@ def place_parts(plan: Plan, find: Callable[[str], Design]) -> dict[str, Part]:
     parts: dict[str, Part] = {}
     for name in plan.order:
         table = plan.table.parts[name]
-        parts[name] = _place(name, table, find(table.entry), parts)
+        try:
+            design = find(table.entry)
+        except BellcrankError as error:
+            raise InvalidFile(f"{plan.source}: parts.{name}.entry: {error}") from None
+        parts[name] = _place(name, table, design, parts)
     _check_stiffness(plan, parts)
     return {name: parts[name] for name in plan.table.parts}
 

@@ -30,7 +30,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from bellcrank.errors import InvalidFile
 from bellcrank.model.parsing import Table, parse, read_toml
@@ -44,6 +44,15 @@ TURN = 60
 
 Kind = Literal["weld", "bridge"]
 Vector = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+def _no_zero(vector: list[float]) -> list[float]:
+    if not any(vector):
+        raise ValueError("expected a vector of some length")
+    return vector
+
+
+Direction = Annotated[Vector, AfterValidator(_no_zero)]
 
 
 class PartTable(Table):
@@ -71,7 +80,7 @@ class InputTable(Table):
     """What drives the machine; drive and amount are those of the first part by default."""
 
     ports: list[str] = Field(min_length=1)
-    direction: Vector | None = None
+    direction: Direction | None = None
     drive: Literal["displacement", "force"] | None = None
     amount: float | None = Field(default=None, gt=0.0)
 
@@ -80,7 +89,7 @@ class OutputTable(Table):
     """What the machine moves; directions are those of the parts by default."""
 
     ports: list[str] = Field(min_length=1)
-    direction: Vector | None = None
+    direction: Direction | None = None
 
 
 class MachineTable(Table):
@@ -198,6 +207,8 @@ def plan_of(table: MachineTable, source: str) -> Plan:
                 f"{source}: no port {str(port)!r}; a port is an input or output of one of "
                 f"{', '.join(table.parts)}"
             )
+    if both := [port for port in plan.inputs if port in plan.outputs]:
+        raise InvalidFile(f"{source}: port {str(both[0])!r} is input and output at once")
     for link in links:
         if link.first == link.second:
             raise InvalidFile(f"{source}: port {str(link.first)!r} is linked to itself")

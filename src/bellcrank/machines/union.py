@@ -6,7 +6,7 @@ its distance.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -49,7 +49,30 @@ def unite(
             union.weld(link)
     union.join_supports()
     union.check_clear()
-    return union.numbered()
+    return union.result()
+
+
+def numbered(
+    values: NDArray[np.integer[Any]],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Give distinct rows numbers, in the order in which they first come.
+
+    Returns
+    -------
+    first
+        Where each distinct row comes first.
+    number
+        Of each row.
+
+    Examples
+    --------
+    >>> numbered(np.array([7, 3, 7, 5]))
+    (array([0, 1, 3]), array([0, 1, 0, 2]))
+    """
+    _, first, name = np.unique(values, axis=0, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return np.sort(first), rank[name.ravel()]
 
 
 class _Union:
@@ -105,21 +128,18 @@ class _Union:
             f"their place"
         )
 
-    def numbered(self) -> tuple[dict[str, NDArray[np.int64]], NDArray[np.float64]]:
+    def result(self) -> tuple[dict[str, NDArray[np.int64]], NDArray[np.float64]]:
         """Return each part's nodes by their numbers in the machine, and all positions."""
         pairs, count = self.near[self.same], len(self.positions)
         links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
         _, piece = connected_components(links, directed=False)
-        _, first, name = np.unique(piece, return_index=True, return_inverse=True)
-        rank = np.empty(len(first), np.int64)
-        rank[np.argsort(first)] = np.arange(len(first))
-        number = rank[name]
+        first, number = numbered(piece)
         ends = [*list(self.first.values())[1:], count]
         nodes = {
             part: number[start:end]
             for (part, start), end in zip(self.first.items(), ends, strict=True)
         }
-        return nodes, self.positions[np.sort(first)]
+        return nodes, self.positions[first]
 
     def _port(self, port: PortName) -> NDArray[np.int64]:
         nodes: NDArray[np.int64] = self.parts[port.part].region(port.port).nodes
