@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import spearmanr
 
 from bellcrank.errors import InvalidSettings, UnknownName
+from bellcrank.machines import mean_ports, two_port_at
 from bellcrank.mechanics import Core, Evaluator, Status, foresee_stiffness, output_stiffness
 from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem
 from bellcrank.search.goals import (
@@ -29,6 +30,7 @@ EVERY_GOAL = {
     "degree": "degree >= 2",
     "connected": "connected",
     "mirror": "mirror x",
+    "input-stiffness": "input-stiffness <= 0.1",
     "stiffness": "stiffness >= 0.1",
     "strain": "strain <= 0.1",
     "no-snapping": "no-snapping",
@@ -263,6 +265,22 @@ def test_stiffness_falls_short_by_the_part_that_is_missing() -> None:
     stiffness = output_stiffness(state.evaluator)
     assert excess_of_response(f"stiffness >= {4 * stiffness}", state) == pytest.approx(0.75)
     assert excess_of_response(f"stiffness >= {stiffness / 2}", state) == 0.0
+
+
+def test_input_stiffness_is_that_of_the_condensed_structure() -> None:
+    crane = find_problem("crane")
+    small = replace(crane, input=replace(crane.input, amount=1e-5))
+    element = mean_ports(small.full_design())
+    condensed = two_port_at(element, element.rest()).input_stiffness
+    state = moved(small, small.initial)
+    excess = excess_of_response(f"input-stiffness <= {condensed / 4}", state)
+    assert excess == pytest.approx(0.75, rel=1e-4)
+    assert excess_of_response(f"input-stiffness <= {condensed * 1.01}", state) == 0.0
+
+
+def test_input_stiffness_is_none_of_a_force() -> None:
+    with pytest.raises(InvalidSettings, match="'input-stiffness <= 1': the input is driven by"):
+        GoalResponder([Case(find_problem("pliers"))], ["input-stiffness <= 1"])
 
 
 def test_strain_is_that_of_the_most_stretched_beam() -> None:

@@ -65,6 +65,16 @@ def strain(_problem: Problem, bound: float) -> Term:
     return Term(of_response=lambda moved: above(largest_strain(moved), bound), price=1)
 
 
+def input_stiffness(problem: Problem, bound: float) -> Term:
+    """At most so stiff an input: twice the energy of the stroke, over the squared input motion."""
+    if problem.input.drive != "displacement":
+        raise ValueError("the input is driven by a force, and moves as far as that takes it")
+    squared = problem.input.amount**2
+    return Term(
+        of_response=lambda moved: above(2.0 * moved.response.energy / squared, bound), price=1
+    )
+
+
 def no_snapping(_problem: Problem, _nothing: None) -> Term:
     """Stable along the whole stroke, followed in small increments.
 
@@ -86,6 +96,9 @@ def no_snapping(_problem: Problem, _nothing: None) -> Term:
 
 registry.register("stiffness")(
     Kind("'stiffness >= NUMBER', the number above 0", at_least, stiffness)
+)
+registry.register("input-stiffness")(
+    Kind("'input-stiffness <= NUMBER', the number above 0", at_most, input_stiffness)
 )
 registry.register("strain")(Kind("'strain <= NUMBER', the number above 0", at_most, strain))
 registry.register("no-snapping")(Kind("'no-snapping' alone", nothing, no_snapping))
