@@ -13,7 +13,7 @@ from bellcrank.machines.assembly import Machine, assemble
 from bellcrank.machines.chaining import Prediction, predict
 from bellcrank.machines.characterise import Characterisation, characterise, usual_loads
 from bellcrank.machines.curves import PortCurve, trace
-from bellcrank.machines.elementary import elementary
+from bellcrank.machines.elementary import DIRECTIONS, elementary, strut
 from bellcrank.machines.loads import Load
 from bellcrank.machines.plan import Plan, read_plan
 from bellcrank.machines.ports import INPUT, OUTPUT, Port, block_ports, mean_ports, ports_of
@@ -28,6 +28,7 @@ from bellcrank.machines.sampling import Fit, Reach, fit, sample, usual_reach
 from bellcrank.machines.two_port import TwoPort, two_port_at
 
 __all__ = [
+    "DIRECTIONS",
     "INPUT",
     "OUTPUT",
     "Characterisation",
@@ -55,6 +56,7 @@ __all__ = [
     "read_characterisation",
     "read_plan",
     "sample",
+    "strut",
     "trace",
     "two_port_at",
     "usual_loads",
