@@ -59,7 +59,6 @@ settings = HoppingSettings(
     steps=3000, chains=1, seed=3, goals=("mass <= 0.67", "strain <= 0.1", "connected")
 )
 report = complete_design(start_design(lift, settings, Path("lift")))
-print(
-    f"efficiency {report.selection.efficiency_after:.2f}, {report.selection.design.beam_count} beams"
-)
-draw_motion(move(report.selection.design), "moved.png", title="lift")
+found = report.selection
+print(f"efficiency {found.efficiency_after:.2f}, {found.design.beam_count} beams")
+draw_motion(move(found.design), "moved.png", title="lift")
