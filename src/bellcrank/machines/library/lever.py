@@ -173,7 +173,7 @@ def lever_of(problem: Problem, shape: Shape) -> Design:
     given = np.isin(np.arange(lattice.node_count), problem.input.nodes)
     if not shape.link:
         body |= given
-    mask = body[lattice.beams].all(axis=1) | given[lattice.beams].all(axis=1)
+    mask = body[lattice.beams].all(axis=1) | given[lattice.beams].all(axis=1) | _at_ports(problem)
     mask[_beams_along(problem, shape.link)] = True
     provenance = {
         "kind": "lever",
@@ -208,6 +208,17 @@ def lever_law(problem: Problem, shape: Shape) -> float:
 def _turned(vector: NDArray[np.float64]) -> NDArray[np.float64]:
     """(2,) a vector turned by 90 degrees: its motion in a unit rotation."""
     return np.array([-vector[1], vector[0]])
+
+
+def _at_ports(problem: Problem) -> NDArray[np.bool_]:
+    """(M,) the beams at the ports that every design of the problem has."""
+    lattice = problem.lattice
+    kept = problem.initial & lattice.beams_touching(
+        np.concatenate([problem.input.nodes, problem.output.nodes])
+    )
+    kept[problem.designable] = False
+    kept[lattice.beams_touching(problem.supports.nodes)] = False
+    return kept
 
 
 def _spacing(problem: Problem) -> float:

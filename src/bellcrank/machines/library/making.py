@@ -7,16 +7,21 @@ entries.
 
 from __future__ import annotations
 
+import contextlib
+import math
 import shutil
 import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.machines.library.entry import stem
 from bellcrank.machines.library.files import write_entry
 from bellcrank.machines.library.kinds import Kind, kinds
+from bellcrank.machines.library.lever import plain_lever
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, measure
 from bellcrank.machines.library.summary import entry_files, read_summary, write_index
 from bellcrank.mechanics import Response, Status
@@ -28,10 +33,9 @@ from bellcrank.workflows.design import accepted_candidates, judge_for
 
 if TYPE_CHECKING:
     import threading
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from bellcrank.machines.library.entry import Entry
@@ -62,8 +66,33 @@ class Task:
         return stem(self.direction, self.columns, self.kind)
 
     def problem(self) -> Problem:
-        """Return what the search is given."""
-        return elementary(self.columns, self.direction, kinds[self.kind].spring)
+        """Return what the search is given: it may leave supports unused, as levers do."""
+        given = elementary(self.columns, self.direction, kinds[self.kind].spring)
+        lattice = given.lattice
+        held = np.isin(lattice.beams, given.supports.nodes).all(axis=1)
+        at_ports = lattice.beams_touching(np.concatenate([given.input.nodes, given.output.nodes]))
+        return replace(given, designable=np.flatnonzero(~held & ~at_ports))
+
+    def starts(self, chains: int) -> dict[str, tuple[Problem, int]]:
+        """Return what searches begin with, and how many chains: the full lattice, and a lever.
+
+        Half of the chains are given the plain lever, if there is one. What it is good at is far
+        from the full lattice.
+        """
+        problem = self.problem()
+        for goals in (kinds[self.kind].goals, ()):
+            with contextlib.suppress(InvalidSettings):
+                lever = plain_lever(problem, goals)
+                break
+        else:
+            return {"full": (problem, chains)}
+        initial = problem.initial.copy()
+        initial[problem.designable] = lever.mask[problem.designable]
+        begun = {
+            "full": (problem, chains - chains // 2),
+            "lever": (replace(problem, initial=initial), chains // 2),
+        }
+        return {name: start for name, start in begun.items() if start[1]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,47 +235,57 @@ def _make(
 ) -> Entry | None:
     """Search, choose and measure; None if it was stopped."""
     settings = order.settings(kinds[task.kind])
-    run = _run_of(task, settings, place)
-    done = run_chains(
-        run, settings, workers=workers, tell=lambda progress: tell(task, progress), stop=stop
-    )
-    if not done:
-        return None
-    design, notes = _best(run, settings)
+    runs = []
+    for name, (problem, chains) in task.starts(order.chains).items():
+        own = replace(settings, chains=chains)
+        runs.append(_run_of(problem, own, place / name))
+        if not run_chains(
+            runs[-1], own, workers=workers, tell=lambda progress: tell(task, progress), stop=stop
+        ):
+            return None
+    design, notes = _best(task.problem(), runs, settings)
     return measure(design, task.direction, task.columns, task.kind, notes=notes)
 
 
-def _run_of(task: Task, settings: SearchSettings, place: Path) -> RunFolder:
+def _run_of(problem: Problem, settings: SearchSettings, place: Path) -> RunFolder:
     """Begin a search, or go on with it."""
     if not (place / "run.json").exists():
         if place.exists():  # killed before it was described
             shutil.rmtree(place)
         make_folder(place.parent)
-        return start_design(task.problem(), settings, place)
+        return start_design(problem, settings, place)
     run = reopen_design(place)
-    if read_settings(run.settings) != settings or run.problem.hash != task.problem().hash:
+    if read_settings(run.settings) != settings or run.problem.hash != problem.hash:
         raise InvalidSettings(
             f"{place}: was begun with other settings; go on with those, or remove it"
         )
     return run
 
 
-def _best(run: RunFolder, settings: SearchSettings) -> tuple[Design, dict[str, Any]]:
-    """Choose and clean the design of a search, and say how it came about."""
-    candidates, proposals, best = accepted_candidates(run, settings)
-    judge = Resisting(judge_for(run.problem, settings))
+def _best(
+    problem: Problem, runs: Sequence[RunFolder], settings: SearchSettings
+) -> tuple[Design, dict[str, Any]]:
+    """Choose and clean the design of a task's searches, and say how it came about."""
+    candidates, chains = [], []
+    for run in runs:
+        found, _, best = accepted_candidates(run, read_settings(run.settings))
+        candidates += [replace(each, chain=each.chain + len(chains)) for each in found]
+        chains += [
+            {"begun_with": run.path.name, "best": value if math.isfinite(value) else None}
+            for value in best
+        ]
+    judge = Resisting(judge_for(problem, settings))
     try:
-        chosen = select(run.problem, candidates, settings.objective, judge)
+        chosen = select(problem, candidates, settings.objective, judge)
     except InvalidSettings as error:
         raise _NoneFound(str(error)) from None
     notes = {
         "kind": "machine",
         "settings": settings.to_dict(),
+        "chains": chains,
         "chain": chosen.found.chain,
         "step": chosen.found.step,
         "efficiency_before_cleaning": chosen.efficiency_before,
-        "best_by_chain": best,
-        "proposals": proposals,
         "refused": chosen.refused,
     }
     return chosen.design, notes
