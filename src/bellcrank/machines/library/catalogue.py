@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bellcrank.errors import BellcrankError, InvalidSettings, UnknownName
-from bellcrank.machines.library.entry import DIGITS, check_direction, check_kind
+from bellcrank.machines.elementary import DIRECTIONS
+from bellcrank.machines.library.entry import DIGITS, MIXED, check_direction, check_kind
 from bellcrank.machines.library.files import read_entry
 from bellcrank.machines.library.summary import Summary, entry_files, read_index, read_summary
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from bellcrank.machines.library.entry import Entry
+    from bellcrank.model import Design
 
 VARIABLE = "BELLCRANK_LIBRARY"
 """Of the environment: the user's folder."""
@@ -90,6 +92,10 @@ class Library:
         """What is wrong with files that cannot be read, in sentences."""
         return [line for folder in self.folders for line in self._contents(folder)[1]]
 
+    def readable(self) -> list[str]:
+        """Names of the entries that can be read, in order."""
+        return [each.name for each in self.summaries]
+
     def names(self) -> list[str]:
         """Of all files, readable or not."""
         return sorted({path.stem for folder in self.folders for path in entry_files(folder)})
@@ -138,6 +144,23 @@ class Library:
         UnknownName, InvalidFile, InvalidProblem
         """
         return read_entry(self.path(text))
+
+    def design(self, text: str) -> Design | None:
+        """Return the design of an entry; None for what is not even like the name of one.
+
+        Raises
+        ------
+        UnknownName
+            If it is like one, but there is none, or more than one.
+        InvalidFile, InvalidProblem
+            If the file is damaged.
+        """
+        try:
+            return self.find(text).design
+        except UnknownName:
+            if text.startswith(tuple(f"{word}-" for word in (*DIRECTIONS, MIXED))):
+                raise
+            return None
 
     def search(
         self,
@@ -190,14 +213,9 @@ class Library:
                 direction in (None, each.direction)
                 and columns in (None, each.columns)
                 and kind in (None, each.kind)
-                and (
-                    efficiency is None or each.two_port.efficiency_against(spring) >= efficiency
-                )
+                and (efficiency is None or each.two_port.efficiency_against(spring) >= efficiency)
                 and (stiffness is None or each.input_stiffness <= stiffness)
-                and (
-                    output_stiffness is None
-                    or output_stiffness * each.output_compliance <= 1.0
-                )
+                and (output_stiffness is None or output_stiffness * each.output_compliance <= 1.0)
                 and (each.better or not better)
             )
 

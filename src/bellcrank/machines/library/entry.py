@@ -191,11 +191,10 @@ def check_direction(direction: str) -> str:
 
     Examples
     --------
-    >>> check_direction("upwards")
+    >>> check_direction("upwards")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bellcrank.errors.InvalidSettings: direction: expected one of right, up-right, up, up-left, left, \
-down-left, down, down-right, got 'upwards'
+    bellcrank.errors.InvalidSettings: direction: expected one of right, ..., got 'upwards'
     """
     if direction not in DIRECTIONS and direction != MIXED:
         raise InvalidSettings(

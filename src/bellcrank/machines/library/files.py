@@ -215,9 +215,7 @@ def read_entry(path: str | os.PathLike[str]) -> Entry:
     return entry
 
 
-def write_entry(
-    entry: Entry, folder: str | os.PathLike[str], *, overwrite: bool = False
-) -> Path:
+def write_entry(entry: Entry, folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Write an entry into a folder, under its name; whole or not at all.
 
     Returns

@@ -1,18 +1,19 @@
 """The plain lever: what a design of the library must beat.
 
 Drawn from lever mechanics, and from nothing that a search found. Stiff arms of triangulated struts
-turn about a pivot, a single node of the support, and hold the output. An input that only goes straight
-cannot be part of what turns, so a lever proper takes its motion by a *link*, a straight row of struts
-along a line of the lattice from a corner of the input to the *knee* of the lever. Then with r from the
-pivot, d the direction of the link, t_in and t_out those of the ports, and x the cross product,
+turn about a pivot, a single node of the support, and hold the output. An input that only goes
+straight cannot be part of what turns, so a lever proper takes its motion by a *link*, a straight
+row of struts along a line of the lattice from a corner of the input to the *knee* of the lever.
+Then with r from the pivot, d the direction of the link, t_in and t_out those of the ports, and x
+the cross product,
 
     efficiency = (d . t_in) (t_out . (z x r_output)) / (d . (z x r_knee)).
 
-The family has simpler members, welded to the input, that must bend: a bar from port to port, with and
-without a stay, a bell crank, a triangle. Of all members the most efficient is taken, by the same
-mechanics and under the same load as the design that it is compared with: a strong member of the
-family rather than a typical one. There are directions that no lever makes well; its efficiency
-there is about 0, or below.
+The family has simpler members, welded to the input, that must bend: a bar from port to port, with
+and without a stay, a bell crank, a triangle. Of all members the most efficient is taken, by the
+same mechanics and under the same load as the design that it is compared with: a strong member of
+the family rather than a typical one. There are directions that no lever makes well; its
+efficiency there is about 0, or below.
 """
 
 from __future__ import annotations
@@ -188,6 +189,11 @@ def lever_of(problem: Problem, shape: Shape) -> Design:
 def lever_law(problem: Problem, shape: Shape) -> float:
     """Return the efficiency of a lever with rigid arms, a rigid link and free joints.
 
+    Raises
+    ------
+    InvalidSettings
+        If it has no link.
+
     Examples
     --------
     >>> from bellcrank.machines import elementary
@@ -196,6 +202,8 @@ def lever_law(problem: Problem, shape: Shape) -> float:
     >>> bool(np.isfinite(lever_law(problem, shape)))
     True
     """
+    if shape.pivot is None or not shape.link:
+        raise InvalidSettings(f"{shape.label}: has no joints, and so no law")
     positions = problem.lattice.positions
     pivot, first, knee = positions[[shape.pivot, shape.link[0], shape.link[-1]]]
     along = knee - first

@@ -25,7 +25,6 @@ from bellcrank.machines.library.lever import plain_lever
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, measure
 from bellcrank.machines.library.summary import entry_files, read_summary, write_index
 from bellcrank.mechanics import Response, Status
-from bellcrank.runs import RunFolder
 from bellcrank.runs.files import make_folder
 from bellcrank.search import HoppingSettings, SearchSettings, read_settings, run_chains, select
 from bellcrank.workflows import reopen_design, start_design
@@ -40,7 +39,8 @@ if TYPE_CHECKING:
 
     from bellcrank.machines.library.entry import Entry
     from bellcrank.model import Design, Problem
-    from bellcrank.search import Progress, Responder
+    from bellcrank.runs import RunFolder
+    from bellcrank.search import Candidate, Progress, Responder
 
 WORK = "searches"
 """Folder of the searches, in that of the entries."""
@@ -266,7 +266,8 @@ def _best(
     problem: Problem, runs: Sequence[RunFolder], settings: SearchSettings
 ) -> tuple[Design, dict[str, Any]]:
     """Choose and clean the design of a task's searches, and say how it came about."""
-    candidates, chains = [], []
+    candidates: list[Candidate] = []
+    chains: list[dict[str, Any]] = []
     for run in runs:
         found, _, best = accepted_candidates(run, read_settings(run.settings))
         candidates += [replace(each, chain=each.chain + len(chains)) for each in found]
