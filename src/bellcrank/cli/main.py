@@ -18,6 +18,7 @@ from bellcrank.cli import (
     evaluate,
     explain,
     export,
+    library,
     machine,
     onnx,
     plot,
@@ -50,6 +51,7 @@ COMMANDS = (
     surrogate_search,
     onnx,
     machine,
+    library,
     problems,
 )
 """Modules that register a command."""

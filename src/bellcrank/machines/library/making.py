@@ -1,0 +1,321 @@
+"""Making entries: a search for each task, the best of what it found measured and written.
+
+Each entry is written once, whole, when all of it is known; searches are run folders, which go on
+where a kill left them. So a making that is stopped, however, and begun again ends with the same
+entries.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import shutil
+import time
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.machines.elementary import DIRECTIONS, elementary
+from bellcrank.machines.library.entry import stem
+from bellcrank.machines.library.files import write_entry
+from bellcrank.machines.library.kinds import Kind, kinds
+from bellcrank.machines.library.lever import plain_lever
+from bellcrank.machines.library.measuring import LEAST_STIFFNESS, measure
+from bellcrank.machines.library.summary import entry_files, read_summary, write_index
+from bellcrank.mechanics import Response, Status
+from bellcrank.runs.files import make_folder
+from bellcrank.search import HoppingSettings, SearchSettings, read_settings, run_chains, select
+from bellcrank.workflows import reopen_design, start_design
+from bellcrank.workflows.design import accepted_candidates, judge_for
+
+if TYPE_CHECKING:
+    import threading
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from bellcrank.machines.library.entry import Entry
+    from bellcrank.model import Design, Problem
+    from bellcrank.runs import RunFolder
+    from bellcrank.search import Candidate, Progress, Responder
+
+WORK = "searches"
+"""Folder of the searches, in that of the entries."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One entry to make.
+
+    Examples
+    --------
+    >>> Task("up", 9, "loaded").problem().name
+    'elementary-9-up-loaded'
+    """
+
+    direction: str
+    columns: int
+    kind: str
+
+    @property
+    def name(self) -> str:
+        """With which the name of the entry begins."""
+        return stem(self.direction, self.columns, self.kind)
+
+    def problem(self) -> Problem:
+        """Return what the search is given: it may leave supports unused, as levers do."""
+        given = elementary(self.columns, self.direction, kinds[self.kind].spring)
+        lattice = given.lattice
+        held = np.isin(lattice.beams, given.supports.nodes).all(axis=1)
+        at_ports = lattice.beams_touching(np.concatenate([given.input.nodes, given.output.nodes]))
+        return replace(given, designable=np.flatnonzero(~held & ~at_ports))
+
+    def starts(self, chains: int) -> dict[str, tuple[Problem, int]]:
+        """Return what searches begin with, and how many chains: the full lattice, and a lever.
+
+        Half of the chains are given the plain lever, if there is one. What it is good at is far
+        from the full lattice.
+        """
+        problem = self.problem()
+        for goals in (kinds[self.kind].goals, ()):
+            with contextlib.suppress(InvalidSettings):
+                lever = plain_lever(problem, goals)
+                break
+        else:
+            return {"full": (problem, chains)}
+        initial = problem.initial.copy()
+        initial[problem.designable] = lever.mask[problem.designable]
+        begun = {
+            "full": (problem, chains - chains // 2),
+            "lever": (replace(problem, initial=initial), chains // 2),
+        }
+        return {name: start for name, start in begun.items() if start[1]}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """What entries to make, and how long to search for each.
+
+    Parameters
+    ----------
+    directions, columns, kinds
+        An entry for each combination.
+    steps, chains, seed
+        Of each search.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+
+    Examples
+    --------
+    >>> len(Order().tasks)
+    72
+    """
+
+    directions: tuple[str, ...] = tuple(DIRECTIONS)
+    columns: tuple[int, ...] = (9, 7, 12)
+    kinds: tuple[str, ...] = tuple(kinds)
+    steps: int = 20_000
+    chains: int = 4
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for task in self.tasks:
+            task.problem()
+            self.settings(kinds[task.kind])
+
+    @property
+    def tasks(self) -> list[Task]:
+        """Of one size after the other."""
+        return [
+            Task(direction, columns, kind)
+            for columns in self.columns
+            for direction in self.directions
+            for kind in self.kinds
+        ]
+
+    def settings(self, kind: Kind) -> SearchSettings:
+        """Return what the search for a kind is told."""
+        return HoppingSettings(
+            steps=self.steps, chains=self.chains, seed=self.seed, goals=kind.goals
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What became of one task.
+
+    Parameters
+    ----------
+    task, number, total
+        Which, and of how many.
+    entry
+        None if it was there already, or none was found.
+    note
+        ``made``, ``was there``, or why there is none.
+    seconds
+        That it took.
+    """
+
+    task: Task
+    number: int
+    total: int
+    entry: Entry | None
+    note: str
+    seconds: float
+
+
+def make(
+    order: Order,
+    folder: Path,
+    *,
+    workers: int | None = None,
+    tell: Callable[[Task, Progress], None] = lambda _task, _progress: None,
+    stop: threading.Event | None = None,
+) -> Iterator[Made]:
+    """Make the entries of an order that are not there yet, and the index of the folder.
+
+    Parameters
+    ----------
+    folder
+        Of the entries; the searches are in a folder ``searches`` of it as long as they are needed.
+    workers
+        Chains that run at the same time; all cores by default. Changes nothing in the results.
+    tell
+        Called with the progress of a search, from its own thread.
+    stop
+        Set it to end after the steps at hand; what is done is kept.
+
+    Raises
+    ------
+    StorageError
+        If the folder cannot be written.
+    InvalidSettings
+        If a search was begun with other settings.
+    """
+    make_folder(folder)
+    there = {path.stem.rpartition("-")[0] for path in entry_files(folder)}
+    for number, task in enumerate(order.tasks):
+        start = time.monotonic()
+        entry, note = None, "was there"
+        if task.name not in there:
+            place = folder / WORK / task.name
+            try:
+                entry = _make(task, order, place, workers, tell, stop)
+                note = "made"
+            except _NoneFound as none:
+                note = str(none)
+            if entry is None and note == "made":
+                return  # stopped
+            if entry is not None:
+                write_entry(entry, folder)
+                write_index(folder, [read_summary(path) for path in entry_files(folder)])
+            shutil.rmtree(place)
+            if not any(place.parent.iterdir()):
+                place.parent.rmdir()
+        seconds = time.monotonic() - start
+        yield Made(task, number, len(order.tasks), entry, note, seconds)
+
+
+class _NoneFound(Exception):
+    """No design of a search can be an entry."""
+
+
+def _make(
+    task: Task,
+    order: Order,
+    place: Path,
+    workers: int | None,
+    tell: Callable[[Task, Progress], None],
+    stop: threading.Event | None,
+) -> Entry | None:
+    """Search, choose and measure; None if it was stopped."""
+    settings = order.settings(kinds[task.kind])
+    runs = []
+    for name, (problem, chains) in task.starts(order.chains).items():
+        own = replace(settings, chains=chains)
+        runs.append(_run_of(problem, own, place / name))
+        if not run_chains(
+            runs[-1], own, workers=workers, tell=lambda progress: tell(task, progress), stop=stop
+        ):
+            return None
+    design, notes = _best(task.problem(), runs, settings)
+    return measure(design, task.direction, task.columns, task.kind, notes=notes)
+
+
+def _run_of(problem: Problem, settings: SearchSettings, place: Path) -> RunFolder:
+    """Begin a search, or go on with it."""
+    if not (place / "run.json").exists():
+        if place.exists():  # killed before it was described
+            shutil.rmtree(place)
+        make_folder(place.parent)
+        return start_design(problem, settings, place)
+    run = reopen_design(place)
+    if read_settings(run.settings) != settings or run.problem.hash != problem.hash:
+        raise InvalidSettings(
+            f"{place}: was begun with other settings; go on with those, or remove it"
+        )
+    return run
+
+
+def _best(
+    problem: Problem, runs: Sequence[RunFolder], settings: SearchSettings
+) -> tuple[Design, dict[str, Any]]:
+    """Choose and clean the design of a task's searches, and say how it came about."""
+    candidates: list[Candidate] = []
+    chains: list[dict[str, Any]] = []
+    for run in runs:
+        found, _, best = accepted_candidates(run, read_settings(run.settings))
+        candidates += [replace(each, chain=each.chain + len(chains)) for each in found]
+        chains += [
+            {"begun_with": run.path.name, "best": value if math.isfinite(value) else None}
+            for value in best
+        ]
+    judge = Resisting(judge_for(problem, settings))
+    try:
+        chosen = select(problem, candidates, settings.objective, judge)
+    except InvalidSettings as error:
+        raise _NoneFound(str(error)) from None
+    notes = {
+        "kind": "machine",
+        "settings": settings.to_dict(),
+        "chains": chains,
+        "chain": chosen.found.chain,
+        "step": chosen.found.step,
+        "efficiency_before_cleaning": chosen.efficiency_before,
+        "refused": chosen.refused,
+    }
+    return chosen.design, notes
+
+
+class Resisting:
+    """Who judges designs, and refuses those that merely follow their input.
+
+    A bar that hangs between the ports moves down as far as it is pushed, resists nothing, and is
+    of no use to anybody.
+
+    Parameters
+    ----------
+    judge
+        Who knows the goals.
+    """
+
+    def __init__(self, judge: Responder) -> None:
+        self.judge = judge
+        self.problem = judge.problem
+
+    def respond(self, mask: NDArray[np.bool_], largest_increment: float = 1.0) -> Response:
+        """Response of a design; forbidden if nothing resists its input."""
+        response = self.judge.respond(mask, largest_increment)
+        stiffness = 2.0 * response.energy / self.problem.input.amount**2
+        if response.status is Status.CONVERGED and not stiffness > LEAST_STIFFNESS:
+            return replace(response, status=Status.FORBIDDEN)
+        return response
+
+    def __getattr__(self, name: str) -> Any:
+        """Leave all else to the judge."""
+        return getattr(self.judge, name)
