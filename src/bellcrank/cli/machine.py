@@ -14,6 +14,7 @@ from rich.table import Table
 
 from bellcrank.cli.app import app
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.registry import design_sources
 
 if TYPE_CHECKING:
     from bellcrank.machines.assembly import Machine
@@ -30,6 +31,19 @@ app.add_typer(machine)
 PlanName = Annotated[
     str, typer.Argument(help="A machine's plan, TOML, or a name of `bellcrank machine list`.")
 ]
+
+
+STRUT = "strut-"
+
+
+@design_sources.register("struts")
+def design_of_strut(name: str) -> Design | None:
+    """Return the strut of a length, like strut-6; None for other names."""
+    if not name.startswith(STRUT) or not name.removeprefix(STRUT).isdecimal():
+        return None
+    from bellcrank.machines.elementary import strut
+
+    return strut(int(name.removeprefix(STRUT))).full_design()
 
 
 @machine.command(name="list")
