@@ -255,9 +255,9 @@ def find_entry(text: str) -> Entry:
 
     Examples
     --------
-    >>> find_entry("sideways-9-free")  # doctest: +ELLIPSIS
+    >>> find_entry("up-9-fre-")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bellcrank.errors.UnknownName: no entry 'sideways-9-free' in the library; near: ...
+    bellcrank.errors.UnknownName: no entry 'up-9-fre-' in the library...; see bellcrank library list
     """
     return library().find(text)

@@ -1,4 +1,4 @@
-"""Pages that show the library: one to browse, in one file, and one to read, with pictures beside."""
+"""Pages that show the library: one to browse, one to read, and the pictures of the latter."""
 
 from __future__ import annotations
 
@@ -23,6 +23,16 @@ if TYPE_CHECKING:
 PAGE, TABLE = "index.html", "README.md"
 ORDER = ("up-left", "up", "up-right", "right", "down-right", "down", "down-left", "left")
 """Of directions, around a clock."""
+ABOUT = (
+    "{} entries, {} of them more efficient than the plain lever of the same task. Each is pushed "
+    "down on the right (orange) and moves its left port (blue); `index.html` beside this page is "
+    "the same to browse. What the figures mean is said in [docs/machines.md]"
+    "(../machines.md#the-library). This page is written by `bellcrank library index`."
+)
+COLUMNS = (
+    "", "name", "efficiency", "plain lever", "frame FEM", "input stiffness", "output stiffness",
+    "best share of work",
+)  # fmt: skip
 
 
 def write_pages(known: Library, out: Path, *, overwrite: bool = False) -> list[Path]:
@@ -90,23 +100,15 @@ def page(entries: list[Entry], drawn: dict[str, Thumbnail]) -> str:
 
 def table(entries: list[Entry]) -> str:
     """Return the page to read: Markdown with a table for each kind."""
-    lines = [
-        "# Library of elementary actuators",
-        "",
-        f"{len(entries)} entries, {sum(entry.better for entry in entries)} of them more efficient "
-        "than the plain lever of the same task. Each is pushed down on the right (orange) and moves "
-        "its left port (blue); `index.html` beside this page is the same to browse. What the "
-        "figures mean is said in [docs/machines.md](../machines.md#the-library). This page is "
-        "written by `bellcrank library index`.",
-    ]
+    better = sum(entry.better for entry in entries)
+    lines = ["# Library of elementary actuators", "", ABOUT.format(len(entries), better)]
     for kind in dict.fromkeys(entry.kind for entry in entries):
         lines += [
             "",
             f"## {kind}",
             "",
-            "| | name | efficiency | plain lever | frame FEM | input stiffness | "
-            "output stiffness | best share of work |",
-            "|---|---|---|---|---|---|---|---|",
+            f"| {' | '.join(COLUMNS)} |",
+            f"|{'---|' * len(COLUMNS)}",
         ]
         lines += [_row(entry) for entry in entries if entry.kind == kind]
     return "\n".join(lines) + "\n"
@@ -166,7 +168,7 @@ def _card(entry: Entry, picture: Thumbnail, place: int, longest: float) -> str:
         ("strain", f"{100.0 * entry.validation.strain:.1f} %"),
     ]
     rows = "".join(f"<div><dt>{key}</dt><dd>{value}</dd></div>" for key, value in figures)
-    verdict = "efficiency" if entry.better else '<span class="w">the lever is better</span>'
+    verdict = "efficiency" if entry.better else '<span class="w">below lever</span>'
     return (
         f'<li {data}><svg viewBox="{picture.view_box}" role="img" aria-label="{name}">'
         f'{picture.content}</svg><div class="t"><b>{entry.direction.replace("-", " ")}{size}</b>'

@@ -23,7 +23,7 @@ from bellcrank.machines.library.files import write_entry
 from bellcrank.machines.library.kinds import Kind, kinds
 from bellcrank.machines.library.lever import plain_lever
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, measure
-from bellcrank.machines.library.summary import entry_files, read_summary, write_index
+from bellcrank.machines.library.summary import entry_files, read_index, read_summary, write_index
 from bellcrank.mechanics import Response, Status
 from bellcrank.runs.files import make_folder
 from bellcrank.search import HoppingSettings, SearchSettings, read_settings, run_chains, select
@@ -201,24 +201,36 @@ def make(
     there = {path.stem.rpartition("-")[0] for path in entry_files(folder)}
     for number, task in enumerate(order.tasks):
         start = time.monotonic()
+        place = folder / WORK / task.name
         entry, note = None, "was there"
         if task.name not in there:
-            place = folder / WORK / task.name
             try:
                 entry = _make(task, order, place, workers, tell, stop)
                 note = "made"
             except _NoneFound as none:
                 note = str(none)
-            if entry is None and note == "made":
-                return  # stopped
             if entry is not None:
                 write_entry(entry, folder)
-                write_index(folder, [read_summary(path) for path in entry_files(folder)])
-            shutil.rmtree(place)
-            if not any(place.parent.iterdir()):
-                place.parent.rmdir()
-        seconds = time.monotonic() - start
-        yield Made(task, number, len(order.tasks), entry, note, seconds)
+            elif note == "made":
+                return  # stopped
+        _forget(place)
+        _refresh_index(folder)
+        yield Made(task, number, len(order.tasks), entry, note, time.monotonic() - start)
+
+
+def _forget(place: Path) -> None:
+    """Remove a search that is not needed any more, and the folder of searches with the last."""
+    if place.exists():
+        shutil.rmtree(place)
+    if place.parent.exists() and not any(place.parent.iterdir()):
+        place.parent.rmdir()
+
+
+def _refresh_index(folder: Path) -> None:
+    """Write the index of a folder if it does not fit the entries."""
+    files = entry_files(folder)
+    if files and read_index(folder) is None:
+        write_index(folder, [read_summary(path) for path in files])
 
 
 class _NoneFound(Exception):
