@@ -280,7 +280,7 @@ def _tell(known: Library, found: list[Summary], *, as_json: bool, spring: float 
     worse = len(found) - sum(each.better for each in found)
     said = "1 entry" if len(found) == 1 else f"{len(found)} entries"
     mark = f"; * the plain lever is better ({worse})" if worse else ""
-    results.print(f"\n{said}: efficiencies, and stiffnesses in lattice units{mark}")
+    results.print(f"\n{said}, lattice units{mark}")
     _warn(known)
 
 
