@@ -39,7 +39,7 @@ svg{--rest:#d5dae0;--ink:#20262d;--in:#d55e00;--out:#0072b2;--ground:#c3c9d0;--b
 path{fill:none;stroke-linecap:round;stroke-linejoin:round;stroke-width:4.2}
 .r{stroke:var(--rest)}.m{stroke:var(--ink)}.i{stroke:var(--in)}.o{stroke:var(--out)}
 .g{stroke:var(--ground);stroke-width:13}
-.a{stroke-width:5}.h{stroke:var(--back);stroke-width:10}"""
+.a{stroke-width:5}.h{stroke:var(--back);stroke-width:9}"""
 
 
 @dataclass(frozen=True, slots=True)
