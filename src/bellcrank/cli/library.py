@@ -14,7 +14,7 @@ import typer
 from bellcrank.cli.app import INTERRUPTED, app
 from bellcrank.cli.arguments import DesignName
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json
-from bellcrank.cli.library_view import entry_line, print_entries, print_entry, warn
+from bellcrank.cli.library_view import MakingProgress, print_entries, print_entry, warn
 from bellcrank.errors import InvalidSettings
 from bellcrank.registry import design_sources
 
@@ -185,14 +185,10 @@ def make(
     announce_compilation()
     done = 0
     start = time.monotonic()
-    with stopping_on_interrupt() as stop:
-        for made in make_entries(order, folder, workers=workers, stop=stop):
+    with stopping_on_interrupt() as stop, MakingProgress(order) as progress:
+        for made in make_entries(order, folder, workers=workers, tell=progress, stop=stop):
+            progress.finish(made, time.monotonic() - start)
             done += 1
-            what = made.note if made.entry is None else entry_line(made.entry)
-            notes.print(
-                f"{made.number + 1:3d} of {made.total}  {plain(made.task.name)}: {plain(what)}"
-                f"  ({made.seconds:.0f} s, {time.monotonic() - start:.0f} s in all)"
-            )
             if stop.is_set():
                 break
     if done < len(order.tasks):

@@ -4,15 +4,53 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.table import Table
 
 from bellcrank.cli.console import notes, number_of, plain, print_json, results
+from bellcrank.cli.live import Live
 
 if TYPE_CHECKING:
-    from bellcrank.machines.library import Entry, Library, Summary
+    from bellcrank.machines.library import Entry, Library, Made, Order, Summary, Task
+    from bellcrank.search import Progress
+
+
+class MakingProgress(Live):
+    """A live line: which entry is searched for, and a line for each that is made.
+
+    Parameters
+    ----------
+    order
+        What is to be made.
+    """
+
+    def __init__(self, order: Order) -> None:
+        self._each = order.steps * order.chains
+        self._total = len(order.tasks)
+        self._finished = self._steps = 0
+        self._lock = threading.Lock()
+        super().__init__("making", self._total * self._each)
+
+    def __call__(self, task: Task, step: Progress) -> None:
+        """Take in the news of one chain."""
+        with self._lock:
+            self._steps += step.steps
+            line = f"{self._finished + 1} of {self._total}  {task.name}"
+            done = self._finished * self._each + min(self._steps, self._each)
+            self._show(done, self._total * self._each, line, f"{line}  {self._steps} steps")
+
+    def finish(self, made: Made, elapsed: float) -> None:
+        """Say what became of a task."""
+        with self._lock:
+            self._finished, self._steps = made.number + 1, 0
+        what = made.note if made.entry is None else entry_line(made.entry)
+        notes.print(
+            f"{made.number + 1:3d} of {made.total}  {plain(made.task.name)}: {plain(what)}"
+            f"  ({made.seconds:.0f} s, {elapsed:.0f} s in all)"
+        )
 
 
 def warn(known: Library) -> None:
