@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+import re
 from importlib.resources import files
 from string import Template
 from typing import TYPE_CHECKING
@@ -21,13 +22,15 @@ if TYPE_CHECKING:
     from bellcrank.machines.library.entry import Entry
 
 PAGE, TABLE = "index.html", "README.md"
+PICTURE = re.compile(r"[a-z0-9-]+-[0-9a-f]{8}\.svg")
+"""Of an entry; others in the folder are none of ours."""
 ORDER = ("up-left", "up", "up-right", "right", "down-right", "down", "down-left", "left")
 """Of directions, around a clock."""
 ABOUT = (
     "{} entries, {} of them more efficient than the plain lever of the same task. Each is pushed "
     "down on the right (orange) and moves its left port (blue); `index.html` beside this page is "
-    "the same to browse. What the figures mean is said in [docs/machines.md]"
-    "(../machines.md#the-library). This page is written by `bellcrank library index`."
+    "the same to browse. What the figures mean is said in `docs/machines.md`. This page is written "
+    "by `bellcrank library index`."
 )
 COLUMNS = (
     "", "name", "efficiency", "plain lever", "frame FEM", "input stiffness", "output stiffness",
@@ -59,7 +62,7 @@ def write_pages(known: Library, out: Path, *, overwrite: bool = False) -> list[P
     for name, picture in drawn.items():
         write_text(out / f"{name}.svg", picture.svg(name), overwrite=True)
     for old in out.glob("*.svg"):
-        if old.stem not in drawn:
+        if PICTURE.fullmatch(old.name) and old.stem not in drawn:
             old.unlink()
     write_text(pages[0], page(entries, drawn), overwrite=overwrite)
     write_text(pages[1], table(entries), overwrite=overwrite)
