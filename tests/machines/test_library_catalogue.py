@@ -125,6 +125,9 @@ def test_a_search_keeps_what_fits_and_sorts_the_best_first() -> None:
     assert values == sorted(values, reverse=True)
     assert {each.columns for each in SHIPPED.search(columns=7)} == {7}
     assert all(each.better for each in SHIPPED.search(better=True))
+    clear = SHIPPED.search(clear=True)
+    assert 0 < len(clear) < len(NAMES)
+    assert all(SHIPPED.find(each.name).clear for each in clear[::10])
     assert all(each.input_stiffness <= 0.2 for each in SHIPPED.search(stiffness=0.2))
     assert all(1.0 / each.output_compliance >= 0.1 for each in SHIPPED.search(output_stiffness=0.1))
 

@@ -67,6 +67,9 @@ def search(
     better: Annotated[
         bool, typer.Option("--better", help="Only what beats the plain lever.")
     ] = False,
+    clear: Annotated[
+        bool, typer.Option("--clear", help="Only what has no struts that touch when it moves.")
+    ] = False,
     sort: Annotated[
         str, typer.Option(help="efficiency, stiffness, output-stiffness, work, gain or size.")
     ] = "efficiency",
@@ -85,6 +88,7 @@ def search(
         stiffness=stiffness,
         output_stiffness=output_stiffness,
         better=better,
+        clear=clear,
         sort=sort,
     )
     print_entries(known, found, as_json=as_json, spring=spring)

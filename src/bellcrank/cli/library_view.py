@@ -83,14 +83,17 @@ def print_entries(
             _figure(each.efficiency, 3),
             _figure(port.efficiency_against(spring), 3),
             _figure(each.lever_efficiency, 3) + ("" if each.better else "*"),
-            _figure(each.frame_efficiency, 3) if each.frame_status == "converged" else "snaps",
+            (_figure(each.frame_efficiency, 3) if each.frame_status == "converged" else "snaps")
+            + ("" if each.clear else "!"),
             _figure(each.input_stiffness, 3),
             _figure(port.output_stiffness, 3),
         )
     results.print(table)
     worse = len(found) - sum(each.better for each in found)
     said = "1 entry" if len(found) == 1 else f"{len(found)} entries"
-    mark = f"; * the plain lever is better ({worse})" if worse else ""
+    touching = len(found) - sum(each.clear for each in found)
+    marks = {"* the plain lever is better": worse, "! struts touch": touching}
+    mark = "".join(f"; {text} ({count})" for text, count in marks.items() if count)
     results.print(f"\n{said}, lattice units{mark}")
     warn(known)
 

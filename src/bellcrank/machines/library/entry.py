@@ -134,6 +134,11 @@ class Entry:
         return math.nan if self.design.efficiency is None else self.design.efficiency
 
     @property
+    def clear(self) -> bool:
+        """Whether there is nothing to be warned of: struts that touch, a loss of stability."""
+        return not (self.validation.warnings or self.characterisation.doubts)
+
+    @property
     def better(self) -> bool:
         """Whether it is more efficient than the plain lever."""
         return not self.lever.efficiency >= self.efficiency

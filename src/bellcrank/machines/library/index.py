@@ -30,7 +30,7 @@ ABOUT = (
     "{} entries, {} of them more efficient than the plain lever of the same task. Each is pushed "
     "down on the right (orange) and moves its left port (blue); `index.html` beside this page is "
     "the same to browse. What the figures mean is said in `docs/machines.md`. This page is written "
-    "by `bellcrank library index`."
+    "by `bellcrank library index`. *Touches*: at the full stroke, struts of the part touch."
 )
 COLUMNS = (
     "", "name", "efficiency", "plain lever", "frame FEM", "input stiffness", "output stiffness",
@@ -90,6 +90,7 @@ def page(entries: list[Entry], drawn: dict[str, Thumbnail]) -> str:
         count=len(entries),
         better=sum(entry.better for entry in entries),
         stable=sum(check.status == "converged" for check in checks),
+        clear=sum(entry.clear for entry in entries),
         directions=_choices(
             "direction",
             [("", "all"), *((name, _pointer(name)) for name in ORDER if name in found)],
@@ -131,7 +132,7 @@ def _row(entry: Entry) -> str:
         f"`{entry.name}`",
         f"**{_figure(entry.efficiency)}**",
         lever if entry.better else f"{lever} (better)",
-        _frame(entry),
+        _frame(entry) + ("" if entry.clear else " (touches)"),
         _figure(rest.input_stiffness),
         _figure(rest.output_stiffness),
         f"{rest.best_work_share:.1%}".replace("%", " %"),
@@ -163,7 +164,7 @@ def _card(entry: Entry, picture: Thumbnail, place: int, longest: float) -> str:
         for label, value in (("this", entry.efficiency), ("lever", lever))
     )
     figures = [
-        ("FEM", _frame(entry)),
+        ("FEM", _frame(entry) + _warning(entry)),
         ("work", f"{100.0 * rest.best_work_share:.1f} %"),
         ("input k", _figure(rest.input_stiffness)),
         ("output k", _figure(rest.output_stiffness)),
@@ -180,6 +181,13 @@ def _card(entry: Entry, picture: Thumbnail, place: int, longest: float) -> str:
         f'<div class="b">{bars}</div></div><dl class="f">{rows}</dl>'
         f'<button class="n" type="button" data-name="{name}">{name}</button></li>'
     )
+
+
+def _warning(entry: Entry) -> str:
+    """Return a mark that tells what a builder should know, when pointed at."""
+    told = [*entry.validation.warnings, *entry.characterisation.doubts]
+    text = html.escape("; ".join(told))
+    return f' <abbr class="w" title="{text}">touches</abbr>' if told else ""
 
 
 def _longest(entries: list[Entry], entry: Entry) -> float:
