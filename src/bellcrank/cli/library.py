@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shlex
 import sys
 import time
@@ -11,24 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE
-from rich.table import Table
 
 from bellcrank.cli.app import INTERRUPTED, app
 from bellcrank.cli.arguments import DesignName
-from bellcrank.cli.console import (
-    announce_compilation,
-    notes,
-    number_of,
-    plain,
-    print_json,
-    results,
-)
+from bellcrank.cli.console import announce_compilation, notes, plain, print_json
+from bellcrank.cli.library_view import MakingProgress, print_entries, print_entry, warn
 from bellcrank.errors import InvalidSettings
 from bellcrank.registry import design_sources
 
 if TYPE_CHECKING:
-    from bellcrank.machines.library import Entry, Library, Summary
     from bellcrank.model import Design
 
 library = typer.Typer(
@@ -58,7 +48,7 @@ def list_(as_json: AsJson = False) -> None:
     from bellcrank.machines.library import library
 
     known = library()
-    _tell(known, known.summaries, as_json=as_json)
+    print_entries(known, known.summaries, as_json=as_json)
 
 
 @library.command()
@@ -76,6 +66,9 @@ def search(
     output_stiffness: Annotated[float | None, typer.Option(help="At least.")] = None,
     better: Annotated[
         bool, typer.Option("--better", help="Only what beats the plain lever.")
+    ] = False,
+    clear: Annotated[
+        bool, typer.Option("--clear", help="Only what has no struts that touch when it moves.")
     ] = False,
     sort: Annotated[
         str, typer.Option(help="efficiency, stiffness, output-stiffness, work, gain or size.")
@@ -95,9 +88,10 @@ def search(
         stiffness=stiffness,
         output_stiffness=output_stiffness,
         better=better,
+        clear=clear,
         sort=sort,
     )
-    _tell(known, found, as_json=as_json, spring=spring)
+    print_entries(known, found, as_json=as_json, spring=spring)
 
 
 @library.command()
@@ -124,7 +118,7 @@ def show(
     if as_json:
         print_json(json.dumps(entry_to_dict(entry), indent=1))
     else:
-        _print_entry(entry, known.path(entry.name))
+        print_entry(entry, known.path(entry.name))
     if out is not None:
         from bellcrank.plots import draw_motion
         from bellcrank.workflows import move
@@ -156,7 +150,7 @@ def add(
     if as_json:
         print_json(json.dumps(entry_to_dict(entry), indent=1))
     else:
-        _print_entry(entry, path)
+        print_entry(entry, path)
     notes.print(f"kept {plain(entry.name)}")
 
 
@@ -195,14 +189,10 @@ def make(
     announce_compilation()
     done = 0
     start = time.monotonic()
-    with stopping_on_interrupt() as stop:
-        for made in make_entries(order, folder, workers=workers, stop=stop):
+    with stopping_on_interrupt() as stop, MakingProgress(order) as progress:
+        for made in make_entries(order, folder, workers=workers, tell=progress, stop=stop):
+            progress.finish(made, time.monotonic() - start)
             done += 1
-            what = made.note if made.entry is None else _line(made.entry)
-            notes.print(
-                f"{made.number + 1:3d} of {made.total}  {plain(made.task.name)}: {plain(what)}"
-                f"  ({made.seconds:.0f} s, {time.monotonic() - start:.0f} s in all)"
-            )
             if stop.is_set():
                 break
     if done < len(order.tasks):
@@ -226,7 +216,7 @@ def index(
     from bellcrank.machines.library.index import write_pages
 
     known = whole() if entries is None else Library((entries,))
-    _warn(known)
+    warn(known)
     announce_compilation()
     for path in write_pages(known, out, overwrite=overwrite):
         notes.print(f"wrote {plain(path)}")
@@ -244,124 +234,3 @@ def _numbers(option: str, text: str) -> tuple[int, ...]:
         raise InvalidSettings(
             f"{option} {text}: expected whole numbers with commas between"
         ) from None
-
-
-def _warn(known: Library) -> None:
-    for line in known.damaged:
-        notes.print(f"[yellow]left out:[/] {plain(line)}")
-
-
-def _tell(known: Library, found: list[Summary], *, as_json: bool, spring: float = 0.0) -> None:
-    """Print entries, a line each."""
-    from bellcrank.machines.library.summary import summary_to_dict
-
-    if as_json:
-        print_json(json.dumps([summary_to_dict(each) for each in found], indent=1))
-        _warn(known)
-        return
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    table.add_column("name", no_wrap=True)
-    for heading in (
-        "as\nmade", f"against\n{spring:g}" if spring else "free,\nat rest", "plain\nlever",
-        "frame\nFEM", "input\nstiff.", "output\nstiff.",
-    ):  # fmt: skip
-        table.add_column(heading, justify="right", no_wrap=True)
-    for each in found:
-        port = each.two_port
-        table.add_row(
-            plain(each.name),
-            _figure(each.efficiency, 3),
-            _figure(port.efficiency_against(spring), 3),
-            _figure(each.lever_efficiency, 3) + ("" if each.better else "*"),
-            _figure(each.frame_efficiency, 3) if each.frame_status == "converged" else "snaps",
-            _figure(each.input_stiffness, 3),
-            _figure(port.output_stiffness, 3),
-        )
-    results.print(table)
-    worse = len(found) - sum(each.better for each in found)
-    said = "1 entry" if len(found) == 1 else f"{len(found)} entries"
-    mark = f"; * the plain lever is better ({worse})" if worse else ""
-    results.print(f"\n{said}: efficiencies, and stiffnesses in lattice units{mark}")
-    _warn(known)
-
-
-def _line(entry: Entry) -> str:
-    """Return an entry in a line."""
-    lever = _figure(entry.lever.efficiency)
-    return f"{entry.name}  efficiency {entry.efficiency:.3f}, plain lever {lever}"
-
-
-def _print_entry(entry: Entry, path: Path) -> None:
-    """Print all that is known of an entry."""
-    rest, check = entry.characterisation.rest, entry.validation
-    told = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    lever = _figure(entry.lever.efficiency)
-    if entry.lever.unbound_efficiency > entry.lever.efficiency:
-        lever += f" ({_figure(entry.lever.unbound_efficiency)} without its goals)"
-    spring = entry.design.problem.output.spring
-    rows = [
-        ("name", entry.name),
-        ("made for", _made_for(entry)),
-        ("beams", str(entry.design.beam_count)),
-        ("efficiency" + (f", springs of {spring:g}" if spring else ""), _figure(entry.efficiency)),
-        ("plain lever", lever + ("" if entry.better else ": better")),
-        ("  which is", entry.lever.shape or "none that is stable and keeps the goals"),
-        ("frame FEM", _frame(entry)),
-        ("  part", f"{check.material}, struts {check.width:g} mm, {check.scale:g} mm a unit"),
-        ("at rest, free efficiency", _figure(rest.efficiency)),
-        ("  input stiffness", _figure(rest.input_stiffness)),
-        ("  output stiffness", _figure(rest.output_stiffness)),
-        ("  blocked force per motion", _figure(rest.transmitted_stiffness)),
-        ("  best spring", f"{_figure(rest.matched_spring)}, {rest.best_work_share:.1%} of work"),
-    ]  # fmt: skip
-    for curve in entry.characterisation.curves:
-        way = "" if curve.reached >= 1.0 else f", {curve.status.label} at {curve.reached:.1%}"
-        end = (
-            f"output {_figure(curve.output[-1])}, force {_figure(-curve.output_force[-1])}, "
-            f"for {_figure(curve.motion[-1])} with {_figure(curve.input_force[-1])}"
-        )
-        rows.append((f"stroke, {curve.load.label}", end + way))
-    rows += [("origin", _origin(entry)), ("file", str(path))]
-    for label, value in rows:
-        told.add_row(label, plain(value))
-    results.print(told)
-    for line in (*check.warnings, *entry.characterisation.doubts):
-        notes.print(f"[yellow]note:[/] {plain(line)}")
-
-
-def _made_for(entry: Entry) -> str:
-    from bellcrank.machines.library import kinds
-
-    size = "" if entry.columns is None else f", {entry.columns} columns"
-    about = f": {kinds[entry.kind].about}" if entry.kind in kinds else ""
-    return f"output {entry.direction}{size}, {entry.kind}{about}"
-
-
-def _frame(entry: Entry) -> str:
-    check = entry.validation
-    known = math.isfinite(check.efficiency)
-    value = _figure(check.efficiency) if known else f"{check.status} at {check.reached:.1%}"
-    return (
-        f"{value} (linear {_figure(check.linear_efficiency)}), strain {check.strain:.1%}, "
-        f"stress {check.stress:.3g} MPa"
-    )
-
-
-def _origin(entry: Entry) -> str:
-    """Return where an entry comes from, in a line."""
-    told = entry.provenance
-    settings = told.get("settings")
-    made = f"version {told.get('version')}, {str(told.get('time'))[:10]}"
-    if not isinstance(settings, dict):
-        return f"a design of its own, measured by {made}"
-    return (
-        f"{settings.get('search')}, {number_of(int(settings.get('chains', 0)), 'chain')} of "
-        f"{settings.get('steps')} steps, seed {settings.get('seed')}; {made}"
-    )
-
-
-def _figure(value: float, digits: int = 4) -> str:
-    """Return some digits; what is no number is a dash."""
-    if not math.isfinite(value):
-        return "-"
-    return "0" if abs(value) < 1e-12 else f"{value:.{digits}g}"

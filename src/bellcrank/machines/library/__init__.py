@@ -24,8 +24,9 @@ from bellcrank.machines.library.entry import Entry, FrameCheck, LeverCheck
 from bellcrank.machines.library.files import read_entry, write_entry
 from bellcrank.machines.library.kinds import Kind, kinds
 from bellcrank.machines.library.lever import plain_lever
-from bellcrank.machines.library.making import Made, Order, Task, make
+from bellcrank.machines.library.making import Made, make
 from bellcrank.machines.library.measuring import measure
+from bellcrank.machines.library.orders import Order, Task
 from bellcrank.machines.library.summary import Summary
 
 __all__ = [

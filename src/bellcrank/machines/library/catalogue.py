@@ -173,6 +173,7 @@ class Library:
         stiffness: float | None = None,
         output_stiffness: float | None = None,
         better: bool = False,
+        clear: bool = False,
         sort: str = "efficiency",
     ) -> list[Summary]:
         """Return the entries that are as asked for, the best first.
@@ -191,6 +192,8 @@ class Library:
             Input held, at least.
         better
             Whether only what beats the plain lever is wanted.
+        clear
+            Whether only what there is nothing to be warned of is wanted: no struts that touch.
         sort
             A key of `SORTS`.
 
@@ -217,6 +220,7 @@ class Library:
                 and (stiffness is None or each.input_stiffness <= stiffness)
                 and (output_stiffness is None or output_stiffness * each.output_compliance <= 1.0)
                 and (each.better or not better)
+                and (each.clear or not clear)
             )
 
         key = SORTS[sort]
@@ -255,9 +259,9 @@ def find_entry(text: str) -> Entry:
 
     Examples
     --------
-    >>> find_entry("sideways-9-free")  # doctest: +ELLIPSIS
+    >>> find_entry("up-9-fre-")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bellcrank.errors.UnknownName: no entry 'sideways-9-free' in the library; near: ...
+    bellcrank.errors.UnknownName: no entry 'up-9-fre-' in the library...; see bellcrank library list
     """
     return library().find(text)

@@ -134,6 +134,11 @@ class Entry:
         return math.nan if self.design.efficiency is None else self.design.efficiency
 
     @property
+    def clear(self) -> bool:
+        """Whether there is nothing to be warned of: struts that touch, a loss of stability."""
+        return not (self.validation.warnings or self.characterisation.doubts)
+
+    @property
     def better(self) -> bool:
         """Whether it is more efficient than the plain lever."""
         return not self.lever.efficiency >= self.efficiency
@@ -146,7 +151,7 @@ def identity(design: Design, kind: str) -> str:
     --------
     >>> from bellcrank.machines import elementary
     >>> identity(elementary(9, "down").full_design(), "free")
-    'b0e21efd'
+    '15be2a2a'
     """
     told = {"kind": kind, "mask": design.mask_hex, "problem": design.problem.hash}
     return hashlib.sha256(canonical(told).encode()).hexdigest()[:DIGITS]
@@ -210,7 +215,7 @@ def direction_of(output: Output) -> str:
     --------
     >>> from bellcrank.model import find_problem
     >>> direction_of(find_problem("crane").output), direction_of(find_problem("pliers").output)
-    ('left', 'mixed')
+    ('left', 'down')
     """
     mean = output.direction.mean(axis=0)
     if np.hypot(*mean) < 0.5:

@@ -1,9 +1,10 @@
-"""Pages that show the library: one to browse, in one file, and one to read, with pictures beside."""
+"""Pages that show the library: one to browse, one to read, and the pictures of the latter."""
 
 from __future__ import annotations
 
 import html
 import math
+import re
 from importlib.resources import files
 from string import Template
 from typing import TYPE_CHECKING
@@ -21,8 +22,20 @@ if TYPE_CHECKING:
     from bellcrank.machines.library.entry import Entry
 
 PAGE, TABLE = "index.html", "README.md"
+PICTURE = re.compile(r"[a-z0-9-]+-[0-9a-f]{8}\.svg")
+"""Of an entry; others in the folder are none of ours."""
 ORDER = ("up-left", "up", "up-right", "right", "down-right", "down", "down-left", "left")
 """Of directions, around a clock."""
+ABOUT = (
+    "{} entries, {} of them more efficient than the plain lever of the same task. Each is pushed "
+    "down on the right (orange) and moves its left port (blue); `index.html` beside this page is "
+    "the same to browse. What the figures mean is said in `docs/machines.md`. This page is written "
+    "by `bellcrank library index`. *Touches*: at the full stroke, struts of the part touch."
+)
+COLUMNS = (
+    "", "name", "efficiency", "plain lever", "frame FEM", "input stiffness", "output stiffness",
+    "best share of work",
+)  # fmt: skip
 
 
 def write_pages(known: Library, out: Path, *, overwrite: bool = False) -> list[Path]:
@@ -49,7 +62,7 @@ def write_pages(known: Library, out: Path, *, overwrite: bool = False) -> list[P
     for name, picture in drawn.items():
         write_text(out / f"{name}.svg", picture.svg(name), overwrite=True)
     for old in out.glob("*.svg"):
-        if old.stem not in drawn:
+        if PICTURE.fullmatch(old.name) and old.stem not in drawn:
             old.unlink()
     write_text(pages[0], page(entries, drawn), overwrite=overwrite)
     write_text(pages[1], table(entries), overwrite=overwrite)
@@ -77,6 +90,7 @@ def page(entries: list[Entry], drawn: dict[str, Thumbnail]) -> str:
         count=len(entries),
         better=sum(entry.better for entry in entries),
         stable=sum(check.status == "converged" for check in checks),
+        clear=sum(entry.clear for entry in entries),
         directions=_choices(
             "direction",
             [("", "all"), *((name, _pointer(name)) for name in ORDER if name in found)],
@@ -90,23 +104,15 @@ def page(entries: list[Entry], drawn: dict[str, Thumbnail]) -> str:
 
 def table(entries: list[Entry]) -> str:
     """Return the page to read: Markdown with a table for each kind."""
-    lines = [
-        "# Library of elementary actuators",
-        "",
-        f"{len(entries)} entries, {sum(entry.better for entry in entries)} of them more efficient "
-        "than the plain lever of the same task. Each is pushed down on the right (orange) and moves "
-        "its left port (blue); `index.html` beside this page is the same to browse. What the "
-        "figures mean is said in [docs/machines.md](../machines.md#the-library). This page is "
-        "written by `bellcrank library index`.",
-    ]
+    better = sum(entry.better for entry in entries)
+    lines = ["# Library of elementary actuators", "", ABOUT.format(len(entries), better)]
     for kind in dict.fromkeys(entry.kind for entry in entries):
         lines += [
             "",
             f"## {kind}",
             "",
-            "| | name | efficiency | plain lever | frame FEM | input stiffness | "
-            "output stiffness | best share of work |",
-            "|---|---|---|---|---|---|---|---|",
+            f"| {' | '.join(COLUMNS)} |",
+            f"|{'---|' * len(COLUMNS)}",
         ]
         lines += [_row(entry) for entry in entries if entry.kind == kind]
     return "\n".join(lines) + "\n"
@@ -126,7 +132,7 @@ def _row(entry: Entry) -> str:
         f"`{entry.name}`",
         f"**{_figure(entry.efficiency)}**",
         lever if entry.better else f"{lever} (better)",
-        _frame(entry),
+        _frame(entry) + ("" if entry.clear else " (touches)"),
         _figure(rest.input_stiffness),
         _figure(rest.output_stiffness),
         f"{rest.best_work_share:.1%}".replace("%", " %"),
@@ -158,7 +164,7 @@ def _card(entry: Entry, picture: Thumbnail, place: int, longest: float) -> str:
         for label, value in (("this", entry.efficiency), ("lever", lever))
     )
     figures = [
-        ("FEM", _frame(entry)),
+        ("FEM", _frame(entry) + _warning(entry)),
         ("work", f"{100.0 * rest.best_work_share:.1f} %"),
         ("input k", _figure(rest.input_stiffness)),
         ("output k", _figure(rest.output_stiffness)),
@@ -166,7 +172,7 @@ def _card(entry: Entry, picture: Thumbnail, place: int, longest: float) -> str:
         ("strain", f"{100.0 * entry.validation.strain:.1f} %"),
     ]
     rows = "".join(f"<div><dt>{key}</dt><dd>{value}</dd></div>" for key, value in figures)
-    verdict = "efficiency" if entry.better else '<span class="w">the lever is better</span>'
+    verdict = "efficiency" if entry.better else '<span class="w">below lever</span>'
     return (
         f'<li {data}><svg viewBox="{picture.view_box}" role="img" aria-label="{name}">'
         f'{picture.content}</svg><div class="t"><b>{entry.direction.replace("-", " ")}{size}</b>'
@@ -175,6 +181,13 @@ def _card(entry: Entry, picture: Thumbnail, place: int, longest: float) -> str:
         f'<div class="b">{bars}</div></div><dl class="f">{rows}</dl>'
         f'<button class="n" type="button" data-name="{name}">{name}</button></li>'
     )
+
+
+def _warning(entry: Entry) -> str:
+    """Return a mark that tells what a builder should know, when pointed at."""
+    told = [*entry.validation.warnings, *entry.characterisation.doubts]
+    text = html.escape("; ".join(told))
+    return f' <abbr class="w" title="{text}">touches</abbr>' if told else ""
 
 
 def _longest(entries: list[Entry], entry: Entry) -> float:

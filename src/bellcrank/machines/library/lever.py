@@ -19,6 +19,7 @@ efficiency there is about 0, or below.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -54,6 +55,8 @@ LINK = (2, 8)
 """Struts of a link, at least and at most."""
 STEEPEST = 0.35
 """Least part of the input's motion that a link must take along."""
+DEAD = 1e-9
+"""Lever arm of a link, by its length, that is none."""
 MOST_PIVOTS = 24
 """More support nodes than that are thinned out evenly."""
 
@@ -189,6 +192,8 @@ def lever_of(problem: Problem, shape: Shape) -> Design:
 def lever_law(problem: Problem, shape: Shape) -> float:
     """Return the efficiency of a lever with rigid arms, a rigid link and free joints.
 
+    Infinite at a dead point, where the link points at the pivot.
+
     Raises
     ------
     InvalidSettings
@@ -210,7 +215,8 @@ def lever_law(problem: Problem, shape: Shape) -> float:
     output = positions[problem.output.nodes].mean(axis=0)
     given = along @ problem.input.direction.mean(axis=0)
     wanted = _turned(output - pivot) @ problem.output.direction.mean(axis=0)
-    return float(given * wanted / (along @ _turned(knee - pivot)))
+    arm = along @ _turned(knee - pivot)
+    return float(given * wanted / arm) if abs(arm) > DEAD * float(along @ along) else math.inf
 
 
 def _turned(vector: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,26 +7,20 @@ entries.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import shutil
 import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bellcrank.errors import InvalidSettings
-from bellcrank.machines.elementary import DIRECTIONS, elementary
-from bellcrank.machines.library.entry import stem
 from bellcrank.machines.library.files import write_entry
-from bellcrank.machines.library.kinds import Kind, kinds
-from bellcrank.machines.library.lever import plain_lever
+from bellcrank.machines.library.kinds import kinds
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, measure
-from bellcrank.machines.library.summary import entry_files, read_summary, write_index
+from bellcrank.machines.library.summary import entry_files, read_index, read_summary, write_index
 from bellcrank.mechanics import Response, Status
 from bellcrank.runs.files import make_folder
-from bellcrank.search import HoppingSettings, SearchSettings, read_settings, run_chains, select
+from bellcrank.search import read_settings, run_chains, select
 from bellcrank.workflows import reopen_design, start_design
 from bellcrank.workflows.design import accepted_candidates, judge_for
 
@@ -35,114 +29,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from bellcrank.machines.library.entry import Entry
+    from bellcrank.machines.library.orders import Order, Task
     from bellcrank.model import Design, Problem
     from bellcrank.runs import RunFolder
-    from bellcrank.search import Candidate, Progress, Responder
+    from bellcrank.search import Candidate, Progress, Responder, SearchSettings
 
 WORK = "searches"
 """Folder of the searches, in that of the entries."""
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """One entry to make.
-
-    Examples
-    --------
-    >>> Task("up", 9, "loaded").problem().name
-    'elementary-9-up-loaded'
-    """
-
-    direction: str
-    columns: int
-    kind: str
-
-    @property
-    def name(self) -> str:
-        """With which the name of the entry begins."""
-        return stem(self.direction, self.columns, self.kind)
-
-    def problem(self) -> Problem:
-        """Return what the search is given: it may leave supports unused, as levers do."""
-        given = elementary(self.columns, self.direction, kinds[self.kind].spring)
-        lattice = given.lattice
-        held = np.isin(lattice.beams, given.supports.nodes).all(axis=1)
-        at_ports = lattice.beams_touching(np.concatenate([given.input.nodes, given.output.nodes]))
-        return replace(given, designable=np.flatnonzero(~held & ~at_ports))
-
-    def starts(self, chains: int) -> dict[str, tuple[Problem, int]]:
-        """Return what searches begin with, and how many chains: the full lattice, and a lever.
-
-        Half of the chains are given the plain lever, if there is one. What it is good at is far
-        from the full lattice.
-        """
-        problem = self.problem()
-        for goals in (kinds[self.kind].goals, ()):
-            with contextlib.suppress(InvalidSettings):
-                lever = plain_lever(problem, goals)
-                break
-        else:
-            return {"full": (problem, chains)}
-        initial = problem.initial.copy()
-        initial[problem.designable] = lever.mask[problem.designable]
-        begun = {
-            "full": (problem, chains - chains // 2),
-            "lever": (replace(problem, initial=initial), chains // 2),
-        }
-        return {name: start for name, start in begun.items() if start[1]}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
-    """What entries to make, and how long to search for each.
-
-    Parameters
-    ----------
-    directions, columns, kinds
-        An entry for each combination.
-    steps, chains, seed
-        Of each search.
-
-    Raises
-    ------
-    InvalidSettings, UnknownName
-
-    Examples
-    --------
-    >>> len(Order().tasks)
-    72
-    """
-
-    directions: tuple[str, ...] = tuple(DIRECTIONS)
-    columns: tuple[int, ...] = (9, 7, 12)
-    kinds: tuple[str, ...] = tuple(kinds)
-    steps: int = 20_000
-    chains: int = 4
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for task in self.tasks:
-            task.problem()
-            self.settings(kinds[task.kind])
-
-    @property
-    def tasks(self) -> list[Task]:
-        """Of one size after the other."""
-        return [
-            Task(direction, columns, kind)
-            for columns in self.columns
-            for direction in self.directions
-            for kind in self.kinds
-        ]
-
-    def settings(self, kind: Kind) -> SearchSettings:
-        """Return what the search for a kind is told."""
-        return HoppingSettings(
-            steps=self.steps, chains=self.chains, seed=self.seed, goals=kind.goals
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,24 +98,36 @@ def make(
     there = {path.stem.rpartition("-")[0] for path in entry_files(folder)}
     for number, task in enumerate(order.tasks):
         start = time.monotonic()
+        place = folder / WORK / task.name
         entry, note = None, "was there"
         if task.name not in there:
-            place = folder / WORK / task.name
             try:
                 entry = _make(task, order, place, workers, tell, stop)
                 note = "made"
             except _NoneFound as none:
                 note = str(none)
-            if entry is None and note == "made":
-                return  # stopped
             if entry is not None:
                 write_entry(entry, folder)
-                write_index(folder, [read_summary(path) for path in entry_files(folder)])
-            shutil.rmtree(place)
-            if not any(place.parent.iterdir()):
-                place.parent.rmdir()
-        seconds = time.monotonic() - start
-        yield Made(task, number, len(order.tasks), entry, note, seconds)
+            elif note == "made":
+                return  # stopped
+        _forget(place)
+        _refresh_index(folder)
+        yield Made(task, number, len(order.tasks), entry, note, time.monotonic() - start)
+
+
+def _forget(place: Path) -> None:
+    """Remove a search that is not needed any more, and the folder of searches with the last."""
+    if place.exists():
+        shutil.rmtree(place)
+    if place.parent.exists() and not any(place.parent.iterdir()):
+        place.parent.rmdir()
+
+
+def _refresh_index(folder: Path) -> None:
+    """Write the index of a folder if it does not fit the entries."""
+    files = entry_files(folder)
+    if files and read_index(folder) is None:
+        write_index(folder, [read_summary(path) for path in files])
 
 
 class _NoneFound(Exception):

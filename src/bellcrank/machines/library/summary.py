@@ -46,6 +46,8 @@ class Summary:
         Of the plain lever; nan where none is stable.
     better
         Whether it is more efficient than that.
+    clear
+        Whether there is nothing to be warned of: struts that touch, a loss of stability.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Summary:
     frame_status: str
     lever_efficiency: float
     better: bool
+    clear: bool
 
     @property
     def hash(self) -> str:
@@ -89,6 +92,7 @@ class SummaryTable(Table):
     frame_status: str
     lever_efficiency: float | None
     better: bool
+    clear: bool
 
 
 class IndexTable(Table):
@@ -127,6 +131,7 @@ def read_summary(path: str | os.PathLike[str]) -> Summary:
             frame_status=table.validation.status,
             lever_efficiency=table.lever.efficiency,
             better=table.lever.better,
+            clear=not (table.validation.warnings or found.doubts),
         )
     )
 

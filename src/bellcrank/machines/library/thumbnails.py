@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.plots.scene import beam_kinds, input_arrows, spacing, wanted_arrows
+from bellcrank.plots.scene import (
+    arrow_length,
+    beam_kinds,
+    input_arrows,
+    spacing,
+    wanted_arrows,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -26,12 +32,14 @@ UNITS = 20
 HEAD = 11.0
 """Length of the head of an arrow, in those units."""
 STYLE = """
-svg{--rest:#d5dae0;--ink:#20262d;--in:#d55e00;--out:#0072b2;--ground:#c3c9d0}
+svg{--rest:#d5dae0;--ink:#20262d;--in:#d55e00;--out:#0072b2;--ground:#c3c9d0;--back:#fff}
 @media(prefers-color-scheme:dark){svg{--rest:#3a424b;--ink:#e3e8ee;--in:#ff9352;--out:#63b7f2;\
---ground:#4c555f}}
+--ground:#4c555f;\
+--back:#0d1117}}
 path{fill:none;stroke-linecap:round;stroke-linejoin:round;stroke-width:4.2}
 .r{stroke:var(--rest)}.m{stroke:var(--ink)}.i{stroke:var(--in)}.o{stroke:var(--out)}
-.g{stroke:var(--ground);stroke-width:13}.a{stroke-width:5}"""
+.g{stroke:var(--ground);stroke-width:13}
+.a{stroke-width:5}.h{stroke:var(--back);stroke-width:9}"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +74,11 @@ class Thumbnail:
             f'<path class="{name}" data-r="{self.rest[name]}" d="{path}"/>'
             for name, path in self.moved.items()
         ]
-        parts += [f'<path class="{name} a" d="{path}"/>' for name, path in self.arrows.items()]
+        parts += [
+            f'<path class="{shade} a" d="{path}"/>'
+            for name, path in self.arrows.items()
+            for shade in ("h", name)
+        ]
         return "".join(parts)
 
     def svg(self, label: str) -> str:
@@ -94,7 +106,7 @@ def thumbnail(design: Design, displacement: NDArray[np.float64]) -> Thumbnail:
     >>> design = elementary(7, "up").full_design()
     >>> drawn = thumbnail(design, np.zeros((design.problem.lattice.node_count, 2)))
     >>> drawn.view_box.split()[:2], len(drawn.moved), drawn.moved == drawn.rest
-    (['-58', '-196'], 3, True)
+    (['-88', '-168'], 3, True)
     """
     problem = design.problem
     scale = UNITS / spacing(problem)
@@ -109,7 +121,10 @@ def thumbnail(design: Design, displacement: NDArray[np.float64]) -> Thumbnail:
     groups = {"m": ends[~of_input & ~of_output], "i": ends[of_input], "o": ends[of_output]}
     arrows = {"i": input_arrows(problem), "o": wanted_arrows(problem, places)}
     tips = np.array([point for each in arrows.values() for a in each for point in (a.tail, a.tip)])
-    corners = np.concatenate([rest, moved, (tips * flip).round().astype(np.int64)])
+    # Room for an arrow to any side of the ports, so that drawings of a size are to one scale.
+    room = int(scale * arrow_length(problem)) + np.array([UNITS // 2, 0])
+    sides = [rest.min(axis=0) - room, rest.max(axis=0) + np.array([UNITS // 2, 0])]
+    corners = np.concatenate([rest, moved, (tips * flip).round().astype(np.int64), sides])
     low, high = corners.min(axis=0) - 8, corners.max(axis=0) + 10
     return Thumbnail(
         view_box=f"{low[0]} {low[1]} {high[0] - low[0]} {high[1] - low[1]}",
