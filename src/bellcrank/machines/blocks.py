@@ -158,6 +158,12 @@ class Blocks:
     offset: NDArray[np.float64]
     direction: NDArray[np.float64]
 
+    def output_slope(self, q: NDArray[np.float64]) -> float:
+        """Return the mean motion of the output for small motions q (b, 3) of the blocks."""
+        motion, (x, y) = q[self.moved], self.offset.T
+        travel = motion[:, :2] + motion[:, 2:] * np.column_stack([-y, x])
+        return float((travel * self.direction).sum(axis=1).mean())
+
     def output(self, q: NDArray[np.float64]) -> float:
         """Return the mean motion of the output along its directions, blocks being moved by q."""
         motion = q[self.moved]
@@ -234,15 +240,14 @@ def _frame(part: Part) -> NDArray[np.float64]:
 def _own_design(part: Part) -> Design:
     """Return the design of a part in its own lattice, in its size and with the supports it keeps.
 
-    The same design for all parts that differ by their place only, whatever else was in its
-    problem: what is known of one is known of all.
+    The same for all parts that differ by their place only: what is known of one is known of all.
     """
     problem, scale = part.design.problem, part.placement.scale
     own = Problem(
         name=problem.name,
         lattice=Lattice(problem.lattice.positions * scale, problem.lattice.beams),
         supports=problem.supports if part.supported else Supports(),
-        input=replace(problem.input, drive="displacement", amount=1.0),
+        input=replace(problem.input, amount=problem.input.amount * scale),
         output=Output(problem.output.nodes, problem.output.direction),
         stiffness=problem.stiffness,
         designable=problem.designable,
@@ -265,9 +270,7 @@ def _bridge(
     first, second = (np.searchsorted(kept, end) for end in ends)
     design = Problem(
         name=f"{problem.name}: bridge from {link.first} to {link.second}",
-        lattice=Lattice(
-            problem.lattice.positions[kept], np.searchsorted(kept, beams[chosen])
-        ),
+        lattice=Lattice(problem.lattice.positions[kept], np.searchsorted(kept, beams[chosen])),
         supports=Supports(),
         input=Input(first, ALONG, "displacement", 1.0),
         output=Output(second, ALONG),

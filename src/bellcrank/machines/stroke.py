@@ -194,9 +194,7 @@ class _Chain:
             place = self.moved(place, found, step.reshape(-1, 3))
         return None
 
-    def advance(
-        self, place: _Place, found: _Found, part: float
-    ) -> tuple[_Place, _Found] | None:
+    def advance(self, place: _Place, found: _Found, part: float) -> tuple[_Place, _Found] | None:
         """Drive on by a part of the stroke; None if that may leave the stable path."""
         before = self.tangent(found, part)
         settled = self.settle(self.moved(place, found, before))
@@ -209,6 +207,50 @@ class _Chain:
         alike = first == last or min(first, last) > LARGEST_SOFTENING * max(first, last)
         near = departure <= LARGEST_DEPARTURE * max(float(np.abs(way).max()), SETTLED)
         return settled if near and alike else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Straight:
+    """What a machine of blocks would do if it were linear.
+
+    Parameters
+    ----------
+    efficiency, input_stiffness
+        For small strokes.
+    ports, forces : (e, 6)
+        Motion of and force on both ports of each element at the full stroke.
+    """
+
+    efficiency: float
+    input_stiffness: float
+    ports: NDArray[np.float64]
+    forces: NDArray[np.float64]
+
+
+def straight(blocks: Blocks, elements: Sequence[Element]) -> Straight:
+    """Return the linear answer of a machine of blocks; parameters as for `follow_stroke`.
+
+    Raises
+    ------
+    InvalidFile
+        If something in the machine swings freely, or is not stable at rest.
+    """
+    chain = _Chain(blocks, elements)
+    q = chain.tangent(chain.at_rest, 1.0)
+    ports = np.array(
+        [
+            np.concatenate([arm.motions(np.zeros(3)) @ q[arm.block] for arm in member.arms])
+            for member in blocks.members
+        ]
+    )
+    felt = chain.at_rest.felt
+    stroke = blocks.stroke.ravel()
+    return Straight(
+        efficiency=blocks.output_slope(q) / blocks.amount,
+        input_stiffness=float(stroke @ chain.at_rest.stiffness @ q.ravel()) / blocks.amount**2,
+        ports=ports,
+        forces=np.array([each.stiffness @ way for each, way in zip(felt, ports, strict=True)]),
+    )
 
 
 def follow_stroke(blocks: Blocks, elements: Sequence[Element], points: int) -> Stroke:

@@ -1,0 +1,142 @@
+"""What stands for each part in a chain: its usual table, one for its work here, or itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.machines.elements import Live, Tabled, tangent
+from bellcrank.machines.ports import block_ports
+from bellcrank.machines.potential import Potential
+from bellcrank.machines.ranges import TOLERATED, Range, around
+from bellcrank.machines.sampling import fit, usual_reach
+from bellcrank.machines.shelf import kept_fit
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from bellcrank.machines.blocks import Member
+    from bellcrank.machines.elements import Element
+    from bellcrank.machines.sampling import Fit, Reach
+
+DEGREES = (2, 3, 4)
+"""Of the potentials that are tried, as in `bellcrank.machines.characterise`."""
+ROUGH = 0.1
+"""Typical error of a table, as a part of its largest answers, from which on it is not used."""
+
+Kind = Literal["usual", "around", "linear", "itself"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stand:
+    """What stands for a part or a bridge.
+
+    Parameters
+    ----------
+    name
+        Of the part.
+    kind
+        ``"usual"``: the table that fits every machine in which the part is not pushed further than
+        on its own; ``"around"``: one around its way in this machine; ``"linear"``: it is neither
+        moved nor loaded; ``"itself"``: the part, followed.
+    element
+        For the chain.
+    fit, span
+        Of a table.
+    reason
+        Why it is the part itself, if nobody asked for that.
+    """
+
+    name: str
+    kind: Kind
+    element: Element
+    fit: Fit | None = None
+    span: Range | None = None
+    reason: str = ""
+
+    def holds(self, way: NDArray[np.float64]) -> bool:
+        """Whether it stands for the part all along its way (p, 6)."""
+        return self.span is None or self.excess(way).max() <= TOLERATED
+
+    def excess(self, way: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p,) how far out of the range of its table each point of a way is: 1 at the rim."""
+        if self.span is None:
+            return np.zeros(len(way))
+        return np.array([self.span.excess(x) for x in way])
+
+
+def itself(member: Member, reason: str = "") -> Stand:
+    """Let a part stand for itself."""
+    return Stand(member.name, "itself", Live(member.element), reason=reason)
+
+
+def linear(member: Member) -> Stand:
+    """Let its tangent at rest stand for a part; itself, if nothing holds its output."""
+    bend = tangent(member.element)
+    if bend is None:
+        return itself(member, "nothing holds its output while its input is held")
+    return Stand(member.name, "linear", Tabled(_quadratic(bend)))
+
+
+def table(member: Member, way: NDArray[np.float64], folder: Path | None) -> Stand:
+    """Let a table stand for a part: the usual one if it reaches, or one around its way.
+
+    Parameters
+    ----------
+    member
+    way : (6,)
+        Where it is foreseen to be at the full stroke: motion of its input, force on its output.
+    folder
+        Where tables are kept, or None.
+    """
+    bend = tangent(member.element)
+    if bend is None:
+        return linear(member)
+    usual = _usual(member)
+    if usual is not None and Range(usual).excess(way) <= TOLERATED:
+        found = _fitted(member, "usual", usual, folder)
+        if found.kind == "usual":
+            return found
+    reach = around(member, bend, way)
+    return linear(member) if reach is None else _fitted(member, "around", reach, folder)
+
+
+def _usual(member: Member) -> Reach | None:
+    try:
+        return usual_reach(block_ports(member.design))
+    except InvalidSettings:
+        return None
+
+
+def _fitted(member: Member, kind: Kind, reach: Reach, folder: Path | None) -> Stand:
+    """Return a table over a range; the part itself if it is no polynomial there."""
+    element = block_ports(member.design) if kind == "usual" else member.element
+    try:
+        found = kept_fit(
+            folder, member.design, reach, DEGREES, lambda: fit(element, DEGREES, reach)
+        )
+    except InvalidSettings as error:
+        return itself(member, str(error))
+    worst = float(found.typical_error.max())
+    if worst > ROUGH:
+        return itself(
+            member,
+            f"a polynomial of degree {found.degree} is off by {worst:.0%} typically in its range"
+            + (f", where it snaps in {found.lost} places" if found.lost else ""),
+        )
+    return Stand(member.name, kind, Tabled(found.potential), found, Range(reach))
+
+
+def _quadratic(bend: NDArray[np.float64]) -> Potential:
+    return Potential(
+        prescribed=np.arange(6) < 3,
+        quadratic=bend,
+        scale=np.ones(6),
+        exponents=np.zeros((0, 6), np.int64),
+        coefficients=np.zeros(0),
+    )
