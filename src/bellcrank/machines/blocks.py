@@ -9,19 +9,18 @@ springs in gaps that beams of two parts share around a node.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
 from bellcrank.errors import InvalidFile
+from bellcrank.machines.members import ALONG, Arm, Body, Member
 from bellcrank.machines.plan import PORTS, PortName
-from bellcrank.mechanics import Rigid, Superelement
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -31,97 +30,6 @@ if TYPE_CHECKING:
 
 SAME = 1e-9
 """Difference of directions within which a drive moves a port as a block."""
-ALONG = np.array([1.0, 0.0])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Arm:
-    """How a port sits on a block.
-
-    Parameters
-    ----------
-    block
-        Number of the block.
-    offset : (2,)
-        From the middle of the block to that of the port, at rest.
-    frame : (3, 3)
-        Turns motions in the machine into those in the part's own lattice; orthogonal.
-
-    Examples
-    --------
-    A quarter turn of the block takes a port beside it along:
-
-    >>> arm = Arm(0, np.array([1.0, 0.0]), np.eye(3))
-    >>> arm.place(np.array([0.0, 0.0, np.pi / 2])).round(3)
-    array([-1.   ,  1.   ,  1.571])
-    """
-
-    block: int
-    offset: NDArray[np.float64]
-    frame: NDArray[np.float64]
-
-    def _turned(self, angle: float) -> NDArray[np.float64]:
-        cosine, sine = np.cos(angle), np.sin(angle)
-        turned: NDArray[np.float64] = np.array([[cosine, -sine], [sine, cosine]]) @ self.offset
-        return turned
-
-    def place(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (3,) how the port moves, in its part's own lattice, when the block moves by q."""
-        moved = np.append(q[:2] + self._turned(q[2]) - self.offset, q[2])
-        placed: NDArray[np.float64] = self.frame @ moved
-        return placed
-
-    def motions(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (3, 3) the derivative of `place`."""
-        arm, slope = self._turned(q[2]), np.eye(3)
-        slope[:2, 2] = -arm[1], arm[0]
-        turned: NDArray[np.float64] = self.frame @ slope
-        return turned
-
-    def bend(self, q: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (3, 3) the second derivative of `place`, times a force (3,) on the port."""
-        curved = np.zeros((3, 3))
-        curved[2, 2] = -(self.frame.T @ force)[:2] @ self._turned(q[2])
-        return curved
-
-
-@dataclass(frozen=True, eq=False)
-class Member:
-    """A part or a bridge between two blocks.
-
-    Parameters
-    ----------
-    name
-        As the plan calls it.
-    design
-        In its own lattice, not placed yet, and with what else it loses in the machine.
-    ports
-        Nodes (n,) of its input and its output.
-    arms
-        Of both.
-    """
-
-    name: str
-    design: Design
-    ports: tuple[NDArray[np.int64], NDArray[np.int64]]
-    arms: tuple[Arm, Arm]
-
-    @cached_property
-    def element(self) -> Superelement:
-        """As felt through its two blocks: x, y, rotation of the input, then of the output."""
-        positions = self.design.problem.lattice.positions
-        grips = [
-            Rigid(nodes, positions[nodes], positions[nodes].mean(axis=0)) for nodes in self.ports
-        ]
-        # What counts is all that hangs together with a port: all gripped nodes but one drive.
-        gripped = np.concatenate(self.ports)
-        whole = replace(
-            self.design.problem,
-            input=Input(gripped[:-1], ALONG, "displacement", 1.0),
-            output=Output(gripped[-1:], ALONG),
-            designable=np.array([0]),
-        )
-        return Superelement(Design(whole, self.design.mask), grips)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,16 +106,19 @@ def blocks_of(machine: Machine) -> Blocks:
         return Arm(number, _centre(machine, port) - middles[number], frame)
 
     members = []
+    bodies: dict[tuple[str, float, bool], Body] = {}
     for name, part in machine.parts.items():
         frame = _frame(part)
-        ends = (part.region("input").nodes, part.region("output").nodes)
         arms = tuple(arm(PortName(name, port), frame) for port in PORTS)
-        members.append(Member(name, _own_design(part), ends, (arms[0], arms[1])))
+        kind = (machine.plan.table.parts[name].entry, part.placement.scale, part.supported)
+        body = bodies.setdefault(kind, _body(part))
+        members.append(Member(name, body, (arms[0], arms[1])))
     for link in machine.plan.links:
         if link.kind == "bridge":
-            design, ends = _bridge(machine, link)
+            body = _bridge(machine, link)
             arms = (arm(link.first, np.eye(3)), arm(link.second, np.eye(3)))
-            members.append(Member(f"the bridge to {link.second}", design, ends, arms))
+            name = f"the bridge to {link.second}"
+            members.append(Member(name, body, arms))
     stroke, driven = _drive(machine, names)
     moved, offset, direction = _moved(machine, block, middles)
     return Blocks(
@@ -218,7 +129,7 @@ def blocks_of(machine: Machine) -> Blocks:
 
 def _welded(machine: Machine) -> tuple[tuple[PortName, ...], ...]:
     """Return the ports of each block: those that welds join, directly or not."""
-    block = {port: (port,) for port in machine.ports}
+    block: dict[PortName, tuple[PortName, ...]] = {port: (port,) for port in machine.ports}
     for link in machine.plan.links:
         first, second = block[link.first], block[link.second]
         if link.kind == "weld" and first != second:
@@ -237,8 +148,8 @@ def _frame(part: Part) -> NDArray[np.float64]:
     return frame
 
 
-def _own_design(part: Part) -> Design:
-    """Return the design of a part in its own lattice, in its size and with the supports it keeps.
+def _body(part: Part) -> Body:
+    """Return a part in its own lattice, in its size and with the supports it keeps.
 
     The same for all parts that differ by their place only: what is known of one is known of all.
     """
@@ -252,13 +163,11 @@ def _own_design(part: Part) -> Design:
         stiffness=problem.stiffness,
         designable=problem.designable,
     )
-    return Design(own, part.design.mask)
+    return Body(Design(own, part.design.mask), (own.input.nodes, own.output.nodes))
 
 
-def _bridge(
-    machine: Machine, link: Link
-) -> tuple[Design, tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Return a bridge with the insides of its ports as a design, and its ports."""
+def _bridge(machine: Machine, link: Link) -> Body:
+    """Return a bridge, with the insides of its ports."""
     problem = machine.design.problem
     ends = [machine.port_nodes(port) for port in (link.first, link.second)]
     beams = problem.lattice.beams
@@ -277,7 +186,7 @@ def _bridge(
         stiffness=problem.stiffness,
         designable=np.array([0]),
     ).full_design()
-    return design, (first, second)
+    return Body(design, (first, second), alone=False)
 
 
 def bridge_beams(machine: Machine, link: Link) -> NDArray[np.int64]:
@@ -292,22 +201,20 @@ def bridge_beams(machine: Machine, link: Link) -> NDArray[np.int64]:
 
 
 def _drive(
-    machine: Machine, names: Iterable[tuple[PortName, ...]]
+    machine: Machine, names: Sequence[tuple[PortName, ...]]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return how far each block is driven, and which are at all."""
     drive, source = machine.design.problem.input, machine.plan.source
-    strokes = []
-    for ports in names:
+    stroke, driven = np.zeros((len(names), 3)), np.zeros(len(names), np.bool_)
+    for number, ports in enumerate(names):
         own = [machine.port_nodes(port) for port in ports if port in machine.plan.inputs]
-        if not own:
-            strokes.append(None)
-            continue
-        directions = drive.direction[np.isin(drive.nodes, np.concatenate(own))]
-        if np.abs(directions - directions[0]).max() > SAME:
-            raise InvalidFile(f"{source}: the drive moves the nodes of {ports[0]} apart")
-        strokes.append(np.append(drive.amount * directions[0], 0.0))
-    driven = np.array([stroke is not None for stroke in strokes])
-    return np.array([np.zeros(3) if stroke is None else stroke for stroke in strokes]), driven
+        if own:
+            directions = drive.direction[np.isin(drive.nodes, np.concatenate(own))]
+            if np.abs(directions - directions[0]).max() > SAME:
+                raise InvalidFile(f"{source}: the drive moves the nodes of {ports[0]} apart")
+            stroke[number, :2] = drive.amount * directions[0]
+            driven[number] = True
+    return stroke, driven
 
 
 def _moved(

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from bellcrank.mechanics import Superelement
 from bellcrank.mechanics.conditions import SMALLEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+
+    from bellcrank.mechanics import Superelement
 
 IN, OUT = slice(0, 3), slice(3, 6)
 """Of the coordinates of both ports: x, y, rotation of the input, then of the output."""

@@ -18,7 +18,7 @@ from bellcrank.machines.sampling import OVERSHOOT, Reach
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.machines.blocks import Member
+    from bellcrank.machines.members import Body
 
 FURTHER = 0.15
 """Beyond the end of the foreseen way, as a part of it."""
@@ -68,23 +68,25 @@ class Range:
         return float(max(along, np.abs(y[1:]).max(initial=0.0)))
 
 
-def around(member: Member, bend: NDArray[np.float64], way: NDArray[np.float64]) -> Reach | None:
+def around(body: Body, way: NDArray[np.float64]) -> Reach | None:
     """Return a range around the way that a part is foreseen to go in a machine.
 
     Parameters
     ----------
-    member
-    bend : (6, 6)
-        Second derivative of its potential at rest.
+    body
+        With a potential.
     way : (6,)
         Motion of its input and force on its output at the full stroke.
 
     Returns
     -------
     Reach or None
-        None if it is neither moved nor loaded: it stays at rest.
+        None if it is neither moved nor loaded, and stays at rest, or if it has no potential.
     """
-    nodes = member.design.problem.lattice.positions[member.ports[0]]
+    bend = body.bend
+    if bend is None:
+        return None
+    nodes = body.design.problem.lattice.positions[body.ports[0]]
     radius = float(np.sqrt(((nodes - nodes.mean(axis=0)) ** 2).sum(axis=1).mean()))
     give, vectors = np.linalg.eigh(-bend[OUT, OUT])
     root = vectors / np.sqrt(give)

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.machines.elements import Live, Tabled, tangent
-from bellcrank.machines.ports import block_ports
+from bellcrank.machines.elements import Live, Tabled
 from bellcrank.machines.potential import Potential
 from bellcrank.machines.ranges import TOLERATED, Range, around
-from bellcrank.machines.sampling import fit, usual_reach
+from bellcrank.machines.sampling import fit
 from bellcrank.machines.shelf import kept_fit
 
 if TYPE_CHECKING:
@@ -20,9 +19,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.machines.blocks import Member
     from bellcrank.machines.elements import Element
+    from bellcrank.machines.members import Member
     from bellcrank.machines.sampling import Fit, Reach
+    from bellcrank.mechanics import Superelement
 
 DEGREES = (2, 3, 4)
 """Of the potentials that are tried, as in `bellcrank.machines.characterise`."""
@@ -72,15 +72,14 @@ class Stand:
 
 def itself(member: Member, reason: str = "") -> Stand:
     """Let a part stand for itself."""
-    return Stand(member.name, "itself", Live(member.element), reason=reason)
+    return Stand(member.name, "itself", Live(member.body.element), reason=reason)
 
 
 def linear(member: Member) -> Stand:
     """Let its tangent at rest stand for a part; itself, if nothing holds its output."""
-    bend = tangent(member.element)
-    if bend is None:
+    if member.body.bend is None:
         return itself(member, "nothing holds its output while its input is held")
-    return Stand(member.name, "linear", Tabled(_quadratic(bend)))
+    return Stand(member.name, "linear", Tabled(_quadratic(member.body.bend)))
 
 
 def table(member: Member, way: NDArray[np.float64], folder: Path | None) -> Stand:
@@ -94,31 +93,26 @@ def table(member: Member, way: NDArray[np.float64], folder: Path | None) -> Stan
     folder
         Where tables are kept, or None.
     """
-    bend = tangent(member.element)
-    if bend is None:
+    body = member.body
+    if body.bend is None:
         return linear(member)
-    usual = _usual(member)
-    if usual is not None and Range(usual).excess(way) <= TOLERATED:
-        found = _fitted(member, "usual", usual, folder)
+    if body.usual is not None and Range(body.usual[1]).excess(way) <= TOLERATED:
+        found = _fitted(member, "usual", *body.usual, folder)
         if found.kind == "usual":
             return found
-    reach = around(member, bend, way)
-    return linear(member) if reach is None else _fitted(member, "around", reach, folder)
+    reach = around(body, way)
+    if reach is None:
+        return linear(member)
+    return _fitted(member, "around", body.element, reach, folder)
 
 
-def _usual(member: Member) -> Reach | None:
-    try:
-        return usual_reach(block_ports(member.design))
-    except InvalidSettings:
-        return None
-
-
-def _fitted(member: Member, kind: Kind, reach: Reach, folder: Path | None) -> Stand:
+def _fitted(
+    member: Member, kind: Kind, element: Superelement, reach: Reach, folder: Path | None
+) -> Stand:
     """Return a table over a range; the part itself if it is no polynomial there."""
-    element = block_ports(member.design) if kind == "usual" else member.element
     try:
         found = kept_fit(
-            folder, member.design, reach, DEGREES, lambda: fit(element, DEGREES, reach)
+            folder, member.body.design, reach, DEGREES, lambda: fit(element, DEGREES, reach)
         )
     except InvalidSettings as error:
         return itself(member, str(error))
