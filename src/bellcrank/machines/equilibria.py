@@ -75,11 +75,20 @@ class Chain:
         )
         found = self.around(self.rest)
         if found is None:
-            raise InvalidFile(f"{blocks.source}: a part is not stable at rest")
+            raise InvalidFile(f"{blocks.source}: {self._unstable()} is not stable at rest")
         self.at_rest = found
         # Blocks that nothing at all resists, as of a port that its part has lost, stay at rest.
         self.free = np.repeat(~blocks.driven, 3) & found.stiffness.any(axis=1)
         self._check_held()
+
+    def _unstable(self) -> str:
+        """Name what is not stable at rest."""
+        members = zip(self.blocks.members, self.elements, self.rest.memories, strict=True)
+        return ", ".join(
+            member.name
+            for member, element, memory in members
+            if element.feel(np.zeros(6), memory) is None
+        )
 
     def _check_held(self) -> None:
         free = np.flatnonzero(self.free)

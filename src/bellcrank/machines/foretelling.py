@@ -11,12 +11,13 @@ same, one more around where it led.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings
 from bellcrank.machines.blocks import blocks_of
 from bellcrank.machines.chaining import predict
 from bellcrank.machines.elements import IN, OUT
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from bellcrank.machines.assembly import Machine
     from bellcrank.machines.blocks import Blocks
     from bellcrank.machines.chaining import Prediction
+    from bellcrank.machines.elements import Element
 
 ROUNDS = 2
 """How often tables are chosen."""
@@ -61,6 +63,8 @@ class Foretold:
         The chain of blocks by itself.
     rigid
         The linear answer of that chain, whose ports do not give.
+    seconds
+        That the stroke took, when all tables were there.
     doubts
         What is to be known before relying on it, in sentences.
     """
@@ -73,6 +77,7 @@ class Foretold:
     stands: tuple[Stand, ...]
     stroke: Stroke
     rigid: Straight
+    seconds: float
     doubts: tuple[str, ...]
 
     @property
@@ -115,12 +120,18 @@ def foretell(
         raise InvalidSettings(f"points: expected at least one, got {points}")
     blocks = blocks_of(machine)
     exact = predict(machine)
-    foreseen = straight(blocks, [linear(member).element for member in blocks.members])
-    if live:
-        stands = tuple(itself(member) for member in blocks.members)
+    foreseen = straight(blocks, _linear_elements(blocks))
+    stands = tuple(itself(member) for member in blocks.members)
+    if not live:
+        ways = np.concatenate([foreseen.ports[:, IN], foreseen.forces[:, OUT]], axis=1)
+        stands = _tables(blocks, ways, points, folder, tell or _say_nothing)
+    start = time.perf_counter()
+    stroke = follow_stroke(blocks, [stand.element for stand in stands], points)
+    seconds = time.perf_counter() - start
+    if stroke.status is not Status.CONVERGED and not live:
+        # Tables may lose their stability where the parts do not.
+        stands = tuple(itself(member, _lost(stroke)) for member in blocks.members)
         stroke = follow_stroke(blocks, [stand.element for stand in stands], points)
-    else:
-        stands, stroke = _by_tables(blocks, foreseen, points, folder, tell or _say_nothing)
     # What the ports give is linear: it is added to the curve.
     more = exact.efficiency - foreseen.efficiency
     stiffer = exact.input_stiffness - foreseen.input_stiffness
@@ -133,6 +144,7 @@ def foretell(
         stands=stands,
         stroke=stroke,
         rigid=foreseen,
+        seconds=seconds,
         doubts=(*_doubts_of_tables(stands, stroke), *_doubts_of_chain(exact, foreseen, stroke)),
     )
 
@@ -141,32 +153,47 @@ def _say_nothing(_: str) -> None:
     """Tell nobody."""
 
 
-def _by_tables(
+def _linear_elements(blocks: Blocks) -> list[Element]:
+    elements = []
+    for member in blocks.members:
+        try:
+            elements.append(linear(member).element)
+        except (InvalidProblem, InvalidSettings) as error:
+            raise InvalidFile(
+                f"{blocks.source}: {member.name} cannot be chained: {error}"
+            ) from None
+    return elements
+
+
+def _tables(
     blocks: Blocks,
-    foreseen: Straight,
+    ways: NDArray[np.float64],
     points: int,
     folder: Path | None,
     tell: Callable[[str], None],
-) -> tuple[tuple[Stand, ...], Stroke]:
-    """Choose tables by where the parts are foreseen to go, and once more by where they went."""
-    ways = np.concatenate([foreseen.ports[:, IN], foreseen.forces[:, OUT]], axis=1)
-    stands: list[Stand | None] = [None] * len(blocks.members)
-    stroke = None
+) -> tuple[Stand, ...]:
+    """Choose tables by where the parts are foreseen to go (e, 6), and again by where they go."""
+    stands: dict[int, Stand] = {}
+    chosen: tuple[Stand, ...] = ()
     for _ in range(ROUNDS):
         for number, member in enumerate(blocks.members):
-            if stands[number] is None:
-                tell(f"table of {member.name} ({number + 1} of {len(stands)})")
+            if number not in stands:
+                tell(f"table of {member.name} ({number + 1} of {len(blocks.members)})")
                 stands[number] = table(member, ways[number], folder)
-        chosen = tuple(stand for stand in stands if stand is not None)
+        chosen = tuple(stands[number] for number in range(len(blocks.members)))
         stroke = follow_stroke(blocks, [stand.element for stand in chosen], points)
         went = way_of(stroke)
-        kept = [stand.holds(went[:, number]) for number, stand in enumerate(chosen)]
-        if all(kept) or stroke.reached == 0.0:
+        stands = {
+            number: stand for number, stand in enumerate(chosen) if stand.holds(went[:, number])
+        }
+        if len(stands) == len(chosen) or stroke.reached == 0.0:
             break
-        stands = [stand if good else None for stand, good in zip(chosen, kept, strict=True)]
         ways = went[-1] / stroke.reached
-    assert stroke is not None
-    return chosen, stroke
+    return chosen
+
+
+def _lost(stroke: Stroke) -> str:
+    return f"by tables, stability is lost at {stroke.reached:.1%} of the stroke"
 
 
 def way_of(stroke: Stroke) -> NDArray[np.float64]:
