@@ -19,6 +19,7 @@ from bellcrank.cli import (
     explain,
     export,
     machine,
+    machine_predict,
     onnx,
     plot,
     predict,
@@ -50,6 +51,7 @@ COMMANDS = (
     surrogate_search,
     onnx,
     machine,
+    machine_predict,
     problems,
 )
 """Modules that register a command."""
