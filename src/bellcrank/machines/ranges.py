@@ -68,24 +68,17 @@ class Range:
         return float(max(along, np.abs(y[1:]).max(initial=0.0)))
 
 
-def around(body: Body, way: NDArray[np.float64]) -> Reach | None:
+def around(body: Body, bend: NDArray[np.float64], way: NDArray[np.float64]) -> Reach:
     """Return a range around the way that a part is foreseen to go in a machine.
 
     Parameters
     ----------
     body
-        With a potential.
+    bend : (6, 6)
+        Second derivative of its potential at rest.
     way : (6,)
-        Motion of its input and force on its output at the full stroke.
-
-    Returns
-    -------
-    Reach or None
-        None if it is neither moved nor loaded, and stays at rest, or if it has no potential.
+        Motion of its input and force on its output at the full stroke; not both zero.
     """
-    bend = body.bend
-    if bend is None:
-        return None
     nodes = body.design.problem.lattice.positions[body.ports[0]]
     radius = float(np.sqrt(((nodes - nodes.mean(axis=0)) ** 2).sum(axis=1).mean()))
     give, vectors = np.linalg.eigh(-bend[OUT, OUT])
@@ -94,8 +87,6 @@ def around(body: Body, way: NDArray[np.float64]) -> Reach | None:
     load = float(np.linalg.norm(root.T @ bend[OUT, OUT] @ way[OUT]))
     block = float(np.linalg.norm(root.T @ bend[OUT, IN] @ way[IN]))
     travel = float(np.hypot(np.hypot(way[0], way[1]), radius * way[2]))
-    if travel == 0.0 and load == 0.0:
-        return None
     if travel == 0.0:
         # Its output alone is moved: the input goes where it likes, by about as much.
         travel = load * float(np.sqrt(give.max()))

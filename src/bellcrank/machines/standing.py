@@ -94,15 +94,13 @@ def table(member: Member, way: NDArray[np.float64], folder: Path | None) -> Stan
         Where tables are kept, or None.
     """
     body = member.body
-    if body.bend is None:
+    if body.bend is None or not way.any():
         return linear(member)
     if body.usual is not None and Range(body.usual[1]).excess(way) <= TOLERATED:
         found = _fitted(member, "usual", *body.usual, folder)
         if found.kind == "usual":
             return found
-    reach = around(body, way)
-    if reach is None:
-        return linear(member)
+    reach = around(body, body.bend, way)
     return _fitted(member, "around", body.element, reach, folder)
 
 
