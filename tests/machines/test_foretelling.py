@@ -16,6 +16,7 @@ from bellcrank.machines.elements import IN, OUT, Live
 from bellcrank.machines.foretelling import way_of
 from bellcrank.machines.standing import linear
 from bellcrank.machines.stroke import follow_stroke, straight
+from bellcrank.mechanics import Status
 
 from .actuators import KINDS, SOFT, STRONG, build, machine
 
@@ -192,6 +193,17 @@ def test_what_cannot_be_foretold_is_refused_in_words(folder: Path) -> None:
         told(forced, folder)
     with pytest.raises(InvalidSettings, match="points: expected at least one"):
         told(machine("row"), folder, points=0)
+
+
+def test_where_a_machine_snaps_is_foretold(folder: Path) -> None:
+    # Driven 25 times as far as it was made for.
+    built = build({"a": STRONG, "b": {**STRONG, "join": "a.output"}}, ["b.output"],
+                  drive={"amount": 3.5})  # fmt: skip
+    whole, found = simulate(built, POINTS), told(built, folder, live=True)
+    assert whole.status is found.stroke.status is Status.SNAPPED
+    assert found.stroke.reached == pytest.approx(whole.reached, abs=0.02)
+    assert any(doubt.startswith("stability is lost at 7") for doubt in found.doubts)
+    assert compare(found, whole).output_error < 0.15
 
 
 def test_ranges_are_measured_along_and_across_the_way() -> None:

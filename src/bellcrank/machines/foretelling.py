@@ -27,7 +27,7 @@ from bellcrank.machines.stroke import Straight, Stroke, follow_stroke, straight
 from bellcrank.mechanics import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from bellcrank.machines.chaining import Prediction
     from bellcrank.machines.elements import Element
 
-ROUNDS = 2
-"""How often tables are chosen."""
 DOUBTFUL = 0.02
 """Typical error of a table, as a part of its largest answers, that is worth a word."""
 BENT = 0.2
@@ -121,17 +119,17 @@ def foretell(
     blocks = blocks_of(machine)
     exact = predict(machine)
     foreseen = straight(blocks, _linear_elements(blocks))
-    stands = tuple(itself(member) for member in blocks.members)
+    stands: tuple[Stand, ...] = ()
+    reason = ""
     if not live:
         ways = np.concatenate([foreseen.ports[:, IN], foreseen.forces[:, OUT]], axis=1)
-        stands = _tables(blocks, ways, points, folder, tell or _say_nothing)
-    start = time.perf_counter()
-    stroke = follow_stroke(blocks, [stand.element for stand in stands], points)
-    seconds = time.perf_counter() - start
-    if stroke.status is not Status.CONVERGED and not live:
-        # Tables may lose their stability where the parts do not.
-        stands = tuple(itself(member, _lost(stroke)) for member in blocks.members)
-        stroke = follow_stroke(blocks, [stand.element for stand in stands], points)
+        stands, stroke, seconds = _by_tables(blocks, ways, points, folder, tell or _say_nothing)
+        if stroke.status is not Status.CONVERGED:
+            # Tables may lose their stability where the parts do not.
+            reason = f"by tables, stability is lost at {stroke.reached:.1%} of the stroke"
+    if live or reason:
+        stands = tuple(itself(member, reason) for member in blocks.members)
+        stroke, seconds = _timed(blocks, stands, points)
     # What the ports give is linear: it is added to the curve.
     more = exact.efficiency - foreseen.efficiency
     stiffer = exact.input_stiffness - foreseen.input_stiffness
@@ -165,35 +163,37 @@ def _linear_elements(blocks: Blocks) -> list[Element]:
     return elements
 
 
-def _tables(
+def _timed(blocks: Blocks, stands: Sequence[Stand], points: int) -> tuple[Stroke, float]:
+    """Follow the stroke, and say how many seconds that took."""
+    start = time.perf_counter()
+    stroke = follow_stroke(blocks, [stand.element for stand in stands], points)
+    return stroke, time.perf_counter() - start
+
+
+def _by_tables(
     blocks: Blocks,
     ways: NDArray[np.float64],
     points: int,
     folder: Path | None,
     tell: Callable[[str], None],
-) -> tuple[Stand, ...]:
-    """Choose tables by where the parts are foreseen to go (e, 6), and again by where they go."""
-    stands: dict[int, Stand] = {}
-    chosen: tuple[Stand, ...] = ()
-    for _ in range(ROUNDS):
+) -> tuple[tuple[Stand, ...], Stroke, float]:
+    """Choose tables by where the parts are foreseen to go (e, 6), and again by where they went."""
+    kept: dict[int, Stand] = {}
+    for last in (False, True):
         for number, member in enumerate(blocks.members):
-            if number not in stands:
+            if number not in kept:
                 tell(f"table of {member.name} ({number + 1} of {len(blocks.members)})")
-                stands[number] = table(member, ways[number], folder)
-        chosen = tuple(stands[number] for number in range(len(blocks.members)))
-        stroke = follow_stroke(blocks, [stand.element for stand in chosen], points)
+                kept[number] = table(member, ways[number], folder)
+        stands = tuple(kept[number] for number in range(len(blocks.members)))
+        stroke, seconds = _timed(blocks, stands, points)
         went = way_of(stroke)
-        stands = {
-            number: stand for number, stand in enumerate(chosen) if stand.holds(went[:, number])
+        kept = {
+            number: stand for number, stand in enumerate(stands) if stand.holds(went[:, number])
         }
-        if len(stands) == len(chosen) or stroke.reached == 0.0:
+        if last or len(kept) == len(stands) or stroke.reached == 0.0:
             break
         ways = went[-1] / stroke.reached
-    return chosen
-
-
-def _lost(stroke: Stroke) -> str:
-    return f"by tables, stability is lost at {stroke.reached:.1%} of the stroke"
+    return stands, stroke, seconds
 
 
 def way_of(stroke: Stroke) -> NDArray[np.float64]:

@@ -52,12 +52,13 @@ class Arm:
 
     def _turned(self, angle: float) -> NDArray[np.float64]:
         cosine, sine = np.cos(angle), np.sin(angle)
-        turned: NDArray[np.float64] = np.array([[cosine, -sine], [sine, cosine]]) @ self.offset
-        return turned
+        x, y = self.offset
+        return np.array([cosine * x - sine * y, sine * x + cosine * y])
 
     def place(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (3,) how the port moves, in its part's own lattice, when the block moves by q."""
-        moved = np.append(q[:2] + self._turned(q[2]) - self.offset, q[2])
+        moved = q.copy()
+        moved[:2] += self._turned(q[2]) - self.offset
         placed: NDArray[np.float64] = self.frame @ moved
         return placed
 
