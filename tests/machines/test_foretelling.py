@@ -9,12 +9,21 @@ import pytest
 from scipy.integrate import cumulative_simpson
 
 from bellcrank.errors import InvalidFile, InvalidSettings
-from bellcrank.machines import compare, foretell, foretold_to_dict, predict, ranges, simulate
+from bellcrank.machines import (
+    block_ports,
+    compare,
+    fit,
+    foretell,
+    foretold_to_dict,
+    predict,
+    ranges,
+    simulate,
+)
 from bellcrank.machines import foretelling as module
 from bellcrank.machines.blocks import blocks_of
 from bellcrank.machines.elements import IN, OUT, Live
 from bellcrank.machines.foretelling import way_of
-from bellcrank.machines.standing import linear
+from bellcrank.machines.standing import DEGREES, linear
 from bellcrank.machines.stroke import follow_stroke, straight
 from bellcrank.mechanics import Status
 
@@ -193,6 +202,15 @@ def test_what_cannot_be_foretold_is_refused_in_words(folder: Path) -> None:
         told(forced, folder)
     with pytest.raises(InvalidSettings, match="points: expected at least one"):
         told(machine("row"), folder, points=0)
+
+
+def test_a_table_that_is_known_already_is_not_made_again(folder: Path, tmp_path: Path) -> None:
+    built = machine("gripper")
+    known = fit(block_ports(built.parts["a"].design), DEGREES)
+    found = told(built, tmp_path, known={"a": known, "b": known})
+    assert all(stand.fit is known for stand in found.stands)
+    assert not list(tmp_path.iterdir())
+    assert found.output == pytest.approx(told(built, folder).output, abs=1e-8)
 
 
 def test_where_a_machine_snaps_is_foretold(folder: Path) -> None:

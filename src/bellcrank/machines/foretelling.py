@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,7 @@ from bellcrank.machines.stroke import Straight, Stroke, follow_stroke, straight
 from bellcrank.mechanics import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from bellcrank.machines.blocks import Blocks
     from bellcrank.machines.chaining import Prediction
     from bellcrank.machines.elements import Element
+    from bellcrank.machines.sampling import Fit
 
 DOUBTFUL = 0.02
 """Typical error of a table, as a part of its largest answers, that is worth a word."""
@@ -90,6 +92,7 @@ def foretell(
     *,
     live: bool = False,
     folder: Path | None = None,
+    known: Mapping[str, Fit] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Foretold:
     """Foretell what a machine does along its whole stroke.
@@ -104,6 +107,9 @@ def foretell(
         Follow the parts themselves instead of tables: nothing has to be fitted.
     folder
         Where tables are kept between runs; None keeps none.
+    known
+        Usual tables that are known already, by part: its potential by blocks, as in a
+        `Characterisation`. Not looked at where a part is scaled or lets go of its supports.
     tell
         Is told what is going on.
 
@@ -123,7 +129,13 @@ def foretell(
     reason = ""
     if not live:
         ways = np.concatenate([foreseen.ports[:, IN], foreseen.forces[:, OUT]], axis=1)
-        stands, stroke, seconds = _by_tables(blocks, ways, points, folder, tell or _say_nothing)
+        given = {
+            name: found
+            for name, found in (known or {}).items()
+            if machine.parts[name].supported and machine.parts[name].placement.scale == 1.0
+        }
+        make = partial(_table, blocks, given, folder, tell or _say_nothing)
+        stands, stroke, seconds = _by_tables(blocks, ways, points, make)
         if stroke.status is not Status.CONVERGED:
             # Tables may lose their stability where the parts do not.
             reason = f"by tables, stability is lost at {stroke.reached:.1%} of the stroke"
@@ -170,21 +182,32 @@ def _timed(blocks: Blocks, stands: Sequence[Stand], points: int) -> tuple[Stroke
     return stroke, time.perf_counter() - start
 
 
+def _table(
+    blocks: Blocks,
+    known: Mapping[str, Fit],
+    folder: Path | None,
+    tell: Callable[[str], None],
+    number: int,
+    way: NDArray[np.float64],
+) -> Stand:
+    """Return a table for one member on its way (6,)."""
+    member = blocks.members[number]
+    tell(f"table of {member.name} ({number + 1} of {len(blocks.members)})")
+    return table(member, way, folder, known.get(member.name))
+
+
 def _by_tables(
     blocks: Blocks,
     ways: NDArray[np.float64],
     points: int,
-    folder: Path | None,
-    tell: Callable[[str], None],
+    make: Callable[[int, NDArray[np.float64]], Stand],
 ) -> tuple[tuple[Stand, ...], Stroke, float]:
     """Choose tables by where the parts are foreseen to go (e, 6), and again by where they went."""
     kept: dict[int, Stand] = {}
     for last in (False, True):
-        for number, member in enumerate(blocks.members):
-            if number not in kept:
-                tell(f"table of {member.name} ({number + 1} of {len(blocks.members)})")
-                kept[number] = table(member, ways[number], folder)
-        stands = tuple(kept[number] for number in range(len(blocks.members)))
+        stands = tuple(
+            kept[number] if number in kept else make(number, way) for number, way in enumerate(ways)
+        )
         stroke, seconds = _timed(blocks, stands, points)
         went = way_of(stroke)
         kept = {

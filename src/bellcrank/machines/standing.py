@@ -82,7 +82,9 @@ def linear(member: Member) -> Stand:
     return Stand(member.name, "linear", Tabled(_quadratic(member.body.bend)))
 
 
-def table(member: Member, way: NDArray[np.float64], folder: Path | None) -> Stand:
+def table(
+    member: Member, way: NDArray[np.float64], folder: Path | None, known: Fit | None = None
+) -> Stand:
     """Let a table stand for a part: the usual one if it reaches, or one around its way.
 
     Parameters
@@ -92,28 +94,36 @@ def table(member: Member, way: NDArray[np.float64], folder: Path | None) -> Stan
         Where it is foreseen to be at the full stroke: motion of its input, force on its output.
     folder
         Where tables are kept, or None.
+    known
+        Its usual table, if that is known already.
     """
     body = member.body
     if body.bend is None or not way.any():
         return linear(member)
     if body.usual is not None and Range(body.usual[1]).excess(way) <= TOLERATED:
-        found = _fitted(member, "usual", *body.usual, folder)
-        if found.kind == "usual":
-            return found
+        element, reach = body.usual
+        found = known or _fitted(member, element, reach, folder)
+        stand = _judged(member, "usual", reach, found)
+        if stand.kind == "usual":
+            return stand
     reach = around(body, body.bend, way)
-    return _fitted(member, "around", body.element, reach, folder)
+    return _judged(member, "around", reach, _fitted(member, body.element, reach, folder))
 
 
-def _fitted(
-    member: Member, kind: Kind, element: Superelement, reach: Reach, folder: Path | None
-) -> Stand:
-    """Return a table over a range; the part itself if it is no polynomial there."""
+def _fitted(member: Member, element: Superelement, reach: Reach, folder: Path | None) -> Fit | str:
+    """Return a table over a range, or why there is none."""
     try:
-        found = kept_fit(
+        return kept_fit(
             folder, member.body.design, reach, DEGREES, lambda: fit(element, DEGREES, reach)
         )
     except InvalidSettings as error:
-        return itself(member, str(error))
+        return str(error)
+
+
+def _judged(member: Member, kind: Kind, reach: Reach, found: Fit | str) -> Stand:
+    """Let a table stand for a part, or the part itself if there is none or it is no good."""
+    if isinstance(found, str):
+        return itself(member, found)
     worst = float(found.typical_error.max())
     if worst > ROUGH:
         return itself(
