@@ -10,6 +10,7 @@ from scipy.integrate import cumulative_simpson
 
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.machines import (
+    assemble,
     block_ports,
     compare,
     fit,
@@ -27,7 +28,7 @@ from bellcrank.machines.standing import DEGREES, linear
 from bellcrank.machines.stroke import follow_stroke, straight
 from bellcrank.mechanics import Status
 
-from .actuators import KINDS, SOFT, STRONG, build, machine
+from .actuators import KINDS, SOFT, STRONG, actuator, build, machine
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -194,6 +195,23 @@ def test_live_parts_of_blocks_are_the_linear_chain_of_blocks_for_small_strokes()
     stroke = follow_stroke(blocks, [Live(member.body.element) for member in blocks.members], 1)
     assert stroke.efficiency[-1] == pytest.approx(expected.efficiency, rel=1e-3)
     assert stroke.input_force[-1] / 1e-5 == pytest.approx(expected.input_stiffness, rel=1e-3)
+
+
+@pytest.mark.parametrize("port", ["input", "output"])
+@pytest.mark.parametrize("name", ["a", "b"])
+def test_a_part_that_has_lost_a_port_moves_nothing_beyond_it(
+    name: str, port: str, folder: Path
+) -> None:
+    whole = machine("row")
+    part = whole.parts[name].design
+    nodes = whole.parts[name].region(port).nodes
+    touching = np.isin(part.problem.lattice.beams, nodes).sum(axis=1)
+    cut = part.with_mask(part.mask & (touching != 1))
+    entry = whole.plan.table.parts[name].entry
+    built = assemble(whole.plan, lambda given: cut if given == entry else actuator(given))
+    found = told(built, folder)
+    assert np.abs(found.output).max() < 1e-12
+    assert compare(found, simulate(built, POINTS)).force_error < STATED
 
 
 def test_what_cannot_be_foretold_is_refused_in_words(folder: Path) -> None:

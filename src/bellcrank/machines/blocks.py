@@ -48,6 +48,8 @@ class Blocks:
         Motion of each block that is driven, at the full stroke.
     driven : (b,) bool
         Which are.
+    reached : (b,) bool
+        Which hang together with a support or the drive; others stay at rest, as in a response.
     amount
         Of the input's motion at the full stroke.
     moved : (n,) int64
@@ -61,6 +63,7 @@ class Blocks:
     members: tuple[Member, ...]
     stroke: NDArray[np.float64]
     driven: NDArray[np.bool_]
+    reached: NDArray[np.bool_]
     amount: float
     moved: NDArray[np.int64]
     offset: NDArray[np.float64]
@@ -120,9 +123,12 @@ def blocks_of(machine: Machine) -> Blocks:
             name = f"the bridge to {link.second}"
             members.append(Member(name, body, arms))
     stroke, driven = _drive(machine, names)
+    lattice = Lattice(problem.lattice.positions, problem.lattice.beams[machine.design.mask])
+    held = lattice.reachable(np.concatenate([problem.supports.nodes, problem.input.nodes]))
+    reached = np.array([held[machine.port_nodes(ports[0])].any() for ports in names])
     moved, offset, direction = _moved(machine, block, middles)
     return Blocks(
-        source, names, tuple(members), stroke, driven, problem.input.amount, moved, offset,
+        source, names, tuple(members), stroke, driven, reached, problem.input.amount, moved, offset,
         direction,
     )  # fmt: skip
 

@@ -77,8 +77,8 @@ class Chain:
         if found is None:
             raise InvalidFile(f"{blocks.source}: {self._unstable()} is not stable at rest")
         self.at_rest = found
-        # Blocks that nothing at all resists, as of a port that its part has lost, stay at rest.
-        self.free = np.repeat(~blocks.driven, 3) & found.stiffness.any(axis=1)
+        # What nothing at all resists stays at rest, as a port that its part has lost.
+        self.free = np.repeat(blocks.reached & ~blocks.driven, 3) & found.stiffness.any(axis=1)
         self._check_held()
 
     def _unstable(self) -> str:
