@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from bellcrank.model import read_design
+from bellcrank.model import find_problem, read_design
 from bellcrank.search import pieces
 
 from .helpers import PROBLEM, RESULTS, ROWS, call, colours, design_of, files, table
@@ -24,11 +24,11 @@ def test_a_job_says_on_standard_output_what_it_found(first_run: tuple[Path, Outc
     folder, outcome = first_run
     rows = [line.split(maxsplit=1) for line in outcome.out.splitlines()]
     assert [row[0] for row in rows] == [
-        "efficiency", "before", "beams", "verified", "designs", "results",
+        "efficiency", "before", "where", "beams", "verified", "designs", "results",
     ]  # fmt: skip
     assert float(rows[0][1]) == pytest.approx(design_of(folder)["efficiency"], abs=5e-5)
-    assert rows[4][1].split()[-1] == str(ROWS)
-    assert rows[5][1].strip() == f"{folder}/"
+    assert rows[5][1].split()[-1] == str(ROWS)
+    assert rows[6][1].strip() == f"{folder}/"
 
 
 def test_a_job_leaves_its_results_and_nothing_else(whole: Path) -> None:
@@ -133,3 +133,12 @@ def test_a_problem_of_ones_own_is_designed_into_a_folder_of_its_name(here: Path,
     assert outcome.code == 0, outcome.err
     assert sorted(files(here / "lift")) == RESULTS
     assert len(table(here / "lift")["step"]) == 300
+
+
+def test_a_job_can_begin_with_a_design(here: Path) -> None:
+    outcome = call("design", "--from", "human:crane", "--steps", "250", "--chains", "1")
+    assert outcome.code == 0, outcome.err
+    data = json.loads((here / "crane" / "summary.json").read_text())
+    assert data["initial_efficiency"] == pytest.approx(1.0104575, abs=1e-6)
+    assert data["efficiency"] >= data["initial_efficiency"]
+    assert table(here / "crane")["mask"][0] != find_problem("crane").full_design().mask_hex

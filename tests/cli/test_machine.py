@@ -130,3 +130,13 @@ def test_what_is_wrong_is_said_in_one_line(plan: Path, tmp_path: Path) -> None:
     assert "parts first and second overlap near" in refusal("machine", "build", plan, "--overwrite")
     plan.write_text(PLAN.replace("rotate", "turn"))
     assert "unknown key" in refusal("machine", "build", plan, "--overwrite")
+
+
+def test_a_machine_is_designed_further_from_what_it_is(plan: Path) -> None:
+    built = call("machine", "build", plan, "--json").data
+    whole = plan.with_suffix(".json")
+    out = plan.parent / "better"
+    call("design", "--from", whole, "--steps", "200", "--chains", "1", "--out", out)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["initial_efficiency"] == pytest.approx(built["efficiency"], abs=1e-8)
+    assert summary["efficiency"] > summary["initial_efficiency"]

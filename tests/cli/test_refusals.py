@@ -207,7 +207,10 @@ def test_a_design_job_needs_either_a_problem_or_a_run(whole: Path) -> None:
     before = files(whole)
     for words in ((), (PROBLEM, "--resume", whole)):
         line = refusal("design", *words)
-        assert line == "error: give either a problem to design for or --resume DIR"
+        assert (
+            line
+            == "error: give one of these: a problem to design for, --from DESIGN, or --resume DIR"
+        )
     assert files(whole) == before
 
 

@@ -174,6 +174,18 @@ def test_bad_plans_get_one_clear_error(
         build(parts, links, **ends)
 
 
+def test_ports_can_have_a_direction_each() -> None:
+    machine = build(PAIR, output={"ports": ["a.output", "b.output"],
+                                  "direction": [[2.0, 0.0], [0.0, -3.0]]})  # fmt: skip
+    wanted = machine.design.problem.output
+    for port, unit in (("a", [1.0, 0.0]), ("b", [0.0, -1.0])):
+        own = np.isin(wanted.nodes, machine.port_nodes(PortName(port, "output")))
+        assert own.sum() == 7
+        assert wanted.direction[own].tolist() == [unit] * 7
+    with pytest.raises(InvalidFile, match=r"output\.direction: .*one for each of 1 ports, got 2"):
+        build(PAIR, output={"ports": ["a.output"], "direction": [[1.0, 0.0], [0.0, 1.0]]})
+
+
 def test_files_are_checked_too(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_text('name = "x"\nengine = 3\n[parts.a]\nentry = "e"\n')
@@ -183,7 +195,7 @@ def test_files_are_checked_too(tmp_path: Path) -> None:
         'name = "x"\n[parts.a]\nentry = "full"\n[output]\nports = ["a.output"]\n'
         '[input]\nports = ["a.input"]\ndirection = [0.0, 0.0]\n'
     )
-    with pytest.raises(InvalidFile, match=r"input\.direction: .*a vector of some length"):
+    with pytest.raises(InvalidFile, match=r"input\.direction: .*a vector \[x, y\] of some length"):
         read_plan(path)
     path.write_text(
         'name = "x"\n[parts.a]\nentry = "full"\n'

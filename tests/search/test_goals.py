@@ -276,6 +276,10 @@ def test_input_stiffness_is_that_of_the_condensed_structure() -> None:
     excess = excess_of_response(f"input-stiffness <= {condensed / 4}", state)
     assert excess == pytest.approx(0.75, rel=1e-4)
     assert excess_of_response(f"input-stiffness <= {condensed * 1.01}", state) == 0.0
+    assert excess_of_response(f"input-stiffness >= {condensed / 1.01}", state) == 0.0
+    assert excess_of_response(f"input-stiffness >= {condensed * 4}", state) == pytest.approx(
+        0.75, rel=1e-4
+    )
 
 
 def test_input_stiffness_is_none_of_a_force() -> None:

@@ -233,6 +233,18 @@ def test_the_figures_of_the_last_epoch_are_those_of_the_model(
     assert Recipe.from_dict(model.record["recipe"]) == AVERAGED
 
 
+def test_the_last_test_may_be_on_a_part_and_says_how_far_it_is(data: Dataset) -> None:
+    training = begin(data, replace(TINY, tested_last=40), None, device="cpu")
+    for _ in training.run():
+        pass
+    seen: list[tuple[int, int]] = []
+    model = training.finish(tell=lambda progress: seen.append(progress.testing or (0, 0)))
+    assert model.record["held_out"]["count"] == 40 < len(training.split.held_out)
+    assert seen[-1] == (40, 40)
+    assert [done for done, _ in seen] == sorted({done for done, _ in seen})
+    assert training.finish(most=25).record["held_out"]["count"] == 25
+
+
 def test_a_network_learns_to_count_beams(problem: Problem) -> None:
     data = random_dataset(problem, runs=20, steps=50)
     recipe = Recipe(

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 DesignName = Annotated[
     str,
-    typer.Argument(help="A design file or folder, human:NAME, machine:NAME, or a problem."),
+    typer.Argument(
+        help="A design file or folder, human:NAME, machine:NAME, an entry of the library, or a "
+        "problem."
+    ),
 ]
 PartFile = Annotated[
     Path | None,

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated
@@ -27,6 +28,7 @@ from bellcrank.cli.console import (
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
+    from bellcrank.model import Design, Problem
     from bellcrank.parts import PartSpec
     from bellcrank.workflows import DesignReport
 
@@ -98,24 +100,29 @@ def design(
         int | None, typer.Option(help="Chains at the same time; changes no result.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Result folder; default: the name.")] = None,
+    begin: Annotated[
+        str | None,
+        typer.Option("--from", help="Begin with this design, in place of a whole lattice."),
+    ] = None,
     resume: Annotated[Path | None, typer.Option(help="Go on with the run in this folder.")] = None,
 ) -> None:
     """Design an actuator: search, clean up, verify, and see what was designed."""
     from bellcrank.cli.progress import SearchProgress
     from bellcrank.model import find_problem
     from bellcrank.search import read_settings
-    from bellcrank.workflows import complete_design, reopen_design, start_design
+    from bellcrank.workflows import complete_design, find_design, reopen_design, start_design
 
-    if (problem is None) == (resume is None):
-        raise InvalidSettings("give either a problem to design for or --resume DIR")
+    if sum(given is not None for given in (problem, begin, resume)) != 1:
+        raise InvalidSettings(
+            "give one of these: a problem to design for, --from DESIGN, or --resume DIR"
+        )
     measures = _measures(pareto)
     part = _part(strut_width, scale, material)
     if resume is not None and part is not None:
         raise InvalidSettings("--strut-width, --scale and --material are kept from the run's start")
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
-    if problem is None:
-        assert resume is not None
+    if resume is not None:
         announce_compilation()
         folder = reopen_design(resume)
         warn_of_another_version(folder.provenance, "run")
@@ -128,7 +135,7 @@ def design(
         }  # fmt: skip
         chosen = {key: value for key, value in given.items() if value is not None}
         settings = read_settings({"search": search, **chosen, **settings_of("--set", more)})
-        task = find_problem(problem)
+        task = find_problem(problem) if problem is not None else _task_from(find_design(str(begin)))
         announce_compilation()
         folder = start_design(task, settings, out or Path(Path(task.name).name), part)
     progress = SearchProgress(read_settings(folder.settings))
@@ -141,6 +148,11 @@ def design(
         )
         sys.exit(INTERRUPTED)
     _print_report(report)
+
+
+def _task_from(design: Design) -> Problem:
+    """Return the task of a design, with that to begin with."""
+    return replace(design.problem, initial=design.mask)
 
 
 def _part(width: str | None, scale: str | None, material: str | None) -> PartSpec | None:
@@ -196,6 +208,7 @@ def _print_report(report: DesignReport) -> None:
     table = Table.grid(padding=(0, 2))
     table.add_row("efficiency", f"[bold]{selection.efficiency_after:.4f}[/]")
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
+    table.add_row("where the search began", f"{report.initial_efficiency:.4f}")
     if report.human_response is not None:
         table.add_row("human design", f"{report.human_response.efficiency:.4f}")
     if report.settings.goals:

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from bellcrank.cli.app import app
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.registry import design_sources
 
 if TYPE_CHECKING:
     from bellcrank.machines.assembly import Machine
@@ -27,14 +28,43 @@ machine = typer.Typer(
 )
 app.add_typer(machine)
 
-PlanFile = Annotated[Path, typer.Argument(help="A machine's plan, TOML.")]
+PlanName = Annotated[
+    str, typer.Argument(help="A machine's plan, TOML, or a name of `bellcrank machine list`.")
+]
+
+
+STRUT = "strut-"
+
+
+@design_sources.register("struts")
+def design_of_strut(name: str) -> Design | None:
+    """Return the strut of a length, like strut-6; None for other names."""
+    if not name.startswith(STRUT) or not name.removeprefix(STRUT).isdecimal():
+        return None
+    from bellcrank.machines.elementary import strut
+
+    return strut(int(name.removeprefix(STRUT))).full_design()
+
+
+@machine.command(name="list")
+def list_machines() -> None:
+    """List the machines that come with the package."""
+    from bellcrank.machines.showcases import find_plan, showcases
+
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for heading in ("machine", "parts", "about"):
+        table.add_column(heading)
+    for name in showcases():
+        plan = find_plan(name).table
+        table.add_row(name, str(len(plan.parts)), plain(plan.about))
+    results.print(table)
 
 
 @machine.command()
 def build(
-    plan: PlanFile,
+    plan: PlanName,
     out: Annotated[
-        Path | None, typer.Option(help="Design to write; default: NAME.json beside the plan.")
+        Path | None, typer.Option(help="Design to write; default: beside the plan, or NAME.json.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
@@ -43,17 +73,17 @@ def build(
     from dataclasses import replace
 
     from bellcrank.machines.assembly import assemble
-    from bellcrank.machines.plan import read_plan
+    from bellcrank.machines.showcases import find_plan
     from bellcrank.mechanics import CAREFUL, Evaluator
     from bellcrank.model import write_design
     from bellcrank.model.storage import already_exists, check_folder
 
-    target = out or plan.with_suffix(".json")
+    target = out or Path(plan).with_suffix(".json")
     check_folder(target)
     if target.exists() and not overwrite:
         raise already_exists(target)
     start = time.perf_counter()
-    built = assemble(read_plan(plan), partial(find_part, plan.parent))
+    built = assemble(find_plan(plan), partial(find_part, Path(plan).parent))
     announce_compilation()
     response = Evaluator(built.design.problem).respond(built.design.mask, CAREFUL)
     seconds = time.perf_counter() - start

@@ -14,7 +14,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
-from bellcrank.cli.machine import PlanFile, find_part, machine
+from bellcrank.cli.machine import PlanName, find_part, machine
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ ROWS = 5
 
 @machine.command()
 def predict(
-    plan: PlanFile,
+    plan: PlanName,
     stroke: Annotated[
         bool, typer.Option("--stroke", help="Along the whole stroke too, by tables of the parts.")
     ] = False,
@@ -45,14 +45,15 @@ def predict(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Foretell what a machine does, by chaining its condensed parts."""
-    from bellcrank.machines import assemble, foretold_to_dict, predict, read_plan
+    from bellcrank.machines import assemble, foretold_to_dict, predict
+    from bellcrank.machines.showcases import find_plan
 
     if not stroke and (live or check or out is not None):
         raise InvalidSettings("--live, --check and --out are about the whole stroke: add --stroke")
     if points < 1:
         raise InvalidSettings(f"--points: expected at least one, got {points}")
     _check_out(out, overwrite=overwrite)
-    built = assemble(read_plan(plan), partial(find_part, plan.parent))
+    built = assemble(find_plan(plan), partial(find_part, Path(plan).parent))
     announce_compilation()
     predict(built)  # the first time, kernels are loaded
     start = time.perf_counter()

@@ -18,6 +18,7 @@ from bellcrank.cli import (
     evaluate,
     explain,
     export,
+    library,
     machine,
     machine_predict,
     onnx,
@@ -52,6 +53,7 @@ COMMANDS = (
     onnx,
     machine,
     machine_predict,
+    library,
     problems,
 )
 """Modules that register a command."""

@@ -14,7 +14,7 @@ from bellcrank.machines.chaining import Prediction, predict
 from bellcrank.machines.characterise import Characterisation, characterise, usual_loads
 from bellcrank.machines.checking import Check, compare, foretold_to_dict, simulate
 from bellcrank.machines.curves import PortCurve, trace
-from bellcrank.machines.elementary import elementary
+from bellcrank.machines.elementary import DIRECTIONS, elementary, strut
 from bellcrank.machines.foretelling import Foretold, foretell
 from bellcrank.machines.loads import Load
 from bellcrank.machines.plan import Plan, read_plan
@@ -30,6 +30,7 @@ from bellcrank.machines.sampling import Fit, Reach, fit, sample, usual_reach
 from bellcrank.machines.two_port import TwoPort, two_port_at
 
 __all__ = [
+    "DIRECTIONS",
     "INPUT",
     "OUTPUT",
     "Characterisation",
@@ -63,6 +64,7 @@ __all__ = [
     "read_plan",
     "sample",
     "simulate",
+    "strut",
     "trace",
     "two_port_at",
     "usual_loads",

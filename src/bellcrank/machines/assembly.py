@@ -99,6 +99,7 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
             input=driven,
             output=wanted,
             stiffness=next(iter(parts.values())).design.problem.stiffness,
+            initial=present,
             designable=designable(plan, parts, nodes, beams, (held, driven, wanted)),
         )
     except InvalidProblem as error:

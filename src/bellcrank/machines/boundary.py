@@ -10,12 +10,12 @@ from bellcrank.errors import InvalidFile
 from bellcrank.model import Input, Output, Supports
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from bellcrank.machines.placing import Part
-    from bellcrank.machines.plan import Plan, PortName
+    from bellcrank.machines.plan import Directions, Plan, PortName
     from bellcrank.model import Lattice
 
 
@@ -120,21 +120,22 @@ def _together(lists: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
 
 
 def _region(
-    ports: Iterable[PortName],
+    ports: Sequence[PortName],
     parts: dict[str, Part],
     nodes: dict[str, NDArray[np.int64]],
-    direction: list[float] | None,
+    direction: Directions | None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the nodes of ports, each once, with their directions."""
+    wanted = None if direction is None else np.broadcast_to(direction, (len(ports), 2))
     ids, directions = [], []
-    for port in ports:
+    for number, port in enumerate(ports):
         part = parts[port.part]
         own = nodes[port.part][part.region(port.port).nodes]
         ids.append(own)
-        if direction is None:
+        if wanted is None:
             directions.append(part.direction(port.port))
         else:
-            unit = np.array(direction) / np.linalg.norm(direction)
+            unit = wanted[number] / np.linalg.norm(wanted[number])
             directions.append(np.tile(unit, (len(own), 1)))
     every = np.concatenate(ids)
     _, first = np.unique(every, return_index=True)

@@ -1,7 +1,8 @@
 """Tasks for elementary actuators: a push down on one side, a motion wanted on the other.
 
-Both ports are hexagons of seven nodes, which any turn by 60 degrees and any mirror takes to
-themselves: whatever way parts are placed, their ports fit.
+A strut is what passes a motion on as it is: a finger, a spacer. The ports of all are hexagons of
+seven nodes, which any turn by 60 degrees and any mirror takes to themselves: whatever way parts are
+placed, their ports fit.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ PUSH = 0.02
 """Of the height of the lattice: how far the input is pushed."""
 REACH = 2
 """Nodes by which the rows of the ports are longer at each end."""
+SHORTEST = 3
+"""Strut whose ports do not share nodes."""
 DIRECTIONS = {
     "right": 0, "up-right": 45, "up": 90, "up-left": 135,
     "left": 180, "down-left": 225, "down": 270, "down-right": 315,
@@ -79,6 +82,43 @@ def elementary(columns: int, direction: str, spring: float | None = None) -> Pro
             nodes=_hexagon(lattice, (-1.0, height)),
             direction=np.array([math.cos(angle), math.sin(angle)]).round(15), spring=spring,
         ),
+    )  # fmt: skip
+
+
+def strut(length: int) -> Problem:
+    """Return a bar of three rows, whose ports are its ends.
+
+    It has no supports: in a machine it hangs on what it is joined to.
+
+    Parameters
+    ----------
+    length
+        From the middle of one port to that of the other, at least 3.
+
+    Raises
+    ------
+    InvalidSettings
+
+    Examples
+    --------
+    >>> bar = strut(6)
+    >>> bar.lattice.beam_count, bar.lattice.positions[bar.input.nodes].mean(axis=0).round(3)
+    (57, array([6.   , 0.866]))
+    """
+    if length < SHORTEST:
+        raise InvalidSettings(f"length: expected at least {SHORTEST}, got {length!r}")
+    lattice = lattices["triangular-rows"]([length + 2, length + 3, length + 2], [-0.5, -1.0, -0.5])
+    down = np.array([0.0, -1.0])
+    return Problem(
+        name=f"strut-{length}",
+        lattice=lattice,
+        supports=Supports(),
+        input=Input(
+            nodes=_hexagon(lattice, (length, HEIGHT)), direction=down, drive="displacement",
+            amount=PUSH * HEIGHT * length,
+        ),
+        output=Output(nodes=_hexagon(lattice, (0.0, HEIGHT)), direction=down),
+        designable=np.arange(lattice.beam_count),
     )  # fmt: skip
 
 

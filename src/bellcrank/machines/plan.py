@@ -30,7 +30,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field
+import numpy as np
+from pydantic import BeforeValidator, Field
+from pydantic_core import PydanticCustomError
 
 from bellcrank.errors import InvalidFile
 from bellcrank.model.parsing import Table, parse, read_toml
@@ -46,13 +48,26 @@ Kind = Literal["weld", "bridge"]
 Vector = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-def _no_zero(vector: list[float]) -> list[float]:
-    if not any(vector):
-        raise ValueError("expected a vector of some length")
-    return vector
+def _directions(given: object) -> object:
+    """Take one vector for a list of one."""
+    rows = given if isinstance(given, list) and given and isinstance(given[0], list) else [given]
+    try:
+        vectors = np.array(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        vectors = np.empty(0)
+    if (
+        vectors.shape != (len(rows), 2)
+        or not np.isfinite(vectors).all()
+        or not vectors.any(axis=1).all()
+    ):
+        raise PydanticCustomError(
+            "vectors", "Input should be a vector [x, y] of some length, or one for each port"
+        )
+    return vectors.tolist()
 
 
-Direction = Annotated[Vector, AfterValidator(_no_zero)]
+Directions = Annotated[list[list[float]], BeforeValidator(_directions)]
+"""One for all ports, or one for each."""
 
 
 class PartTable(Table):
@@ -80,7 +95,7 @@ class InputTable(Table):
     """What drives the machine; drive and amount are those of the first part by default."""
 
     ports: list[str] = Field(min_length=1)
-    direction: Direction | None = None
+    direction: Directions | None = None
     drive: Literal["displacement", "force"] | None = None
     amount: float | None = Field(default=None, gt=0.0)
 
@@ -89,7 +104,7 @@ class OutputTable(Table):
     """What the machine moves; directions are those of the parts by default."""
 
     ports: list[str] = Field(min_length=1)
-    direction: Direction | None = None
+    direction: Directions | None = None
 
 
 class MachineTable(Table):
@@ -206,6 +221,12 @@ def plan_of(table: MachineTable, source: str) -> Plan:
             raise InvalidFile(
                 f"{source}: no port {str(port)!r}; a port is an input or output of one of "
                 f"{', '.join(table.parts)}"
+            )
+    for name, region in (("input", table.input), ("output", table.output)):
+        if region.direction and len(region.direction) not in (1, len(region.ports)):
+            raise InvalidFile(
+                f"{source}: {name}.direction: expected one vector, or one for each of "
+                f"{len(region.ports)} ports, got {len(region.direction)}"
             )
     if both := [port for port in plan.inputs if port in plan.outputs]:
         raise InvalidFile(f"{source}: port {str(both[0])!r} is input and output at once")

@@ -28,6 +28,8 @@ from bellcrank.model.builtin import builtin
 from bellcrank.model.conditions import Input, Output, Stiffness, Supports
 from bellcrank.model.explicit import problem_to_dict
 from bellcrank.model.files import (
+    design_from_dict,
+    design_to_dict,
     find_problem,
     read_design,
     read_masks,
@@ -53,6 +55,8 @@ __all__ = [
     "Stiffness",
     "Supports",
     "builtin",
+    "design_from_dict",
+    "design_to_dict",
     "find_problem",
     "formats",
     "gallery_design",

@@ -19,6 +19,8 @@ from bellcrank.model.schema import problem_from_dict
 from bellcrank.model.storage import write_text
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -111,14 +113,54 @@ def read_design(path: str | os.PathLike[str]) -> Design:
     InvalidProblem
         If the problem in it is impossible.
     """
-    table = parse(DesignTable, read_json(path), str(path))
-    problem = problem_from_dict(table.problem, source=f"{path}: problem", folder=Path(path).parent)
+    return design_from_dict(read_json(path), str(path), Path(path).parent)
+
+
+def design_from_dict(
+    data: Mapping[str, Any], source: str = "design", folder: Path = Path()
+) -> Design:
+    """Build the design that plain data describes.
+
+    Parameters
+    ----------
+    data
+        As `design_to_dict` makes it.
+    source
+        What to call it in an error, usually the file.
+    folder
+        Where the files lie that its problem refers to.
+
+    Raises
+    ------
+    InvalidFile, InvalidProblem
+        As `read_design`.
+    """
+    table = parse(DesignTable, data, source)
+    problem = problem_from_dict(table.problem, source=f"{source}: problem", folder=folder)
     return Design(
         problem=problem,
-        mask=_mask(table.mask, problem, f"{path}: mask"),
+        mask=_mask(table.mask, problem, f"{source}: mask"),
         efficiency=table.efficiency,
         provenance=table.provenance,
     )
+
+
+def design_to_dict(design: Design) -> dict[str, Any]:
+    """Return a design together with its problem as plain data.
+
+    Examples
+    --------
+    >>> design = find_problem("scaling-8").full_design()
+    >>> design_from_dict(design_to_dict(design)).mask_hex == design.mask_hex
+    True
+    """
+    return {
+        "schema": DESIGN_SCHEMA,
+        "problem": problem_to_dict(design.problem),
+        "mask": design.mask_hex,
+        "efficiency": design.efficiency,
+        "provenance": dict(design.provenance),
+    }
 
 
 def write_design(design: Design, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
@@ -142,14 +184,7 @@ def write_design(design: Design, path: str | os.PathLike[str], *, overwrite: boo
     ...     read_design(f"{folder}/design.json").mask_hex == design.mask_hex
     True
     """
-    data = {
-        "schema": DESIGN_SCHEMA,
-        "problem": problem_to_dict(design.problem),
-        "mask": design.mask_hex,
-        "efficiency": design.efficiency,
-        "provenance": design.provenance,
-    }
-    _write_json(data, path, overwrite=overwrite)
+    _write_json(design_to_dict(design), path, overwrite=overwrite)
 
 
 def read_masks(path: str | os.PathLike[str], problem: Problem) -> list[NDArray[np.bool_]]:

@@ -13,7 +13,7 @@ from bellcrank.mechanics import load_bearing_core
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.model import Design, Problem
+    from bellcrank.model import Design, Input, Output, Problem
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,28 +127,31 @@ def spacing(problem: Problem) -> float:
 
 def arrow_length(problem: Problem) -> float:
     """Length of the arrows at a region: visible at any size of the lattice."""
-    extent = float(np.ptp(problem.lattice.positions, axis=0).max())
-    return max(1.5 * spacing(problem), extent / 9.0)
+    width, height = np.ptp(problem.lattice.positions, axis=0)
+    return max(1.5 * spacing(problem), float(np.sqrt(width * height)) / 9.0)
 
 
 def input_arrows(problem: Problem) -> list[Arrow]:
-    """Return arrows that end where the region begins, pushing on it."""
+    """Return arrows that end where the region begins, pushing on each of its pieces."""
     region = problem.input
     places = problem.lattice.positions[region.nodes]
     length, gap = arrow_length(problem), 0.45 * spacing(problem)
-    if not _one_direction(region.direction):
-        tips = places - 0.5 * gap * region.direction
-        return [
+    arrows = []
+    for own, directions in _pieces(problem, region, places):
+        if _one_direction(directions):
+            tip = _edge(own, directions[0], side=-1.0) - gap * directions[0]
+            arrows.append(Arrow(_pair(tip - length * directions[0]), _pair(tip)))
+            continue
+        tips = own - 0.5 * gap * directions
+        arrows += [
             Arrow(_pair(tip - 0.6 * length * t), _pair(tip))
-            for tip, t in zip(tips, region.direction, strict=True)
+            for tip, t in zip(tips, directions, strict=True)
         ]
-    direction = region.direction[0]
-    tip = _edge(places, direction, side=-1.0) - gap * direction
-    return [Arrow(_pair(tip - length * direction), _pair(tip))]
+    return arrows
 
 
 def wanted_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
-    """Return arrows that start where the region ends, showing where it should go.
+    """Return arrows that start where the region's pieces end, showing where they should go.
 
     Parameters
     ----------
@@ -156,18 +159,23 @@ def wanted_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
         Where the nodes go; the arrows stay clear of them.
     """
     region = problem.output
-    at_rest = problem.lattice.positions[region.nodes]
+    places = np.concatenate([problem.lattice.positions, moved], axis=1)[region.nodes]
     length, gap = arrow_length(problem), 0.45 * spacing(problem)
-    if not _one_direction(region.direction):
-        return [
-            Arrow(_pair(place), _pair(place + 0.6 * length * t))
-            for place, t in zip(at_rest, region.direction, strict=True)
-        ]
-    direction = region.direction[0]
-    start = _edge(at_rest, direction, side=1.0)
-    reach = max(float((moved[region.nodes] @ direction).max() - start @ direction), 0.0)
-    tail = start + (reach + gap) * direction
-    return [Arrow(_pair(tail), _pair(tail + length * direction))]
+    arrows = []
+    for own, directions in _pieces(problem, region, places):
+        at_rest, gone = own[:, :2], own[:, 2:]
+        if not _one_direction(directions):
+            arrows += [
+                Arrow(_pair(place), _pair(place + 0.6 * length * t))
+                for place, t in zip(at_rest, directions, strict=True)
+            ]
+            continue
+        direction = directions[0]
+        start = _edge(at_rest, direction, side=1.0)
+        reach = max(float((gone @ direction).max() - start @ direction), 0.0)
+        tail = start + (reach + gap) * direction
+        arrows.append(Arrow(_pair(tail), _pair(tail + length * direction)))
+    return arrows
 
 
 def motion_arrows(motion: Motion) -> list[Arrow]:
@@ -207,19 +215,38 @@ def outline_around(points: NDArray[np.float64], radius: float) -> NDArray[np.flo
 
 def support_groups(problem: Problem) -> list[NDArray[np.int64]]:
     """Group fully held nodes that are joined by beams of the lattice."""
-    fixed = problem.supports.fixed
+    return _joined(problem, problem.supports.fixed)
+
+
+def _joined(problem: Problem, nodes: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Group nodes that are joined by beams of the lattice between them."""
     beams = problem.lattice.beams
-    owner = {int(node): int(node) for node in fixed}
+    owner = {int(node): int(node) for node in nodes}
 
     def root(node: int) -> int:
         while owner[node] != node:
             node = owner[node]
         return node
 
-    for a, b in beams[np.isin(beams, fixed).all(axis=1)].tolist():
+    for a, b in beams[np.isin(beams, nodes).all(axis=1)].tolist():
         owner[root(a)] = root(b)
-    roots = np.array([root(int(node)) for node in fixed], dtype=np.int64)
-    return [fixed[roots == one] for one in np.unique(roots)]
+    roots = np.array([root(int(node)) for node in nodes], dtype=np.int64)
+    return [nodes[roots == one] for one in np.unique(roots)]
+
+
+def _pieces(
+    problem: Problem, region: Input | Output, rows: NDArray[np.float64]
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Return rows and directions of the nodes of each piece of a region.
+
+    A region of one direction and scattered nodes counts as one piece: a discrete packing may
+    have no beam between any two of them.
+    """
+    groups = _joined(problem, region.nodes)
+    if min(map(len, groups)) == 1:
+        groups = [region.nodes]
+    inside = [np.isin(region.nodes, group) for group in groups]
+    return [(rows[own], region.direction[own]) for own in inside]
 
 
 def extent(

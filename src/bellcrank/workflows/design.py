@@ -194,15 +194,17 @@ def conclude(folder: RunFolder, settings: SearchSettings) -> DesignReport:
     candidates, proposals, best = accepted_candidates(folder, settings)
     judge = judge_for(problem, settings)
     selection = select(problem, candidates, settings.objective, judge)
+    literal = judge_for(problem, settings, goals=())
     human = human_design(problem.name)
     human_response = None
     if human is not None:
-        human_response = judge_for(problem, settings, goals=()).respond(human.mask, CAREFUL)
+        human_response = literal.respond(human.mask, CAREFUL)
     report = DesignReport(
         folder=folder.path,
         settings=settings,
         selection=selection,
         checks=verify(selection.design, settings, selection.response),
+        initial_efficiency=literal.respond(problem.initial, CAREFUL).efficiency,
         human=human,
         human_response=human_response,
         proposals=proposals,

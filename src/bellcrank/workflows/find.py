@@ -9,6 +9,7 @@ from typing import cast, get_args
 from bellcrank.errors import UnknownName
 from bellcrank.model import Design, builtin, find_problem, gallery_design, read_design
 from bellcrank.model.gallery import Kind
+from bellcrank.registry import design_sources
 
 
 def find_design(name_or_path: str) -> Design:
@@ -21,7 +22,8 @@ def find_design(name_or_path: str) -> Design:
         result folder with a ``design.json``; or ``human:NAME`` or ``machine:NAME`` for a
         design of a built-in problem that comes with the package. The name of a built-in
         problem means the problem even where there is a folder of that name: ``crane/`` is
-        the folder.
+        the folder. What is none of these is asked of `bellcrank.registry.design_sources`: on
+        the command line, the library of actuators.
 
     Raises
     ------
@@ -47,6 +49,11 @@ def find_design(name_or_path: str) -> Design:
         return read_design(path / "design.json")
     if path.suffix == ".json" and path.is_file() and _is_design(path):
         return read_design(path)
+    if not path.exists():
+        for ask in design_sources.values():
+            known: Design | None = ask(name_or_path)
+            if known is not None:
+                return known
     return find_problem(name_or_path).full_design()
 
 

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from bellcrank.search import SearchSettings, Selection
 
 AGREEMENT = 1e-6
-"""Largest difference in efficiency between two minimisers that verify each other."""
+"""Largest difference between two minimisers that verify each other, as a part of the efficiency, or
+of 1 where that is less."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +31,8 @@ class DesignReport:
         The design, and where it comes from.
     checks
         Efficiency of the design from rest by each minimiser that verified it.
+    initial_efficiency
+        Where the search began, under the same objective; nan if that has none.
     human
         The human-designed counterpart, if there is one.
     human_response
@@ -42,6 +45,7 @@ class DesignReport:
     settings: SearchSettings
     selection: Selection
     checks: dict[str, float]
+    initial_efficiency: float
     human: Design | None
     human_response: Response | None
     proposals: int
@@ -55,4 +59,4 @@ class DesignReport:
     @property
     def verified(self) -> bool:
         """Whether the minimisers agree."""
-        return self.agreement <= AGREEMENT
+        return self.agreement <= AGREEMENT * max(1.0, *map(abs, self.checks.values()))

@@ -34,6 +34,7 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "mask": selection.design.mask_hex,
         "checks": report.checks,
         "verified": report.verified,
+        "initial_efficiency": _finite(report.initial_efficiency),
         "human_efficiency": human.efficiency if human else None,
         "found": {
             "chain": selection.found.chain,
@@ -41,9 +42,13 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         },
         "refused_candidates": selection.refused,
         "proposals": report.proposals,
-        "best_by_chain": [b if math.isfinite(b) else None for b in report.best_by_chain],
+        "best_by_chain": [_finite(best) for best in report.best_by_chain],
         "settings": report.settings.to_dict(),
     }
+
+
+def _finite(number: float) -> float | None:
+    return number if math.isfinite(number) else None
 
 
 def summary_text(report: DesignReport) -> str:
@@ -52,6 +57,7 @@ def summary_text(report: DesignReport) -> str:
     rows = [
         ("efficiency of the design", f"{selection.efficiency_after:.6f}"),
         ("the same before cleaning", f"{selection.efficiency_before:.6f}"),
+        ("where the search began", f"{report.initial_efficiency:.6f}"),
         *((f"from rest by {name}", f"{value:.9f}") for name, value in report.checks.items()),
         ("beams", str(selection.design.beam_count)),
         ("found by chain, at step", f"{selection.found.chain}, {selection.found.step}"),
@@ -60,7 +66,7 @@ def summary_text(report: DesignReport) -> str:
     if report.settings.goals:
         rows.append(("goals kept", ", ".join(report.settings.goals).replace("|", "/")))
     if report.human_response is not None:
-        rows.insert(2, ("human-designed counterpart", f"{report.human_response.efficiency:.6f}"))
+        rows.insert(3, ("human-designed counterpart", f"{report.human_response.efficiency:.6f}"))
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
     refused = "".join(
         f"\n{count} candidates that looked better were refused: {reason}."

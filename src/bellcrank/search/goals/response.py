@@ -22,6 +22,7 @@ from bellcrank.search.goals.terms import (
     at_least,
     at_most,
     below,
+    bounded,
     nothing,
 )
 from bellcrank.search.goals.terms import terms as registry
@@ -65,13 +66,18 @@ def strain(_problem: Problem, bound: float) -> Term:
     return Term(of_response=lambda moved: above(largest_strain(moved), bound), price=1)
 
 
-def input_stiffness(problem: Problem, bound: float) -> Term:
-    """At most so stiff an input: twice the energy of the stroke, over the squared input motion."""
+def input_stiffness(problem: Problem, wanted: tuple[str, float]) -> Term:
+    """At most or at least so stiff an input: 2 E / u^2, E the energy of the stroke, u the motion.
+
+    A least one keeps a search away from mechanisms that merely follow the input.
+    """
     if problem.input.drive != "displacement":
         raise ValueError("the input is driven by a force, and moves as far as that takes it")
     squared = problem.input.amount**2
+    excess = above if wanted[0] == "<=" else below
     return Term(
-        of_response=lambda moved: above(2.0 * moved.response.energy / squared, bound), price=1
+        of_response=lambda moved: excess(2.0 * moved.response.energy / squared, wanted[1]),
+        price=1,
     )
 
 
@@ -98,7 +104,7 @@ registry.register("stiffness")(
     Kind("'stiffness >= NUMBER', the number above 0", at_least, stiffness)
 )
 registry.register("input-stiffness")(
-    Kind("'input-stiffness <= NUMBER', the number above 0", at_most, input_stiffness)
+    Kind("'input-stiffness <= NUMBER' or '>= NUMBER', above 0", bounded, input_stiffness)
 )
 registry.register("strain")(Kind("'strain <= NUMBER', the number above 0", at_most, strain))
 registry.register("no-snapping")(Kind("'no-snapping' alone", nothing, no_snapping))

@@ -176,6 +176,12 @@ def at_least(rest: str) -> float:
     return _behind(">=", rest)
 
 
+def bounded(rest: str) -> tuple[str, float]:
+    """Read ``<= NUMBER`` or ``>= NUMBER``."""
+    sign = rest[:2]
+    return sign, (at_most if sign == "<=" else at_least)(rest)
+
+
 def _behind(sign: str, rest: str) -> float:
     if not rest.startswith(sign):
         raise ValueError(rest)

@@ -1,0 +1,238 @@
+"""Pages that show the library: one to browse, one to read, and the pictures of the latter."""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from importlib.resources import files
+from string import Template
+from typing import TYPE_CHECKING
+
+from bellcrank.machines.elementary import DIRECTIONS
+from bellcrank.machines.library.thumbnails import Thumbnail, thumbnail
+from bellcrank.mechanics import Evaluator
+from bellcrank.model.storage import already_exists, write_text
+from bellcrank.runs.files import make_folder
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bellcrank.machines.library.catalogue import Library
+    from bellcrank.machines.library.entry import Entry
+
+PAGE, TABLE = "index.html", "README.md"
+PICTURE = re.compile(r"[a-z0-9-]+-[0-9a-f]{8}\.svg")
+"""Of an entry; others in the folder are none of ours."""
+ORDER = ("up-left", "up", "up-right", "right", "down-right", "down", "down-left", "left")
+"""Of directions, around a clock."""
+ABOUT = (
+    "{} entries, {} of them more efficient than the plain lever of the same task. Each is pushed "
+    "down on the right (orange) and moves its left port (blue); `index.html` beside this page is "
+    "the same to browse. What the figures mean is said in `docs/machines.md`. This page is written "
+    "by `bellcrank library index`. *Touches*: at the full stroke, struts of the part touch."
+)
+COLUMNS = (
+    "", "name", "efficiency", "plain lever", "frame FEM", "input stiffness", "output stiffness",
+    "best share of work",
+)  # fmt: skip
+
+
+def write_pages(known: Library, out: Path, *, overwrite: bool = False) -> list[Path]:
+    """Write both pages and the pictures into a folder.
+
+    Returns
+    -------
+    list of Path
+        Of the two pages.
+
+    Raises
+    ------
+    OutputExists, StorageError
+    InvalidFile
+        If an entry is damaged.
+    """
+    pages = [out / PAGE, out / TABLE]
+    for path in pages:
+        if path.exists() and not overwrite:
+            raise already_exists(path)
+    make_folder(out)
+    entries = sorted(map(known.find, known.readable()), key=_place)
+    drawn = {entry.name: draw(entry) for entry in entries}
+    for name, picture in drawn.items():
+        write_text(out / f"{name}.svg", picture.svg(name), overwrite=True)
+    for old in out.glob("*.svg"):
+        if PICTURE.fullmatch(old.name) and old.stem not in drawn:
+            old.unlink()
+    write_text(pages[0], page(entries, drawn), overwrite=overwrite)
+    write_text(pages[1], table(entries), overwrite=overwrite)
+    return pages
+
+
+def draw(entry: Entry) -> Thumbnail:
+    """Draw an entry at rest and at its full stroke, under the load that it was made for."""
+    response = Evaluator(entry.design.problem).respond(entry.design.mask)
+    return thumbnail(entry.design, response.displacement)
+
+
+def page(entries: list[Entry], drawn: dict[str, Thumbnail]) -> str:
+    """Return the page to browse: HTML that needs nothing else."""
+    found = [entry.direction for entry in entries]
+    sizes = sorted({entry.columns for entry in entries if entry.columns is not None})
+    kinds = list(dict.fromkeys(entry.kind for entry in entries))
+    checks = [entry.validation for entry in entries]
+    parts = {f"{c.material}, struts of {c.width:g} mm, {c.scale:g} mm a spacing" for c in checks}
+    cards = [
+        _card(entry, drawn[entry.name], place, _longest(entries, entry))
+        for place, entry in enumerate(entries)
+    ]
+    return Template((files(__package__) / "page.html").read_text(encoding="utf-8")).substitute(
+        count=len(entries),
+        better=sum(entry.better for entry in entries),
+        stable=sum(check.status == "converged" for check in checks),
+        clear=sum(entry.clear for entry in entries),
+        directions=_choices(
+            "direction",
+            [("", "all"), *((name, _pointer(name)) for name in ORDER if name in found)],
+        ),
+        kinds=_choices("kind", [("", "all"), *((kind, kind) for kind in kinds)]),
+        sizes=_choices("columns", [("", "all"), *((str(size), str(size)) for size in sizes)]),
+        cards="\n".join(cards),
+        part="; ".join(sorted(parts)),
+    )
+
+
+def table(entries: list[Entry]) -> str:
+    """Return the page to read: Markdown with a table for each kind."""
+    better = sum(entry.better for entry in entries)
+    lines = ["# Library of elementary actuators", "", ABOUT.format(len(entries), better)]
+    for kind in dict.fromkeys(entry.kind for entry in entries):
+        lines += [
+            "",
+            f"## {kind}",
+            "",
+            f"| {' | '.join(COLUMNS)} |",
+            f"|{'---|' * len(COLUMNS)}",
+        ]
+        lines += [_row(entry) for entry in entries if entry.kind == kind]
+    return "\n".join(lines) + "\n"
+
+
+def _place(entry: Entry) -> tuple[int, int, str]:
+    """Where an entry stands: around the clock, the small before the large."""
+    place = ORDER.index(entry.direction) if entry.direction in ORDER else len(ORDER)
+    return place, entry.columns or 0, entry.kind
+
+
+def _row(entry: Entry) -> str:
+    rest = entry.characterisation.rest
+    lever = _figure(entry.lever.efficiency)
+    cells = [
+        f'<img src="{entry.name}.svg" width="130" alt="{entry.name}">',
+        f"`{entry.name}`",
+        f"**{_figure(entry.efficiency)}**",
+        lever if entry.better else f"{lever} (better)",
+        _frame(entry) + ("" if entry.clear else " (touches)"),
+        _figure(rest.input_stiffness),
+        _figure(rest.output_stiffness),
+        f"{rest.best_work_share:.1%}".replace("%", " %"),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def _card(entry: Entry, picture: Thumbnail, place: int, longest: float) -> str:
+    """Return an entry of the page to browse."""
+    rest = entry.characterisation.rest
+    lever = entry.lever.efficiency
+    told = {
+        "direction": entry.direction,
+        "kind": entry.kind,
+        "columns": "" if entry.columns is None else str(entry.columns),
+        "e": f"{entry.efficiency:.4f}",
+        "g": f"{entry.efficiency - (lever if math.isfinite(lever) else 0.0):.4f}",
+        "k": f"{rest.input_stiffness:.6f}",
+        "o": f"{rest.output_stiffness:.6f}",
+        "w": f"{rest.best_work_share:.5f}",
+        "p": str(place),
+    }
+    data = " ".join(f'data-{key}="{value}"' for key, value in told.items())
+    name = html.escape(entry.name)
+    size = "" if entry.columns is None else f" · {entry.columns} columns"
+    bars = "".join(
+        f'<div><span>{label}</span><i style="--w:{100.0 * _part(value, longest):.0f}"></i>'
+        f"<span>{_short(value)}</span></div>"
+        for label, value in (("this", entry.efficiency), ("lever", lever))
+    )
+    figures = [
+        ("FEM", _frame(entry) + _warning(entry)),
+        ("work", f"{100.0 * rest.best_work_share:.1f} %"),
+        ("input k", _figure(rest.input_stiffness)),
+        ("output k", _figure(rest.output_stiffness)),
+        ("beams", str(entry.design.beam_count)),
+        ("strain", f"{100.0 * entry.validation.strain:.1f} %"),
+    ]
+    rows = "".join(f"<div><dt>{key}</dt><dd>{value}</dd></div>" for key, value in figures)
+    verdict = "efficiency" if entry.better else '<span class="w">below lever</span>'
+    return (
+        f'<li {data}><svg viewBox="{picture.view_box}" role="img" aria-label="{name}">'
+        f'{picture.content}</svg><div class="t"><b>{entry.direction.replace("-", " ")}{size}</b>'
+        f'<span class="k {entry.kind}">{entry.kind}</span></div>'
+        f'<div class="e"><div><strong>{entry.efficiency:.2f}</strong><small>{verdict}</small></div>'
+        f'<div class="b">{bars}</div></div><dl class="f">{rows}</dl>'
+        f'<button class="n" type="button" data-name="{name}">{name}</button></li>'
+    )
+
+
+def _warning(entry: Entry) -> str:
+    """Return a mark that tells what a builder should know, when pointed at."""
+    told = [*entry.validation.warnings, *entry.characterisation.doubts]
+    text = html.escape("; ".join(told))
+    return f' <abbr class="w" title="{text}">touches</abbr>' if told else ""
+
+
+def _longest(entries: list[Entry], entry: Entry) -> float:
+    """Return what a whole bar stands for: the most efficient of its kind, or its lever."""
+    values = [
+        value
+        for each in entries
+        if each.kind == entry.kind
+        for value in (each.efficiency, each.lever.efficiency)
+        if math.isfinite(value)
+    ]
+    return max(values, default=1.0)
+
+
+def _part(value: float, whole: float) -> float:
+    return min(max(value / whole, 0.0), 1.0) if math.isfinite(value) and whole > 0.0 else 0.0
+
+
+def _choices(name: str, options: list[tuple[str, str]]) -> str:
+    """Return radio buttons; the first is chosen."""
+    return "".join(
+        f'<label class="c" title="{value or "all"}"><input type="radio" name="{name}" '
+        f'value="{value}"{" checked" * (place == 0)} aria-label="{value or "all"}">'
+        f"<span>{shown}</span></label>"
+        for place, (value, shown) in enumerate(options)
+    )
+
+
+def _pointer(direction: str) -> str:
+    """Return an arrow that points in a direction."""
+    return (
+        f'<svg viewBox="-12 -12 24 24" aria-hidden="true"><path transform="rotate('
+        f'{-DIRECTIONS[direction]})" d="M-8 0H8M2 -6L8 0L2 6"/></svg>'
+    )
+
+
+def _frame(entry: Entry) -> str:
+    check = entry.validation
+    return _figure(check.efficiency) if check.status == "converged" else check.status
+
+
+def _figure(value: float) -> str:
+    """Return three digits; what is no number is a dash."""
+    return f"{value:.3g}" if math.isfinite(value) else "–"
+
+
+def _short(value: float) -> str:
+    return f"{value:.2f}" if math.isfinite(value) else "none"

@@ -1,0 +1,297 @@
+"""The plain lever: what a design of the library must beat.
+
+Drawn from lever mechanics, and from nothing that a search found. Stiff arms of triangulated struts
+turn about a pivot, a single node of the support, and hold the output. An input that only goes
+straight cannot be part of what turns, so a lever proper takes its motion by a *link*, a straight
+row of struts along a line of the lattice from a corner of the input to the *knee* of the lever.
+Then with r from the pivot, d the direction of the link, t_in and t_out those of the ports, and x
+the cross product,
+
+    efficiency = (d . t_in) (t_out . (z x r_output)) / (d . (z x r_knee)).
+
+The family has simpler members, welded to the input, that must bend: a bar from port to port, with
+and without a stay, a bell crank, a triangle. Of all members the most efficient is taken, by the
+same mechanics and under the same load as the design that it is compared with: a strong member of
+the family rather than a typical one. There are directions that no lever makes well; its
+efficiency there is about 0, or below.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.mechanics import CAREFUL, Status
+from bellcrank.model import Design
+from bellcrank.search.goals import Case, GoalResponder
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+
+LEVER = "lever"
+ARMS = {
+    LEVER: (("pivot", "knee"), ("pivot", "output")),
+    "bar": (("input", "output"),),
+    "bell crank": (("pivot", "input"), ("pivot", "output")),
+    "bar with a stay at the input": (("pivot", "input"), ("input", "output")),
+    "bar with a stay at the output": (("pivot", "output"), ("input", "output")),
+    "triangle": (("pivot", "input"), ("pivot", "output"), ("input", "output")),
+}
+"""Of each member of the family: from where to where; only the first has a link."""
+WIDTH = 0.9
+"""How far from the middle of an arm its nodes may be, in spacings: two rows at least."""
+LEAST_ARM = 1.5
+"""Of a knee from the pivot, in spacings."""
+LINK = (2, 8)
+"""Struts of a link, at least and at most."""
+STEEPEST = 0.35
+"""Least part of the input's motion that a link must take along."""
+DEAD = 1e-9
+"""Lever arm of a link, by its length, that is none."""
+MOST_PIVOTS = 24
+"""More support nodes than that are thinned out evenly."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What a lever is made of.
+
+    Parameters
+    ----------
+    arms
+        A key of `ARMS`.
+    pivot
+        Node of the support that it turns about; None for a bar that hangs between the ports.
+    link
+        Nodes from the input to the knee; empty where there is none.
+
+    Examples
+    --------
+    >>> Shape("lever", 4, (80, 71, 62)).label
+    'lever about node 4, by a link of 2 struts'
+    """
+
+    arms: str
+    pivot: int | None = None
+    link: tuple[int, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        place = "" if self.pivot is None else f" about node {self.pivot}"
+        return self.arms + place + (f", by a link of {len(self.link) - 1} struts" * bool(self.link))
+
+
+def plain_lever(problem: Problem, goals: Sequence[str] = ()) -> Design:
+    """Return the most efficient plain lever for a problem.
+
+    Parameters
+    ----------
+    goals
+        What it must keep, as a search would.
+
+    Raises
+    ------
+    InvalidSettings
+        If no lever of the family is stable and keeps the goals.
+
+    Examples
+    --------
+    >>> from bellcrank.machines import elementary
+    >>> lever = plain_lever(elementary(7, "up"))
+    >>> lever.provenance["pivot"] in range(7), lever.efficiency > 1.0
+    (True, True)
+    """
+    judge = GoalResponder([Case(problem)], goals)
+    best: Design | None = None
+    for shape in shapes(problem):
+        lever = lever_of(problem, shape)
+        response = judge.respond(lever.mask, CAREFUL)
+        if response.status is not Status.CONVERGED:
+            continue
+        if best is None or best.efficiency is None or response.efficiency > best.efficiency:
+            best = replace(lever, efficiency=response.efficiency)
+    if best is None:
+        what = f"is stable and keeps {', '.join(goals)}" if goals else "is stable"
+        raise InvalidSettings(f"{problem.name}: no plain lever {what}")
+    return best
+
+
+def shapes(problem: Problem) -> Iterator[Shape]:
+    """Yield all levers of the family, as shapes."""
+    pivots = problem.supports.fixed
+    if len(pivots) > MOST_PIVOTS:
+        pivots = pivots[np.linspace(0, len(pivots) - 1, MOST_PIVOTS).round().astype(np.int64)]
+    links = list(_links(problem))
+    positions, spacing = problem.lattice.positions, _spacing(problem)
+    for arms in ARMS:
+        if arms == "bar":
+            yield Shape(arms)
+        elif arms != LEVER:
+            yield from (Shape(arms, pivot) for pivot in pivots.tolist())
+    for pivot, link in itertools.product(pivots.tolist(), links):
+        if np.hypot(*(positions[link[-1]] - positions[pivot])) > LEAST_ARM * spacing:
+            yield Shape(LEVER, pivot, link)
+
+
+def lever_of(problem: Problem, shape: Shape) -> Design:
+    """Return a lever as a design: its arms, its link, both ports whole.
+
+    Examples
+    --------
+    >>> from bellcrank.machines import elementary
+    >>> bar = lever_of(elementary(7, "down"), Shape("bar"))
+    >>> bar.beam_count < 80, bar.provenance["kind"]
+    (True, 'lever')
+    """
+    lattice = problem.lattice
+    taken = np.zeros(lattice.node_count, dtype=np.bool_)
+    taken[problem.supports.nodes] = True
+    ends = {
+        "input": lattice.positions[problem.input.nodes].mean(axis=0),
+        "output": lattice.positions[problem.output.nodes].mean(axis=0),
+    }
+    if shape.link:
+        # What turns keeps off what goes straight, but for the knee.
+        taken[problem.input.nodes] = taken[list(shape.link)] = True
+        ends["knee"] = lattice.positions[shape.link[-1]]
+        taken[shape.link[-1]] = False
+    if shape.pivot is not None:
+        taken[shape.pivot] = False
+        ends["pivot"] = lattice.positions[shape.pivot]
+    body = np.zeros(lattice.node_count, dtype=np.bool_)
+    for start, stop in ARMS[shape.arms]:
+        away = _distance(lattice.positions, ends[start], ends[stop])
+        body |= away < WIDTH * _spacing(problem)
+    body[problem.output.nodes] = True
+    body &= ~taken
+    given = np.isin(np.arange(lattice.node_count), problem.input.nodes)
+    if not shape.link:
+        body |= given
+    mask = body[lattice.beams].all(axis=1) | given[lattice.beams].all(axis=1) | _at_ports(problem)
+    mask[_beams_along(problem, shape.link)] = True
+    provenance = {
+        "kind": "lever",
+        "origin": f"drawn from lever mechanics: {shape.label}",
+        "arms": shape.arms,
+        "pivot": shape.pivot,
+        "link": list(shape.link),
+    }
+    return Design(problem, mask, provenance=provenance)
+
+
+def lever_law(problem: Problem, shape: Shape) -> float:
+    """Return the efficiency of a lever with rigid arms, a rigid link and free joints.
+
+    Infinite at a dead point, where the link points at the pivot.
+
+    Raises
+    ------
+    InvalidSettings
+        If it has no link.
+
+    Examples
+    --------
+    >>> from bellcrank.machines import elementary
+    >>> problem = elementary(9, "up")
+    >>> shape = next(each for each in shapes(problem) if each.link)
+    >>> bool(np.isfinite(lever_law(problem, shape)))
+    True
+    """
+    if shape.pivot is None or not shape.link:
+        raise InvalidSettings(f"{shape.label}: has no joints, and so no law")
+    positions = problem.lattice.positions
+    pivot, first, knee = positions[[shape.pivot, shape.link[0], shape.link[-1]]]
+    along = knee - first
+    output = positions[problem.output.nodes].mean(axis=0)
+    given = along @ problem.input.direction.mean(axis=0)
+    wanted = _turned(output - pivot) @ problem.output.direction.mean(axis=0)
+    arm = along @ _turned(knee - pivot)
+    return float(given * wanted / arm) if abs(arm) > DEAD * float(along @ along) else math.inf
+
+
+def _turned(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2,) a vector turned by 90 degrees: its motion in a unit rotation."""
+    return np.array([-vector[1], vector[0]])
+
+
+def _at_ports(problem: Problem) -> NDArray[np.bool_]:
+    """(M,) the beams at the ports that every design of the problem has."""
+    lattice = problem.lattice
+    kept = problem.initial & lattice.beams_touching(
+        np.concatenate([problem.input.nodes, problem.output.nodes])
+    )
+    kept[problem.designable] = False
+    kept[lattice.beams_touching(problem.supports.nodes)] = False
+    return kept
+
+
+def _spacing(problem: Problem) -> float:
+    return float(np.median(problem.lattice.rest_length))
+
+
+def _links(problem: Problem) -> Iterator[tuple[int, ...]]:
+    """Yield straight rows of nodes that lead away from the input, to where it pushes."""
+    lattice = problem.lattice
+    neighbours: list[list[int]] = [[] for _ in range(lattice.node_count)]
+    for first, second in lattice.beams.tolist():
+        neighbours[first].append(second)
+        neighbours[second].append(first)
+    closed = {*problem.supports.nodes.tolist(), *problem.input.nodes.tolist()}
+    closed |= set(problem.output.nodes.tolist())
+    push = problem.input.direction.mean(axis=0)
+    for corner in problem.input.nodes.tolist():
+        for second in neighbours[corner]:
+            way = lattice.positions[second] - lattice.positions[corner]
+            if second in closed or abs(way @ push) < STEEPEST * np.hypot(*way):
+                continue
+            row = [corner, second]
+            while len(row) <= LINK[1]:
+                if len(row) > LINK[0]:
+                    yield tuple(row)
+                ahead = [
+                    node
+                    for node in neighbours[row[-1]]
+                    if node not in closed and _straight(lattice.positions, row, node)
+                ]
+                if not ahead:
+                    break
+                row.append(ahead[0])
+
+
+def _straight(positions: NDArray[np.float64], row: list[int], node: int) -> bool:
+    """Whether a node goes on with a row in its direction."""
+    before, after = positions[row[-1]] - positions[row[-2]], positions[node] - positions[row[-1]]
+    return bool(before @ after > 0.99 * np.hypot(*before) * np.hypot(*after))
+
+
+def _beams_along(problem: Problem, row: Sequence[int]) -> NDArray[np.int64]:
+    """(n,) the beams between each two nodes of a row."""
+    pairs = {frozenset(pair) for pair in itertools.pairwise(row)}
+    return np.array(
+        [
+            number
+            for number, ends in enumerate(problem.lattice.beams.tolist())
+            if frozenset(ends) in pairs
+        ],
+        dtype=np.int64,
+    )
+
+
+def _distance(
+    points: NDArray[np.float64], start: NDArray[np.float64], stop: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n,) from each point to a segment."""
+    way = stop - start
+    part = np.clip((points - start) @ way / (way @ way), 0.0, 1.0)
+    away: NDArray[np.float64] = np.linalg.norm(points - start - part[:, None] * way, axis=1)
+    return away

@@ -1,0 +1,202 @@
+"""`bellcrank library`: entries to look through, to use anywhere, and to add to."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bellcrank.machines import elementary
+from bellcrank.machines.library import Library, find_entry, shipped_folder
+from bellcrank.model import read_design, write_design
+
+from .helpers import call, refusal
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+COUNT = len(Library((shipped_folder(),)).names())
+
+
+@pytest.fixture(autouse=True)
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Keep tests away from the folder of whoever runs them."""
+    folder = tmp_path / "own"
+    monkeypatch.setenv("BELLCRANK_LIBRARY", str(folder))
+    return folder
+
+
+@pytest.fixture
+def lever(tmp_path: Path) -> Path:
+    """A design file of somebody's own."""
+    path = tmp_path / "lever.json"
+    write_design(elementary(7, "left").full_design(), path)
+    return path
+
+
+def test_all_entries_are_listed() -> None:
+    outcome = call("library", "list", width=80)
+    assert outcome.code == 0, outcome.err
+    assert f"{COUNT} entries" in outcome.out
+    assert find_entry("down-9-free").name in outcome.out
+    assert max(map(len, outcome.out.splitlines())) <= 80
+    listed = call("library", "list", "--json").data
+    assert len(listed) == COUNT
+    assert {"name", "efficiency", "better", "input_stiffness"} <= set(listed[0])
+
+
+def test_a_search_gives_the_best_first() -> None:
+    told = call(
+        "library", "search", "--direction", "up", "--kind", "light", "--better", "--json"
+    ).data
+    assert told
+    assert all(
+        (each["direction"], each["kind"], each["better"]) == ("up", "light", True) for each in told
+    )
+    efficiency = [each["free_efficiency"] for each in told]
+    assert efficiency == sorted(efficiency, reverse=True)
+    outcome = call("library", "search", "--columns", 9, "--spring", 0.14, "--sort", "work")
+    assert "against" in outcome.out
+    assert call("library", "search", "--efficiency", 1e6, "--json").data == []
+
+
+def test_an_entry_is_shown_with_its_two_port_figures_and_origin(tmp_path: Path) -> None:
+    entry = find_entry("down-9-free")
+    outcome = call("library", "show", "down-9-free", "--out", tmp_path / "picture.png")
+    assert outcome.code == 0, outcome.err
+    for words in (
+        entry.name,
+        "plain lever",
+        "frame FEM",
+        "input stiffness",
+        "stroke, free",
+        "seed",
+    ):
+        assert words in outcome.out
+    assert (tmp_path / "picture.png").stat().st_size > 1000
+    record = call("library", "show", entry.name, "--json").data
+    assert record["schema"] == "bellcrank/entry/1"
+    assert record["name"] == entry.name
+
+
+def test_an_entry_goes_wherever_a_design_does(tmp_path: Path) -> None:
+    entry = find_entry("down-9-free")
+    told = call("evaluate", "down-9-free", "--json").data["results"][0]
+    assert told["mask"] == entry.design.mask_hex
+    assert told["efficiency"] == pytest.approx(entry.efficiency, abs=1e-8)
+    found = call("characterise", entry.name[:-2], "--points", 2, "--json").data
+    assert found["rest"]["efficiency"] == pytest.approx(
+        entry.characterisation.rest.efficiency, rel=1e-6
+    )
+    checked = call("validate", entry.hash, "--json").data
+    assert checked["efficiency"] == pytest.approx(entry.validation.efficiency, rel=1e-6)
+    assert call("export", entry.name, tmp_path / "part.svg").code == 0
+    plan = tmp_path / "pair.toml"
+    plan.write_text(
+        'name = "pair"\n[parts.first]\nentry = "down-9-free"\n[parts.second]\n'
+        'entry = "down-9-light"\njoin = "first.output"\nrotate = 300\n[input]\n'
+        'ports = ["first.input"]\n[output]\nports = ["second.output"]\n'
+    )
+    outcome = call("machine", "build", plan)
+    assert outcome.code == 0, outcome.err
+    assert read_design(tmp_path / "pair.json").beam_count > entry.design.beam_count
+
+
+def test_a_file_or_problem_goes_before_an_entry(
+    lever: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name = find_entry("down-9-free").name
+    lever.rename(tmp_path / f"{name}.json")
+    told = call("evaluate", f"{name}.json", "--json").data["results"][0]
+    assert told["mask"] == elementary(7, "left").full_design().mask_hex
+    assert call("evaluate", "crane", "--json").code == 0
+
+
+def test_a_design_is_added_to_ones_own_folder(lever: Path, own: Path) -> None:
+    outcome = call("library", "add", lever, "--points", 2)
+    assert outcome.code == 0, outcome.err
+    (path,) = own.iterdir()
+    assert re.fullmatch(r"left-own-[0-9a-f]{8}\.json", path.name)
+    assert f"kept {path.stem}" in outcome.err
+    assert "a design of its own" in outcome.out
+    assert len(call("library", "list", "--json").data) == COUNT + 1
+    assert call("evaluate", "left-own", "--json").code == 0
+    again = call("library", "add", lever, "--points", 2)
+    assert again.code == 2
+    assert "exists already" in again.err
+
+
+def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
+    words = (
+        "library", "make", "--directions", "down", "--columns", "5", "--kinds", "free",
+        "--steps", 500, "--chains", 2, "--out", tmp_path / "made",
+    )  # fmt: skip
+    outcome = call(*words)
+    assert outcome.code == 0, outcome.err
+    assert "1 of 1  down-5-free: down-5-free-" in outcome.err
+    assert len(list((tmp_path / "made").glob("down-5-free-*.json"))) == 1
+    assert "was there" in call(*words).err
+    outcome = call("library", "index", "--entries", tmp_path / "made", "--out", tmp_path / "pages")
+    assert outcome.code == 0, outcome.err
+    page = (tmp_path / "pages" / "index.html").read_text()
+    (name,) = (path.stem for path in (tmp_path / "made").glob("down-*.json"))
+    assert page.count(f'data-name="{name}"') == 1
+    assert "http" not in page.replace("http://www.w3.org", "")
+    assert "$" not in page
+    readable = (tmp_path / "pages" / "README.md").read_text()
+    assert f"{name}.svg" in readable
+    assert (tmp_path / "pages" / f"{name}.svg").read_text().startswith("<svg")
+    assert "exists" in refusal("library", "index", "--out", tmp_path / "pages")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("show", "down-9-frei"), "no entry 'down-9-frei' in the library; near: down-9-free-"),
+        (("show", "down"), "is the beginning of"),
+        (("search", "--direction", "sideways"), "direction: expected one of right"),
+        (("search", "--kind", "strong"), "unknown kind of actuator 'strong'"),
+        (("search", "--sort", "beauty"), "sort: expected one of"),
+        (("make", "--directions", "sideways", "--out", "x"), "direction: expected one of right"),
+        (("make", "--columns", "nine", "--out", "x"), "--columns nine: expected whole numbers"),
+        (("make", "--columns", "3", "--out", "x"), "columns: expected at least 5"),
+        (("make", "--workers", "0", "--out", "x"), "workers: expected at least 1"),
+        (("add", "nothing.json"), "unknown problem 'nothing.json'"),
+        (("add", "crane", "--points", "0"), "--points: expected at least one"),
+        (("show", "down-9-free", "--out", "picture.gif"), "expected a picture name"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(words: tuple[str, ...], told: str, here: Path) -> None:
+    assert told in refusal("library", *words, folder=here)
+
+
+def test_a_name_like_an_entrys_is_told_what_is_near() -> None:
+    assert "no entry 'down-9-fee' in the library; near: down-9-free-" in refusal(
+        "evaluate", "down-9-fee"
+    )
+    assert "unknown problem 'crain'" in refusal("evaluate", "crain")
+
+
+def test_a_damaged_file_is_refused_where_it_is_asked_for_and_listed(lever: Path, own: Path) -> None:
+    call("library", "add", lever, "--points", 1)
+    (path,) = own.iterdir()
+    data = json.loads(path.read_text())
+    data["design"]["efficiency"] = 99.0
+    path.write_text(json.dumps(data))
+    assert "checksum: does not fit the content" in refusal("evaluate", path.stem)
+    outcome = call("library", "list")
+    assert outcome.code == 0
+    assert "left out:" in outcome.err
+
+
+def test_a_folder_that_cannot_be_written_is_said(
+    lever: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("BELLCRANK_LIBRARY", str(tmp_path / "file" / "folder"))
+    assert "cannot be written" in refusal("library", "add", lever, code=1)
+    told = refusal("library", "make", "--out", tmp_path / "file" / "folder", code=1)
+    assert "cannot be written" in told

@@ -1,0 +1,198 @@
+"""The library as it comes along, and how entries are found in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidFile, InvalidSettings, UnknownName
+from bellcrank.machines import elementary, mean_ports, two_port_at
+from bellcrank.machines.elementary import DIRECTIONS
+from bellcrank.machines.library import (
+    Library,
+    kinds,
+    library,
+    measure,
+    shipped_folder,
+    user_folder,
+    write_entry,
+)
+from bellcrank.machines.library.catalogue import SORTS
+from bellcrank.machines.library.measuring import LEAST_STIFFNESS, lever_check
+from bellcrank.machines.library.summary import INDEX, entry_files, read_summary, write_index
+from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.search.goals import Case, GoalResponder
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SHIPPED = Library((shipped_folder(),))
+NAMES = SHIPPED.names()
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of the user with one entry."""
+    monkeypatch.setenv("BELLCRANK_LIBRARY", str(tmp_path))
+    write_entry(measure(elementary(7, "left").full_design(), points=2), tmp_path)
+    return tmp_path
+
+
+def test_there_are_entries_for_all_directions_sizes_and_kinds() -> None:
+    there = {(each.direction, each.columns, each.kind) for each in SHIPPED.summaries}
+    assert len(there) == len(NAMES) >= 60
+    assert {direction for direction, _, _ in there} == set(DIRECTIONS)
+    assert {kind for _, _, kind in there} == set(kinds)
+    assert len({columns for _, columns, _ in there}) == 3
+
+
+def test_what_comes_along_is_small() -> None:
+    sizes = [path.stat().st_size for path in entry_files(shipped_folder())]
+    assert max(sizes) < 40_000
+    assert sum(sizes) < 4_000_000
+
+
+def test_the_index_says_what_the_entries_say() -> None:
+    assert SHIPPED.summaries == [read_summary(path) for path in entry_files(shipped_folder())]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_entry_that_comes_along_is_sound(name: str) -> None:
+    entry = SHIPPED.find(name)
+    problem, mask = entry.design.problem, entry.design.mask
+    kind = kinds[entry.kind]
+    response = GoalResponder([Case(problem)], kind.goals).respond(mask, CAREFUL)
+    assert response.status is Status.CONVERGED, "stable, and keeps the goals of its kind"
+    assert entry.efficiency == pytest.approx(response.efficiency, abs=1e-8)
+    assert problem.output.spring == kind.spring
+    assert 2.0 * response.energy / problem.input.amount**2 > LEAST_STIFFNESS
+
+    element = mean_ports(entry.design)
+    fresh = two_port_at(element, element.rest())
+    stiffness = entry.characterisation.rest.stiffness
+    assert np.allclose(stiffness, fresh.stiffness, rtol=1e-6, atol=1e-12)
+    assert np.abs(stiffness - stiffness.T).max() <= 1e-8 * np.abs(stiffness).max()
+    assert np.linalg.eigvalsh(stiffness)[0] >= -1e-8 * np.abs(stiffness).max()
+    blocks = entry.characterisation.blocks
+    assert blocks is not None
+    assert np.linalg.eigvalsh(blocks)[0] >= -1e-8 * np.abs(blocks).max()
+
+    assert np.isfinite(entry.validation.linear_efficiency)
+    assert entry.provenance["settings"]["steps"] > 0
+
+
+@pytest.mark.parametrize("name", NAMES[::12])
+def test_the_lever_of_an_entry_is_that_of_its_task(name: str) -> None:
+    entry = SHIPPED.find(name)
+    fresh = lever_check(entry.design.problem, kinds[entry.kind].goals)
+    assert entry.lever.efficiency == pytest.approx(fresh.efficiency, abs=1e-8, nan_ok=True)
+    assert entry.better == (not fresh.efficiency >= entry.efficiency)
+    response = Evaluator(entry.design.problem).respond(
+        np.unpackbits(np.frombuffer(bytes.fromhex(entry.lever.mask), np.uint8))[
+            : len(entry.design.mask)
+        ].astype(bool)
+    )
+    assert response.efficiency == pytest.approx(entry.lever.efficiency, abs=1e-8)
+
+
+def test_an_entry_is_known_by_name_beginning_and_hash() -> None:
+    name = next(name for name in NAMES if name.startswith("down-9-free"))
+    for text in (name, name[:-3], "down-9-free", name[-8:], name[-8:-3]):
+        assert SHIPPED.resolve(text) == name, text
+    assert SHIPPED.find("down-9-free").name == name
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("down", r"is the beginning of \d+ entries: down-"),
+        ("down-9-frei", "no entry 'down-9-frei' in the library; near: down-9-free-"),
+        ("zzz", "no entry 'zzz' in the library; see"),
+        ("", "no entry ''"),
+    ],
+)
+def test_what_is_not_known_is_said_with_what_is_near(text: str, told: str) -> None:
+    with pytest.raises(UnknownName, match=told):
+        SHIPPED.resolve(text)
+
+
+def test_a_search_keeps_what_fits_and_sorts_the_best_first() -> None:
+    found = SHIPPED.search(direction="up", kind="free")
+    assert {(each.direction, each.kind) for each in found} == {("up", "free")}
+    values = [each.two_port.efficiency_against(0.0) for each in found]
+    assert values == sorted(values, reverse=True)
+    assert {each.columns for each in SHIPPED.search(columns=7)} == {7}
+    assert all(each.better for each in SHIPPED.search(better=True))
+    clear = SHIPPED.search(clear=True)
+    assert 0 < len(clear) < len(NAMES)
+    assert all(SHIPPED.find(each.name).clear for each in clear[::10])
+    assert all(each.input_stiffness <= 0.2 for each in SHIPPED.search(stiffness=0.2))
+    assert all(1.0 / each.output_compliance >= 0.1 for each in SHIPPED.search(output_stiffness=0.1))
+
+
+def test_a_search_under_load_prefers_what_pushes() -> None:
+    free, loaded = SHIPPED.search(), SHIPPED.search(spring=0.14)
+    assert free[0].kind == "free"
+    assert loaded[0].kind == "loaded"
+    least = SHIPPED.search(spring=0.14, efficiency=1.0)
+    assert all(each.two_port.efficiency_against(0.14) >= 1.0 for each in least)
+    assert 0 < len(least) < len(loaded)
+
+
+@pytest.mark.parametrize("sort", SORTS)
+def test_every_order_keeps_all_entries(sort: str) -> None:
+    assert {each.name for each in SHIPPED.search(sort=sort)} == set(NAMES)
+
+
+def test_a_search_for_what_there_cannot_be_is_refused() -> None:
+    with pytest.raises(InvalidSettings, match="direction: expected one of"):
+        SHIPPED.search(direction="sideways")
+    with pytest.raises(UnknownName, match="unknown kind of actuator 'strong'"):
+        SHIPPED.search(kind="strong")
+    with pytest.raises(InvalidSettings, match="sort: expected one of efficiency"):
+        SHIPPED.search(sort="beauty")
+    with pytest.raises(InvalidSettings, match="spring: expected a stiffness"):
+        SHIPPED.search(spring=-1.0)
+
+
+def test_the_users_entries_stand_beside_those_that_come_along(own: Path) -> None:
+    assert user_folder() == own
+    known = library()
+    assert len(known) == len(NAMES) + 1
+    assert known.find("left-own").kind == "own"
+    assert [each.name for each in known.search(kind="own")] == ["left-own-" + known.find(
+        "left-own").hash]  # fmt: skip
+
+
+def test_a_damaged_file_is_told_of_and_hides_no_other(own: Path) -> None:
+    (path,) = entry_files(own)
+    path.write_text(path.read_text()[:-30])
+    known = library()
+    assert len(known) == len(NAMES)
+    (line,) = known.damaged
+    assert str(path) in line
+    with pytest.raises(InvalidFile, match="not valid JSON"):
+        known.find(path.stem)
+
+
+def test_an_index_that_is_out_of_date_is_not_believed(own: Path) -> None:
+    known = Library((own,))
+    write_index(own, known.summaries)
+    assert Library((own,)).summaries == known.summaries
+    write_entry(measure(elementary(7, "up").full_design(), points=2), own)
+    assert len(Library((own,))) == 2
+    (own / INDEX).write_text("{}")
+    with pytest.raises(InvalidFile, match="schema"):
+        Library((own,)).summaries  # noqa: B018
+
+
+def test_a_folder_that_is_not_there_is_an_empty_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BELLCRANK_LIBRARY", str(tmp_path / "nowhere"))
+    assert len(library()) == len(NAMES)
+    monkeypatch.delenv("BELLCRANK_LIBRARY")
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    assert user_folder() == tmp_path / "bellcrank" / "library"

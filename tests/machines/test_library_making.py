@@ -1,0 +1,168 @@
+"""Making entries: the same whatever stops it on the way."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidSettings, StorageError, UnknownName
+from bellcrank.machines.library import Library, Order, Task, make
+from bellcrank.machines.library.files import entry_to_dict
+from bellcrank.machines.library.making import WORK, Resisting
+from bellcrank.machines.library.summary import INDEX, entry_files
+from bellcrank.mechanics import Evaluator, Status
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bellcrank.search import Progress
+
+ORDER = Order(directions=("down",), columns=(5,), kinds=("free", "light"), steps=750, chains=2)
+TIMED = ("provenance", "checksum")
+SCRIPT = """
+import sys
+from pathlib import Path
+from bellcrank.machines.library import Order, make
+order = Order(directions=("down",), columns=(5,), kinds=("free", "light"), steps=750, chains=2)
+for made in make(order, Path(sys.argv[1]), workers=1):
+    pass
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Entries that nothing stopped. Not to be changed."""
+    folder = tmp_path_factory.mktemp("whole")
+    made = list(make(ORDER, folder, workers=1))
+    assert [each.note for each in made] == ["made", "made"]
+    return folder
+
+
+def told(folder: Path) -> dict[str, object]:
+    """All entries of a folder without when they were made."""
+    known = Library((folder,))
+    return {
+        name: {
+            key: value for key, value in entry_to_dict(known.find(name)).items() if key not in TIMED
+        }
+        for name in known.names()
+    }
+
+
+def test_each_task_makes_one_entry_and_leaves_nothing_else(whole: Path) -> None:
+    names = sorted(path.name for path in whole.iterdir())
+    assert len(names) == 3
+    assert INDEX in names
+    known = Library((whole,))
+    free, light = known.find("down-5-free"), known.find("down-5-light")
+    assert (free.direction, free.columns, free.kind) == ("down", 5, "free")
+    assert free.provenance["settings"]["goals"] == []
+    assert light.provenance["settings"]["goals"][0] == "input-stiffness <= 0.1"
+    begun = [chain["begun_with"] for chain in free.provenance["chains"]]
+    assert begun == ["full", "lever"]
+    assert free.efficiency == pytest.approx(
+        Evaluator(free.design.problem).respond(free.design.mask).efficiency, abs=1e-8
+    )
+
+
+def test_what_is_there_is_not_made_again(whole: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in whole.iterdir()}
+    made = list(make(ORDER, whole, workers=1))
+    assert [(each.note, each.entry) for each in made] == [("was there", None)] * 2
+    assert {path: path.stat().st_mtime_ns for path in whole.iterdir()} == before
+
+
+def test_after_a_stop_it_ends_with_the_same_entries(whole: Path, tmp_path: Path) -> None:
+    stop = threading.Event()
+    seen: list[Task] = []
+
+    def tell(task: Task, _progress: Progress) -> None:
+        seen.append(task)
+        if len(seen) == 4:  # in the second chain of the first task
+            stop.set()
+
+    assert list(make(ORDER, tmp_path, workers=1, tell=tell, stop=stop)) == []
+    assert (tmp_path / WORK).exists()
+    assert [each.note for each in make(ORDER, tmp_path, workers=1)] == ["made", "made"]
+    assert told(tmp_path) == told(whole)
+
+
+def test_after_a_kill_it_ends_with_the_same_entries(whole: Path, tmp_path: Path) -> None:
+    process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(tmp_path)])
+    deadline = time.monotonic() + 120.0
+    while not any(tmp_path.glob(f"{WORK}/*/*/**/*.parquet")) and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    list(make(ORDER, tmp_path, workers=2))
+    assert told(tmp_path) == told(whole)
+    assert not (tmp_path / WORK).exists()
+
+
+def test_an_index_that_a_kill_kept_from_being_written_is_written(
+    whole: Path, tmp_path: Path
+) -> None:
+    for path in entry_files(whole):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    (tmp_path / WORK / "down-5-free").mkdir(parents=True)
+    list(make(ORDER, tmp_path))
+    assert (tmp_path / INDEX).read_text() == (whole / INDEX).read_text()
+    assert not (tmp_path / WORK).exists()
+
+
+def test_a_search_with_other_settings_is_not_mixed_in(tmp_path: Path) -> None:
+    stop = threading.Event()
+    list(make(ORDER, tmp_path, workers=1, tell=lambda *_: stop.set(), stop=stop))
+    with pytest.raises(InvalidSettings, match="was begun with other settings"):
+        list(make(replace(ORDER, seed=1), tmp_path))
+
+
+def test_orders_for_what_there_cannot_be_are_refused() -> None:
+    with pytest.raises(InvalidSettings, match="direction: expected one of"):
+        Order(directions=("sideways",))
+    with pytest.raises(InvalidSettings, match="columns: expected at least 5"):
+        Order(columns=(3,))
+    with pytest.raises(UnknownName, match="unknown kind of actuator"):
+        Order(kinds=("strong",))
+    with pytest.raises(InvalidSettings, match="steps"):
+        Order(steps=0)
+
+
+def test_a_folder_that_cannot_be_written_is_said_at_once(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError, match="cannot be written"):
+        list(make(ORDER, tmp_path / "file" / "entries"))
+
+
+def test_a_task_may_leave_supports_unused() -> None:
+    """Else the plain lever, which stands on one node, would be outside of the search."""
+    problem = Task("up", 7, "free").problem()
+    full, lever = Task("up", 7, "free").starts(4).values()
+    assert (full[1], lever[1]) == (2, 2)
+    kept = np.flatnonzero(~np.isin(np.arange(len(problem.initial)), problem.designable))
+    assert lever[0].initial[kept].all()
+    response = Evaluator(lever[0]).respond(lever[0].initial)
+    assert response.status is Status.CONVERGED
+    assert response.efficiency > 1.0
+
+
+def test_what_merely_follows_its_input_is_forbidden() -> None:
+    from bellcrank.machines import elementary
+    from bellcrank.machines.library.lever import Shape, lever_of
+
+    problem = elementary(7, "down")
+    judge = Resisting(Evaluator(problem))
+    bar = lever_of(problem, Shape("bar")).mask
+    assert Evaluator(problem).respond(bar).status is Status.CONVERGED
+    assert judge.respond(bar).status is Status.FORBIDDEN
+    assert judge.respond(problem.initial).status is Status.CONVERGED
+    assert judge.load_bearing(bar).any(), "all else is the judge's"

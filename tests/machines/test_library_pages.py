@@ -1,0 +1,82 @@
+"""The index pages: every entry once, drawn as it moves, in files that need nothing else."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import OutputExists
+from bellcrank.machines import elementary
+from bellcrank.machines.library import Library, measure, shipped_folder, write_entry
+from bellcrank.machines.library.index import PAGE, TABLE, draw, write_pages
+from bellcrank.machines.library.thumbnails import UNITS, thumbnail
+
+DOCS = Path(__file__).parents[2] / "docs" / "library"
+NUMBER = re.compile(r"-?\d+")
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """Two entries of somebody's own."""
+    folder = tmp_path_factory.mktemp("entries")
+    for direction in ("left", "down"):
+        write_entry(measure(elementary(7, direction).full_design(), points=2), folder)
+    return Library((folder,))
+
+
+def test_a_drawing_moves_as_the_design_does() -> None:
+    entry = Library((shipped_folder(),)).find("down-9-free")
+    drawn = draw(entry)
+    assert drawn.rest.keys() == drawn.moved.keys() == {"m", "i", "o"}
+    for name, path in drawn.rest.items():
+        assert len(NUMBER.findall(path)) == len(NUMBER.findall(drawn.moved[name]))
+    rest, moved = (
+        np.array(NUMBER.findall(path["o"]), dtype=float).reshape(-1, 2)
+        for path in (drawn.rest, drawn.moved)
+    )
+    amount = entry.design.problem.input.amount
+    down = (moved - rest).mean(axis=0)[1] / UNITS / amount
+    assert down == pytest.approx(entry.efficiency, rel=0.05), "as far as whole numbers can tell"
+
+
+def test_what_does_not_move_is_drawn_at_rest() -> None:
+    design = elementary(7, "up").full_design()
+    drawn = thumbnail(design, np.full((design.problem.lattice.node_count, 2), np.nan))
+    assert drawn.rest == drawn.moved
+
+
+def test_pages_show_each_entry_once(small: Library, tmp_path: Path) -> None:
+    page, table = write_pages(small, tmp_path)
+    assert (page.name, table.name) == (PAGE, TABLE)
+    text = page.read_text()
+    for name in small.names():
+        assert text.count(f'data-name="{name}"') == 1
+        assert table.read_text().count(f"`{name}`") == 1
+        ET.parse(tmp_path / f"{name}.svg")
+    assert 'value="left"' in text
+    assert 'value="up"' not in text, "only what there is to choose from"
+    assert "nan" not in text
+    with pytest.raises(OutputExists):
+        write_pages(small, tmp_path)
+
+
+def test_pictures_of_entries_that_are_gone_are_removed(small: Library, tmp_path: Path) -> None:
+    for name in ("up-own-00000000.svg", "a-picture-of-mine.svg"):
+        (tmp_path / name).write_text("<svg/>")
+    write_pages(small, tmp_path)
+    there = {path.stem for path in tmp_path.glob("*.svg")}
+    assert there == {*small.names(), "a-picture-of-mine"}
+
+
+def test_the_pages_in_the_documentation_show_what_comes_along() -> None:
+    if not DOCS.is_dir():
+        pytest.skip("no documentation beside the tests")
+    names = Library((shipped_folder(),)).names()
+    assert sorted(path.stem for path in DOCS.glob("*.svg")) == names
+    for page in (PAGE, TABLE):
+        text = (DOCS / page).read_text()
+        assert all(name in text for name in names)
