@@ -76,6 +76,49 @@ def test_its_answer_is_foretold(plan: Path) -> None:
     assert "efficiency, small strokes" in outcome.out
 
 
+@pytest.fixture
+def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Keep tables elsewhere than the user's; kernels stay where they are."""
+    folder = tmp_path / "tables"
+    monkeypatch.setattr("bellcrank.machines.shelf.usual_folder", lambda: folder)
+    return folder
+
+
+def test_the_whole_stroke_is_foretold_and_checked(plan: Path, tmp_path: Path, shelf: Path) -> None:
+    out = tmp_path / "stroke.json"
+    told = call(
+        "machine", "predict", plan, "--stroke", "--points", 4, "--check", "--out", out, "--json"
+    ).data
+    assert json.loads(out.read_text()) == told
+    stroke = told["stroke"]
+    assert len(stroke["motion"]) == len(stroke["output"]) == len(stroke["input_force"]) == 5
+    assert stroke["efficiency"] == stroke["output"][-1] / stroke["motion"][-1]
+    assert {stand["part"] for stand in stroke["stands"]} == {"first", "second"}
+    assert stroke["check"]["output_error"] < 0.15
+    assert stroke["check"]["force_error"] < 0.15
+    assert list(shelf.iterdir())
+
+
+def test_the_stroke_is_told_in_words_and_drawn(plan: Path, tmp_path: Path, shelf: Path) -> None:
+    picture = tmp_path / "stroke.png"
+    outcome = call(
+        "machine", "predict", plan, "--stroke", "--live", "--points", 3, "--check", "--out", picture
+    )
+    assert outcome.code == 0, outcome.err
+    for words in ("efficiency, full stroke", "itself, followed", "foretold motion off by"):
+        assert words in outcome.out
+    assert picture.exists()
+    assert not shelf.exists()
+
+
+def test_a_stroke_is_refused_before_anything_is_computed(plan: Path, tmp_path: Path) -> None:
+    assert "add --stroke" in refusal("machine", "predict", plan, "--live")
+    assert "at least one" in refusal("machine", "predict", plan, "--stroke", "--points", 0)
+    stroke = ("machine", "predict", plan, "--stroke", "--out")
+    assert "ending in .json" in refusal(*stroke, tmp_path / "stroke.txt")
+    assert "exists" in refusal(*stroke, plan.with_name("lever.json"))
+
+
 def test_what_is_wrong_is_said_in_one_line(plan: Path, tmp_path: Path) -> None:
     call("machine", "build", plan)
     assert "exists" in refusal("machine", "build", plan)

@@ -106,3 +106,14 @@ def test_forces_are_not_chained_yet() -> None:
                     output={"ports": ["a.output"]})  # fmt: skip
     with pytest.raises(InvalidFile, match="driven by a displacement"):
         predict(machine)
+
+
+def test_two_bridges_from_one_port_count_once_each() -> None:
+    parts = {
+        "a": {"entry": "1"}, "b": {"entry": "2", "at": [-13.0, 0.0]},
+        "c": {"entry": "3", "at": [-8.0, 4.0 * 3.0**0.5], "rotate": 180},
+    }  # fmt: skip
+    links = [{"from": "a.output", "to": f"{end}.input", "kind": "bridge"} for end in "bc"]
+    for port in ("a.output", "b.output", "c.output"):
+        machine = build(parts, links, output={"ports": [port]})
+        assert predict(machine).efficiency == pytest.approx(whole(machine), rel=0.01)

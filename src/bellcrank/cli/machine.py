@@ -83,7 +83,7 @@ def build(
     if target.exists() and not overwrite:
         raise already_exists(target)
     start = time.perf_counter()
-    built = assemble(find_plan(plan), partial(_find, Path(plan).parent))
+    built = assemble(find_plan(plan), partial(find_part, Path(plan).parent))
     announce_compilation()
     response = Evaluator(built.design.problem).respond(built.design.mask, CAREFUL)
     seconds = time.perf_counter() - start
@@ -96,39 +96,7 @@ def build(
     notes.print(f"wrote {plain(target)}")
 
 
-@machine.command()
-def predict(
-    plan: PlanName,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-) -> None:
-    """Foretell what a machine does for small strokes, by chaining its condensed parts."""
-    from bellcrank.machines import assemble, predict
-    from bellcrank.machines.showcases import find_plan
-
-    built = assemble(find_plan(plan), partial(_find, Path(plan).parent))
-    announce_compilation()
-    start = time.perf_counter()
-    found = predict(built)
-    seconds = time.perf_counter() - start
-    told = {
-        "name": built.design.problem.name,
-        "parts": list(built.parts),
-        "efficiency": found.efficiency,
-        "input_stiffness": found.input_stiffness,
-        "seconds": round(seconds, 4),
-    }
-    if as_json:
-        print_json(json.dumps(told, indent=1))
-        return
-    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    table.add_row("name", plain(told["name"]))
-    table.add_row("efficiency, small strokes", f"{found.efficiency:.4f}")
-    table.add_row("input stiffness", f"{found.input_stiffness:.4g}")
-    table.add_row("chained in", f"{1e3 * seconds:.0f} ms")
-    results.print(table)
-
-
-def _find(folder: Path, entry: str) -> Design:
+def find_part(folder: Path, entry: str) -> Design:
     """Return the design of a part: a file beside the plan, or what is known by that name."""
     from bellcrank.workflows import find_design
 

@@ -20,6 +20,7 @@ from bellcrank.cli import (
     export,
     library,
     machine,
+    machine_predict,
     onnx,
     plot,
     predict,
@@ -51,6 +52,7 @@ COMMANDS = (
     surrogate_search,
     onnx,
     machine,
+    machine_predict,
     library,
     problems,
 )

@@ -12,8 +12,10 @@ The work flow, in four lines:
 from bellcrank.machines.assembly import Machine, assemble
 from bellcrank.machines.chaining import Prediction, predict
 from bellcrank.machines.characterise import Characterisation, characterise, usual_loads
+from bellcrank.machines.checking import Check, compare, foretold_to_dict, simulate
 from bellcrank.machines.curves import PortCurve, trace
 from bellcrank.machines.elementary import DIRECTIONS, elementary, strut
+from bellcrank.machines.foretelling import Foretold, foretell
 from bellcrank.machines.loads import Load
 from bellcrank.machines.plan import Plan, read_plan
 from bellcrank.machines.ports import INPUT, OUTPUT, Port, block_ports, mean_ports, ports_of
@@ -32,7 +34,9 @@ __all__ = [
     "INPUT",
     "OUTPUT",
     "Characterisation",
+    "Check",
     "Fit",
+    "Foretold",
     "Load",
     "Machine",
     "Plan",
@@ -47,15 +51,19 @@ __all__ = [
     "characterisation_from_dict",
     "characterisation_to_dict",
     "characterise",
+    "compare",
     "elementary",
     "fit",
     "fit_potential",
+    "foretell",
+    "foretold_to_dict",
     "mean_ports",
     "ports_of",
     "predict",
     "read_characterisation",
     "read_plan",
     "sample",
+    "simulate",
     "strut",
     "trace",
     "two_port_at",

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings
+from bellcrank.machines.blocks import bridge_beams
 from bellcrank.mechanics import Loose, Superelement
 from bellcrank.model import Input, Lattice, Output, Problem, Supports
 
@@ -85,7 +86,7 @@ def predict(machine: Machine) -> Prediction:
         if link.kind == "bridge":
             shared = ends
             own = within(ends[0]) | within(ends[1])
-            own[machine.bridges] = True
+            own[bridge_beams(machine, link)] = True
             add(1.0, own, np.concatenate(ends), f"the bridge to {link.second}")
         for each in shared:
             add(-1.0, within(each), each, link.first)

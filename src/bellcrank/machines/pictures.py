@@ -1,16 +1,18 @@
-"""The picture of an actuator as a two-port."""
+"""Pictures of actuators as two-ports, and of the strokes of machines."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from bellcrank.mechanics import Status
-from bellcrank.plots import LoadedCurve, LoadLine, draw_two_port
+from bellcrank.plots import LoadedCurve, LoadLine, StrokeOfMachine, draw_foretold, draw_two_port
 
 if TYPE_CHECKING:
     import os
 
     from bellcrank.machines.characterise import Characterisation
+    from bellcrank.machines.checking import Check
+    from bellcrank.machines.foretelling import Foretold
 
 
 def draw_characterisation(
@@ -54,3 +56,41 @@ def draw_characterisation(
         f"output stiffness {rest.output_stiffness:.3g}; lattice units"
     )
     draw_two_port(curves, line, path, title=title or found.name, note=note, overwrite=overwrite)
+
+
+def draw_stroke(
+    found: Foretold,
+    check: Check | None,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    overwrite: bool = False,
+) -> None:
+    """Draw what a machine is foretold to do, and what it does if that was simulated.
+
+    Raises
+    ------
+    InvalidSettings, OutputExists, StorageError
+    """
+    told = StrokeOfMachine(
+        found.motion,
+        found.output,
+        found.input_force,
+        complete=found.stroke.status is Status.CONVERGED,
+    )
+    note = f"efficiency {found.efficiency:.4g} at the full stroke, {found.linear.efficiency:.4g} "
+    note += "for small ones"
+    simulated = None
+    if check is not None:
+        whole = check.simulated
+        simulated = StrokeOfMachine(
+            whole.motion,
+            whole.output,
+            whole.input_force,
+            complete=whole.status is Status.CONVERGED,
+        )
+        note += f"; off by {check.output_error:.2%} in motion, {check.force_error:.2%} in force"
+    slopes = (found.linear.efficiency, found.linear.input_stiffness)
+    draw_foretold(
+        told, slopes, path, simulated=simulated, title=title, note=note, overwrite=overwrite
+    )

@@ -99,6 +99,43 @@ class Potential:
             bend[i] += higher / (self.scale[i] * self.scale)
         return np.where(self.prescribed[:, None], bend, -bend)
 
+    def expand(
+        self, x: NDArray[np.float64]
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+        """Return the potential, its slope (k,) and its second derivative (k, k) at once."""
+        value, slope, bend = self._higher(x / self.scale)
+        own = self.quadratic @ x
+        return (
+            float(0.5 * x @ own) + value,
+            own + slope / self.scale,
+            self.quadratic + bend / np.outer(self.scale, self.scale),
+        )
+
+    def _higher(
+        self, x: NDArray[np.float64]
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+        """Sum the higher terms and their derivatives, all in one product of factors."""
+        count = len(x)
+        powers = np.arange(int(self.exponents.max(initial=0)) + 1)
+        table = np.zeros((3, count, len(powers)))
+        table[0] = x[:, None] ** powers
+        table[1, :, 1:] = table[0, :, :-1] * powers[1:]
+        table[2, :, 1:] = table[1, :, :-1] * powers[1:]
+        place = np.arange(count)
+        # (3, k, t): each factor of each term, and its first and second derivative.
+        factors = table[:, place, self.exponents].transpose(0, 2, 1)
+        order = np.eye(count, dtype=np.int64)
+        first, second = np.triu_indices(count)
+        each = factors[order[:, None] + order[None, :], place][first, second]
+        bend = np.zeros((count, count))
+        bend[first, second] = each.prod(axis=1) @ self.coefficients
+        bend[second, first] = bend[first, second]
+        return (
+            float(factors[0].prod(axis=0) @ self.coefficients),
+            factors[order, place].prod(axis=1) @ self.coefficients,
+            bend,
+        )
+
 
 def lowered(
     exponents: NDArray[np.int64], variable: int

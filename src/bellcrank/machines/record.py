@@ -79,7 +79,7 @@ def characterisation_to_dict(found: Characterisation) -> dict[str, Any]:
         },
         "blocks": None if found.blocks is None else found.blocks.tolist(),
         "curves": [_curve(curve) for curve in found.curves],
-        "potentials": {name: _potential(one) for name, one in found.potentials.items()},
+        "potentials": {name: fit_to_dict(one) for name, one in found.potentials.items()},
         "doubts": list(found.doubts),
         "provenance": dict(found.provenance),
     }
@@ -99,7 +99,8 @@ def _curve(curve: PortCurve) -> dict[str, Any]:
     }
 
 
-def _potential(fitted: Fit) -> dict[str, Any]:
+def fit_to_dict(fitted: Fit) -> dict[str, Any]:
+    """Return a fitted potential as plain data, ready for JSON."""
     arrays = ("prescribed", "quadratic", "scale", "exponents", "coefficients")
     measured = ("low", "high", "error", "typical_error")
     return {
@@ -150,7 +151,7 @@ def characterisation_from_dict(data: Mapping[str, Any], source: str) -> Characte
             for number, curve in enumerate(table.curves)
         ),
         potentials={
-            name: _read_potential(one, f"{source}: potentials.{name}")
+            name: _read_fit(one, f"{source}: potentials.{name}")
             for name, one in table.potentials.items()
         },
         doubts=tuple(table.doubts),
@@ -216,7 +217,18 @@ def _read_curve(table: CurveTable, where: str) -> PortCurve:
     )
 
 
-def _read_potential(table: PotentialTable, where: str) -> Fit:
+def fit_from_dict(data: Mapping[str, Any], source: str) -> Fit:
+    """Read back what `fit_to_dict` made.
+
+    Raises
+    ------
+    InvalidFile
+        With one sentence about the first thing that is wrong.
+    """
+    return _read_fit(parse(PotentialTable, data, source), source)
+
+
+def _read_fit(table: PotentialTable, where: str) -> Fit:
     count, terms = len(table.prescribed), len(table.coefficients)
     by_variable = {
         name: _array(getattr(table, name), (count,), f"{where}.{name}").astype(np.float64)

@@ -35,6 +35,8 @@ ASKEW = 0.3
 units in which all cost the same energy)."""
 PARTS = 5
 """Of the samples: one to choose the degree by, one to measure the error with, the others to fit."""
+NOTHING = 1e-12
+"""Answers that are all smaller are rounding errors, and none of them is wrong."""
 EQUATIONS = 6
 """For each term of a polynomial."""
 
@@ -245,7 +247,7 @@ def fit(
             f"{element.design.problem.name}: snaps nearly everywhere in its range; no potential"
         )
     size = np.abs([answers_of(state, prescribed) for state in states]).max(axis=0)
-    size[size == 0.0] = 1.0
+    size = np.maximum(size, NOTHING)
     fitted = [(degree, fit_potential(element, prescribed, kept, degree)) for degree in degrees]
     degree, potential = min(
         fitted, key=lambda one: float(((_missed(one[1], parts[1]) / size) ** 2).mean(axis=0).max())

@@ -8,10 +8,13 @@ thread. The suffix of a path (png, svg, pdf) chooses the format.
 - `draw_paths` draws efficiency against accepted steps, given as `ChainPath`;
 - `draw_front` draws a Pareto front;
 - `draw_stress` draws parts in the colours of their stress, given as `Stressed`;
-- `draw_two_port` draws an actuator's answers to loads, given as `LoadedCurve`.
+- `draw_two_port` draws an actuator's answers to loads, given as `LoadedCurve`;
+- `draw_foretold` draws what a machine is foretold to do beside what it does, given as
+  `StrokeOfMachine`.
 """
 
 from bellcrank.plots.chains import ChainPath, PathsStyle
+from bellcrank.plots.foretold import StrokeOfMachine, draw_foretold
 from bellcrank.plots.front import draw_front
 from bellcrank.plots.motion import draw_comparison, draw_design, draw_motion
 from bellcrank.plots.paths import draw_paths
@@ -29,8 +32,10 @@ __all__ = [
     "Stressed",
     "StrokeAxes",
     "StrokeCurve",
+    "StrokeOfMachine",
     "draw_comparison",
     "draw_design",
+    "draw_foretold",
     "draw_front",
     "draw_motion",
     "draw_paths",
