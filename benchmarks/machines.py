@@ -1,9 +1,9 @@
-"""The machines that come along, foretold, simulated and designed further: ``python -m benchmarks.machines``.
+"""The machines that come along, foretold and simulated: ``python -m benchmarks.machines``.
 
-For each: how long it takes to build and to simulate; the efficiency for small strokes foretold by its
-condensed parts beside that of the whole lattice; the largest difference along the whole stroke, by
-tables and by the parts themselves; and what a search over all beams makes of it. Prints Markdown and
-writes ``docs/machines/showcases.json``. ``--work`` keeps searches, which go on after a kill.
+For each: how long it takes to build and to simulate; the efficiency for small strokes foretold by
+its condensed parts beside that of the whole lattice; the largest difference along the whole stroke,
+by tables and by the parts themselves; and what a search over all beams makes of it. Prints Markdown
+and writes ``docs/machines/showcases.json``. ``--work`` keeps searches, which go on after a kill.
 """
 
 from __future__ import annotations
@@ -147,8 +147,10 @@ def measure(name: str, options: argparse.Namespace) -> Row:
 def main() -> None:
     options = parse()
     rows = []
-    print("| machine | parts | beams | built, s | simulated, s | small strokes | foretold "
-          "| full stroke | by tables | largest difference | force | by parts | designed further |")  # fmt: skip
+    print(
+        "| machine | parts | beams | built, s | simulated, s | small strokes | foretold "
+        "| full stroke | by tables | largest difference | force | by parts | designed further |"
+    )
     print("|---" * 13 + "|")
     for name in options.machines:
         row = measure(name, options)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import pytest
 
 from bellcrank.cli.machine import design_of_strut
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.machines import assemble, predict
-from bellcrank.machines.assembly import Machine
 from bellcrank.machines.library import library
 from bellcrank.machines.showcases import find_plan, showcases
 from bellcrank.mechanics import CAREFUL, Evaluator, Status
-from bellcrank.model import Design
+
+if TYPE_CHECKING:
+    from bellcrank.machines.assembly import Machine
+    from bellcrank.model import Design
 
 SMALL = 1e-3
 """Part of the stroke in which all is linear."""
