@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from bellcrank.machines.elements import Element
     from bellcrank.machines.sampling import Fit
 
-DOUBTFUL = 0.02
+DOUBTFUL = 0.005
 """Typical error of a table, as a part of its largest answers, that is worth a word."""
 BENT = 0.2
 """Part of the linear efficiency that blocks leave out, which is worth a word."""
@@ -240,7 +240,7 @@ def _doubts_of_tables(stands: tuple[Stand, ...], stroke: Stroke) -> list[str]:
         if stand.fit is not None:
             typical = float(stand.fit.typical_error.max())
             if typical > DOUBTFUL:
-                doubts.append(f"the table of {stand.name} is off by {typical:.1%} typically")
+                doubts.append(f"the table of {stand.name} is off by {typical:.2%} typically")
             if stand.fit.lost:
                 doubts.append(
                     f"{stand.name} snaps on the way to {stand.fit.lost} places in the range of "

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
 DEGREES = (2, 3, 4)
 """Of the potentials that are tried, as in `bellcrank.machines.characterise`."""
-ROUGH = 0.1
-"""Typical error of a table, as a part of its largest answers, from which on it is not used."""
+ROUGH = 0.01
+"""Typical error of a table, as a part of its largest answers, from which on it is not used: chains
+of high gain make ten times as much of it, and following the part itself takes little longer."""
 
 Kind = Literal["usual", "around", "linear", "itself"]
 
@@ -128,7 +129,7 @@ def _judged(member: Member, kind: Kind, reach: Reach, found: Fit | str) -> Stand
     if worst > ROUGH:
         return itself(
             member,
-            f"a polynomial of degree {found.degree} is off by {worst:.0%} typically in its range"
+            f"a polynomial of degree {found.degree} is off by {worst:.1%} typically in its range"
             + (f", where it snaps in {found.lost} places" if found.lost else ""),
         )
     return Stand(member.name, kind, Tabled(found.potential), found, Range(reach))
