@@ -103,7 +103,7 @@ def strut(length: int) -> Problem:
     --------
     >>> bar = strut(6)
     >>> bar.lattice.beam_count, bar.lattice.positions[bar.input.nodes].mean(axis=0).round(3)
-    (57, array([6.   , 0.866]))
+    (54, array([6.   , 0.866]))
     """
     if length < SHORTEST:
         raise InvalidSettings(f"length: expected at least {SHORTEST}, got {length!r}")

@@ -5,7 +5,7 @@ Examples
 >>> sorted(showcases())
 ['amplifier', 'gripper', 'reverser', 'sorter-left', 'sorter-right', 'wave']
 >>> find_plan("gripper").table.input.ports
-['right.input']
+['left.input']
 """
 
 from __future__ import annotations
