@@ -24,6 +24,7 @@ from bellcrank.cli import (
     predict,
     print_part,
     problems,
+    serve,
     surrogate_search,
     train,
     validate,
@@ -51,6 +52,7 @@ COMMANDS = (
     onnx,
     machine,
     problems,
+    serve,
 )
 """Modules that register a command."""
 FAILURES = (StorageError, CorruptRun, RunFailed)
