@@ -29,6 +29,7 @@ export class Canvas extends Drawing {
   private readonly band = s("rect", { class: "band", visibility: "hidden" });
   private readonly faults = s("g", { class: "faults" });
   private readonly arrows = { input: s("g", { class: "arrow input" }), output: s("g", { class: "arrow output" }) };
+  private readonly response = s("path", { class: "beam response" });
   private readonly axes = s("path", { class: "axis" });
 
   constructor(private readonly deeds: Deeds) {
@@ -37,6 +38,7 @@ export class Canvas extends Drawing {
     this.svg.setAttribute("tabindex", "0");
     this.svg.setAttribute("aria-roledescription", "drawing");
     this.svg.classList.add("canvas");
+    this.svg.insertBefore(this.response, this.dots);
     this.overlay.append(this.axes, this.hoverBeam, this.hover, this.band, this.faults);
     this.svg.insertBefore(this.arrows.output, this.dots);
     this.svg.insertBefore(this.arrows.input, this.dots);
@@ -85,14 +87,12 @@ export class Canvas extends Drawing {
 
   /** Show where an answer of the solver puts the design. */
   showMoved(displacement: number[] | null, beams: number[]): void {
-    const path = this.path("response");
-    if (!displacement) {
-      path.setAttribute("d", "");
-      return;
-    }
     const at = this.rest.slice();
-    for (let k = 0; k < at.length; k++) at[k]! += displacement[k]!;
-    path.setAttribute("d", this.lines(beams, at));
+    if (displacement) for (let k = 0; k < at.length; k++) at[k]! += displacement[k]!;
+    this.response.setAttribute("d", displacement ? this.lines(beams, at) : "");
+    const { problem } = this.task!;
+    this.mark("input", problem.input.nodes, at);
+    this.mark("output", problem.output.nodes, at);
   }
 
   private showRollers(along_y: number[], along_x: number[]): void {

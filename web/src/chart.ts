@@ -3,7 +3,7 @@
 import type { TracePoint } from "./api";
 import { figure, s } from "./dom";
 
-const [W, H] = [640, 230];
+const [W, H] = [820, 230];
 const PAD = { left: 44, right: 14, top: 14, bottom: 30 };
 
 export class Chart {
@@ -49,6 +49,9 @@ export class Chart {
     }
     if (this.level) { high = Math.max(high, this.level.value); low = Math.min(low, this.level.value); }
     const ticks = ladder(low, high);
+    const step = ticks[1]! - ticks[0]!;
+    const digits = step >= 1 ? 0 : step >= 0.1 ? 1 : 2;
+    if (ticks[0]! < low - 0.3 * step) ticks.shift();
     [low, high] = [Math.min(low, ticks[0]!), Math.max(high, ticks.at(-1)!)];
     const x = (step: number): number => PAD.left + ((W - PAD.left - PAD.right) * step) / this.steps;
     const y = (value: number): number => H - PAD.bottom - ((H - PAD.top - PAD.bottom) * (value - low)) / (high - low || 1);
@@ -56,12 +59,12 @@ export class Chart {
     if (this.shaded) parts.push(...this.shading(x));
     for (const tick of ticks) {
       parts.push(s("path", { class: "grid", d: `M${PAD.left} ${y(tick)}H${W - PAD.right}` }),
-        s("text", { class: "tick", x: PAD.left - 8, y: y(tick) + 4, "text-anchor": "end" }, figure(tick, tick % 1 ? 1 : 0)));
+        s("text", { class: "tick", x: PAD.left - 8, y: y(tick) + 4, "text-anchor": "end" }, figure(tick, digits)));
     }
     for (const part of [0, 0.25, 0.5, 0.75, 1]) {
-      const step = Math.round(part * this.steps);
-      parts.push(s("text", { class: "tick", x: x(step), y: H - 10, "text-anchor": part === 1 ? "end" : part ? "middle" : "start" },
-        part === 1 ? `${step.toLocaleString("en")} steps` : step.toLocaleString("en")));
+      const at = Math.round(part * this.steps);
+      parts.push(s("text", { class: "tick", x: x(at), y: H - 8, "text-anchor": part === 1 ? "end" : part ? "middle" : "start" },
+        part === 1 ? `${at.toLocaleString("en")} steps` : at.toLocaleString("en")));
     }
     if (this.level) {
       const at = y(this.level.value);

@@ -78,7 +78,7 @@ export class Editor {
     const stage = h("section", { class: "stage", "aria-label": "Drawing" },
       h("div", { class: "bar" }, this.tools,
         h("span", { class: "spring" }), this.undoButton, this.redoButton),
-      h("div", { class: "paper" }, this.canvas.svg, this.readout),
+      h("div", { class: "paper" }, this.readout, this.canvas.svg),
       h("div", { class: "below" }, this.hint, this.complaint));
     this.element.append(
       h("div", { class: "intro" },

@@ -32,7 +32,7 @@ export class MachinePage {
       h("div", { class: "intro" }, h("h1", {}, "A machine of several parts"),
         h("p", {}, "Pick designs, say what pushes what, and build them as one piece.")),
       h("div", { class: "main" },
-        h("section", { class: "stage", "aria-label": "Machine" }, h("div", { class: "paper" }, this.drawing.svg, this.readout), h("div", { class: "below" }, this.fault)),
+        h("section", { class: "stage", "aria-label": "Machine" }, h("div", { class: "paper" }, this.readout, this.drawing.svg), h("div", { class: "below" }, this.fault)),
         h("section", { class: "card", "aria-label": "Designs to add" }, h("h2", {}, "Add a part"), this.shelf)),
       this.panel);
     this.show();

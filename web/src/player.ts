@@ -48,7 +48,7 @@ export class Player {
     times.addEventListener("input", () => { this.times = Number(times.value); size.textContent = `× ${this.times}`; this.show(); });
     this.controls.append(this.playButton, this.slider,
       h("span", { class: "amplify" }, field("Amplify", times), size));
-    this.element.append(h("div", { class: "paper" }, this.drawing.svg, this.readout), this.controls,
+    this.element.append(h("div", { class: "paper" }, this.readout, this.drawing.svg), this.controls,
       h("div", { class: "row between colour" }, this.colours(), this.legend));
     this.setPlaying(false);
     this.drawing.svg.addEventListener("pointermove", (event) => this.point(event));
@@ -69,7 +69,7 @@ export class Player {
     this.colour = colour;
     if (colour === "stress" && !this.picture) this.want("stress");
     if (colour === "beams" && !this.sensitivity) void this.loadSensitivity();
-    if (colour === "stress") this.stop();
+    if (colour === "stress") { this.stop(); this.part = 1; }
     const input = this.element.querySelector<HTMLInputElement>(`.colour input[value="${colour}"]`);
     if (input) input.checked = true;
     this.show();

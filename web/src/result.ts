@@ -71,7 +71,7 @@ export class Result {
     const rows: (HTMLElement | null)[] = [
       h("tr", {}, h("th", { scope: "row" }, "Discrete model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, `${beams} beams`)),
       comparison && h("tr", {}, h("th", { scope: "row" }, comparison.title === "yours" ? "Your own design" : "Drawn by hand"), h("td", {}, figure(comparison.efficiency, 3)),
-        h("td", { class: "more" }, comparison.efficiency && efficiency ? `${figure(efficiency / comparison.efficiency, 1)} times less` : "")),
+        h("td", { class: "more" }, comparison.efficiency && efficiency && comparison.efficiency > 0 && efficiency > comparison.efficiency ? `${figure(efficiency / comparison.efficiency, 1)} times less` : "")),
       ...LEVELS.map(([level, name, time]) => this.femRow(level, name, time)),
     ];
     clear(this.table, h("caption", {}, "Efficiency by level of detail"), h("tbody", {}, ...rows));

@@ -22,8 +22,9 @@ export class RunPage {
   private readonly controls = h("div", { class: "buttons" });
   private readonly trouble = h("p", { class: "fault", role: "alert" });
   private readonly readout = h("div", { class: "readout" });
+  private readonly watch: HTMLElement;
   private readonly side = h("div", { class: "side" });
-  private readonly paper = h("div", { class: "paper" }, this.drawing.svg, this.readout);
+  private readonly paper = h("div", { class: "paper" }, this.readout, this.drawing.svg);
   private readonly switcher = h("div", { class: "bar" });
   private result: Result | null = null;
   private shown = "";
@@ -41,9 +42,9 @@ export class RunPage {
     const card = h("section", { class: "card", "aria-label": "Efficiency along the search" },
       h("h2", {}, "Efficiency along the search"), this.chart.svg,
       h("p", { class: "note" }, this.shadingNote()));
-    const watch = h("aside", { class: "panel", "aria-label": "Search" },
+    this.watch = h("aside", { class: "panel", "aria-label": "Search" },
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.controls, this.trouble));
-    this.side.append(watch);
+    this.side.append(this.watch);
     this.element.append(this.head, h("div", { class: "main" }, this.stage, card), this.side);
     this.show(run);
     this.draw(run.problem.initial, null);
@@ -123,6 +124,7 @@ export class RunPage {
     });
     clear(this.stage, this.result.player.element);
     this.side.prepend(this.result.element);
+    this.element.querySelector(".main")!.append(this.watch);
     this.show(whole);
   }
 
@@ -154,16 +156,16 @@ export class RunPage {
     }
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
-    if (run.status === "failed") this.trouble.textContent = sentence(run.message);
+    if (run.message && run.status !== "running") this.trouble.textContent = sentence(run.message);
     if (!this.result) {
       const moved = this.news?.moved;
       clear(this.readout, h("strong", {}, figure(moved?.efficiency ?? run.efficiency, 3)),
-        h("span", {}, running ? "best design so far, moved" : WORDS[run.status]));
+        h("span", {}, running ? (run.method === "basin-hopping" ? "best design so far, moved" : "the design at hand, moved") : WORDS[run.status]));
     }
   }
 
   private showSwitcher(): void {
-    const chains = [["best", "Best"], ...Array.from({ length: Math.min(6, this.run.settings.chains) }, (_, k) => [String(k), `Chain ${k + 1}`])] as [string, string][];
+    const chains = [["best", this.run.method === "basin-hopping" ? "Best" : "Leading"], ...Array.from({ length: Math.min(6, this.run.settings.chains) }, (_, k) => [String(k), `Chain ${k + 1}`])] as [string, string][];
     if (this.run.comparison) chains.push(["human", this.run.comparison.title === "yours" ? "Yours" : "By hand"]);
     clear(this.switcher, choice("Which design is shown", chains, this.showing === "human" ? "human" : this.chain, (picked) => {
       this.showing = picked === "human" ? "human" : "live";

@@ -210,7 +210,9 @@ class Scheduler:
             job.update(status="failed", message=last["message"], done=done)
         elif last["kind"] == "paused":
             resumes = each.wanted == "yield"
-            job.update(status="queued" if resumes else "paused", done=done)
+            job.update(
+                status="queued" if resumes else "paused", done=done, message=last.get("message", "")
+            )
             if resumes and not self._closing:
                 self.queue.append(job)
         else:

@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from bellcrank.errors import BellcrankError, first_line
+from bellcrank.errors import BellcrankError, InvalidSettings, first_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,11 +26,12 @@ if TYPE_CHECKING:
     from bellcrank.search import Progress, SearchSettings
     from bellcrank.web.tracing import Point
 
+TOO_EARLY = "nothing has been found yet that could be built; search a little longer"
 INTERVAL = 0.1
 """Seconds between two messages."""
 MOVED_INTERVAL = 0.4
 """Seconds between two responses of the design that is shown."""
-NICENESS = 10
+NICENESS = 5
 
 
 class Ears:
@@ -104,7 +105,8 @@ class Reporter:
                 "best": best,
                 "temperature": progress.temperature,
                 "accepted": state.accepted,
-                "mask": _shown(state),
+                "mask": _at_hand(state),
+                "kept": _kept(state),
             }
             point = (state.step, now, best, round(progress.temperature, 6))
             self._points.setdefault(progress.chain, []).append(point)
@@ -134,8 +136,8 @@ class Reporter:
             "left": round((self._total - done) / max(speed, 1e-9), 1),
         }
         best = max(chains.values(), key=lambda each: _number(each["best"]))
-        if time.monotonic() - self._moved_at > MOVED_INTERVAL and best["mask"] != self._moved_mask:
-            message["moved"] = self._move(best["mask"])
+        if time.monotonic() - self._moved_at > MOVED_INTERVAL and best["kept"] != self._moved_mask:
+            message["moved"] = self._move(best["kept"])
         self._pipe.send(message)
 
     def _move(self, mask: str) -> dict[str, Any]:
@@ -158,11 +160,16 @@ def _number(value: float | None) -> float:
     return float("-inf") if value is None else value
 
 
-def _shown(state: Any) -> str:
+def _at_hand(state: Any) -> str:
     """Return the design that a chain has just been at: while a climb lasts, the climber's."""
     for name in ("climbing", "walker"):
         if getattr(state, name, None):
             return str(getattr(state, name))
+    return _kept(state)
+
+
+def _kept(state: Any) -> str:
+    """Return the best design of a chain where it knows it, or else where it stands."""
     return str(state.mask if isinstance(state.mask, str) else state.mask[-1])
 
 
@@ -215,7 +222,10 @@ def _search(where: Path, workers: int, pipe: Connection, ears: Ears) -> dict[str
     with Reporter(pipe, folder, settings) as reporter:
         report = complete_design(folder, workers=workers, tell=reporter, stop=ears.stop)
     if report is None and ears.told == "stop":
-        report = conclude(folder, settings)
+        try:
+            report = conclude(folder, settings)
+        except InvalidSettings:
+            return {"kind": "paused", "message": TOO_EARLY}
         return {"kind": "stopped", "efficiency": report.selection.efficiency_after}
     if report is None:
         return {"kind": "paused"}
