@@ -116,7 +116,7 @@ export class MachinePage {
     }
     drawing.svg.classList.remove("stale");
     const { problem } = built;
-    drawing.setLattice(problem.positions, problem.beams);
+    drawing.setLattice(problem.positions, problem.beams, 2.6);
     const bits = bitsOf(built.mask, problem.beams.length);
     const owned = new Set<number>();
     const groups = Object.values(built.parts).map((beams, k) => {

@@ -61,7 +61,7 @@ export class Player {
   close(): void { this.stop(); }
 
   private colours(): HTMLElement {
-    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["beams", "Each beam’s worth"], ["stress", "Stress"]] as [Colour, string][],
+    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["beams", "Beam worth"], ["stress", "Stress"]] as [Colour, string][],
       this.colour, (picked) => this.paint(picked));
   }
 

@@ -27,6 +27,7 @@ HEADERS = {
     "cross-origin-opener-policy": "same-origin",
     "cross-origin-resource-policy": "same-origin",
 }
+TOO_LARGE = f"more than {BODY // 1_000_000} MB cannot be taken"
 UNSAFE = ("POST", "PUT", "PATCH", "DELETE")
 
 
@@ -42,10 +43,6 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-class _TooLarge(Exception):
-    """More came than was announced or is allowed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +94,7 @@ class Guard:
             return 401, "open the address with the token that bellcrank serve has printed"
         length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > BODY:
-            return 413, f"more than {BODY // 1_000_000} MB cannot be taken"
+            return 413, TOO_LARGE
         if scope["type"] == "http" and scope["method"] in UNSAFE and int(length or 0) > 0:
             kind = headers.get("content-type", "").partition(";")[0].strip()
             if kind != "application/json":  # what a form elsewhere could send is not this
@@ -125,8 +122,8 @@ class Guard:
         )
 
     async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on what comes as long as it is not too much, and dress what goes."""
         read = 0
-        begun = False
 
         async def counted() -> Message:
             nonlocal read
@@ -134,22 +131,22 @@ class Guard:
             if message["type"] == "http.request":
                 read += len(message.get("body", b""))
                 if read > BODY:
-                    raise _TooLarge
+                    return {"type": "http.disconnect"}
             return message
 
         async def dressed(message: Message) -> None:
-            nonlocal begun
+            if read > BODY:
+                return  # whatever is made of half a request, the answer is another
             if message["type"] == "http.response.start":
-                begun = True
                 extra = [(key.encode(), value.encode()) for key, value in HEADERS.items()]
                 message = {**message, "headers": [*message["headers"], *extra]}
             await send(message)
 
         try:
             await self.app(scope, counted, dressed)
-        except _TooLarge:
-            if not begun:
-                await _answer(send, 413, f"more than {BODY // 1_000_000} MB cannot be taken")
+        finally:
+            if read > BODY:
+                await _answer(send, 413, TOO_LARGE)
 
 
 def _hostname(host: str) -> str:
