@@ -129,8 +129,8 @@ def test_a_search_is_told_over_a_websocket_and_ends_with_a_design(
 def test_a_paused_search_goes_on_to_the_same_end_as_one_that_never_paused(
     client: TestClient, begin: Any
 ) -> None:
-    whole = begin(seed=5, steps=20_000)
-    parted = begin(seed=5, steps=20_000)
+    whole = begin(seed=5, steps=8_000)
+    parted = begin(seed=5, steps=8_000)
     wait_for(lambda: client.get(f"/api/runs/{parted}").json()["done"] > 0)
     client.post(f"/api/runs/{parted}/pause")
     resting = wait_for(lambda: status_is(client, parted, "paused", "finished"))

@@ -53,7 +53,7 @@ def _answers(client: Any) -> bool:
 def test_a_search_goes_on_after_its_server_has_ended(tmp_path: Path, end: int) -> None:
     with serving(tmp_path, end) as client:
         problem = client.get("/api/problems/scaling-8").json()
-        body = {"title": "long", "session": "s", "problem": problem, "steps": 16_000, "chains": 2}
+        body = {"title": "long", "session": "s", "problem": problem, "steps": 6_000, "chains": 2}
         name = client.post("/api/runs", json=body).json()["id"]
         wait_for(lambda: client.get(f"/api/runs/{name}").json()["done"] > 1000)
         assert client.get(f"/api/runs/{name}").json()["status"] == "running"

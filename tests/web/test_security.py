@@ -55,10 +55,11 @@ def test_a_link_elsewhere_may_lead_to_the_page_and_to_nothing_else(client: TestC
 def test_websockets_from_other_pages_are_refused(client: TestClient) -> None:
     address = "ws://localhost:8642/api/edit"
     with (
-        pytest.raises(WebSocketDisconnect, match="other pages"),
+        pytest.raises(WebSocketDisconnect) as caught,
         client.websocket_connect(address, headers={"origin": "http://evil.example"}),
     ):
         pass
+    assert "other pages" in caught.value.reason
     with client.websocket_connect(address, headers={"origin": "http://localhost:8642"}):
         pass
 
