@@ -104,7 +104,11 @@ def page(chromium: Any, server: Server) -> Iterator[Any]:
     places = {urlsplit(url).hostname for url in asked if not url.startswith(("blob:", "data:"))}
     assert places == {"127.0.0.1"}
     # While a server is restarted, the browser itself writes down that it is not reached.
-    ours = [text for text in trouble if "ERR_" not in text and "WebSocket" not in text and "status of" not in text]
+    ours = [
+        text
+        for text in trouble
+        if "ERR_" not in text and "WebSocket" not in text and "status of" not in text
+    ]
     assert not ours
 
 

@@ -143,9 +143,7 @@ def test_lattices_are_made_and_refused_by_their_size(client: TestClient) -> None
     small = {"kind": "triangular-rectangle", "columns": 3, "rows": 4}
     made = client.post("/api/lattices", json={"lattice": small}).json()
     assert len(made["positions"]) == 14
-    message, key = refusal(
-        client.post("/api/lattices", json={"lattice": {**small, "rows": 10**9}})
-    )
+    message, key = refusal(client.post("/api/lattices", json={"lattice": {**small, "rows": 10**9}}))
     assert "up to" in message
     assert key == "lattice"
     refusal(client.post("/api/lattices", json={"lattice": {"kind": "cubic"}}), 404)

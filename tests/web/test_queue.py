@@ -45,26 +45,42 @@ class Still(Scheduler):
 
 
 def record(title: str, session: str) -> Record:
-    return Record(title=title, session=session, settings={"search": "paper", "steps": 10, "chains": 1})
+    return Record(
+        title=title, session=session, settings={"search": "paper", "steps": 10, "chains": 1}
+    )
 
 
 def test_sessions_take_turns_however_many_searches_one_of_them_queues(tmp_path: Path) -> None:
     problem = find_problem("scaling-8")
     jobs = Jobs(tmp_path)
     scheduler = Still(jobs)
-    for title, session in [("a1", "a"), ("a2", "a"), ("a3", "a"), ("a4", "a"), ("b1", "b"), ("c1", "c"), ("b2", "b")]:
+    for title, session in [
+        ("a1", "a"),
+        ("a2", "a"),
+        ("a3", "a"),
+        ("a4", "a"),
+        ("b1", "b"),
+        ("c1", "c"),
+        ("b2", "b"),
+    ]:
         scheduler.add(jobs.add(problem, record(title, session)))
     places = {job.record.title: scheduler.place(job) for job in scheduler.queue}
     for _ in range(6):
         scheduler.end()
     assert scheduler.started == ["a1", "b1", "c1", "a2", "b2", "a3", "a4"]
-    assert [title for title, _ in sorted(places.items(), key=lambda each: each[1])] == scheduler.started[1:]
+    assert [
+        title for title, _ in sorted(places.items(), key=lambda each: each[1])
+    ] == scheduler.started[1:]
 
 
 def test_jobs_are_found_again_and_damaged_ones_are_left_alone(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path)
     job = jobs.add(find_problem("scaling-8"), record("one", "a"))
-    for name, text in [("0" * 12, "{"), ("1" * 12, '{"schema": "bellcrank/job/1"}'), ("2" * 12, "[]")]:
+    for name, text in [
+        ("0" * 12, "{"),
+        ("1" * 12, '{"schema": "bellcrank/job/1"}'),
+        ("2" * 12, "[]"),
+    ]:
         (tmp_path / name).mkdir()
         (tmp_path / name / "job.json").write_text(text)
     again = Jobs(tmp_path)
@@ -90,7 +106,14 @@ def begin(client: TestClient) -> Any:
 
     def begin(**more: Any) -> str:
         problem = client.get("/api/problems/scaling-8").json()
-        body = {"title": "t", "session": "s", "problem": problem, "chains": 2, "steps": 1000, **more}
+        body = {
+            "title": "t",
+            "session": "s",
+            "problem": problem,
+            "chains": 2,
+            "steps": 1000,
+            **more,
+        }
         answer = client.post("/api/runs", json=body)
         assert answer.status_code == 201, answer.text
         return str(answer.json()["id"])
@@ -123,7 +146,9 @@ def test_a_search_is_told_over_a_websocket_and_ends_with_a_design(
     assert history.content[:4] == b"PAR1"
     entry = client.get(f"/api/gallery/runs/{name}").json()
     assert entry["mask"] == run["mask"]
-    assert client.post(f"/api/runs/{name}/resume").json()["message"].startswith("this search has made")
+    assert (
+        client.post(f"/api/runs/{name}/resume").json()["message"].startswith("this search has made")
+    )
 
 
 def test_a_paused_search_goes_on_to_the_same_end_as_one_that_never_paused(
@@ -138,12 +163,16 @@ def test_a_paused_search_goes_on_to_the_same_end_as_one_that_never_paused(
     assert 0 < resting["done"] < resting["total"]
     assert "not running" in client.post(f"/api/runs/{parted}/pause").json()["message"]
     client.post(f"/api/runs/{parted}/resume")
-    ends = [wait_for(lambda name=name: status_is(client, name, "finished")) for name in (whole, parted)]
+    ends = [
+        wait_for(lambda name=name: status_is(client, name, "finished")) for name in (whole, parted)
+    ]
     assert ends[0]["mask"] == ends[1]["mask"]
     assert ends[0]["efficiency"] == ends[1]["efficiency"]
 
 
-def test_a_search_that_is_stopped_gives_the_best_it_has_found(client: TestClient, begin: Any) -> None:
+def test_a_search_that_is_stopped_gives_the_best_it_has_found(
+    client: TestClient, begin: Any
+) -> None:
     name = begin(steps=1_000_000, method="paper")
     wait_for(lambda: (client.get(f"/api/runs/{name}").json()["done"]) > 2000)
     assert "running" in client.delete(f"/api/runs/{name}").json()["message"]
@@ -186,7 +215,9 @@ def test_searches_that_make_no_sense_are_refused_before_they_are_queued(
 ) -> None:
     problem = client.get("/api/problems/scaling-8").json()
     before = len(client.get("/api/runs").json())
-    answer = client.post("/api/runs", json={"title": "t", "session": "s", "problem": problem, **change})
+    answer = client.post(
+        "/api/runs", json={"title": "t", "session": "s", "problem": problem, **change}
+    )
     assert answer.status_code == 422
     assert words in answer.json()["message"]
     assert len(client.get("/api/runs").json()) == before

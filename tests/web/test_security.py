@@ -105,10 +105,10 @@ def test_a_token_is_made_up_for_every_address_but_that_of_this_machine(tmp_path:
         ServerSettings(folder=tmp_path, token="short")
 
 
-@pytest.mark.parametrize(
-    "name", [ "%2e%2e%2f%2e%2e", "server.lock", "aaaaaaaaaaaa", "A" * 12]
-)
-def test_names_that_are_no_runs_or_designs_are_not_looked_for(client: TestClient, name: str) -> None:
+@pytest.mark.parametrize("name", ["%2e%2e%2f%2e%2e", "server.lock", "aaaaaaaaaaaa", "A" * 12])
+def test_names_that_are_no_runs_or_designs_are_not_looked_for(
+    client: TestClient, name: str
+) -> None:
     for path in (f"/api/runs/{name}", f"/api/gallery/kept/{name}", f"/api/gallery/runs/{name}"):
         assert client.get(path).status_code in {404, 422}
     assert client.get(f"/api/runs/{name}/history.parquet").status_code in {404, 422}

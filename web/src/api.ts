@@ -22,7 +22,6 @@ export interface Response {
   message: string;
   efficiency: number | null;
   displacement: number[] | null;
-  energy: number[] | null;
 }
 
 export interface Motion {

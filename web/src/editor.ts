@@ -40,6 +40,7 @@ export class Editor {
   private readonly redoButton = h("button", { type: "button", class: "quiet icon", title: "Redo (Ctrl+Shift+Z)", "aria-label": "Redo", onclick: () => this.redo() }, icon("redo"));
   private checking: AbortController | null = null;
   private timer = 0;
+  private checked = "";
   private readonly keys = (event: KeyboardEvent): void => this.key(event);
 
   constructor(task: Task) {
@@ -152,11 +153,21 @@ export class Editor {
 
   private changed(): void {
     if (this.tool === "hand" && !this.task.hand) this.history.set({ ...this.task, hand: this.problem.initial }, true);
-    try { localStorage.setItem(KEY, JSON.stringify(this.task)); } catch { /* storage is full: nothing is kept */ }
-    this.show();
-    if (this.tool === "hand") this.ask();
     clearTimeout(this.timer);
+    if (this.tool === "hand") {
+      // The question goes out before anything is drawn, and what can wait waits.
+      this.ask();
+      this.showDrawing();
+      this.timer = window.setTimeout(() => { this.keep(); this.show(); void this.check(); }, 150);
+      return;
+    }
+    this.keep();
+    this.show();
     this.timer = window.setTimeout(() => void this.check(), 120);
+  }
+
+  private keep(): void {
+    try { localStorage.setItem(KEY, JSON.stringify(this.task)); } catch { /* storage is full: nothing is kept */ }
   }
 
   private ask(): void {
@@ -164,17 +175,22 @@ export class Editor {
   }
 
   private show(): void {
+    this.showDrawing();
+    const byHand = this.tool === "hand" && this.task.hand;
+    this.undoButton.disabled = !this.history.canUndo;
+    this.redoButton.disabled = !this.history.canRedo;
+    this.complaint.textContent = this.missing ? "" : (this.fault?.message ?? "");
+    if (!byHand) clear(this.readout);
+    this.panels.show();
+  }
+
+  private showDrawing(): void {
     const byHand = this.tool === "hand" && this.task.hand;
     const problem = this.problem;
     const fault = this.fault ? [...this.fault.message.matchAll(/\bnode (\d+)/g)].map((m) => Number(m[1])) : [];
     this.canvas.show(this.task, problem, byHand ? bitsOf(this.task.hand!, problem.beams.length) : null, fault);
     if (!byHand) this.canvas.showMoved(null, []);
     this.element.classList.toggle("by-hand", !!byHand);
-    this.undoButton.disabled = !this.history.canUndo;
-    this.redoButton.disabled = !this.history.canRedo;
-    this.complaint.textContent = this.missing ? "" : (this.fault?.message ?? "");
-    if (!byHand) clear(this.readout);
-    this.panels.show();
   }
 
   /** Ask the server what it thinks of the task. */
@@ -185,15 +201,20 @@ export class Editor {
       this.show();
       return;
     }
+    const body = { problem: this.problem, goals: goalsOf(this.task) };
+    const text = JSON.stringify(body);
+    if (text === this.checked) return;
     const asked = new AbortController();
     this.checking = asked;
     try {
-      const found = await post<{ response: Response | null }>("/tasks/check", { problem: this.problem, goals: goalsOf(this.task) }, asked.signal);
+      const found = await post<{ response: Response | null }>("/tasks/check", body, asked.signal);
+      this.checked = found.response ? text : "";
       this.fault = null;
       this.response = found.response;
     } catch (error) {
       if (error instanceof DOMException) return;
       const refused = error as Refusal;
+      this.checked = "";
       this.fault = { key: refused.key, message: sentence(refused.message) };
     }
     if (!asked.signal.aborted) this.show();

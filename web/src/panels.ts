@@ -195,7 +195,7 @@ export class Panels {
     angle.dataset.key = `${region}-angle`;
     const ways: [string, string, Point][] = [["↑", "up", [0, 1]], ["→", "right", [1, 0]], ["↓", "down", [0, -1]], ["←", "left", [-1, 0]]];
     return h("div", { class: "row" }, field("Direction", angle, "°"),
-      h("div", { class: "ways", role: "group", "aria-label": "Direction" }, ...ways.map(([sign, name, way]) =>
+      h("div", { class: "ways", role: "group", "aria-label": "Usual ways" }, ...ways.map(([sign, name, way]) =>
         button(sign, () => editor.turn(region, way), "quiet", { "aria-label": name, title: name, "data-key": `${region}-${name}` }))));
   }
 

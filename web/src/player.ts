@@ -29,6 +29,7 @@ export class Player {
   private colour: Colour = "energy";
   private frame = 0;
   private began = 0;
+  private told = 0;
   private sensitivity: Sensitivity | null = null;
   private picture: Picture | null = null;
   private shares = new Float64Array(0);
@@ -141,6 +142,10 @@ export class Player {
 
   private show(): void {
     const { drawing, motion } = this;
+    // Numbers that change sixty times a second cannot be read, and cost a layout each.
+    const now = performance.now();
+    const calm = this.playing && now - this.told < 100;
+    if (!calm) this.told = now;
     let energy: ArrayLike<number> | null = null;
     if (motion) {
       const place = this.part * (motion.part.length - 1);
@@ -156,8 +161,8 @@ export class Player {
       for (let b = 0; b < e0.length; b++) this.shares[b] = e0[b]! + t * (e1[b]! - e0[b]!);
       energy = this.shares;
       const value = Math.round(1000 * this.part);
-      if (this.slider.valueAsNumber !== value) this.slider.value = String(value);
-      this.tell(motion, k, t);
+      if (!calm && this.slider.valueAsNumber !== value) this.slider.value = String(value);
+      if (!calm) this.tell(motion, k, t);
     }
     const stressed = this.colour === "stress" && this.picture !== null;
     if (stressed) this.drawStress(this.picture!);
@@ -168,7 +173,7 @@ export class Player {
     else drawing.draw([{ name: "plain", beams: this.beams }]);
     if (stressed) for (const name of ["support", "input", "output"]) drawing.mark(name, []);
     else drawing.markRegions(this.problem);
-    this.explain();
+    if (!calm) this.explain();
   }
 
   private tell(motion: Motion, k: number, t: number): void {

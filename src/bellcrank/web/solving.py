@@ -15,7 +15,6 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import CAREFUL, Evaluator, Status
-from bellcrank.mechanics.strain import strain_of
 from bellcrank.model import Design, human_design, unpack_mask
 from bellcrank.web.texts import problem_of
 
@@ -81,11 +80,9 @@ def respond(text: str, mask: str) -> dict[str, Any]:
         "message": response.status.message,
         "efficiency": finite(response.efficiency),
         "displacement": None,
-        "energy": None,
     }
     if response.status in {Status.CONVERGED, Status.SNAPPED}:
         answer["displacement"] = flat(response.displacement)
-        answer["energy"] = shares(strain_of(at_hand.evaluator).energy)
     return answer
 
 
@@ -157,10 +154,4 @@ def finite(value: float) -> float | None:
 def flat(displacement: NDArray[np.float64]) -> list[float]:
     """Return x and y of all nodes in turn, as short as a picture needs them."""
     rounded: list[float] = displacement.round(DIGITS).ravel().tolist()
-    return rounded
-
-
-def shares(energy: NDArray[np.float64]) -> list[float]:
-    """Return energies as parts of the largest."""
-    rounded: list[float] = (energy / (float(energy.max(initial=0.0)) or 1.0)).round(4).tolist()
     return rounded
