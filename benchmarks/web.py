@@ -54,7 +54,7 @@ def serving() -> Iterator[tuple[str, int]]:
 def megabytes(pid: int) -> float:
     """Memory of a process and all it has started, what they share counted once."""
     children = Path(f"/proc/{pid}/task/{pid}/children")
-    own = re.search(r"^Pss:\s+(\d+)", Path(f"/proc/{pid}/smaps_rollup").read_text(), re.M)
+    own = re.search(r"^Pss:\s+(\d+)", Path(f"/proc/{pid}/smaps_rollup").read_text(), re.MULTILINE)
     total = int(own[1]) / 1024 if own else 0.0
     for child in children.read_text().split():
         with contextlib.suppress(OSError):
@@ -178,9 +178,7 @@ def in_browser(address: str) -> None:
             page.goto("about:blank")
             page.goto(address)
             page.locator("svg.canvas path.dot").first.wait_for(state="attached")
-            paints.append(page.evaluate(
-                "[performance.getEntriesByName('first-contentful-paint')[0].startTime, performance.now()]"
-            ))  # fmt: skip
+            paints.append(page.evaluate(PAINTED))
         first, drawn = (statistics.median(each) for each in zip(*paints, strict=True))
         print(f"first paint, task drawn             {first:.0f} ms, {drawn:.0f} ms")
         print(f"all that is fetched                 {weight / 5000:.0f} kB")
@@ -207,9 +205,8 @@ def in_browser(address: str) -> None:
         before = used(watch)
         frames, rate = page.evaluate(PLAYED)
         work = 1e3 * (used(watch) - before) / frames
-        print(
-            f"playback of the crane               {rate:.0f} frames a second, each {work:.1f} ms of its thread"
-        )
+        print(f"playback of the crane               {rate:.0f} frames a second")
+        print(f"processor time of a frame           {work:.1f} ms of the page's thread")
         browser.close()
 
 
@@ -219,6 +216,9 @@ def used(session: Any) -> float:
     return float(next(each["value"] for each in metrics if each["name"] == "TaskDuration"))
 
 
+PAINTED = """() => [
+  performance.getEntriesByName("first-contentful-paint")[0].startTime, performance.now()
+]"""
 WATCH = """() => {
   window.answered = [];
   let begin = 0;

@@ -101,6 +101,7 @@ def test_a_design_is_changed_by_hand_and_the_real_solver_answers(page: Any) -> N
     shown = float(page.locator(".readout strong").inner_text().replace("−", "-"))
     assert shown == pytest.approx(exact, abs=6e-4)
     page.keyboard.press("Control+z")
+    page.wait_for_timeout(500)
     assert unpack_mask(task(page)["hand"], problem.lattice.beam_count).sum() == len(mask) - 2
     page.get_by_role("button", name="Keep this design").click()
     page.locator('.player[data-ready="yes"]').wait_for()
@@ -154,8 +155,9 @@ def test_a_machine_is_made_of_two_parts(page: Any, server: Server) -> None:
     for direction in ("down", "left"):
         made = """async (name) => {
           const problem = await (await fetch(`/api/problems/${name}`)).json();
-          await fetch("/api/gallery", {method: "POST", headers: {"content-type": "application/json"},
-            body: JSON.stringify({problem, mask: problem.initial, title: name})});
+          const headers = {"content-type": "application/json"};
+          const body = JSON.stringify({problem, mask: problem.initial, title: name});
+          await fetch("/api/gallery", {method: "POST", headers, body});
         }"""
         page.evaluate(made, f"elementary-{direction}")
     page.goto(f"{server.address}/#/machine")

@@ -30,7 +30,7 @@ class Still(Scheduler):
         self.started: list[str] = []
         self.jobs_of: dict[str, Any] = {}
 
-    def _start(self, job: Job, wanted: str = "") -> None:
+    def _start(self, job: Job, _wanted: str = "") -> None:
         self.started.append(job.record.title)
         self.running[job.name] = object()  # type: ignore[assignment]
         self._served[job.record.session] = float(len(self.started))

@@ -24,10 +24,10 @@ TOKEN = "a-token-of-some-length"
 
 
 @pytest.fixture
-def guarded(tmp_path: Path) -> Iterator[TestClient]:
+def guarded(tmp_path: Path) -> TestClient:
     """Ask a server that wants a token; nothing is computed, so nothing is started."""
     app = make_app(tmp_path, token=TOKEN)
-    yield TestClient(app, base_url="http://192.0.2.7:8642", follow_redirects=False)
+    return TestClient(app, base_url="http://192.0.2.7:8642", follow_redirects=False)
 
 
 @pytest.mark.parametrize("host", ["evil.example", "192.0.2.7:8642", "localhost.evil.example", ""])

@@ -41,6 +41,7 @@ export class Editor {
   private checking: AbortController | null = null;
   private timer = 0;
   private checked = "";
+  private readonly leaving = (): void => this.keep();
   private readonly keys = (event: KeyboardEvent): void => this.key(event);
 
   constructor(task: Task) {
@@ -55,6 +56,7 @@ export class Editor {
     this.build();
     this.choose("supports");
     document.addEventListener("keydown", this.keys);
+    addEventListener("pagehide", this.leaving);
     this.changed();
   }
 
@@ -69,6 +71,7 @@ export class Editor {
   }
 
   close(): void {
+    removeEventListener("pagehide", this.leaving);
     document.removeEventListener("keydown", this.keys);
     clearTimeout(this.timer);
     this.checking?.abort();

@@ -9,6 +9,7 @@ import signal
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from bellcrank.errors import RunFailed
@@ -29,16 +30,16 @@ class TookTooLong(RunFailed):
     """A computation was ended, by its limit or by the system."""
 
 
-def limited(seconds: int, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+def limited(seconds: int, function: Callable[[], T]) -> T:
     """Call a function; where the system knows alarms, end the process if it takes longer.
 
     Compiled code listens to nothing gentler.
     """
     if not hasattr(signal, "alarm"):
-        return function(*args, **kwargs)
+        return function()
     signal.alarm(seconds)
     try:
-        return function(*args, **kwargs)
+        return function()
     finally:
         signal.alarm(0)
 
@@ -94,7 +95,7 @@ class Pool:
         self._taken += 1
         try:
             executor = self._started()
-            submitted = executor.submit(limited, self.seconds, function, *args, **kwargs)
+            submitted = executor.submit(limited, self.seconds, partial(function, *args, **kwargs))
             return await asyncio.wrap_future(submitted)
         except BrokenProcessPool:
             if self._executor is executor:

@@ -79,27 +79,33 @@ class Guard:
             await _answer(send, *refusal)
 
     def _refusal(self, scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
-        host = headers.get("host", "")
-        if self.token is None and _hostname(host) not in LOOPBACK:
-            # A page elsewhere can give its own name the address of this machine.
-            return 403, "this server answers only to localhost"
-        origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
-            return 403, "requests from other pages are refused"
-        if headers.get("sec-fetch-site") in {"cross-site", "same-site"}:
-            followed = scope["type"] == "http" and scope["path"] == "/" and scope["method"] == "GET"
-            if not followed:  # a link elsewhere may lead to the page, and to nothing else
-                return 403, "requests from other pages are refused"
+        """Return status and sentence for what may not pass."""
+        if refusal := self._stranger(scope, headers):
+            return refusal
         if self.token is not None and not self._knows_token(scope, headers):
             return 401, "open the address with the token that bellcrank serve has printed"
         length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > BODY:
             return 413, TOO_LARGE
-        if scope["type"] == "http" and scope["method"] in UNSAFE and int(length or 0) > 0:
+        if scope["type"] == "http" and scope["method"] in UNSAFE and int(length) > 0:
             kind = headers.get("content-type", "").partition(";")[0].strip()
             if kind != "application/json":  # what a form elsewhere could send is not this
                 return 415, "expected application/json"
         return None
+
+    def _stranger(self, scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
+        """Refuse what a page from elsewhere has made a browser send."""
+        host = headers.get("host", "")
+        if self.token is None and _hostname(host) not in LOOPBACK:
+            # A page elsewhere can give its own name the address of this machine.
+            return 403, "this server answers only to localhost"
+        origin = headers.get("origin")
+        foreign = origin is not None and _netloc(origin) != host
+        if headers.get("sec-fetch-site") in {"cross-site", "same-site"}:
+            # A link elsewhere may lead to the page, and to nothing else.
+            followed = scope["type"] == "http" and scope["path"] == "/" and scope["method"] == "GET"
+            foreign = foreign or not followed
+        return (403, "requests from other pages are refused") if foreign else None
 
     def _knows_token(self, scope: Scope, headers: dict[str, str]) -> bool:
         given = [headers.get("authorization", "").removeprefix("Bearer "), _query_token(scope)]
@@ -156,8 +162,15 @@ def _hostname(host: str) -> str:
         return ""
 
 
+def _netloc(origin: str) -> str:
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return ""
+
+
 def _query_token(scope: Scope) -> str:
-    query = scope.get("query_string", b"").decode("latin-1")
+    query: str = scope.get("query_string", b"").decode("latin-1")
     return parse_qs(query).get("token", [""])[0]
 
 

@@ -107,6 +107,7 @@ def _listening(settings: ServerSettings) -> Iterator[socket.socket]:
         listener = socket.socket(family, kind, protocol)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
+        listener.listen(128)  # who comes before the server is up waits
     except OSError as error:
         raise InvalidSettings(
             f"{settings.host}:{settings.port} cannot be opened ({error.strerror}); "
