@@ -41,7 +41,7 @@ export interface Run {
   message: string;
   efficiency: number | null;
   method: string;
-  settings: { steps: number; chains: number; seed: number; goals: string[]; annealing?: number };
+  settings: { steps: number; chains: number; seed: number; goals: string[]; hot?: number; cold?: number };
   part: Part | null;
   reference: string | null;
   done: number;

@@ -12,9 +12,13 @@ export class Chart {
   private level: { title: string; value: number } | null = null;
   private steps = 1;
   private shaded = true;
+  private cold = 0;
+  private hot = 0;
 
-  begin(steps: number, method: string): void {
+  begin(steps: number, method: string, hot = 0, cold = 0): void {
     this.steps = steps;
+    this.hot = hot;
+    this.cold = cold;
     this.shaded = method !== "tempering"; // where hot and cold replicas take turns all the time
   }
 
@@ -92,13 +96,13 @@ export class Chart {
     const bins = 64;
     const sum = new Float64Array(bins);
     const seen = new Float64Array(bins);
-    let hottest = 0;
+    let hottest = this.hot - this.cold;
     for (const curve of this.curves.values()) {
       for (const [step, , , temperature] of curve) {
         const bin = Math.min(bins - 1, Math.floor((step / this.steps) * bins));
-        sum[bin]! += temperature;
+        sum[bin]! += Math.max(0, temperature - this.cold);
         seen[bin]! += 1;
-        hottest = Math.max(hottest, temperature);
+        hottest = Math.max(hottest, temperature - this.cold);
       }
     }
     if (hottest <= 0) return [];

@@ -87,7 +87,7 @@ export class Panels {
     const { editor } = this;
     const table = editor.task.lattice;
     const kinds: [string, string][] = [
-      ["triangular-rectangle", "Rectangle"], ["displaced-delaunay", "Disordered"], ["jammed-discs", "Packed discs"],
+      ["triangular-rectangle", "Rectangle"], ["triangular-rows", "Crane"], ["displaced-delaunay", "Disordered"], ["jammed-discs", "Discs"],
     ];
     const kind = String(table?.kind ?? "");
     const start = select(
@@ -113,9 +113,13 @@ export class Panels {
       field("Start from", start),
       choice("Kind of lattice", kinds, kind as never, (picked) => void this.remake(
         picked === "jammed-discs" ? { kind: picked, discs: 120, seed: 1 }
+          : picked === "triangular-rows" ? craneRows(11, 6)
           : { kind: picked, columns: Number(table?.columns ?? 8), rows: Number(table?.rows ?? 9), ...(picked === "displaced-delaunay" ? { displacement: 0.2, seed: 1 } : {}) })),
       (kind === "triangular-rectangle" || kind === "displaced-delaunay") && h("div", { class: "row" },
         whole("columns", "Across", 2, 60), whole("rows", "Up", 2, 60)),
+      kind === "triangular-rows" && Array.isArray(table?.counts) && table.counts.length > 6 && h("div", { class: "row" },
+        this.size("Across", Number(table.counts[0]), 5, 40, (value) => craneRows(value, (table.counts as number[]).length - 6)),
+        this.size("Rows between", table.counts.length - 6, 1, 40, (value) => craneRows(Number((table.counts as number[])[0]), value))),
       kind === "jammed-discs" && h("div", { class: "row" }, whole("discs", "Discs", 20, 1000)),
       (kind === "jammed-discs" || kind === "displaced-delaunay") && h("div", { class: "row" }, whole("seed", "Seed", 0, 100000)),
       h("div", { class: "row" }, field("Beam length", scale, "mm"),
@@ -128,6 +132,13 @@ export class Panels {
           await editor.link();
           this.local.link = "Copied";
         }), "", { "data-key": "link" })));
+  }
+
+  private size(label: string, value: number, least: number, most: number, make: (value: number) => Record<string, unknown>): HTMLElement {
+    const input = number(value, { min: least, max: most, step: 1 }, (given) =>
+      void this.remake(make(Math.min(most, Math.max(least, Math.round(given))))));
+    input.dataset.key = `crane-${label}`;
+    return field(label, input);
   }
 
   private name(): HTMLInputElement {
@@ -302,6 +313,22 @@ export class Panels {
   }
 }
 
+/** The rows of a lattice like the crane of the paper: a broad base, a body, and arms that reach out. */
+function craneRows(across: number, up: number): Record<string, unknown> {
+  const counts = [across, across + 1, across];
+  const first_x = [0.5, 0, 0.5];
+  for (let row = 0; row < up; row++) {
+    counts.push(row % 2 ? across - 1 : across);
+    first_x.push(row % 2 ? 0.5 : 0);
+  }
+  const shift = up % 2 ? 0.5 : 0;
+  for (const start of [-1 + shift, -0.5 + shift, -1 + shift]) {
+    counts.push(across + (up % 2 ? 0 : 1));
+    first_x.push(start);
+  }
+  return { kind: "triangular-rows", counts, first_x };
+}
+
 /** Find the nodes of a new lattice that lie where some of the old one lay, by their share of the box. */
 function moved(before: Problem, made: Pick<Problem, "positions">, nodes: number[]): number[] {
   const box = (positions: Point[]): [number, number, number, number] => {
@@ -312,7 +339,23 @@ function moved(before: Problem, made: Pick<Problem, "positions">, nodes: number[
   const [ox, oy, ow, oh] = box(before.positions);
   const [nx, ny, nw, nh] = box(made.positions);
   const found = new Set<number>();
-  for (const node of nodes) {
+  const height = (positions: Point[]): Map<number, number[]> => {
+    const rows = new Map<number, number[]>();
+    positions.forEach(([, y], k) => { const key = Math.round(10 * y); rows.set(key, [...(rows.get(key) ?? []), k]); });
+    return rows;
+  };
+  // A whole row stays a whole row, however many nodes it has now.
+  const [old, fresh] = [height(before.positions), height(made.positions)];
+  const rows = [...fresh.keys()];
+  const left = new Set(nodes);
+  for (const [key, row] of old) {
+    if (row.length < 3 || !row.every((node) => left.has(node))) continue;
+    const target = key / 10 - oy < 0.5 * oh ? 10 * ny + key - 10 * oy : 10 * (ny + nh) - (10 * (oy + oh) - key);
+    const nearest = rows.reduce((a, b) => (Math.abs(b - target) < Math.abs(a - target) ? b : a));
+    fresh.get(nearest)!.forEach((node) => found.add(node));
+    row.forEach((node) => left.delete(node));
+  }
+  for (const node of left) {
     const [x, y] = before.positions[node]!;
     // Near an edge the distance from that edge counts, so that corners stay corners.
     const fit = (v: number, o: number, w: number, n: number, m: number): number =>

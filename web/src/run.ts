@@ -36,7 +36,7 @@ export class RunPage {
 
   constructor(private run: WholeRun) {
     this.drawing.setLattice(run.problem.positions, run.problem.beams);
-    this.chart.begin(run.settings.steps, run.method);
+    this.chart.begin(run.settings.steps, run.method, run.settings.hot, run.settings.cold);
     if (run.comparison) this.chart.compare(run.comparison.title, run.comparison.efficiency);
     this.stage.append(this.switcher, this.paper);
     const card = h("section", { class: "card", "aria-label": "Efficiency along the search" },

@@ -79,8 +79,18 @@ class Reporter:
         self._start = time.monotonic()
         self._moved_at, self._moved_mask = 0.0, ""
         self._done = {chain: folder.progress(chain)[0] for chain in range(settings.chains)}
+        self._points.update(self._beginnings(settings))
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._pass_on, daemon=True)
+
+    def _beginnings(self, settings: SearchSettings) -> dict[int, list[Point]]:
+        """Return where chains that have done nothing yet stand: annealing is soon over."""
+        from bellcrank.web.tracing import tidy
+
+        efficiency = tidy(self._evaluator.respond(self._problem.initial).efficiency)
+        temperature = float(getattr(settings, "temperatures", [0.0])[0])
+        point = (0, efficiency, efficiency, temperature)
+        return {chain: [point] for chain, done in self._done.items() if not done}
 
     def __enter__(self) -> Self:
         self._thread.start()
