@@ -70,13 +70,13 @@ def read_curves(folder: RunFolder) -> dict[int, list[Point]]:
         last = np.maximum.accumulate(np.where(taken, np.arange(count), -1))
         current = np.where(last >= 0, rows["efficiency"][last], np.nan)
         stride = max(BLOCK, -(-count // (MOST // 2)))
-        places = np.unique(np.append(np.arange(stride - 1, count, stride), count - 1))
+        places = np.append(np.arange(stride - 1, count, stride), [0, count - 1])
         if settings.name == "paper":  # the annealing is over within a few hundred steps
-            places = np.unique(np.append(places, np.arange(0, min(count, 2 * BLOCK), 10)))
+            places = np.append(places, np.arange(0, min(count, 2 * BLOCK), 10))
         shown = best if leaps else current
         curves[chain] = [
             (k + 1, tidy(shown[k]), tidy(best[k]), round(float(rows["temperature"][k]), 6))
-            for k in places.tolist()
+            for k in np.unique(places).tolist()
         ]
     return curves
 
