@@ -18,6 +18,7 @@ from bellcrank.web.pools import plain_error
 from bellcrank.web.state import Shop
 from bellcrank.web.tables import (
     MEDIA,
+    SWIFT,
     DesignBody,
     FemBody,
     FileBody,
@@ -64,7 +65,7 @@ async def make_file(suffix: FileSuffix, body: FileBody, shop: Shop) -> Response:
     """Return a file of a design: to print, to cut, to look at, to compute with."""
     about = {"efficiency": body.efficiency, "provenance": body.provenance}
     text = json.dumps(body.problem)
-    pool = shop.pools.slow
+    pool = shop.pools.thorough if suffix in SWIFT else shop.pools.slow
     content = await pool.call(making.design_file, text, body.mask, f".{suffix}", body.part, about)
     return Response(content, media_type=MEDIA[suffix])
 

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from bellcrank.web.jobs import Jobs
 
 NAME = re.compile(r"[a-z0-9]{12}")
+AT_HAND = 200
+"""Designs of runs that are not read again for every look at the gallery."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,6 +110,7 @@ class OwnRuns:
 
     def __init__(self, jobs: Jobs) -> None:
         self._jobs = jobs
+        self._read: dict[str, tuple[float, Entry]] = {}
 
     def entries(self) -> Iterable[Entry]:
         """Return the design of every search that has one, the latest first."""
@@ -120,12 +123,19 @@ class OwnRuns:
         """Return the design of a job."""
         try:
             job = self._jobs[key]
+            made = (job.path / "run" / "design.json").stat().st_mtime
+            if key in self._read and self._read[key][0] == made:
+                return self._read[key][1]
             design = job.design()
-        except BellcrankError:
+        except (BellcrankError, OSError):
             return None
         if design is None:
             return None
-        return Entry(key, job.record.title, job.record.settings["search"], design)
+        entry = Entry(key, job.record.title, job.record.settings["search"], design)
+        if len(self._read) >= AT_HAND:
+            self._read.clear()
+        self._read[key] = (made, entry)
+        return entry
 
 
 class Kept:

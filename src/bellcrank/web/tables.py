@@ -28,6 +28,9 @@ MEDIA = {
     "json": "application/json",
 }
 
+SWIFT = ("stl", "3mf", "svg", "dxf", "json")
+"""Files that take a moment, and need not wait behind movies and finite elements."""
+
 
 class Body(BaseModel):
     """A request: no unknown keys, no NaN."""
