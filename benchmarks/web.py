@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 SESSIONS, SEARCHES = 20, 8
+LONGEST = 120.0
+"""Seconds to wait until all searches have begun."""
 PAUSE = 0.5
 """Seconds between two edits of a person."""
 
@@ -142,7 +144,7 @@ async def crowd(address: str, pid: int, design: dict[str, Any], seconds: float) 
             *(edit(address, design, k, count, PAUSE) for k in range(SESSIONS))
         )
         passed = time.perf_counter() - begin
-        while len(order) < SEARCHES:
+        while len(order) < SEARCHES and time.perf_counter() - begin < LONGEST:
             await asyncio.sleep(0.5)
         for task in others:
             task.cancel()

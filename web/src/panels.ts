@@ -189,7 +189,7 @@ export class Panels {
   }
 
   private supports(): HTMLElement {
-    const options: [Hold, string][] = [["fixed", "Fixed"], ["fixed_y", "Slides sideways"], ["fixed_x", "Slides up"]];
+    const options: [Hold, string][] = [["fixed", "Fixed"], ["fixed_y", "Slides ↔"], ["fixed_x", "Slides ↕"]];
     return h("div", { class: "content" },
       choice("How they are held", options, this.editor.hold, (picked) => { this.editor.hold = picked; }),
       this.picking("supports"));
