@@ -23,6 +23,7 @@ export class Canvas extends Drawing {
   private task: Task | null = null;
   private bits: Uint8Array = new Uint8Array(0);
   private cursor = -1;
+  private movedTo: Float64Array | null = null;
   private drag: { kind: "box" | "paint" | "aim"; from: Point; region?: "input" | "output"; add: boolean; done: Set<number>; moved: boolean } | null = null;
   private readonly hover = s("circle", { class: "hover", r: 0.24, visibility: "hidden" });
   private readonly hoverBeam = s("path", { class: "hover-beam" });
@@ -76,8 +77,9 @@ export class Canvas extends Drawing {
     const { fixed, fixed_x, fixed_y } = problem.supports;
     this.mark("support", fixed);
     this.mark("roller", [...fixed_x, ...fixed_y]);
-    this.mark("input", problem.input.nodes);
-    this.mark("output", problem.output.nodes);
+    const at = bits && this.movedTo?.length === this.rest.length ? this.movedTo : this.rest;
+    this.mark("input", problem.input.nodes, at);
+    this.mark("output", problem.output.nodes, at);
     this.showRollers(fixed_x, fixed_y);
     this.showArrow("input");
     this.showArrow("output");
@@ -89,6 +91,7 @@ export class Canvas extends Drawing {
   showMoved(displacement: number[] | null, beams: number[]): void {
     const at = this.rest.slice();
     if (displacement) for (let k = 0; k < at.length; k++) at[k]! += displacement[k]!;
+    this.movedTo = displacement ? at : null;
     this.response.setAttribute("d", displacement ? this.lines(beams, at) : "");
     const { problem } = this.task!;
     this.mark("input", problem.input.nodes, at);

@@ -3,12 +3,17 @@
 import type { TracePoint } from "./api";
 import { figure, s } from "./dom";
 
-const [W, H] = [820, 230];
+const H = 230;
+const USUAL = 820;
 const PAD = { left: 44, right: 14, top: 14, bottom: 30 };
 
 export class Chart {
-  readonly svg = s("svg", { class: "chart", viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": "Efficiency against step, one curve for each chain" });
+  readonly svg = s("svg", { class: "chart", viewBox: `0 0 ${USUAL} ${H}`, role: "img", "aria-label": "Efficiency against step, one curve for each chain" });
   readonly curves = new Map<number, TracePoint[]>();
+  constructor() {
+    new ResizeObserver(() => this.draw()).observe(this.svg);
+  }
+
   private level: { title: string; value: number } | null = null;
   private steps = 1;
   private shaded = true;
@@ -38,6 +43,9 @@ export class Chart {
   }
 
   private draw(): void {
+    // As wide as it is shown, so that its letters are as large as others.
+    const W = Math.max(280, Math.round(this.svg.clientWidth) || USUAL);
+    this.svg.setAttribute("viewBox", `0 0 ${W} ${H}`);
     let [low, high] = [0, 0.1];
     let bestChain = -1;
     let best = -Infinity;
@@ -65,7 +73,7 @@ export class Chart {
       parts.push(s("path", { class: "grid", d: `M${PAD.left} ${y(tick)}H${W - PAD.right}` }),
         s("text", { class: "tick", x: PAD.left - 8, y: y(tick) + 4, "text-anchor": "end" }, figure(tick, digits)));
     }
-    for (const part of [0, 0.25, 0.5, 0.75, 1]) {
+    for (const part of W > 480 ? [0, 0.25, 0.5, 0.75, 1] : [0, 0.5, 1]) {
       const at = Math.round(part * this.steps);
       parts.push(s("text", { class: "tick", x: x(at), y: H - 8, "text-anchor": part === 1 ? "end" : part ? "middle" : "start" },
         part === 1 ? `${at.toLocaleString("en")} steps` : at.toLocaleString("en")));

@@ -53,7 +53,7 @@ class Record:
     message
         Why it failed.
     efficiency
-        Of the design that came out.
+        Of the design that came out, or of the best so far.
     done
         Proposals made, by all chains, when it last ended.
     """
@@ -106,13 +106,15 @@ class Job:
         self.told = message
         self.changed += 1
 
+    def best(self) -> float | None:
+        """Return the best efficiency that its process has told of."""
+        told = [each["best"] for each in self.told.get("chains", {}).values()]
+        return max((value for value in told if value is not None), default=None)
+
     def summary(self) -> dict[str, Any]:
         """Return what a list of jobs shows."""
         record = self.record
-        chains = self.told.get("chains") or {}
-        best = max(
-            (each["best"] for each in chains.values() if each["best"] is not None), default=None
-        )
+        best = self.best()
         settings = record.settings
         return {
             "id": self.name,
@@ -120,7 +122,9 @@ class Job:
             "created": record.created,
             "status": record.status,
             "message": record.message,
-            "efficiency": record.efficiency if record.efficiency is not None else best,
+            "efficiency": best
+            if best is not None and record.status in ALIVE
+            else record.efficiency,
             "method": settings["search"],
             "settings": settings,
             "part": record.part,

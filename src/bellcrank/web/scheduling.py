@@ -210,8 +210,12 @@ class Scheduler:
             job.update(status="failed", message=last["message"], done=done)
         elif last["kind"] == "paused":
             resumes = each.wanted == "yield"
+            best = job.best()
             job.update(
-                status="queued" if resumes else "paused", done=done, message=last.get("message", "")
+                status="queued" if resumes else "paused",
+                done=done,
+                message=last.get("message", ""),
+                efficiency=job.record.efficiency if best is None else best,
             )
             if resumes and not self._closing:
                 self.queue.append(job)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 COOKIE = "bellcrank_token"
-LOOPBACK = ("localhost", "127.0.0.1", "::1")
 HEADERS = {
     "content-security-policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -96,7 +95,7 @@ class Guard:
     def _stranger(self, scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
         """Refuse what a page from elsewhere has made a browser send."""
         host = headers.get("host", "")
-        if self.token is None and _hostname(host) not in LOOPBACK:
+        if self.token is None and not is_loopback(_hostname(host)):
             # A page elsewhere can give its own name the address of this machine.
             return 403, "this server answers only to localhost"
         origin = headers.get("origin")
