@@ -32,6 +32,12 @@ export class Chart {
     this.draw();
   }
 
+  /** The best that any chain has reached. */
+  get best(): number | null {
+    const tops = [...this.curves.values()].map((curve) => curve.at(-1)?.[2] ?? null).filter((top) => top !== null);
+    return tops.length ? Math.max(...tops) : null;
+  }
+
   add(points: Record<string, TracePoint[]>, reset: boolean): void {
     if (reset) this.curves.clear();
     for (const [chain, more] of Object.entries(points)) {

@@ -143,7 +143,7 @@ export class RunPage {
     const share = Math.min(1, done / run.total);
     const running = run.status === "running";
     const rows: [string, string][] = [
-      ["best so far", figure(run.efficiency, 3)],
+      ["best so far", figure(run.efficiency ?? this.chart.best, 3)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
       ...(running ? [["speed", this.news?.speed ? `${Math.round(this.news.speed).toLocaleString("en")} steps/s` : "starting …"], ["time left", duration(this.news?.left)]] as [string, string][] : []),
       ["method", `${run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
@@ -159,7 +159,7 @@ export class RunPage {
     if (run.message && run.status !== "running") this.trouble.textContent = sentence(run.message);
     if (!this.result) {
       const moved = this.news?.moved;
-      clear(this.readout, h("strong", {}, figure(moved?.efficiency ?? run.efficiency, 3)),
+      clear(this.readout, h("strong", {}, figure(moved?.efficiency ?? run.efficiency ?? this.chart.best, 3)),
         h("span", {}, running ? (run.method === "basin-hopping" ? "best design so far, moved" : "the design at hand, moved") : WORDS[run.status]));
     }
   }

@@ -172,8 +172,8 @@ async def follow(socket: WebSocket, name: str, shop: Shop) -> None:
         await socket.close()
         return
     listening = asyncio.create_task(_until_left(socket))
+    loading = asyncio.create_task(_load_curves(shop, job))
     try:
-        await _load_curves(shop, job)
         seen: dict[int, int] = {}
         epoch, changed = -1, -1
         while not listening.done():
@@ -189,6 +189,7 @@ async def follow(socket: WebSocket, name: str, shop: Shop) -> None:
         pass
     finally:
         listening.cancel()
+        loading.cancel()
 
 
 async def _until_left(socket: WebSocket) -> None:
@@ -207,6 +208,9 @@ async def _load_curves(shop: Workshop, job: Job) -> None:
     except BellcrankError:
         job.known_trace = False
         return
+    except asyncio.CancelledError:
+        job.known_trace = False
+        raise
     later = job.trace.chains
     for chain, points in read["curves"].items():
         known = points[-1][0] if points else 0
