@@ -51,6 +51,10 @@ def test_nothing_loads_pytorch_before_a_network_is_needed(statement: str) -> Non
     assert not imported_by(statement) & {"torch", "onnx", "onnxruntime", "safetensors"}
 
 
+def test_nothing_loads_a_web_server_before_it_serves() -> None:
+    assert not imported_by("import bellcrank.cli.main") & {"fastapi", "starlette", "uvicorn"}
+
+
 @pytest.mark.parametrize("module", ["bellcrank.cli", "bellcrank.model", "bellcrank.runs"])
 def test_light_layers_leave_compiler_and_plotting_alone(module: str) -> None:
     assert not imported_by(f"import {module}") & {"numba", "matplotlib", "scipy", "torch"}

@@ -26,6 +26,7 @@ from bellcrank.cli import (
     predict,
     print_part,
     problems,
+    serve,
     surrogate_search,
     train,
     validate,
@@ -55,6 +56,7 @@ COMMANDS = (
     machine_predict,
     library,
     problems,
+    serve,
 )
 """Modules that register a command."""
 FAILURES = (StorageError, CorruptRun, RunFailed)

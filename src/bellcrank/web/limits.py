@@ -1,0 +1,83 @@
+"""How much one page may ask of the server."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+from bellcrank.errors import InvalidFile
+from bellcrank.model import lattices
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+BODY = 2_000_000
+"""Bytes of a request."""
+MESSAGE = 2_000_000
+"""Bytes of a message over a websocket."""
+NODES = 3000
+BEAMS = 9000
+STEPS = 2_000_000
+CHAINS = 64
+WAITING = 200
+"""Searches that are queued or running."""
+
+
+def _grid(given: Mapping[str, Any]) -> int:
+    return _whole(given.get("columns")) * _whole(given.get("rows"))
+
+
+def _rows(given: Mapping[str, Any]) -> int:
+    counts = given.get("counts")
+    return sum(map(_whole, counts)) if isinstance(counts, list) else 0
+
+
+_SIZES: dict[str, Callable[[Mapping[str, Any]], int]] = {
+    "triangular-rectangle": _grid,
+    "displaced-delaunay": _grid,
+    "triangular-rows": _rows,
+    "jammed-discs": lambda given: _whole(given.get("discs")),
+}
+"""About how many nodes a lattice will have, before it is made."""
+
+
+def _whole(value: object) -> int:
+    return value if isinstance(value, int) and value > 0 else 0
+
+
+def check_lattice(given: object) -> None:
+    """Refuse a description of a lattice that is too large, or that would read a file.
+
+    Raises
+    ------
+    InvalidFile
+    """
+    if not isinstance(given, dict):
+        return
+    kind = given.get("kind")
+    if not isinstance(kind, str) or kind not in lattices:
+        return
+    signature = inspect.signature(lattices[kind])
+    if any(each.annotation == "Path" for each in signature.parameters.values()):
+        raise InvalidFile(
+            f"lattice.kind: {kind!r} names a file, which a page cannot; "
+            "load that file as a lattice instead"
+        )
+    if kind not in _SIZES:
+        raise InvalidFile(f"lattice.kind: {kind!r} is not offered here; known: {', '.join(_SIZES)}")
+    nodes = _SIZES[kind](given)
+    if nodes > NODES:
+        raise InvalidFile(f"lattice: about {nodes} nodes; the page takes up to {NODES}")
+
+
+def check_size(nodes: int, beams: int) -> None:
+    """Refuse a lattice that is too large to draw and search on a page.
+
+    Raises
+    ------
+    InvalidFile
+    """
+    if nodes > NODES or beams > BEAMS:
+        raise InvalidFile(
+            f"lattice: {nodes} nodes and {beams} beams; the page takes up to {NODES} and {BEAMS}"
+        )

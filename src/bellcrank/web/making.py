@@ -1,0 +1,179 @@
+"""What takes long: files, movies, finite elements, machines; from plain data to plain data."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from bellcrank.errors import InvalidFile, InvalidSettings
+from bellcrank.model import write_design
+from bellcrank.web.solving import design_of
+
+if TYPE_CHECKING:
+    from bellcrank.model import Design
+    from bellcrank.parts import PartSpec
+
+MOVIE_SECONDS = 4.0
+MOVIE_SIZE = (1280, 720)
+GIF_SIZE = (720, 404)
+GIF_FPS = 20
+PICTURED = 60_000
+"""Most vertices of a picture of stress."""
+
+
+def design_file(
+    text: str, mask: str, suffix: str, part: dict[str, Any], about: dict[str, Any]
+) -> bytes:
+    """Make a file of a design.
+
+    Parameters
+    ----------
+    suffix
+        One of `bellcrank.web.tables.FILES`, with a dot.
+    part
+        Size and material, as `PartSpec.from_dict` reads them.
+    about
+        Efficiency and provenance, as far as they are known.
+    """
+    from bellcrank.parts import PartSpec
+
+    design = replace(
+        design_of(text, mask),
+        efficiency=about.get("efficiency"),
+        provenance=about.get("provenance") or {},
+    )
+    spec = PartSpec.from_dict(part)
+    makers = {".json": _json, ".mp4": _movie, ".gif": _movie, ".pdf": _card, ".png": _card}
+    with TemporaryDirectory(prefix="bellcrank-") as folder:
+        path = Path(folder) / f"part{suffix}"
+        try:
+            makers.get(suffix, _export)(design, spec, path)
+        except InvalidSettings as error:
+            raise InvalidSettings(str(error).removeprefix(f"{path}: ")) from None
+        return path.read_bytes()
+
+
+def _json(design: Design, spec: PartSpec, path: Path) -> None:
+    noted = replace(design, provenance={**design.provenance, "part": spec.to_dict()})
+    write_design(noted, path)
+
+
+def _movie(design: Design, _spec: PartSpec, path: Path) -> None:
+    from bellcrank.plots.movies import movie_settings
+    from bellcrank.workflows.animate import animate_motion
+
+    gif = path.suffix == ".gif"
+    settings = movie_settings(
+        path, MOVIE_SECONDS, GIF_FPS if gif else None, GIF_SIZE if gif else MOVIE_SIZE
+    )
+    animate_motion([(design.problem.name, design)], path, settings)
+
+
+def _card(design: Design, spec: PartSpec, path: Path) -> None:
+    from bellcrank.workflows.card import make_card
+
+    make_card(design, spec, path)
+
+
+def _export(design: Design, spec: PartSpec, path: Path) -> None:
+    from bellcrank.fabricate import export
+    from bellcrank.fabricate.formats.base import LAYER
+    from bellcrank.workflows.fabricate import Grips, bundle_of
+
+    export(bundle_of(design, spec, Grips(), layer=LAYER), path)
+
+
+def remarks(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
+    """Say what a part will be like: size, mass, and what is to be said about printing it."""
+    from bellcrank.parts import PartSpec
+    from bellcrank.workflows.fabricate import Grips, bundle_of, findings_about, profile_for
+
+    spec = PartSpec.from_dict(part)
+    bundle = bundle_of(design_of(text, mask), spec, Grips(), layer=0.32)
+    left, bottom, right, top = bundle.outline().bounds
+    volume = bundle.outline().area * bundle.thickness
+    mass = volume * bundle.part.material.density / 1000.0
+    return {
+        "size": [round(right - left, 2), round(top - bottom, 2), round(bundle.thickness, 3)],
+        "volume": round(volume / 1000.0, 3),
+        "mass": round(mass, 2) if math.isfinite(mass) else None,
+        "stroke": bundle.part.stroke if math.isfinite(bundle.part.stroke) else None,
+        "remarks": findings_about(bundle, profile_for(None, spec)),
+    }
+
+
+def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[str, Any]:
+    """Analyse a design as a part by finite elements.
+
+    Returns
+    -------
+    dict
+        The figures of one level, and ``picture``: struts or triangles where they have moved, mm,
+        with their stress.
+    """
+    from bellcrank.fem import FemSettings
+    from bellcrank.parts import PartSpec
+    from bellcrank.workflows import validate
+
+    spec = PartSpec.from_dict(part)
+    found = validate(design_of(text, mask), spec, [(level, FemSettings())])
+    analysis = found.analyses[0]
+    data: dict[str, Any] = found.to_dict()["results"][0]
+    field = analysis.field
+    picture = None
+    if len(field.rest) <= PICTURED and field.rest.shape[1] == 2:
+        picture = {
+            "points": (field.rest + field.displacement).round(3).ravel().tolist(),
+            "cells": field.cells.ravel().tolist(),
+            "corners": int(field.cells.shape[1]),
+            "stress": [float(f"{each:.4g}") for each in field.stress.tolist()],
+        }
+    kept = (
+        "level", "theory", "status", "stable", "reached", "efficiency", "von_mises_MPa",
+        "principal_strain", "input_force_N", "input_push_N", "mean_output_displacement_mm",
+        "warnings", "discrete_model",
+    )  # fmt: skip
+    return {**{key: data[key] for key in kept}, "doubts": found.doubts, "picture": picture}
+
+
+def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:
+    """Assemble a machine.
+
+    Parameters
+    ----------
+    plan
+        As in the TOML files of `bellcrank.machines.plan`.
+    designs
+        The design of each entry that the plan names: JSON of ``problem`` and ``mask``.
+    """
+    from bellcrank.machines.assembly import assemble
+    from bellcrank.machines.plan import MachineTable, plan_of
+    from bellcrank.mechanics import CAREFUL, Evaluator
+    from bellcrank.model import problem_to_dict
+    from bellcrank.model.parsing import parse
+    from bellcrank.web.limits import check_size
+
+    def find(entry: str) -> Design:
+        if entry not in designs:
+            raise InvalidFile(f"there is no design {entry!r} in the gallery")
+        given = json.loads(designs[entry])
+        return design_of(json.dumps(given["problem"]), given["mask"])
+
+    source = "the machine"
+    built = assemble(plan_of(parse(MachineTable, plan, source), source), find)
+    problem = built.design.problem
+    check_size(problem.lattice.node_count, problem.lattice.beam_count)
+    response = Evaluator(problem).respond(built.design.mask, CAREFUL)
+    return {
+        "problem": problem_to_dict(problem),
+        "mask": built.design.mask_hex,
+        "efficiency": response.efficiency if math.isfinite(response.efficiency) else None,
+        "status": response.status.label,
+        "message": response.status.message,
+        "provenance": {**built.design.provenance, "kind": "assembled"},
+        "parts": {name: beams.tolist() for name, beams in built.beams.items()},
+    }

@@ -1,0 +1,138 @@
+"""From a command to a server that runs."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import socket
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bellcrank.errors import InvalidSettings, StorageError
+from bellcrank.web.security import is_loopback
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+MESSAGE_LIMIT = 2_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServerSettings:
+    """Where a server listens and what it serves.
+
+    Parameters
+    ----------
+    folder
+        Of runs and kept designs.
+    host, port
+        Its address; port 0 for any that is free.
+    token
+        That everybody must know. Made up where the address is not that of this machine alone.
+    searches
+        At the same time; None for as many as there are processors.
+    """
+
+    folder: Path
+    host: str = "127.0.0.1"
+    port: int = 8642
+    token: str | None = None
+    searches: int | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.port < 65536:
+            raise InvalidSettings(f"port: expected 0 to 65535, got {self.port}")
+        if self.searches is not None and self.searches < 1:
+            raise InvalidSettings(f"searches: expected at least 1, got {self.searches}")
+        if self.token is not None and len(self.token) < 8:
+            raise InvalidSettings("token: expected at least 8 letters or digits")
+        if self.token is not None and not self.token.replace("-", "").replace("_", "").isalnum():
+            raise InvalidSettings("token: expected letters, digits, - and _ only")
+
+    @property
+    def needed_token(self) -> str | None:
+        """The token, or a new one where none was given but one is needed."""
+        if self.token is None and not is_loopback(self.host):
+            return secrets.token_urlsafe(18)
+        return self.token
+
+
+def default_folder() -> Path:
+    """Return where runs are kept if nobody says: with the other data of this person."""
+    base = os.environ.get("XDG_DATA_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "share") / "bellcrank" / "web"
+
+
+def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
+    """Serve until interrupted.
+
+    Parameters
+    ----------
+    tell
+        Called with the address, once it is open.
+
+    Raises
+    ------
+    InvalidSettings
+        If the address cannot be had.
+    StorageError
+        If the folder cannot be used, or another server uses it.
+    """
+    import uvicorn
+
+    from bellcrank.web.app import make_app
+
+    token = settings.needed_token
+    with _only_one(settings.folder), _listening(settings) as listener:
+        app = make_app(settings.folder, token=token, searches=settings.searches)
+        config = uvicorn.Config(
+            app, log_level="warning", ws_max_size=MESSAGE_LIMIT, ws="websockets-sansio",
+            server_header=False, timeout_graceful_shutdown=3, limit_concurrency=400,
+        )  # fmt: skip
+        server = uvicorn.Server(config)
+        port = listener.getsockname()[1]
+        host = f"[{settings.host}]" if ":" in settings.host else settings.host
+        tell(f"http://{host}:{port}/" + (f"?token={token}" if token else ""))
+        server.run(sockets=[listener])
+
+
+@contextlib.contextmanager
+def _listening(settings: ServerSettings) -> Iterator[socket.socket]:
+    """Take the address before anything else is done."""
+    try:
+        found = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)
+        family, kind, protocol, _, address = found[0]
+        listener = socket.socket(family, kind, protocol)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(128)  # who comes before the server is up waits
+    except OSError as error:
+        raise InvalidSettings(
+            f"{settings.host}:{settings.port} cannot be opened ({error.strerror}); "
+            "choose another with --port"
+        ) from None
+    with listener:
+        yield listener
+
+
+@contextlib.contextmanager
+def _only_one(folder: Path) -> Iterator[None]:
+    """Refuse a folder that another server uses: both would run its searches."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = (folder / "server.lock").open("w")
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be used ({error.strerror})") from None
+    with file:
+        try:
+            import fcntl
+        except ImportError:
+            yield
+            return
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise StorageError(f"{folder}: another server uses it; close that first") from None
+        yield

@@ -1,0 +1,103 @@
+"""Lattices and tasks: made, checked, read and written."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
+
+from bellcrank.errors import UnknownName
+from bellcrank.machines.elementary import DIRECTIONS, elementary
+from bellcrank.model import builtin, lattices, problem_to_dict
+from bellcrank.model.calls import call_with_keys
+from bellcrank.web import solving
+from bellcrank.web.limits import check_lattice, check_size
+from bellcrank.web.state import Shop
+from bellcrank.web.tables import LatticeBody, SaveBody, TaskBody, TextBody
+from bellcrank.web.texts import problem_of, read_lattice, read_task, write_task
+
+router = APIRouter(prefix="/api", tags=["tasks"])
+
+ELEMENTARY_COLUMNS = 7
+"""Nodes across of the elementary tasks that are offered."""
+
+
+@router.get("/problems")
+def list_problems() -> list[dict[str, str]]:
+    """Tasks to start from, in groups."""
+    named = [
+        {"name": name, "group": "Built in", "about": (make.__doc__ or "").strip().split("\n")[0]}
+        for name, make in builtin.items()
+    ]
+    parts = [
+        {
+            "name": f"elementary-{direction}",
+            "group": "Parts of machines",
+            "about": f"Push down on the right, move {direction} on the left.",
+        }
+        for direction in DIRECTIONS
+    ]
+    return [*named, *parts]
+
+
+@router.get("/problems/{name}")
+def get_problem(name: str) -> dict[str, Any]:
+    """Return one of the tasks to start from."""
+    if name in builtin:
+        return problem_to_dict(builtin[name]())
+    direction = name.removeprefix("elementary-")
+    if direction != name and direction in DIRECTIONS:
+        return problem_to_dict(elementary(ELEMENTARY_COLUMNS, direction))
+    raise UnknownName(f"there is no task {name!r}")
+
+
+@router.post("/lattices")
+def make_lattice(body: LatticeBody) -> dict[str, Any]:
+    """Make the lattice that a table describes."""
+    given = dict(body.lattice)
+    check_lattice(given)
+    kind = given.pop("kind", "")
+    lattice = call_with_keys(lattices[kind], given, "lattice")
+    check_size(lattice.node_count, lattice.beam_count)
+    return {"positions": lattice.positions.tolist(), "beams": lattice.beams.tolist()}
+
+
+@router.post("/lattices/read")
+async def import_lattice(body: TextBody) -> dict[str, Any]:
+    """Read a lattice from a file of another program."""
+    lattice = await run_in_threadpool(read_lattice, body.text, body.suffix)
+    plane = lattice.positions[:, :2]
+    return {"positions": plane.tolist(), "beams": lattice.beams.tolist()}
+
+
+@router.post("/tasks/read")
+async def load_task(body: TextBody) -> dict[str, Any]:
+    """Read a task or a design from a file."""
+    problem, lattice, design = await run_in_threadpool(read_task, body.text, body.suffix)
+    return {
+        "problem": problem_to_dict(problem),
+        "lattice": lattice,
+        "mask": None if design is None else design.mask_hex,
+    }
+
+
+@router.post("/tasks/write")
+async def save_task(body: SaveBody) -> dict[str, str]:
+    """Write a task as text, to be saved or passed on."""
+
+    def write() -> str:
+        return write_task(problem_of(body.problem), body.lattice, body.suffix)
+
+    return {"text": await run_in_threadpool(write)}
+
+
+@router.post("/tasks/check")
+async def check_task(body: TaskBody, shop: Shop) -> dict[str, Any]:
+    """Say what is wrong with a task, or else how its initial design moves."""
+    text = json.dumps(body.problem)
+    await run_in_threadpool(problem_of, body.problem)
+    if not shop.ready:
+        return {"response": None}
+    return await shop.pools.quick.call(solving.check, text, body.goals)

@@ -1,0 +1,65 @@
+"""The page for who uses a keyboard, a small screen or a screen reader."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe")
+
+from .driving import task, tool  # noqa: E402
+
+if TYPE_CHECKING:
+    from .conftest import Server
+
+
+def findings(page: Any) -> list[str]:
+    """Return what axe finds that is serious."""
+    found = axe.Axe().run(page).response["violations"]
+    return [
+        f"{each['id']}: {each['nodes'][0]['html'][:120]}"
+        for each in found
+        if each["impact"] in {"serious", "critical"}
+    ]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1440, 390])
+def test_axe_finds_nothing_serious(page: Any, server: Server, scheme: str, width: int) -> None:
+    page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+    page.set_viewport_size({"width": width, "height": 900})
+    page.locator(".step.lattice h2 button").click()
+    assert findings(page) == []
+    for name in ("Push", "Beams", "By hand"):
+        tool(page, name)
+        page.wait_for_timeout(300)
+        assert findings(page) == []
+    for place in ("gallery", "machine", "runs", "design/builtin/human-crane"):
+        page.goto(f"{server.address}/#/{place}")
+        page.locator("h1").wait_for()
+        page.wait_for_timeout(700)
+        assert findings(page) == [], place
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= width, place
+
+
+def test_a_task_can_be_drawn_with_the_keyboard_alone(page: Any) -> None:
+    page.locator("svg.canvas").focus()
+    before = set(task(page)["problem"]["supports"]["fixed"])
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Space")
+    after = set(task(page)["problem"]["supports"]["fixed"])
+    assert len(before ^ after) == 1
+    assert "node" in page.locator(".unseen[role=status]").inner_text()
+    page.keyboard.press("Shift+Enter")
+    assert set(task(page)["problem"]["supports"]["fixed"]) != after
+    page.locator(".tools input").first.focus()
+    page.keyboard.press("ArrowRight")
+    assert page.locator(".page.draw").get_attribute("data-tool") == "input"
+    page.get_by_label("Direction", exact=True).fill("90")
+    page.keyboard.press("Tab")
+    assert task(page)["problem"]["input"]["direction"] == [0, 1]
+    page.get_by_role("button", name="Design it").focus()
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/#/run/*")

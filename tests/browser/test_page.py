@@ -1,0 +1,189 @@
+"""The way of a person through the page, from an empty lattice to a part."""
+
+from __future__ import annotations
+
+import io
+import math
+import signal
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import trimesh
+
+from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.model import problem_from_dict, unpack_mask
+
+from .driving import click, drag, start_search, summary, task, tool, until
+
+if TYPE_CHECKING:
+    from .conftest import Server
+
+HEIGHT = math.sqrt(3.0) / 2.0
+
+
+def downloaded(page: Any, suffix: str) -> bytes:
+    """Take a file of the design that is shown."""
+    with page.expect_download() as waiting:
+        page.locator(f'[data-file="{suffix}"]').click()
+    with open(waiting.value.path(), "rb") as file:  # noqa: PTH123
+        return file.read()
+
+
+def test_a_task_is_drawn_searched_watched_stopped_played_and_taken(page: Any) -> None:
+    top = 8 * HEIGHT
+    page.get_by_role("button", name="Clear").click()
+    assert summary(page, "supports") == "nothing yet"
+    assert page.get_by_role("button", name="Design it").is_disabled()
+    page.mouse.dblclick(*_at(page, 3.5, 0.0))
+    assert summary(page, "supports") == "8 nodes"
+
+    tool(page, "Push")
+    page.get_by_role("button", name="Clear").click()
+    click(page, 7.5, top)
+    drag(page, (8.2, top - 1.3), (7.6, top - 0.5))
+    assert task(page)["problem"]["input"]["nodes"] == [67, 75]
+    page.get_by_label("down", exact=True).click()
+    tip = 0.5 * (7.5 + 8.0)
+    amount = task(page)["problem"]["input"]["amount"]
+    middle = top - 0.5 * HEIGHT
+    drag(page, (tip, middle - 4 * amount), (tip, middle - 1.6))
+    assert task(page)["problem"]["input"]["amount"] == pytest.approx(0.4, abs=0.02)
+    assert "4.0 mm down" in summary(page, "input")
+    page.keyboard.press("Control+z")
+    assert task(page)["problem"]["input"]["amount"] == amount
+    page.keyboard.press("Control+Shift+z")
+
+    tool(page, "Move")
+    assert summary(page, "output") == "2 nodes, left"
+    page.wait_for_timeout(400)
+    assert not page.locator(".complaint").inner_text()
+
+    start_search(page, "Thorough")
+    page.get_by_text("steps/s").wait_for()
+    until(page, "document.querySelector('.curve.best')?.getAttribute('d').length > 20")
+    page.reload()
+    until(page, "document.querySelector('.curve.best')?.getAttribute('d').length > 20")
+    page.get_by_role("button", name="Stop and take the best").click()
+    page.locator('.player[data-ready="yes"]').wait_for()
+    assert float(page.locator(".headline strong").inner_text().replace("−", "-")) > 0.5
+    before = page.locator(".player path.plain, .player [class*=heat]").first.get_attribute("d")
+    page.wait_for_timeout(300)
+    page.get_by_label("Pause the motion").click()
+    page.locator(".transport > input").fill("1000")
+    assert "mm out" in page.locator(".readout").inner_text()
+    assert before is not None
+    mesh = trimesh.load(io.BytesIO(downloaded(page, "stl")), file_type="stl")
+    assert mesh.is_watertight
+    assert downloaded(page, "3mf")[:2] == b"PK"
+    page.get_by_text("Beam worth").click()
+    page.get_by_text("Dark: all depends on it").wait_for()
+
+
+def _at(page: Any, x: float, y: float) -> tuple[float, float]:
+    from .driving import place
+
+    return place(page, x, y)
+
+
+def test_a_design_is_changed_by_hand_and_the_real_solver_answers(page: Any) -> None:
+    tool(page, "By hand")
+    page.locator(".readout .latency").wait_for()
+    before = page.locator(".readout strong").inner_text()
+    for x in (2.5, 3.5, 4.5):
+        click(page, x, 4 * HEIGHT)
+    until(page, f"document.querySelector('.readout strong').textContent !== '{before}'")
+    page.wait_for_timeout(500)
+    kept = task(page)
+    problem = problem_from_dict({**kept["problem"], "designable": _free(kept)})
+    mask = unpack_mask(kept["hand"], problem.lattice.beam_count)
+    assert mask.sum() == len(mask) - 3
+    exact = Evaluator(problem).respond(mask, CAREFUL).efficiency
+    shown = float(page.locator(".readout strong").inner_text().replace("−", "-"))
+    assert shown == pytest.approx(exact, abs=6e-4)
+    page.keyboard.press("Control+z")
+    page.wait_for_timeout(500)
+    assert unpack_mask(task(page)["hand"], problem.lattice.beam_count).sum() == len(mask) - 2
+    page.get_by_role("button", name="Keep this design").click()
+    page.locator('.player[data-ready="yes"]').wait_for()
+
+
+def _free(kept: Any) -> list[int]:
+    return [k for k, rule in enumerate(kept["rules"]) if rule == "auto"][:1]
+
+
+def test_beams_are_painted_and_mirrored_and_the_task_is_saved_and_loaded(
+    page: Any, tmp_path: Any
+) -> None:
+    tool(page, "Beams")
+    total = summary(page, "beams")
+    page.get_by_label("Mirror left and right").check()
+    click(page, 2.5, 4 * HEIGHT)
+    assert task(page)["rules"].count("keep") == 2
+    page.locator(".beams .choice label", has_text="Never").click()
+    click(page, 4.0, 2 * HEIGHT)
+    assert task(page)["rules"].count("never") in {1, 2}
+    assert summary(page, "beams") != total
+    page.locator(".step.lattice h2 button").click()
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name="Save TOML").click()
+    waiting.value.save_as(tmp_path / "task.toml")
+    text = (tmp_path / "task.toml").read_text()
+    rules = task(page)["rules"]
+    page.get_by_label("Start from").select_option("crane")
+    until(page, "JSON.parse(localStorage.getItem('bellcrank-task')).problem.name === 'crane'")
+    (tmp_path / "broken.toml").write_text(text.replace("drive", "drove"))
+    page.locator('input[type="file"]').set_input_files(tmp_path / "broken.toml")
+    page.get_by_text("unknown key", exact=False).first.wait_for()
+    page.locator('input[type="file"]').set_input_files(tmp_path / "task.toml")
+    until(page, "JSON.parse(localStorage.getItem('bellcrank-task')).problem.name === 'my actuator'")
+    assert task(page)["rules"] == rules
+
+
+def test_what_is_wrong_is_said_where_it_is(page: Any) -> None:
+    page.locator(".step.lattice h2 button").click()
+    page.get_by_label("Start from").select_option("discs")
+    until(page, "JSON.parse(localStorage.getItem('bellcrank-task')).problem.name === 'discs'")
+    tool(page, "Beams")
+    page.get_by_label("Mirror left and right").check()
+    page.locator(".step.beams .fault", has_text="not symmetric").wait_for()
+    assert page.get_by_role("button", name="Design it").is_disabled()
+    page.get_by_label("Mirror left and right").uncheck()
+    page.locator(".step.beams .fault").wait_for(state="detached")
+
+
+def test_a_machine_is_made_of_two_parts(page: Any, server: Server) -> None:
+    for direction in ("down", "left"):
+        made = """async (name) => {
+          const problem = await (await fetch(`/api/problems/${name}`)).json();
+          const headers = {"content-type": "application/json"};
+          const body = JSON.stringify({problem, mask: problem.initial, title: name});
+          await fetch("/api/gallery", {method: "POST", headers, body});
+        }"""
+        page.evaluate(made, f"elementary-{direction}")
+    page.goto(f"{server.address}/#/machine")
+    page.locator("button.tile", has_text="elementary-down").click()
+    page.get_by_text("first: elementary-down").wait_for()
+    page.locator("button.tile", has_text="elementary-left").click()
+    page.get_by_text("second: elementary-left").wait_for()
+    until(page, "document.querySelector('.readout strong')?.textContent.length > 3")
+    page.get_by_label("Turned").last.select_option("120")
+    page.locator(".complaint", has_text="second").wait_for()
+    page.get_by_label("Turned").last.select_option("0")
+    page.locator(".complaint:empty").wait_for(state="attached")
+    page.get_by_role("button", name="Build it").click()
+    page.wait_for_url("**/#/design/kept/*")
+    page.locator('.player[data-ready="yes"]').wait_for()
+
+
+def test_the_page_and_its_search_survive_the_end_of_the_server(page: Any, server: Server) -> None:
+    name = start_search(page, "Usual")
+    page.get_by_text("steps/s").wait_for()
+    until(page, "document.querySelector('.curve.best')?.getAttribute('d').length > 20")
+    server.end(signal.SIGKILL)
+    page.get_by_text("The server does not answer", exact=False).first.wait_for()
+    server.start()
+    page.get_by_text("steps/s").wait_for()
+    page.goto(f"{server.address}/#/runs")
+    page.locator(f'a[href="#/run/{name}"]').click()
+    page.get_by_role("button", name="Stop and take the best").click()
+    page.locator('.player[data-ready="yes"]').wait_for()

@@ -1,0 +1,268 @@
+"""What the page asks of the server, and the sentences it gets when something is wrong."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.model import find_problem, human_design, problem_to_dict
+from bellcrank.web.texts import read_task, write_task
+
+if TYPE_CHECKING:
+    from starlette.testclient import TestClient
+
+LIFT = """schema = "bellcrank/problem/1"
+name = "lift"
+
+[lattice]
+kind = "triangular-rectangle"
+columns = 5
+rows = 6
+
+[supports]
+fixed = [{ row = 0 }]
+
+[input]
+nodes = [{ row = -1, rightmost = 2 }]
+direction = [0, -1]
+drive = "displacement"
+amount = 0.2
+
+[output]
+nodes = [{ row = -1, leftmost = 2 }]
+direction = [0, 1]
+"""
+
+
+def refusal(answer: Any, status: int = 422) -> tuple[str, str]:
+    """Return sentence and key of an answer that refuses."""
+    assert answer.status_code == status, answer.text
+    said = answer.json()
+    assert set(said) == {"message", "key"}
+    assert "\n" not in said["message"]
+    assert "Traceback" not in said["message"]
+    return said["message"], said["key"]
+
+
+def test_every_problem_that_is_listed_can_be_opened(client: TestClient) -> None:
+    listed = client.get("/api/problems").json()
+    assert {"crane", "pliers", "elementary-down"} <= {each["name"] for each in listed}
+    for each in listed:
+        problem = client.get(f"/api/problems/{each['name']}").json()
+        assert problem["schema"] == "bellcrank/problem/1"
+
+
+def test_a_sound_task_is_answered_with_the_response_of_all_its_beams(client: TestClient) -> None:
+    problem = client.get("/api/problems/crane").json()
+    found = client.post("/api/tasks/check", json={"problem": problem}).json()
+    assert found["designable"] == 203
+    assert found["response"]["efficiency"] == pytest.approx(-0.0640859, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "words"),
+    [
+        ({"output": {"nodes": [132], "direction": [-1, 0]}}, "output.nodes", "also in input.nodes"),
+        ({"supports": {"fixed": [999]}}, "supports.fixed", "999"),
+        ({"input": {"nodes": [], "direction": [0, -1], "drive": "displacement", "amount": 0.3}},
+         "input.nodes", "node"),
+        ({"input": {"nodes": [132], "direction": [0, 0], "drive": "displacement", "amount": 0.3}},
+         "input.direction", "unit"),
+        ({"name": 7}, "name", "string"),
+        ({"colour": "red"}, "", "unknown key 'colour'"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_task_is_one_sentence_about_one_thing(
+    client: TestClient, change: dict[str, Any], key: str, words: str
+) -> None:
+    problem = {**problem_to_dict(find_problem("crane")), **change}
+    message, about = refusal(client.post("/api/tasks/check", json={"problem": problem}))
+    assert words in message
+    assert about.partition("[")[0] == key
+
+
+def test_a_lattice_without_mirror_symmetry_refuses_a_mirror(client: TestClient) -> None:
+    problem = client.get("/api/problems/discs").json()
+    body = {"problem": problem, "goals": ["mirror x"]}
+    message, _ = refusal(client.post("/api/tasks/check", json=body))
+    assert "not symmetric in x" in message
+
+
+@pytest.mark.parametrize("suffix", [".toml", ".json"])
+def test_a_task_is_the_same_after_saving_and_loading(suffix: str) -> None:
+    for name in ("crane", "pliers", "discs"):
+        problem = find_problem(name)
+        again, _, _ = read_task(write_task(problem, None, suffix), suffix)
+        assert again.hash == problem.hash
+
+
+def test_a_file_in_toml_keeps_the_table_of_its_lattice(client: TestClient) -> None:
+    read = client.post("/api/tasks/read", json={"text": LIFT, "suffix": ".toml"}).json()
+    assert read["lattice"]["columns"] == 5
+    body = {"problem": read["problem"], "lattice": read["lattice"], "suffix": ".toml"}
+    text = client.post("/api/tasks/write", json=body).json()["text"]
+    assert "positions" not in text
+    again = client.post("/api/tasks/read", json={"text": text, "suffix": ".toml"}).json()
+    assert again["problem"] == read["problem"]
+
+
+def test_a_design_file_is_opened_with_its_design(client: TestClient, crane: dict[str, Any]) -> None:
+    text = client.post(
+        "/api/files/json", json={"problem": crane["problem"], "mask": crane["mask"]}
+    ).text
+    read = client.post("/api/tasks/read", json={"text": text, "suffix": ".json"}).json()
+    assert read["mask"] == crane["mask"]
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix", "words"),
+    [
+        ("schema = ", ".toml", "not valid TOML"),
+        ("[1]", ".json", "JSON object"),
+        ("{}", ".json", "missing"),
+        ("abc", ".exe", "ending in"),
+        (LIFT.replace("rows = 6", "rows = 60000"), ".toml", "nodes"),
+        (LIFT.replace("row = 0", "row = 99"), ".toml", "99"),
+    ],
+)
+def test_a_bad_file_is_refused_in_a_sentence_without_our_paths(
+    client: TestClient, text: str, suffix: str, words: str
+) -> None:
+    message, _ = refusal(client.post("/api/tasks/read", json={"text": text, "suffix": suffix}))
+    assert words in message
+    assert "/tmp" not in message
+    assert "upload" not in message
+
+
+def test_lattices_are_made_and_refused_by_their_size(client: TestClient) -> None:
+    small = {"kind": "triangular-rectangle", "columns": 3, "rows": 4}
+    made = client.post("/api/lattices", json={"lattice": small}).json()
+    assert len(made["positions"]) == 14
+    message, key = refusal(client.post("/api/lattices", json={"lattice": {**small, "rows": 10**9}}))
+    assert "up to" in message
+    assert key == "lattice"
+    refusal(client.post("/api/lattices", json={"lattice": {"kind": "cubic"}}), 404)
+
+
+def test_a_motion_follows_the_true_path(client: TestClient, crane: dict[str, Any]) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"]}
+    motion = client.post("/api/motion", json=body).json()
+    design = human_design("crane")
+    assert design is not None
+    exact = Evaluator(design.problem).respond(design.mask, CAREFUL)
+    there = np.array(motion["displacement"][-1]).reshape(-1, 2)
+    assert np.abs(there - exact.displacement).max() < 1e-5
+    assert motion["efficiency"][-1] == pytest.approx(exact.efficiency, abs=1e-9)
+    assert np.abs(motion["displacement"][0]).max() == 0.0
+
+
+def test_the_worth_of_a_beam_is_what_flipping_it_changes(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"]}
+    found = client.post("/api/sensitivity", json=body).json()
+    design = human_design("crane")
+    assert design is not None
+    evaluator = Evaluator(design.problem)
+    for place in (3, 50, 150):
+        mask = design.mask.copy()
+        mask[found["beams"][place]] ^= True
+        flipped = evaluator.respond(mask)
+        if found["change"][place] is None:
+            assert flipped.status.label != "converged"
+        else:
+            change = flipped.efficiency - found["efficiency"]
+            assert found["change"][place] == pytest.approx(change, abs=1e-9)
+
+
+def test_the_solver_answers_over_a_websocket_design_by_design(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    with client.websocket_connect("ws://localhost:8642/api/edit") as socket:
+        socket.send_json({"id": 1, "mask": crane["mask"]})
+        assert "problem" in socket.receive_json()["error"]["message"]
+        socket.send_json({"id": 2, "mask": crane["mask"], "problem": crane["problem"]})
+        answer = socket.receive_json()
+        assert answer["id"] == 2
+        assert answer["efficiency"] == pytest.approx(1.010457, abs=1e-5)
+        socket.send_json({"id": 3, "mask": "zz"})
+        assert "hexadecimal" in socket.receive_json()["error"]["message"]
+        socket.send_text("[")
+        assert "JSON" in socket.receive_json()["error"]["message"]
+
+
+@pytest.mark.parametrize("suffix", ["stl", "3mf"])
+def test_what_is_downloaded_to_print_is_watertight(
+    client: TestClient, crane: dict[str, Any], suffix: str
+) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"], "part": {"width": 1.6}}
+    answer = client.post(f"/api/files/{suffix}", json=body)
+    assert answer.status_code == 200
+    if suffix == "3mf":
+        assert answer.content[:2] == b"PK"
+        return
+    mesh = trimesh.load(io.BytesIO(answer.content), file_type="stl")
+    assert mesh.is_watertight
+    assert mesh.volume > 0.0
+
+
+def test_a_part_that_cannot_be_is_refused_in_a_sentence(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"], "part": {"width": 20.0}}
+    message, key = refusal(client.post("/api/files/stl", json=body))
+    assert "slender" in message
+    assert key == "width"
+    body["part"] = {"material": "wood"}
+    assert "ninjaflex" in refusal(client.post("/api/part", json=body), 404)[0]
+
+
+def test_frames_say_how_the_part_moves(client: TestClient, crane: dict[str, Any]) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"], "level": "frame"}
+    found = client.post("/api/validation", json=body).json()
+    assert found["efficiency"] == pytest.approx(1.21, abs=0.01)
+    assert len(found["picture"]["stress"]) * found["picture"]["corners"] == len(
+        found["picture"]["cells"]
+    )
+
+
+def test_a_design_by_hand_is_kept_and_found_in_the_gallery(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"], "title": "mine <b>"}
+    kept = client.post("/api/gallery", json=body).json()
+    found = client.get(f"/api/gallery/{kept['source']}/{kept['key']}").json()
+    assert found["title"] == "mine <b>"
+    assert found["mask"] == crane["mask"]
+    shelves = {shelf["source"]: shelf["entries"] for shelf in client.get("/api/gallery").json()}
+    assert kept["key"] in {entry["key"] for entry in shelves["kept"]}
+    assert {"human-crane", "machine-discs"} <= {entry["key"] for entry in shelves["builtin"]}
+
+
+def test_two_parts_make_a_machine_and_parts_that_do_not_fit_are_named(client: TestClient) -> None:
+    keys = []
+    for name in ("elementary-down", "elementary-left"):
+        problem = client.get(f"/api/problems/{name}").json()
+        body = {"problem": problem, "mask": problem["initial"], "title": name}
+        keys.append(client.post("/api/gallery", json=body).json()["key"])
+    parts = {
+        "first": {"entry": f"kept/{keys[0]}"},
+        "second": {"entry": f"kept/{keys[1]}", "join": "first.output"},
+    }
+    plan = {
+        "name": "two", "parts": parts,
+        "input": {"ports": ["first.input"]}, "output": {"ports": ["second.output"]},
+    }  # fmt: skip
+    built = client.post("/api/machines", json={"plan": plan}).json()
+    assert built["status"] == "converged"
+    assert set(built["parts"]) == {"first", "second"}
+    parts["second"]["rotate"] = 120
+    message, _ = refusal(client.post("/api/machines", json={"plan": plan}))
+    assert "second" in message
+    parts["second"]["entry"] = "/etc/passwd"
+    refusal(client.post("/api/machines", json={"plan": plan}), 404)

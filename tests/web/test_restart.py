@@ -1,0 +1,76 @@
+"""Searches outlive the server that began them."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+httpx = pytest.importorskip("httpx2")
+
+from .conftest import wait_for  # noqa: E402
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+@contextmanager
+def serving(folder: Path, end: int = signal.SIGTERM) -> Iterator[Any]:
+    """Run `bellcrank serve` and yield who asks it."""
+    command = [sys.executable, "-m", "bellcrank", "serve", "--port", "0", "--folder", str(folder)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        address = ""
+        while not address:
+            line = process.stderr.readline()
+            assert line, "the server did not start"
+            found = re.search(r"http://\S+", line)
+            address = found[0] if found else ""
+        try:
+            with httpx.Client(base_url=address, timeout=60) as client:
+                wait_for(lambda: _answers(client))
+                yield client
+        finally:
+            os.kill(process.pid, end)
+            process.wait(60)
+
+
+def _answers(client: Any) -> bool:
+    try:
+        return bool(client.get("/api/about").json()["ready"])
+    except httpx.TransportError:
+        return False
+
+
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL], ids=["told", "killed"])
+def test_a_search_goes_on_after_its_server_has_ended(tmp_path: Path, end: int) -> None:
+    with serving(tmp_path, end) as client:
+        problem = client.get("/api/problems/scaling-8").json()
+        body = {"title": "long", "session": "s", "problem": problem, "steps": 6_000, "chains": 2}
+        name = client.post("/api/runs", json=body).json()["id"]
+        wait_for(lambda: client.get(f"/api/runs/{name}").json()["done"] > 1000)
+        assert client.get(f"/api/runs/{name}").json()["status"] == "running"
+    with serving(tmp_path) as client:
+        assert [run["id"] for run in client.get("/api/runs").json()] == [name]
+
+        def ended() -> Any:
+            run = client.get(f"/api/runs/{name}").json()
+            assert run["status"] != "failed", run["message"]
+            return run if run["status"] == "finished" else None
+
+        assert wait_for(ended)["efficiency"] > 1.0
+
+
+def test_a_folder_has_one_server(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "bellcrank", "serve", "--port", "0", "--folder", str(tmp_path)]
+    with serving(tmp_path):
+        second = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert second.returncode == 1
+    assert "another server uses it" in second.stderr

@@ -1,0 +1,217 @@
+// A lattice as SVG: few paths of many beams, so that it can be drawn anew sixty times a second.
+
+import type { Point, Problem } from "./api";
+import { s } from "./dom";
+
+export interface Group { name: string; beams: ArrayLike<number> }
+
+export const BINS = 12;
+
+/** x and y of all nodes in turn. */
+export function flatten(positions: Point[]): Float64Array {
+  const flat = new Float64Array(2 * positions.length);
+  positions.forEach(([x, y], k) => { flat[2 * k] = x; flat[2 * k + 1] = y; });
+  return flat;
+}
+
+export class Drawing {
+  readonly svg: SVGSVGElement;
+  readonly overlay: SVGGElement;
+  private readonly under: SVGGElement;
+  private readonly layer: SVGGElement;
+  protected readonly dots: SVGGElement;
+  private readonly paths = new Map<string, SVGPathElement>();
+  private readonly marks = new Map<string, SVGPathElement>();
+  rest: Float64Array = new Float64Array(0);
+  at: Float64Array = new Float64Array(0);
+  beams: [number, number][] = [];
+  box = { x: 0, y: 0, w: 10, h: 10 };
+
+  constructor(label: string) {
+    this.svg = s("svg", { class: "drawing", role: "img", "aria-label": label, preserveAspectRatio: "xMidYMid meet" });
+    this.under = s("g", { class: "under" });
+    this.layer = s("g", { class: "beams" });
+    this.dots = s("g", { class: "dots" });
+    this.overlay = s("g", { class: "overlay" });
+    this.svg.append(this.under, this.layer, this.dots, this.overlay);
+  }
+
+  setLattice(positions: Point[], beams: [number, number][], margin = 1.1): void {
+    this.rest = flatten(positions);
+    this.at = this.rest;
+    this.beams = beams;
+    let [x0, y0, x1, y1] = [Infinity, Infinity, -Infinity, -Infinity];
+    for (const [x, y] of positions) {
+      x0 = Math.min(x0, x); x1 = Math.max(x1, x);
+      y0 = Math.min(y0, y); y1 = Math.max(y1, y);
+    }
+    this.box = { x: x0 - margin, y: -y1 - margin, w: x1 - x0 + 2 * margin, h: y1 - y0 + 2 * margin };
+    this.svg.setAttribute("viewBox", `${this.box.x} ${this.box.y} ${this.box.w} ${this.box.h}`);
+  }
+
+  /** Put the nodes elsewhere; `null` puts them back. */
+  move(displacement: ArrayLike<number> | null, times = 1): void {
+    if (!displacement) {
+      this.at = this.rest;
+      return;
+    }
+    const at = new Float64Array(this.rest.length);
+    for (let k = 0; k < at.length; k++) at[k] = this.rest[k]! + times * displacement[k]!;
+    this.at = at;
+  }
+
+  lines(beams: ArrayLike<number>, at: Float64Array = this.at): string {
+    let d = "";
+    for (let k = 0; k < beams.length; k++) {
+      const beam = this.beams[beams[k]!]!;
+      const a = 2 * beam[0];
+      const b = 2 * beam[1];
+      d += `M${at[a]!.toFixed(3)} ${(-at[a + 1]!).toFixed(3)}L${at[b]!.toFixed(3)} ${(-at[b + 1]!).toFixed(3)}`;
+    }
+    return d;
+  }
+
+  /** Draw groups of beams where the nodes are; groups that are not named vanish. */
+  draw(groups: Group[]): void {
+    const named = new Set<string>();
+    for (const { name, beams } of groups) {
+      named.add(name);
+      this.path(name).setAttribute("d", this.lines(beams));
+    }
+    for (const [name, path] of this.paths) {
+      if (!named.has(name) && path.parentNode === this.layer) path.setAttribute("d", "");
+    }
+  }
+
+  /** Draw beams at rest underneath everything. */
+  ghost(name: string, beams: ArrayLike<number>): void {
+    const key = `under-${name}`;
+    let path = this.paths.get(key);
+    if (!path) {
+      path = s("path", { class: `beam ${name}` });
+      this.paths.set(key, path);
+      this.under.append(path);
+    }
+    path.setAttribute("d", this.lines(beams, this.rest));
+  }
+
+  path(name: string): SVGPathElement {
+    let path = this.paths.get(name);
+    if (!path) {
+      path = s("path", { class: `beam ${name}` });
+      this.paths.set(name, path);
+      this.layer.append(path);
+    }
+    return path;
+  }
+
+  /** Mark nodes with dots of a kind. */
+  mark(name: string, nodes: ArrayLike<number>, at: Float64Array = this.at): void {
+    let path = this.marks.get(name);
+    if (!path) {
+      path = s("path", { class: `dot ${name}` });
+      this.marks.set(name, path);
+      this.dots.append(path);
+    }
+    let d = "";
+    for (let k = 0; k < nodes.length; k++) {
+      const n = 2 * nodes[k]!;
+      d += `M${at[n]!.toFixed(3)} ${(-at[n + 1]!).toFixed(3)}h0`;
+    }
+    path.setAttribute("d", d);
+  }
+
+  markRegions(problem: Problem): void {
+    this.mark("support", [...problem.supports.fixed, ...problem.supports.fixed_x, ...problem.supports.fixed_y]);
+    this.mark("input", problem.input.nodes);
+    this.mark("output", problem.output.nodes);
+  }
+
+  /** Where the pointer is, in lattice units. */
+  locate(event: { clientX: number; clientY: number }): Point {
+    const matrix = this.svg.getScreenCTM();
+    if (!matrix) return [0, 0];
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse());
+    return [point.x, -point.y];
+  }
+
+  nearestNode([x, y]: Point, reach = 0.6): number {
+    let found = -1;
+    let best = reach * reach;
+    for (let k = 0; k < this.at.length; k += 2) {
+      const distance = (this.at[k]! - x) ** 2 + (this.at[k + 1]! - y) ** 2;
+      if (distance < best) { best = distance; found = k / 2; }
+    }
+    return found;
+  }
+
+  nearestBeam([x, y]: Point, reach = 0.3, at: Float64Array = this.at): number {
+    let found = -1;
+    let best = reach;
+    this.beams.forEach(([a, b], k) => {
+      const [ax, ay, bx, by] = [at[2 * a]!, at[2 * a + 1]!, at[2 * b]!, at[2 * b + 1]!];
+      const [dx, dy] = [bx - ax, by - ay];
+      const t = Math.min(0.85, Math.max(0.15, ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy || 1)));
+      const distance = Math.hypot(ax + t * dx - x, ay + t * dy - y);
+      if (distance < best) { best = distance; found = k; }
+    });
+    return found;
+  }
+}
+
+export function range(length: number): number[] {
+  return Array.from({ length }, (_, k) => k);
+}
+
+export function where(bits: ArrayLike<number>, value = 1): number[] {
+  const found: number[] = [];
+  for (let k = 0; k < bits.length; k++) if (bits[k] === value) found.push(k);
+  return found;
+}
+
+/** Sort beams into as many groups as there are colours, by a share from 0 to 1 each. */
+export function binned(beams: number[], share: ArrayLike<number>, prefix = "heat"): Group[] {
+  const groups: number[][] = Array.from({ length: BINS }, () => []);
+  for (const beam of beams) {
+    const bin = Math.min(BINS - 1, Math.max(0, Math.floor(Math.sqrt(share[beam]!) * BINS)));
+    groups[bin]!.push(beam);
+  }
+  return groups.map((found, bin) => ({ name: `${prefix}-${bin}`, beams: found }));
+}
+
+export function unit(angle: number): Point {
+  const round = (v: number): number => Math.round(v * 1e15) / 1e15;
+  return [round(Math.cos((angle * Math.PI) / 180)), round(Math.sin((angle * Math.PI) / 180))];
+}
+
+export function angleOf([x, y]: Point): number {
+  return (Math.round((Math.atan2(y, x) * 180) / Math.PI) + 360) % 360;
+}
+
+const NAMES: [number, string][] = [
+  [0, "right"], [45, "up and right"], [90, "up"], [135, "up and left"],
+  [180, "left"], [225, "down and left"], [270, "down"], [315, "down and right"],
+];
+
+export function wayOf(direction: Point): string {
+  const angle = angleOf(direction);
+  return NAMES.find(([at]) => at === angle)?.[1] ?? `towards ${angle}°`;
+}
+
+export function isEach(direction: Point | Point[]): direction is Point[] {
+  return Array.isArray(direction[0]);
+}
+
+/** An arrow from one point along a vector, as a path with its head. */
+export function arrow([x, y]: Point, [dx, dy]: Point, head = 0.34): string {
+  const length = Math.hypot(dx, dy) || 1;
+  const [ux, uy] = [dx / length, dy / length];
+  const [tx, ty] = [x + dx, y + dy];
+  const size = Math.min(head, 0.6 * length);
+  const side = (sign: number): string => {
+    const px = tx - size * (ux - sign * 0.55 * uy);
+    const py = ty - size * (uy + sign * 0.55 * ux);
+    return `${px.toFixed(3)} ${(-py).toFixed(3)}`;
+  };
+  return `M${x.toFixed(3)} ${(-y).toFixed(3)}L${tx.toFixed(3)} ${(-ty).toFixed(3)}M${side(1)}L${tx.toFixed(3)} ${(-ty).toFixed(3)}L${side(-1)}`;
+}

@@ -1,0 +1,357 @@
+// The page on which a task is drawn, and a design by hand.
+
+import { get, post, Refusal, session, Solver, bitsOf, hexOf, type Point, type Problem, type Response } from "./api";
+import { Canvas, type Tool } from "./canvas";
+import { isEach, where } from "./drawing";
+import { choice, clear, download, figure, h, icon, say } from "./dom";
+import { Panels } from "./panels";
+import {
+  assign, fromLink, goalsOf, History, images, isTask, nodesOf, problemOf, taskOf, toLink, type Hold, type Task,
+} from "./task";
+
+const KEY = "bellcrank-task";
+const TOOLS: [Tool, string, string][] = [
+  ["supports", "Hold", "Click nodes that are held; drag a box for many, double-click for a row."],
+  ["input", "Push", "Click nodes that are pushed; drag the orange arrow to aim, longer for a longer stroke."],
+  ["output", "Move", "Click nodes that should move; drag the blue arrow to say which way."],
+  ["beams", "Beams", "Paint beams that must stay or must never be there."],
+  ["hand", "By hand", "Click beams away and back; what the real solver says is drawn in at once."],
+];
+
+export interface Settings { method: string; steps: number; chains: number; seed: number; real: boolean; width: number; material: string }
+
+export class Editor {
+  readonly element = h("div", { class: "page draw" });
+  tool: Tool = "supports";
+  hold: Hold = "fixed";
+  brush: "keep" | "never" | "auto" = "keep";
+  settings: Settings = { method: "basin-hopping", steps: 20000, chains: 4, seed: 0, real: false, width: 2, material: "ninjaflex" };
+  fault: { key: string; message: string } | null = null;
+  response: Response | null = null;
+  private history: History<Task>;
+  private readonly canvas: Canvas;
+  private readonly panels: Panels;
+  private readonly solver: Solver;
+  private readonly hint = h("p", { class: "hint" });
+  private readonly complaint = h("p", { class: "complaint", role: "alert" });
+  private readonly readout = h("div", { class: "readout", "aria-live": "polite" });
+  private readonly tools = h("div", { class: "tools" });
+  private readonly undoButton = h("button", { type: "button", class: "quiet icon", title: "Undo (Ctrl+Z)", "aria-label": "Undo", onclick: () => this.undo() }, icon("undo"));
+  private readonly redoButton = h("button", { type: "button", class: "quiet icon", title: "Redo (Ctrl+Shift+Z)", "aria-label": "Redo", onclick: () => this.redo() }, icon("redo"));
+  private checking: AbortController | null = null;
+  private timer = 0;
+  private checked = "";
+  private readonly leaving = (): void => this.keep();
+  private readonly keys = (event: KeyboardEvent): void => this.key(event);
+
+  constructor(task: Task) {
+    this.history = new History(task);
+    this.canvas = new Canvas({
+      nodes: (region, nodes, add, merge) => this.set(assign(this.task, region, nodes, add, this.hold), merge),
+      beams: (beams, merge) => this.paint(beams, merge),
+      aim: (region, direction, amount, merge) => this.aim(region, direction, amount, merge),
+    });
+    this.solver = new Solver((answer, latency) => this.answered(answer, latency, answer.error));
+    this.panels = new Panels(this);
+    this.build();
+    this.choose("supports");
+    document.addEventListener("keydown", this.keys);
+    addEventListener("pagehide", this.leaving);
+    this.changed();
+  }
+
+  get task(): Task { return this.history.value; }
+  get problem(): Problem { return problemOf(this.task); }
+  get missing(): string | null {
+    const { problem } = this.task;
+    if (!problem.input.nodes.length) return "Nothing is pushed yet: choose Push and click nodes.";
+    if (!problem.output.nodes.length) return "Nothing is to move yet: choose Move and click nodes.";
+    if (!nodesOf(problem, "supports").length) return "Nothing is held yet: choose Hold and click nodes.";
+    return null;
+  }
+
+  close(): void {
+    removeEventListener("pagehide", this.leaving);
+    document.removeEventListener("keydown", this.keys);
+    clearTimeout(this.timer);
+    this.checking?.abort();
+    this.solver.close();
+  }
+
+  private build(): void {
+    const stage = h("section", { class: "stage", "aria-label": "Drawing" },
+      h("div", { class: "bar" }, this.tools,
+        h("span", { class: "spring" }), this.undoButton, this.redoButton),
+      h("div", { class: "paper" }, this.readout, this.canvas.svg),
+      h("div", { class: "below" }, this.hint, this.complaint));
+    this.element.append(
+      h("div", { class: "intro" },
+        h("h1", {}, "What should move, when you push where?"),
+        h("p", {}, "Draw it. bellcrank searches which beams to leave out so that one piece of material does it.")),
+      stage, this.panels.element);
+  }
+
+  choose(tool: Tool): void {
+    this.tool = tool;
+    this.canvas.tool = tool;
+    this.element.dataset.tool = tool;
+    if (tool === "hand" && !this.task.hand) this.set({ ...this.task, hand: this.problem.initial });
+    clear(this.tools, choice("Tool", TOOLS.map(([key, text]) => [key, text]), tool, (picked) => this.choose(picked)));
+    this.hint.textContent = TOOLS.find(([key]) => key === tool)![2];
+    this.show();
+    (this.tools.querySelector("input:checked") as HTMLElement | null)?.focus({ preventScroll: true });
+  }
+
+  /** Take in a task that was changed. */
+  set(task: Task, merge = false): void {
+    this.history.set(task, merge);
+    this.changed();
+  }
+
+  /** Take in another task from elsewhere. */
+  open(task: Task): void {
+    this.set(task);
+    this.choose("supports");
+  }
+
+  private aim(region: "input" | "output", direction: [number, number], amount: number | null, merge: boolean): void {
+    const { problem } = this.task;
+    const next = region === "input"
+      ? { ...problem, input: { ...problem.input, direction, amount: amount ?? problem.input.amount } }
+      : { ...problem, output: { ...problem.output, direction } };
+    this.set({ ...this.task, problem: next }, merge);
+  }
+
+  private paint(beams: number[], merge: boolean): void {
+    const all = beams.flatMap((beam) => images(this.problem, beam, this.task.mirror));
+    if (this.tool === "hand") {
+      const bits = bitsOf(this.task.hand ?? this.problem.initial, this.problem.beams.length);
+      const to = bits[beams[0]!] ? 0 : 1;
+      for (const beam of all) bits[beam] = to;
+      this.set({ ...this.task, hand: hexOf(bits) }, merge);
+      say(`${to ? "added" : "removed"} beam ${beams[0]}`);
+      return;
+    }
+    const rules = [...this.task.rules];
+    const to = !merge && rules[beams[0]!] === this.brush ? "auto" : this.brush;
+    for (const beam of all) rules[beam] = to;
+    this.set({ ...this.task, rules, hand: null }, merge);
+  }
+
+  pickRows(yes: boolean): void { this.canvas.rows = yes; }
+
+  clearRegion(region: "supports" | "input" | "output"): void {
+    this.set(assign(this.task, region, nodesOf(this.task.problem, region), false));
+  }
+
+  turn(region: "input" | "output", direction: Point): void { this.change(region, { direction }); }
+
+  change(region: "input" | "output", changes: Record<string, unknown>): void {
+    const { problem } = this.task;
+    this.set({ ...this.task, problem: { ...problem, [region]: { ...problem[region], ...changes } } });
+  }
+
+  undo(): void { this.history.undo(); this.changed(); say("undone"); }
+  redo(): void { this.history.redo(); this.changed(); say("done again"); }
+
+  private changed(): void {
+    if (this.tool === "hand" && !this.task.hand) this.history.set({ ...this.task, hand: this.problem.initial }, true);
+    clearTimeout(this.timer);
+    if (this.tool === "hand") {
+      // The question goes out before anything is drawn, and what can wait waits.
+      this.ask();
+      this.showDrawing();
+      this.timer = window.setTimeout(() => { this.keep(); this.show(); void this.check(); }, 150);
+      return;
+    }
+    this.keep();
+    this.show();
+    this.timer = window.setTimeout(() => void this.check(), 120);
+  }
+
+  private keep(): void {
+    try { localStorage.setItem(KEY, JSON.stringify(this.task)); } catch { /* storage is full: nothing is kept */ }
+  }
+
+  private ask(): void {
+    if (this.task.hand && !this.missing) this.solver.ask(this.problem, this.task.hand);
+  }
+
+  private show(): void {
+    this.showDrawing();
+    const byHand = this.tool === "hand" && this.task.hand;
+    this.undoButton.disabled = !this.history.canUndo;
+    this.redoButton.disabled = !this.history.canRedo;
+    this.complaint.textContent = this.missing ? "" : (this.fault?.message ?? "");
+    if (!byHand) clear(this.readout);
+    this.panels.show();
+  }
+
+  private showDrawing(): void {
+    const byHand = this.tool === "hand" && this.task.hand;
+    const problem = this.problem;
+    const fault = this.fault ? [...this.fault.message.matchAll(/\bnode (\d+)/g)].map((m) => Number(m[1])) : [];
+    this.canvas.show(this.task, problem, byHand ? bitsOf(this.task.hand!, problem.beams.length) : null, fault);
+    if (!byHand) this.canvas.showMoved(null, []);
+    this.element.classList.toggle("by-hand", !!byHand);
+  }
+
+  /** Ask the server what it thinks of the task. */
+  private async check(): Promise<void> {
+    this.checking?.abort();
+    if (this.missing) {
+      this.fault = null;
+      this.show();
+      return;
+    }
+    const body = { problem: this.problem, goals: goalsOf(this.task) };
+    const text = JSON.stringify(body);
+    if (text === this.checked) return;
+    const asked = new AbortController();
+    this.checking = asked;
+    try {
+      const found = await post<{ response: Response | null }>("/tasks/check", body, asked.signal);
+      this.checked = found.response ? text : "";
+      this.fault = null;
+      this.response = found.response;
+    } catch (error) {
+      if (error instanceof DOMException) return;
+      const refused = error as Refusal;
+      this.checked = "";
+      this.fault = { key: refused.key, message: sentence(refused.message) };
+    }
+    if (!asked.signal.aborted) this.show();
+  }
+
+  private answered(answer: Response, latency: number, error?: { message: string }): void {
+    if (this.tool !== "hand" || !this.task.hand) return;
+    const bits = bitsOf(this.task.hand, this.problem.beams.length);
+    this.canvas.showMoved(error ? null : answer.displacement, where(bits));
+    const whole = this.response?.efficiency;
+    const good = !error && answer.status === "converged";
+    clear(this.readout,
+      h("strong", {}, error ? "–" : figure(answer.efficiency, 3)),
+      h("span", {}, error ? sentence(error.message) : good ? "output motion over input motion" : sentence(answer.message)),
+      good && whole !== null && whole !== undefined && h("span", {}, `all beams: ${figure(whole, 3)}`),
+      h("span", { class: "latency" }, `${latency.toFixed(0)} ms, ${where(bits).length} beams`));
+    this.readout.dataset.latency = latency.toFixed(1);
+    document.dispatchEvent(new CustomEvent("bellcrank-response", { detail: latency }));
+  }
+
+  private key(event: KeyboardEvent): void {
+    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
+    if (event.target instanceof HTMLInputElement && event.target.type !== "radio" && event.target.type !== "checkbox") return;
+    event.preventDefault();
+    if (event.shiftKey) this.redo();
+    else this.undo();
+  }
+
+  /** Begin the search, and go to where it can be watched. */
+  async begin(): Promise<void> {
+    const { settings, task } = this;
+    const body = {
+      title: task.problem.name, session: session(), problem: this.problem, goals: goalsOf(task),
+      method: settings.method, steps: settings.steps, chains: settings.chains, seed: settings.seed,
+      part: { width: settings.width, thickness: 5, scale: task.scale, material: settings.material },
+      reference: task.hand && task.hand !== this.problem.initial ? task.hand : null,
+    };
+    const { id } = await post<{ id: string }>("/runs", settings.real ? body : { ...body, part: null });
+    location.hash = `#/run/${id}`;
+  }
+
+  async keepHand(title: string): Promise<void> {
+    const kept = await post<{ source: string; key: string }>("/gallery", {
+      problem: this.problem, mask: this.task.hand, title, provenance: { kind: "drawn" },
+    });
+    location.hash = `#/design/${kept.source}/${kept.key}`;
+  }
+
+  async save(suffix: ".toml" | ".json"): Promise<void> {
+    const { text } = await post<{ text: string }>("/tasks/write", { problem: this.problem, lattice: this.task.lattice, suffix });
+    download(new Blob([text], { type: "text/plain" }), `${fileName(this.task.problem.name)}${suffix}`);
+  }
+
+  async link(): Promise<string> {
+    const address = `${location.origin}/#/draw/${await toLink(this.task)}`;
+    await navigator.clipboard?.writeText(address);
+    return address;
+  }
+
+  async load(file: File): Promise<void> {
+    const suffix = suffixOf(file.name);
+    if (suffix === ".toml" || suffix === ".json") {
+      const read = await post<{ problem: Problem; lattice: Record<string, unknown> | null; mask: string | null }>("/tasks/read", { text: await file.text(), suffix });
+      this.open({ ...taskOf(read.problem, read.lattice, this.task.scale), hand: read.mask });
+    } else {
+      const read = await post<Pick<Problem, "positions" | "beams">>("/lattices/read", { text: await file.text(), suffix });
+      this.open(bare(read, null, this.task));
+    }
+  }
+}
+
+/** A task on a lattice of which nothing is said yet. */
+export function bare(lattice: Pick<Problem, "positions" | "beams">, table: Record<string, unknown> | null, like: Task): Task {
+  const { input, output } = like.problem;
+  const problem: Problem = {
+    ...like.problem, ...lattice,
+    supports: { fixed: [], fixed_x: [], fixed_y: [] },
+    input: { ...input, nodes: [], direction: isEach(input.direction) ? [0, -1] : input.direction },
+    output: { ...output, nodes: [], direction: isEach(output.direction) ? [-1, 0] : output.direction },
+    designable: [], initial: hexOf(new Uint8Array(lattice.beams.length).fill(1)),
+  };
+  return { ...like, problem, lattice: table, rules: lattice.beams.map(() => "auto"), hand: null };
+}
+
+export function fileName(title: string): string {
+  return title.trim().toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, "") || "bellcrank";
+}
+
+export function suffixOf(name: string): string {
+  const found = /\.[a-z0-9]+$/i.exec(name);
+  return found ? found[0].toLowerCase() : ".txt";
+}
+
+export function sentence(text: string): string {
+  const trimmed = text.trim();
+  return trimmed.charAt(0).toUpperCase() + trimmed.slice(1) + (/[.!?]$/.test(trimmed) ? "" : ".");
+}
+
+/** A task to begin with: an empty-handed visitor gets one that works. */
+export async function firstTask(link: string): Promise<Task> {
+  if (link) {
+    try {
+      const given = await fromLink(link);
+      if (isTask(given)) return given;
+    } catch { /* not a link of ours: begin as usual */ }
+  }
+  try {
+    const kept = JSON.parse(localStorage.getItem(KEY) ?? "null") as unknown;
+    if (isTask(kept)) return kept;
+  } catch { /* what was kept is no task */ }
+  return exampleTask();
+}
+
+/** A rectangle that stands on its lowest row: pushed down on the right, it should move left. */
+export async function exampleTask(): Promise<Task> {
+  const lattice = { kind: "triangular-rectangle", columns: 8, rows: 9 };
+  const made = await post<Pick<Problem, "positions" | "beams">>("/lattices", { lattice });
+  const problem: Problem = {
+    schema: "bellcrank/problem/1", name: "my actuator", ...made, initial: "", designable: [],
+    stiffness: { bond: 5, angle: 0.1 }, supports: { fixed: [], fixed_x: [], fixed_y: [] },
+    input: { nodes: [], direction: [0, -1], drive: "displacement", amount: 0.3 },
+    output: { nodes: [], direction: [-1, 0], spring: null, spring_kind: null }, aggregate: "mean",
+  };
+  const rows = made.positions.map(([x, y], k) => ({ x, y, k }));
+  const top = Math.max(...rows.map((node) => node.y));
+  const row = (y: number): number[] => rows.filter((n) => Math.abs(n.y - y) < 0.1).sort((a, b) => a.x - b.x).map((n) => n.k);
+  problem.supports.fixed = row(0);
+  problem.input.nodes = row(top).slice(-2);
+  problem.output.nodes = row(top).slice(0, 2);
+  problem.initial = hexOf(new Uint8Array(made.beams.length).fill(1));
+  const task = taskOf(problem, lattice);
+  return { ...task, rules: made.beams.map(() => "auto") };
+}
+
+export async function builtInTask(name: string): Promise<Task> {
+  return taskOf(await get<Problem>(`/problems/${name}`));
+}

@@ -1,0 +1,373 @@
+// What stands beside the drawing: the same task in words and numbers.
+
+import { get, post, type Point, type Problem, type Refusal } from "./api";
+import { angleOf, isEach, unit, wayOf } from "./drawing";
+import { button, choice, clear, count, field, figure, h, number, select } from "./dom";
+import { bare, builtInTask, exampleTask, sentence, type Editor } from "./editor";
+import { directionOf, nodesOf, type Hold, type Rule } from "./task";
+
+const METHODS: [string, string, string][] = [
+  ["basin-hopping", "Basin hopping", "Climbs, disturbs a part, climbs again. The best in most cases."],
+  ["informed", "Informed", "A Metropolis chain that foresees what each flip does."],
+  ["tempering", "Tempering", "Chains at several temperatures that exchange designs."],
+  ["paper", "The paper", "Single random flips, as Bonfanti et al. (2020) published it."],
+];
+const EFFORTS: [string, string, number, number][] = [
+  ["quick", "Quick", 4000, 2], ["usual", "Usual", 20000, 4], ["long", "Thorough", 100000, 4],
+];
+
+interface Named { name: string; group: string; about: string }
+
+export class Panels {
+  readonly element = h("aside", { class: "panel", "aria-label": "Task" });
+  private problems: Named[] = [];
+  private local: Record<string, string> = {};
+  private busy = false;
+  private more = false;
+
+  constructor(private readonly editor: Editor) {
+    void get<Named[]>("/problems").then((found) => { this.problems = found; this.show(); });
+  }
+
+  show(): void {
+    const focused = document.activeElement;
+    const label = focused instanceof HTMLElement && this.element.contains(focused) ? focused.dataset.key ?? "" : "";
+    clear(this.element,
+      this.section("lattice", "Lattice", this.latticeSummary(), this.lattice()),
+      this.section("supports", "Held", this.regionSummary("supports"), this.supports()),
+      this.section("input", "Pushed", this.regionSummary("input"), this.input()),
+      this.section("output", "Moves", this.regionSummary("output"), this.output()),
+      this.section("beams", "Beams", this.beamSummary(), this.beams()),
+      this.search());
+    if (label) this.element.querySelector<HTMLElement>(`[data-key="${label}"]`)?.focus({ preventScroll: true });
+  }
+
+  private section(key: string, title: string, summary: string, content: HTMLElement): HTMLElement {
+    const { editor } = this;
+    const open = key === "lattice" ? this.local.lattice === "open" : editor.tool === key || (key === "beams" && editor.tool === "hand");
+    const fault = this.faultOf(key);
+    const press = (): void => {
+      if (key === "lattice") { this.local.lattice = open ? "" : "open"; this.show(); }
+      else if (!open) editor.choose(key as never);
+    };
+    return h("section", { class: `step ${key}${open ? " open" : ""}${fault ? " faulty" : ""}` },
+      h("h2", {}, h("button", { type: "button", "aria-expanded": String(open), onclick: press, "data-key": `head-${key}` },
+        h("span", { class: "name" }, title), h("span", { class: "summary" }, summary))),
+      open && content,
+      fault && h("p", { class: "fault", role: "alert" }, fault));
+  }
+
+  private faultOf(key: string): string {
+    const { fault, missing } = this.editor;
+    if (this.local[`fault-${key}`]) return this.local[`fault-${key}`]!;
+    if (missing || !fault) return "";
+    const heads: Record<string, string[]> = {
+      lattice: ["lattice", "positions", "beams"], supports: ["supports"], input: ["input"], output: ["output"], beams: ["designable", "initial", "problem"],
+    };
+    const owner = Object.entries(heads).find(([, names]) => names.some((name) => fault.key.startsWith(name)));
+    return (owner ? owner[0] === key : key === "beams") ? fault.message : "";
+  }
+
+  private async attempt(key: string, work: () => Promise<void>): Promise<void> {
+    this.local[`fault-${key}`] = "";
+    try {
+      await work();
+    } catch (error) {
+      this.local[`fault-${key}`] = sentence((error as Refusal).message);
+    }
+    this.show();
+  }
+
+  private latticeSummary(): string {
+    const { problem, scale } = this.editor.task;
+    return `${count(problem.positions.length, "node")}, ${count(problem.beams.length, "beam")}, ${scale} mm apart`;
+  }
+
+  private lattice(): HTMLElement {
+    const { editor } = this;
+    const table = editor.task.lattice;
+    const kinds: [string, string][] = [
+      ["triangular-rectangle", "Rectangle"], ["triangular-rows", "Crane"], ["displaced-delaunay", "Disordered"], ["jammed-discs", "Discs"],
+    ];
+    const kind = String(table?.kind ?? "");
+    const start = select(
+      [["", "choose …"], ["example", "an example"], ...this.problems.map((each): [string, string] => [each.name, each.name])],
+      "", (name) => void this.attempt("lattice", async () => editor.open(name === "example" ? await exampleTask() : await builtInTask(name))));
+    start.dataset.key = "start";
+    const whole = (key: string, label: string, least: number, most: number): HTMLElement => {
+      const input = number(Number(table?.[key] ?? least), { min: least, max: most, step: 1 }, (value) =>
+        void this.remake({ ...table, [key]: Math.round(value) }));
+      input.dataset.key = `lattice-${key}`;
+      return field(label, input);
+    };
+    const scale = number(editor.task.scale, { min: 0.5, max: 500, step: "any" }, (value) => {
+      if (value > 0) editor.set({ ...editor.task, scale: value });
+    });
+    scale.dataset.key = "scale";
+    const file = h("input", { type: "file", accept: ".toml,.json,.data,.lammps,.lmp,.txt,.csv", class: "unseen", tabindex: -1, "aria-label": "File to open" });
+    file.addEventListener("change", () => {
+      const picked = file.files?.[0];
+      if (picked) void this.attempt("lattice", () => this.editor.load(picked));
+    });
+    return h("div", { class: "content" },
+      field("Start from", start),
+      choice("Kind of lattice", kinds, kind as never, (picked) => void this.remake(
+        picked === "jammed-discs" ? { kind: picked, discs: 120, seed: 1 }
+          : picked === "triangular-rows" ? craneRows(11, 6)
+          : { kind: picked, columns: Number(table?.columns ?? 8), rows: Number(table?.rows ?? 9), ...(picked === "displaced-delaunay" ? { displacement: 0.2, seed: 1 } : {}) })),
+      (kind === "triangular-rectangle" || kind === "displaced-delaunay") && h("div", { class: "row" },
+        whole("columns", "Across", 2, 60), whole("rows", "Up", 2, 60)),
+      kind === "triangular-rows" && Array.isArray(table?.counts) && table.counts.length > 6 && h("div", { class: "row" },
+        this.size("Across", Number(table.counts[0]), 5, 40, (value) => craneRows(value, (table.counts as number[]).length - 6)),
+        this.size("Rows between", table.counts.length - 6, 1, 40, (value) => craneRows(Number((table.counts as number[])[0]), value))),
+      kind === "jammed-discs" && h("div", { class: "row" }, whole("discs", "Discs", 20, 1000)),
+      (kind === "jammed-discs" || kind === "displaced-delaunay") && h("div", { class: "row" }, whole("seed", "Seed", 0, 100000)),
+      h("div", { class: "row" }, field("Beam length", scale, "mm"),
+        field("Name", this.name())),
+      h("div", { class: "buttons" },
+        button("Open a file", () => file.click(), "", { "data-key": "open" }), file,
+        button("Save TOML", () => void this.attempt("lattice", () => editor.save(".toml")), "", { "data-key": "toml" }),
+        button("Save JSON", () => void this.attempt("lattice", () => editor.save(".json")), "", { "data-key": "json" }),
+        button(this.local.link || "Copy link", () => void this.attempt("lattice", async () => {
+          await editor.link();
+          this.local.link = "Copied";
+        }), "", { "data-key": "link" })));
+  }
+
+  private size(label: string, value: number, least: number, most: number, make: (value: number) => Record<string, unknown>): HTMLElement {
+    const input = number(value, { min: least, max: most, step: 1 }, (given) =>
+      void this.remake(make(Math.min(most, Math.max(least, Math.round(given))))));
+    input.dataset.key = `crane-${label}`;
+    return field(label, input);
+  }
+
+  private name(): HTMLInputElement {
+    const input = h("input", { type: "text", value: this.editor.task.problem.name, maxlength: 100, "data-key": "name" });
+    input.addEventListener("change", () => {
+      const name = input.value.trim();
+      if (name) this.editor.set({ ...this.editor.task, problem: { ...this.editor.task.problem, name } });
+    });
+    return input;
+  }
+
+  private async remake(table: Record<string, unknown>): Promise<void> {
+    await this.attempt("lattice", async () => {
+      const made = await post<Pick<Problem, "positions" | "beams">>("/lattices", { lattice: table });
+      const before = this.editor.task;
+      let next = bare(made, table, before);
+      // Regions are found again where they lay, as far as there still are nodes.
+      for (const region of ["input", "output"] as const) next = { ...next, problem: { ...next.problem, [region]: { ...next.problem[region], nodes: moved(before.problem, made, before.problem[region].nodes) } } };
+      const taken = new Set([...next.problem.input.nodes, ...next.problem.output.nodes]);
+      const held = moved(before.problem, made, before.problem.supports.fixed).filter((node) => !taken.has(node));
+      next.problem.supports = { fixed: held, fixed_x: [], fixed_y: [] };
+      const output = next.problem.output.nodes.filter((node) => !next.problem.input.nodes.includes(node));
+      next.problem.output = { ...next.problem.output, nodes: output };
+      this.editor.set(next);
+    });
+  }
+
+  private regionSummary(region: "supports" | "input" | "output"): string {
+    const { problem, scale } = this.editor.task;
+    const nodes = nodesOf(problem, region).length;
+    if (!nodes) return "nothing yet";
+    if (region === "supports") return count(nodes, "node");
+    const at = problem[region];
+    const way = isEach(at.direction) ? "each its own way" : wayOf(at.direction);
+    if (region === "output") return `${count(nodes, "node")}, ${way}`;
+    const { drive, amount } = problem.input;
+    return `${count(nodes, "node")}, ${drive === "displacement" ? `${figure(amount * scale, 1)} mm` : `force ${figure(amount, 2)}`} ${way}`;
+  }
+
+  private picking(region: "supports" | "input" | "output"): HTMLElement {
+    const { editor } = this;
+    const all = nodesOf(editor.task.problem, region);
+    const rows = h("input", { type: "checkbox", "data-key": "rows", checked: this.local.rows === "yes" });
+    rows.addEventListener("change", () => { this.local.rows = rows.checked ? "yes" : ""; editor.pickRows(rows.checked); });
+    return h("div", { class: "row between" },
+      h("label", { class: "tick" }, rows, "Whole rows"),
+      button("Clear", () => editor.clearRegion(region), "quiet", { disabled: !all.length, "data-key": "clear" }));
+  }
+
+  private supports(): HTMLElement {
+    const options: [Hold, string][] = [["fixed", "Fixed"], ["fixed_y", "Slides ↔"], ["fixed_x", "Slides ↕"]];
+    return h("div", { class: "content" },
+      choice("How they are held", options, this.editor.hold, (picked) => { this.editor.hold = picked; }),
+      this.picking("supports"));
+  }
+
+  private direction(region: "input" | "output"): HTMLElement {
+    const { editor } = this;
+    const at = editor.task.problem[region];
+    if (isEach(at.direction)) {
+      return h("p", {}, "Each node has a direction of its own. ",
+        button("Give all the same", () => editor.turn(region, directionOf(at)), "quiet", { "data-key": "same" }));
+    }
+    const angle = number(angleOf(at.direction), { min: 0, max: 360, step: 5 }, (value) => editor.turn(region, unit(value)));
+    angle.dataset.key = `${region}-angle`;
+    const ways: [string, string, Point][] = [["↑", "up", [0, 1]], ["→", "right", [1, 0]], ["↓", "down", [0, -1]], ["←", "left", [-1, 0]]];
+    return h("div", { class: "row" }, field("Direction", angle, "°"),
+      h("div", { class: "ways", role: "group", "aria-label": "Usual ways" }, ...ways.map(([sign, name, way]) =>
+        button(sign, () => editor.turn(region, way), "quiet", { "aria-label": name, title: name, "data-key": `${region}-${name}` }))));
+  }
+
+  private input(): HTMLElement {
+    const { editor } = this;
+    const { drive, amount } = editor.task.problem.input;
+    const moves = drive === "displacement";
+    const by = moves ? editor.task.scale : 1;
+    const size = number(Number((amount * by).toFixed(4)), { min: 0.001, step: "any" }, (value) => {
+      if (value > 0) editor.change("input", { amount: value / by });
+    });
+    size.dataset.key = "amount";
+    return h("div", { class: "content" },
+      this.direction("input"),
+      h("div", { class: "row" }, field(moves ? "Stroke" : "Force on each node", size, moves ? "mm" : ""),
+        field("Driven by", select([["displacement", "a motion"], ["force", "a force"]], drive, (picked) =>
+          editor.change("input", { drive: picked as Problem["input"]["drive"], amount: picked === "force" ? 0.02 : 0.3 })))),
+      this.picking("input"));
+  }
+
+  private output(): HTMLElement {
+    const { editor } = this;
+    const { spring } = editor.task.problem.output;
+    const stiff = number(spring ?? 0, { min: 0, step: "any" }, (value) =>
+      editor.change("output", value > 0 ? { spring: value, spring_kind: "directional" } : { spring: null, spring_kind: null }));
+    stiff.dataset.key = "spring";
+    return h("div", { class: "content" }, this.direction("output"),
+      field("Works against a spring", stiff, "", "0 for none; a beam has a stiffness of 10"),
+      this.picking("output"));
+  }
+
+  private beamSummary(): string {
+    const { editor } = this;
+    const rules = editor.task.rules.filter((rule) => rule === "keep" || rule === "never").length;
+    const mirrored = editor.task.mirror.x || editor.task.mirror.y ? ", mirrored" : "";
+    return `${count(editor.problem.designable.length, "beam")} to search${rules ? `, ${rules} painted` : ""}${mirrored}`;
+  }
+
+  private beams(): HTMLElement {
+    const { editor } = this;
+    const { mirror } = editor.task;
+    const tick = (axis: "x" | "y", text: string): HTMLElement => {
+      const input = h("input", { type: "checkbox", checked: mirror[axis], "data-key": `mirror-${axis}` });
+      input.addEventListener("change", () => editor.set({ ...editor.task, mirror: { ...editor.task.mirror, [axis]: input.checked } }));
+      return h("label", { class: "tick" }, input, text);
+    };
+    if (editor.tool === "hand") {
+      return h("div", { class: "content" },
+        h("p", {}, "Your design is compared with what the search finds."),
+        h("div", { class: "buttons" },
+          button("Keep this design", () => void this.attempt("beams", () => editor.keepHand(editor.task.problem.name)), "", { "data-key": "keep" }),
+          button("All beams again", () => editor.set({ ...editor.task, hand: editor.problem.initial }), "", { "data-key": "all" })),
+        h("div", { class: "row" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")));
+    }
+    const brushes: [Rule, string][] = [["keep", "Must stay"], ["never", "Never"], ["auto", "Free"]];
+    return h("div", { class: "content" },
+      choice("Paint", brushes, editor.brush as Rule, (picked) => { editor.brush = picked as "keep"; }),
+      h("div", { class: "row" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")),
+      h("div", { class: "buttons" },
+        button("Free all beams", () => editor.set({ ...editor.task, rules: editor.task.rules.map(() => "auto") }), "", { "data-key": "free" })));
+  }
+
+  private search(): HTMLElement {
+    const { editor } = this;
+    const { settings } = editor;
+    const update = (changes: Partial<typeof settings>): void => { editor.settings = { ...editor.settings, ...changes }; this.show(); };
+    const whole = (key: "steps" | "chains" | "seed", label: string, least: number, most: number): HTMLElement => {
+      const input = number(settings[key], { min: least, max: most, step: 1 }, (value) => update({ [key]: Math.min(most, Math.max(least, Math.round(value))) }));
+      input.dataset.key = key;
+      return field(label, input);
+    };
+    const effort = EFFORTS.find(([, , steps, chains]) => steps === settings.steps && chains === settings.chains)?.[0] ?? "";
+    const real = h("input", { type: "checkbox", checked: settings.real, "data-key": "real" });
+    real.addEventListener("change", () => update({ real: real.checked }));
+    const method = select(METHODS.map(([key, name]) => [key, name]), settings.method, (picked) => update({ method: picked }));
+    method.dataset.key = "method";
+    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => update({ width: value }));
+    width.dataset.key = "width";
+    const fault = this.local["fault-search"] ?? "";
+    const missing = editor.missing;
+    return h("section", { class: "step search open" },
+      h("h2", { class: "plain" }, "Search"),
+      h("div", { class: "content" },
+        choice("How long", EFFORTS.map(([key, name]) => [key, name]), effort as never, (picked) => {
+          const found = EFFORTS.find(([key]) => key === picked)!;
+          update({ steps: found[2], chains: found[3] });
+        }),
+        h("details", { ...(this.more ? { open: true } : {}), ontoggle: (event: Event) => { this.more = (event.target as HTMLDetailsElement).open; } },
+          h("summary", { "data-key": "more" }, "Method, seed, strut width"),
+          field("Method", method, "", METHODS.find(([key]) => key === settings.method)![2]),
+          h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000), whole("chains", "Chains", 1, 64), whole("seed", "Seed", 0, 2 ** 31)),
+          h("label", { class: "tick" }, real, "With the stiffness of real struts"),
+          settings.real && field("Strut width", width, "mm")),
+        h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !!missing || !!editor.fault || this.busy,
+          onclick: () => void this.begin() }, "Design it"),
+        missing && h("p", { class: "note" }, missing),
+        fault && h("p", { class: "fault", role: "alert" }, fault)));
+  }
+
+  private async begin(): Promise<void> {
+    this.busy = true;
+    await this.attempt("search", () => this.editor.begin());
+    this.busy = false;
+  }
+}
+
+/** The rows of a lattice like the crane of the paper: a broad base, a body, and arms that reach out. */
+function craneRows(across: number, up: number): Record<string, unknown> {
+  const counts = [across, across + 1, across];
+  const first_x = [0.5, 0, 0.5];
+  for (let row = 0; row < up; row++) {
+    counts.push(row % 2 ? across - 1 : across);
+    first_x.push(row % 2 ? 0.5 : 0);
+  }
+  const shift = up % 2 ? 0.5 : 0;
+  for (const start of [-1 + shift, -0.5 + shift, -1 + shift]) {
+    counts.push(across + (up % 2 ? 0 : 1));
+    first_x.push(start);
+  }
+  return { kind: "triangular-rows", counts, first_x };
+}
+
+/** Find the nodes of a new lattice that lie where some of the old one lay, by their share of the box. */
+function moved(before: Problem, made: Pick<Problem, "positions">, nodes: number[]): number[] {
+  const box = (positions: Point[]): [number, number, number, number] => {
+    const xs = positions.map((p) => p[0]);
+    const ys = positions.map((p) => p[1]);
+    return [Math.min(...xs), Math.min(...ys), Math.max(...xs) - Math.min(...xs) || 1, Math.max(...ys) - Math.min(...ys) || 1];
+  };
+  const [ox, oy, ow, oh] = box(before.positions);
+  const [nx, ny, nw, nh] = box(made.positions);
+  const found = new Set<number>();
+  const height = (positions: Point[]): Map<number, number[]> => {
+    const rows = new Map<number, number[]>();
+    positions.forEach(([, y], k) => { const key = Math.round(10 * y); rows.set(key, [...(rows.get(key) ?? []), k]); });
+    return rows;
+  };
+  // A whole row stays a whole row, however many nodes it has now.
+  const [old, fresh] = [height(before.positions), height(made.positions)];
+  const rows = [...fresh.keys()];
+  const left = new Set(nodes);
+  for (const [key, row] of old) {
+    if (row.length < 3 || !row.every((node) => left.has(node))) continue;
+    const target = key / 10 - oy < 0.5 * oh ? 10 * ny + key - 10 * oy : 10 * (ny + nh) - (10 * (oy + oh) - key);
+    const nearest = rows.reduce((a, b) => (Math.abs(b - target) < Math.abs(a - target) ? b : a));
+    fresh.get(nearest)!.forEach((node) => found.add(node));
+    row.forEach((node) => left.delete(node));
+  }
+  for (const node of left) {
+    const [x, y] = before.positions[node]!;
+    // Near an edge the distance from that edge counts, so that corners stay corners.
+    const fit = (v: number, o: number, w: number, n: number, m: number): number =>
+      v - o < 0.3 * w ? n + (v - o) : o + w - v < 0.3 * w ? n + m - (o + w - v) : n + ((v - o) / w) * m;
+    const [tx, ty] = [fit(x, ox, ow, nx, nw), fit(y, oy, oh, ny, nh)];
+    let best = 0.8;
+    let nearest = -1;
+    made.positions.forEach(([px, py], k) => {
+      const distance = Math.hypot(px - tx, py - ty);
+      if (distance < best) { best = distance; nearest = k; }
+    });
+    if (nearest >= 0) found.add(nearest);
+  }
+  return [...found].sort((a, b) => a - b);
+}

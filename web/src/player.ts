@@ -1,0 +1,259 @@
+// A design that moves along its true path: played, scrubbed, amplified, coloured.
+
+import { post, type Motion, type Problem } from "./api";
+import { bitsOf } from "./api";
+import { binned, BINS, Drawing, where } from "./drawing";
+import { choice, clear, field, figure, h, icon, s } from "./dom";
+import { sentence } from "./editor";
+
+export type Colour = "plain" | "energy" | "stress" | "beams";
+
+export interface Picture { points: number[]; cells: number[]; corners: number; stress: number[] }
+export interface Sensitivity { efficiency: number; beams: number[]; change: (number | null)[] }
+
+const PERIOD = 3200;
+
+export class Player {
+  readonly drawing = new Drawing("The design");
+  readonly element = h("div", { class: "player" });
+  readonly readout = h("div", { class: "readout" });
+  private readonly controls = h("div", { class: "transport" });
+  private readonly legend = h("p", { class: "legend" });
+  private readonly slider = h("input", { type: "range", min: 0, max: 1000, value: "1000", "aria-label": "Part of the stroke" });
+  private readonly playButton = h("button", { type: "button", class: "round", onclick: () => this.toggle() });
+  private readonly stress = s("g", { class: "stress" });
+  private motion: Motion | null = null;
+  private beams: number[] = [];
+  private part = 1;
+  private times = 1;
+  private colour: Colour = "energy";
+  private frame = 0;
+  private began = 0;
+  private told = 0;
+  private sensitivity: Sensitivity | null = null;
+  private picture: Picture | null = null;
+  private shares = new Float64Array(0);
+  /** Asked when a colour is picked that needs something computed first. */
+  want: (colour: Colour) => void = () => {};
+  note: (text: string) => void = () => {};
+
+  constructor(private readonly problem: Problem, private readonly mask: string, private readonly scale: number) {
+    this.drawing.setLattice(problem.positions, problem.beams);
+    this.drawing.overlay.append(this.stress);
+    const bits = bitsOf(mask, problem.beams.length);
+    this.beams = where(bits);
+    this.drawing.ghost("rest", this.beams);
+    this.slider.addEventListener("input", () => { this.stop(); this.part = Number(this.slider.value) / 1000; this.show(); });
+    const times = h("input", { type: "range", min: 1, max: 8, step: 0.5, value: "1", "aria-label": "How many times the motion is drawn" });
+    const size = h("output", {}, "× 1");
+    times.addEventListener("input", () => { this.times = Number(times.value); size.textContent = `× ${this.times}`; this.show(); });
+    this.controls.append(this.playButton, this.slider,
+      h("span", { class: "amplify" }, field("Amplify", times), size));
+    this.element.append(h("div", { class: "paper" }, this.readout, this.drawing.svg), this.controls,
+      h("div", { class: "row between colour" }, this.colours(), this.legend));
+    this.setPlaying(false);
+    this.drawing.svg.addEventListener("pointermove", (event) => this.point(event));
+    this.show();
+    void this.load();
+  }
+
+  get playing(): boolean { return this.frame !== 0; }
+
+  close(): void { this.stop(); }
+
+  private colours(): HTMLElement {
+    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["beams", "Beam worth"], ["stress", "Stress"]] as [Colour, string][],
+      this.colour, (picked) => this.paint(picked));
+  }
+
+  paint(colour: Colour): void {
+    this.colour = colour;
+    if (colour === "stress" && !this.picture) this.want("stress");
+    if (colour === "beams" && !this.sensitivity) void this.loadSensitivity();
+    if (colour === "stress") { this.stop(); this.part = 1; }
+    const input = this.element.querySelector<HTMLInputElement>(`.colour input[value="${colour}"]`);
+    if (input) input.checked = true;
+    this.show();
+  }
+
+  showStress(picture: Picture | null): void {
+    this.picture = picture;
+    this.paint("stress");
+  }
+
+  private async load(): Promise<void> {
+    try {
+      this.motion = await post<Motion>("/motion", { problem: this.problem, mask: this.mask });
+      this.makeRoom(this.motion);
+      this.show();
+      this.element.dataset.ready = "yes";
+      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
+    } catch (error) {
+      this.note(sentence((error as Error).message));
+    }
+  }
+
+  /** Enlarge the picture so that the motion stays inside. */
+  private makeRoom(motion: Motion): void {
+    const { box, rest, svg } = this.drawing;
+    let [x0, y0, x1, y1] = [box.x, box.y, box.x + box.w, box.y + box.h];
+    const last = motion.displacement.at(-1)!;
+    for (const beam of this.beams) for (const node of this.problem.beams[beam]!) {
+      const [x, y] = [rest[2 * node]! + last[2 * node]!, -(rest[2 * node + 1]! + last[2 * node + 1]!)];
+      x0 = Math.min(x0, x - 0.6); x1 = Math.max(x1, x + 0.6); y0 = Math.min(y0, y - 0.6); y1 = Math.max(y1, y + 0.6);
+    }
+    svg.setAttribute("viewBox", `${x0} ${y0} ${x1 - x0} ${y1 - y0}`);
+  }
+
+  private async loadSensitivity(): Promise<void> {
+    try {
+      this.sensitivity = await post<Sensitivity>("/sensitivity", { problem: this.problem, mask: this.mask });
+      this.show();
+    } catch (error) {
+      this.note(sentence((error as Error).message));
+    }
+  }
+
+  toggle(): void { if (this.playing) this.stop(); else this.play(); }
+
+  play(): void {
+    if (!this.motion || this.playing) return;
+    if (this.colour === "stress") this.paint("energy");
+    this.began = performance.now() - (Math.acos(1 - 2 * this.part) / (2 * Math.PI)) * PERIOD;
+    const step = (now: number): void => {
+      this.part = 0.5 - 0.5 * Math.cos((2 * Math.PI * (now - this.began)) / PERIOD);
+      this.show();
+      this.frame = requestAnimationFrame(step);
+    };
+    this.frame = requestAnimationFrame(step);
+    this.setPlaying(true);
+  }
+
+  stop(): void {
+    cancelAnimationFrame(this.frame);
+    this.frame = 0;
+    this.setPlaying(false);
+  }
+
+  private setPlaying(yes: boolean): void {
+    this.playButton.replaceChildren(icon(yes ? "pause" : "play"));
+    this.playButton.setAttribute("aria-label", yes ? "Pause the motion" : "Play the motion");
+  }
+
+  private show(): void {
+    const { drawing, motion } = this;
+    // Numbers that change sixty times a second cannot be read, and cost a layout each.
+    const now = performance.now();
+    const calm = this.playing && now - this.told < 100;
+    if (!calm) this.told = now;
+    let energy: ArrayLike<number> | null = null;
+    if (motion) {
+      const place = this.part * (motion.part.length - 1);
+      const k = Math.min(motion.part.length - 2, Math.floor(place));
+      const t = place - k;
+      const [before, after] = [motion.displacement[k]!, motion.displacement[k + 1]!];
+      if (drawing.at === drawing.rest) drawing.at = drawing.rest.slice();
+      for (let n = 0; n < drawing.at.length; n++) {
+        drawing.at[n] = drawing.rest[n]! + this.times * (before[n]! + t * (after[n]! - before[n]!));
+      }
+      const [e0, e1] = [motion.energy[k]!, motion.energy[k + 1]!];
+      if (this.shares.length !== e0.length) this.shares = new Float64Array(e0.length);
+      for (let b = 0; b < e0.length; b++) this.shares[b] = e0[b]! + t * (e1[b]! - e0[b]!);
+      energy = this.shares;
+      const value = Math.round(1000 * this.part);
+      if (!calm && this.slider.valueAsNumber !== value) this.slider.value = String(value);
+      if (!calm) this.tell(motion, k, t);
+    }
+    const stressed = this.colour === "stress" && this.picture !== null;
+    if (stressed) this.drawStress(this.picture!);
+    else if (this.stress.childNodes.length) this.stress.replaceChildren();
+    if (stressed) drawing.draw([]);
+    else if (this.colour === "beams" && this.sensitivity) drawing.draw(this.worth(this.sensitivity));
+    else if (this.colour === "energy" && energy) drawing.draw(binned(this.beams, energy));
+    else drawing.draw([{ name: "plain", beams: this.beams }]);
+    if (stressed) for (const name of ["support", "input", "output"]) drawing.mark(name, []);
+    else drawing.markRegions(this.problem);
+    if (!calm) this.explain();
+  }
+
+  private tell(motion: Motion, k: number, t: number): void {
+    const near = t > 0.5 ? k + 1 : k;
+    const { input } = this.problem;
+    const stroke = input.drive === "displacement" ? `${figure(this.part * input.amount * this.scale, 2)} mm in` : `${figure(100 * this.part, 0)} % of the force`;
+    const efficiency = motion.efficiency[near] ?? null;
+    const out = efficiency === null || input.drive !== "displacement" ? "" : `${figure(this.part * input.amount * this.scale * efficiency, 2)} mm out`;
+    const lines = [figure(efficiency, 3), stroke, out, motion.snapped[near] ? "has snapped here" : ""];
+    if (this.readout.childElementCount !== 4) {
+      clear(this.readout, h("strong"), h("span"), h("span"), h("span", { class: "alarm" }));
+    }
+    lines.forEach((text, n) => {
+      const line = this.readout.children[n]!;
+      if (line.textContent !== text) line.textContent = text;
+    });
+  }
+
+  private worth(found: Sensitivity): { name: string; beams: number[] }[] {
+    const change = new Map(found.beams.map((beam, k) => [beam, found.change[k] ?? null]));
+    const present = new Set(this.beams);
+    const scale = Math.abs(found.efficiency) || 1;
+    const groups: Record<string, number[]> = { "worth-none": [], "worth-1": [], "worth-2": [], "worth-3": [], "worth-broken": [], "worth-harm": [], "worth-add": [], "worth-given": [] };
+    for (const beam of this.beams) {
+      if (!change.has(beam)) { groups["worth-given"]!.push(beam); continue; }
+      const value = change.get(beam)!;
+      const loss = value === null ? null : -value / scale;
+      const name = loss === null ? "worth-broken" : loss > 0.5 ? "worth-3" : loss > 0.1 ? "worth-2" : loss > 0.005 ? "worth-1" : loss < -0.005 ? "worth-harm" : "worth-none";
+      groups[name]!.push(beam);
+    }
+    for (const [beam, value] of change) if (!present.has(beam) && value !== null && value / scale > 0.005) groups["worth-add"]!.push(beam);
+    return Object.entries(groups).map(([name, beams]) => ({ name, beams }));
+  }
+
+  private point(event: PointerEvent): void {
+    if (this.colour !== "beams" || !this.sensitivity) return;
+    const beam = this.drawing.nearestBeam(this.drawing.locate(event), 0.4);
+    const k = this.sensitivity.beams.indexOf(beam);
+    if (beam < 0 || k < 0) { this.legend.dataset.beam = ""; this.explain(); return; }
+    const change = this.sensitivity.change[k] ?? null;
+    const there = this.beams.includes(beam);
+    const after = change === null ? "it would snap or fall apart" : figure(this.sensitivity.efficiency + change, 3);
+    this.legend.dataset.beam = `${there ? "Without" : "With"} beam ${beam}: ${figure(this.sensitivity.efficiency, 3)} → ${after}`;
+    this.explain();
+  }
+
+  private explain(): void {
+    const texts: Record<Colour, string> = {
+      plain: "Grey: at rest. Orange: pushed. Blue: what should move.",
+      energy: "From pale to red: what each beam bears of the energy.",
+      beams: this.sensitivity ? (this.legend.dataset.beam || "Dark: all depends on it. Dashed: would help. Point at a beam.") : "Taking each beam away in turn …",
+      stress: this.picture ? `Von Mises stress, up to ${figure(Math.max(...sample(this.picture.stress)), 2)} MPa.` : "Ask for finite elements under Figures.",
+    };
+    if (this.legend.textContent !== texts[this.colour]) this.legend.textContent = texts[this.colour];
+  }
+
+  private drawStress({ points, cells, corners, stress }: Picture): void {
+    if (this.stress.childNodes.length) return;
+    const peak = Math.max(...sample(stress)) || 1;
+    const paths: string[] = Array.from({ length: BINS }, () => "");
+    const perCell = stress.length * corners === cells.length;
+    for (let c = 0; c < cells.length; c += corners) {
+      let value = 0;
+      let d = "";
+      for (let k = 0; k < corners; k++) {
+        const v = cells[c + k]!;
+        d += `${k ? "L" : "M"}${(points[2 * v]! / this.scale).toFixed(3)} ${(-points[2 * v + 1]! / this.scale).toFixed(3)}`;
+        if (!perCell) value += stress[v]! / corners;
+      }
+      if (perCell) value = stress[c / corners]!;
+      paths[Math.min(BINS - 1, Math.floor((value / peak) * BINS))] += corners > 2 ? `${d}Z` : d;
+    }
+    this.stress.replaceChildren(...paths.map((d, bin) =>
+      s("path", { d, class: `${corners > 2 ? "facet" : "strut"} heat-${bin}` })));
+  }
+}
+
+/** At most some thousand of many values, since a call cannot take more. */
+function sample(values: number[]): number[] {
+  if (values.length < 5000) return values;
+  return Array.from({ length: Math.ceil(values.length / 5000) }, (_, k) =>
+    values.slice(5000 * k, 5000 * (k + 1)).reduce((a, b) => Math.max(a, b), 0));
+}
