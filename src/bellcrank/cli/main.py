@@ -24,6 +24,7 @@ from bellcrank.cli import (
     predict,
     print_part,
     problems,
+    study,
     surrogate_search,
     train,
     validate,
@@ -50,6 +51,7 @@ COMMANDS = (
     surrogate_search,
     onnx,
     machine,
+    study,
     problems,
 )
 """Modules that register a command."""

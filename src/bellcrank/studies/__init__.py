@@ -1,0 +1,33 @@
+"""The paper's figures and tables, remade by commands.
+
+Each study is a module with its settings, full and quick; it computes plain figures from raw
+records that it keeps, draws one picture from them, and says in rows what of it compares with
+Bonfanti et al. (2020). `run_study` leaves record and picture in a folder.
+
+Examples
+--------
+>>> from bellcrank.studies import studies
+>>> studies["paths"].title
+"Efficiency along the paper's chains"
+"""
+
+from bellcrank.studies import structure  # noqa: I001 - registered in the order of the paper
+from bellcrank.studies import paths
+from bellcrank.studies import actuators
+from bellcrank.studies.bench import Bench
+from bellcrank.studies.records import draw_record, read_record, read_records, run_study
+from bellcrank.studies.registry import Claim, Study, studies
+
+__all__ = [
+    "Bench",
+    "Claim",
+    "Study",
+    "actuators",
+    "draw_record",
+    "paths",
+    "read_record",
+    "read_records",
+    "run_study",
+    "structure",
+    "studies",
+]
