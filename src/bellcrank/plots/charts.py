@@ -287,8 +287,9 @@ def _dress(axes: Axes, chart: Chart) -> None:
             size=style.SMALL_SIZE, color=style.INK, family=style.FONT, zorder=8,
         )  # fmt: skip
     if chart.legend is not None and axes.get_legend_handles_labels()[1]:
+        place: Any = chart.legend
         axes.legend(
-            loc=chart.legend, frameon=False, labelcolor=style.INK, handlelength=1.7,
+            loc=place, frameon=False, labelcolor=style.INK, handlelength=1.7,
             prop={"family": style.FONT, "size": style.SMALL_SIZE}, labelspacing=0.35,
         ).set_zorder(9)  # fmt: skip
 

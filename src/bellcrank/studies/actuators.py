@@ -24,8 +24,8 @@ TASKS = {
 }
 OTHERS = (
     (
-        "The paper's own designs, by hand and by machine, are not at hand: all designs here are ours, "
-        "those by hand drawn from lever mechanics before any machine design was looked at."
+        "The paper's own designs, by hand and by machine, are not at hand: all designs here are "
+        "ours, those by hand drawn from lever mechanics before any machine design was looked at."
     ),
 )
 DISPLACED = (
@@ -35,15 +35,15 @@ DISPLACED = (
         "the printed outline in plane stress, both nonlinear."
     ),
     (
-        "The designs for 2 mm struts were searched with the stiffness of such struts, and so that they "
-        "touch nowhere; the others with the paper's stiffness, which stands for wider struts."
+        "The designs for 2 mm struts were searched with the stiffness of such struts, and so that "
+        "they touch nowhere; the others with the paper's stiffness, which stands for wider struts."
     ),
 )
 FORCED = (
     *OTHERS,
     (
-        "Our pliers are another lattice than the paper's, of which only half is modelled; the paper's "
-        "own design by hand, recomputed elsewhere from a description, has 0.2211."
+        "Our pliers are another lattice than the paper's, of which only half is modelled; the "
+        "paper's own design by hand, recomputed elsewhere from a description, has 0.2211."
     ),
     "The paper's figures for pliers are of simulations.",
 )

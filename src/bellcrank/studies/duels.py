@@ -170,7 +170,8 @@ def draw(
     chart = Chart(
         f"Efficiency in the model and by finite elements (struts {figures['width']:g} mm wide on "
         "10 mm), beside what the paper reports",
-        "", "efficiency", series, names=names, legend="upper right", limits_y=(None, 1.12 * tallest),
+        "", "efficiency", series, names=names, legend="upper right",
+        limits_y=(None, 1.12 * tallest),
     )  # fmt: skip
     draw_sheet(
         Sheet(

@@ -173,8 +173,8 @@ STUDY = register(
         runs=lambda told: f"{count(told['chains'], 'chain')} of {count(told['steps'], 'proposal')}",
         deviations=(
             (
-                "Equilibria are found by Newton's method instead of conjugate gradients; the response "
-                "is the same, and always that from rest."
+                "Equilibria are found by Newton's method instead of conjugate gradients; the "
+                "response is the same, and always that from rest."
             ),
             "Designs that snap along the stroke are refused: they have no unique efficiency.",
         ),

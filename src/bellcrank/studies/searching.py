@@ -23,6 +23,7 @@ from bellcrank.search import (
     select,
     start_chain,
 )
+from bellcrank.workflows.design import prepare
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -51,11 +52,13 @@ def run_chain(problem: Problem, settings: SearchSettings, chain: int = 0) -> dic
         reached (proposals after which the best so far first exceeds 0.5, 1, 2), offered (masks,
         efficiencies and steps of the designs worth building).
     """
-    make_responder(problem, settings).respond(problem.initial)  # compiles before the clock runs
+    prepare(problem, settings)  # compiles before the clock runs
     began = time.thread_time()
     responder = make_responder(problem, settings)
     state = start_chain(responder, settings, chain)
-    steps, masks, values = [], [], []
+    steps: list[NDArray[np.int64]] = []
+    masks: list[NDArray[np.uint8]] = []
+    values: list[NDArray[np.float64]] = []
     while not is_done(state, settings):
         before = state.step
         state, rows = advance_chain(responder, settings, chain, state)
@@ -64,7 +67,7 @@ def run_chain(problem: Problem, settings: SearchSettings, chain: int = 0) -> dic
         masks.append(rows.mask[taken])
         values.append(rows.efficiency[taken])
     seconds = time.thread_time() - began
-    step, mask, value = (np.concatenate(parts) for parts in (steps, masks, values))
+    step, mask, value = np.concatenate(steps), np.concatenate(masks), np.concatenate(values)
     offers = candidates_of(chain, step, mask, value, searches[settings.name].offers, OFFERED)
     return {
         "steps": state.step,
