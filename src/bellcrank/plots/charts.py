@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Kind = Literal["line", "steps", "points", "both", "bars", "histogram"]
+ROOM_FOR_NAME = 0.11
+"""Height that a line of the legend takes over histograms, as a part of the highest bar."""
 MANY = 1.0e5
 """From here on numbers on an axis are written as powers of ten."""
 
@@ -158,7 +160,14 @@ def put_chart(axes: Axes, chart: Chart) -> None:
         )  # fmt: skip
     axes.set_xlim(*chart.limits_x)
     axes.set_ylim(*chart.limits_y)
+    if chart.legend is not None and any(each.kind == "histogram" for each in chart.series):
+        axes.set_ylim(0.0, axes.get_ylim()[1] * (1.0 + ROOM_FOR_NAME * _named(chart)))
     _dress(axes, chart)
+
+
+def _named(chart: Chart) -> int:
+    """Return how many lines the legend has."""
+    return sum(bool(each.name) for each in (*chart.series, *chart.levels))
 
 
 def _put_line(axes: Axes, series: Series) -> None:

@@ -29,6 +29,8 @@ TALLEST = 4.4
 LEFT, BETWEEN, BELOW, ABOVE = 0.66, 0.78, 0.56, 0.34
 """Inches around charts: for numbers and words at their left, below and over them."""
 COLUMNS = 8
+LONG_NOTE = 78
+"""Letters of a note from which on a sheet must be wide."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,8 +78,17 @@ def draw_sheet(sheet: Sheet, path: str | os.PathLike[str], *, overwrite: bool = 
     save_figure(_figure(sheet), target, overwrite=overwrite)
 
 
+def _caption(motion: Motion) -> str:
+    """Return what stands over a drawing, in few words."""
+    known = motion.efficiency is not None and np.isfinite(motion.efficiency)
+    efficiency = f"efficiency {motion.efficiency:.2f}" if known else "no efficiency"
+    magnified = "" if motion.magnify == 1.0 else f"motion × {motion.magnify:g}"
+    words = [efficiency, motion.note, magnified or f"{motion.design.beam_count} beams"]
+    return " · ".join(word for word in words if word)
+
+
 def _figure(sheet: Sheet) -> Figure:
-    wide = len(sheet.motions) > 1 or len(sheet.charts) > 1
+    wide = len(sheet.motions) > 1 or len(sheet.charts) > 1 or len(sheet.note) > LONG_NOTE
     width = WIDE if wide else WIDTH
     heading = MARGIN + style.heading_height(sheet.title, sheet.note) + 0.14
     drawings = _Drawings.of(sheet, width)
@@ -102,7 +113,7 @@ class _Drawings:
     @classmethod
     def of(cls, sheet: Sheet, width: float) -> _Drawings:
         parts = [
-            Drawing(motion.name, motion.caption if k not in sheet.still else motion.note, motion,
+            Drawing(motion.name, _caption(motion) if k not in sheet.still else motion.note, motion,
                     moving=k not in sheet.still)
             for k, motion in enumerate(sheet.motions)
         ]  # fmt: skip

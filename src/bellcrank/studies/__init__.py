@@ -14,6 +14,9 @@ Examples
 from bellcrank.studies import structure  # noqa: I001 - registered in the order of the paper
 from bellcrank.studies import paths
 from bellcrank.studies import actuators
+from bellcrank.studies import scaling
+from bellcrank.studies import disorder
+from bellcrank.studies import amplitude
 from bellcrank.studies.bench import Bench
 from bellcrank.studies.records import draw_record, read_record, read_records, run_study
 from bellcrank.studies.registry import Claim, Study, studies
@@ -23,11 +26,14 @@ __all__ = [
     "Claim",
     "Study",
     "actuators",
+    "amplitude",
+    "disorder",
     "draw_record",
     "paths",
     "read_record",
     "read_records",
     "run_study",
+    "scaling",
     "structure",
     "studies",
 ]

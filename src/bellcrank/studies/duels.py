@@ -60,9 +60,9 @@ class Duel:
 
     problem: str
     paper_steps: int = 20_000
-    paper_chains: int = 12
+    paper_chains: int = 8
     steps: int = 20_000
-    chains: int = 6
+    chains: int = 4
     seed: int = 0
     levels: tuple[str, ...] = ("frame", "plane")
     width: float = 2.0

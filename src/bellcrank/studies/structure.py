@@ -29,7 +29,7 @@ class Settings:
 
     problem: str = "crane"
     steps: int = 20_000
-    chains: int = 8
+    chains: int = 4
     seed: int = 0
 
 
