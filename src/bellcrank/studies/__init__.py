@@ -17,6 +17,9 @@ from bellcrank.studies import actuators
 from bellcrank.studies import scaling
 from bellcrank.studies import disorder
 from bellcrank.studies import amplitude
+from bellcrank.studies import angular_springs
+from bellcrank.studies import learning
+from bellcrank.studies import seeing
 from bellcrank.studies.bench import Bench
 from bellcrank.studies.records import draw_record, read_record, read_records, run_study
 from bellcrank.studies.registry import Claim, Study, studies
@@ -27,13 +30,16 @@ __all__ = [
     "Study",
     "actuators",
     "amplitude",
+    "angular_springs",
     "disorder",
     "draw_record",
+    "learning",
     "paths",
     "read_record",
     "read_records",
     "run_study",
     "scaling",
+    "seeing",
     "structure",
     "studies",
 ]

@@ -23,8 +23,11 @@ if TYPE_CHECKING:
     from bellcrank.studies.registry import Study
 
 SCHEMA = "bellcrank/study/1"
-COLOURS = 96
+COLOURS = 160
 """In a picture that is kept: enough for thin lines on white, and a third of the bytes."""
+LARGEST = 145_000
+"""Bytes of a picture that is kept."""
+SCALES = (1.0, 0.85, 0.72, 0.6, 0.5)
 DIGITS = 6
 """Of the figures in a record."""
 
@@ -107,14 +110,23 @@ def draw_record(record: Mapping[str, Any], path: Path) -> None:
 
 
 def shrunk(png: bytes) -> bytes:
-    """Return a PNG picture with few colours."""
+    """Return a PNG picture with few colours, and smaller where that is not enough."""
     from PIL import Image
 
-    content = BytesIO()
-    with Image.open(BytesIO(png)) as picture:
-        few = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-        few.save(content, format="PNG", optimize=True, dpi=(200, 200))
-    return content.getvalue()
+    with Image.open(BytesIO(png)) as opened:
+        picture = opened.convert("RGB")
+    width, height = picture.size
+    found = b""
+    for part in SCALES:
+        size = (round(part * width), round(part * height))
+        scaled = picture if part == 1.0 else picture.resize(size, Image.Resampling.LANCZOS)
+        few = scaled.quantize(COLOURS, kmeans=1, dither=Image.Dither.NONE)
+        content = BytesIO()
+        few.save(content, format="PNG", optimize=True, dpi=(200 * part, 200 * part))
+        found = content.getvalue()
+        if len(found) <= LARGEST:
+            break
+    return found
 
 
 def read_record(path: Path) -> dict[str, Any]:
