@@ -82,7 +82,9 @@ def draw_joints(
     for place, joint in enumerate(joints):
         left = MARGIN + place * (SIDE + GAP)
         style.write_heading(figure, joint.title, joint.note, left, top)
-        axes = figure.add_axes((left / width, 0.08 / height, SIDE / width, SIDE * (1.0 - FLAT / 2.56) / height))
+        axes = figure.add_axes(
+            (left / width, 0.08 / height, SIDE / width, SIDE * (1.0 - FLAT / 2.56) / height)
+        )
         axes.set_xlim(-1.28, 1.28)
         axes.set_ylim(-1.28, 1.28 - FLAT)
         axes.set_axis_off()
