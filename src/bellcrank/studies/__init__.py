@@ -20,6 +20,7 @@ from bellcrank.studies import amplitude
 from bellcrank.studies import angular_springs
 from bellcrank.studies import learning
 from bellcrank.studies import seeing
+from bellcrank.studies import rivals
 from bellcrank.studies.bench import Bench
 from bellcrank.studies.records import draw_record, read_record, read_records, run_study
 from bellcrank.studies.registry import Claim, Study, studies
@@ -37,6 +38,7 @@ __all__ = [
     "paths",
     "read_record",
     "read_records",
+    "rivals",
     "run_study",
     "scaling",
     "seeing",

@@ -369,7 +369,7 @@ STUDY = register(
         title="What a network learns, and the designs it makes",
         after="figure 6",
         full=Settings(),
-        quick=Settings(runs=48, steps=300, train=True),
+        quick=Settings(runs=32, steps=250, epochs=8, train=True),
         run=run,
         draw=draw,
         claims=claims,
