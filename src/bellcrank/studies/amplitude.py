@@ -42,8 +42,8 @@ class Settings:
     problems: tuple[str, ...] = ("crane", "anti-parallel")
     points: int = 30
     furthest: float = 3.0
-    steps: int = 10_000
-    chains: int = 4
+    steps: int = 8000
+    chains: int = 3
     frames: bool = True
 
 

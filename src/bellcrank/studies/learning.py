@@ -52,7 +52,7 @@ class Settings:
     """
 
     problem: str = "crane"
-    runs: int = 40
+    runs: int = 24
     steps: int = 582
     train: bool = False
     model: str = "mlp"

@@ -38,7 +38,7 @@ class Settings:
     """
 
     problem: str = "crane"
-    chains: int = 6
+    chains: int = 4
     steps: int = 582
     stride: int = 4
 

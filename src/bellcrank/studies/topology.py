@@ -37,12 +37,19 @@ def pymoto() -> Any:
     InvalidSettings
         If it is not installed.
     """
+    import matplotlib as mpl
+
+    # On import pyMOTO chooses a window system for all pictures of the process, or fails.
+    chosen = mpl.use
+    mpl.use = lambda *_names, **_more: None  # type: ignore[assignment]
     try:
         import pymoto as module
     except ImportError as missing:
         raise InvalidSettings(
             f"the study of rivals needs pyMOTO and NGSolve; install them with: {INSTALL}"
         ) from missing
+    finally:
+        mpl.use = chosen
     return module
 
 
