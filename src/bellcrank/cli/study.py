@@ -31,7 +31,7 @@ def study(
         str,
         typer.Argument(
             help="Name of a study; [b]list[/] for all names, [b]all[/] for all studies, one after "
-            "the other; [b]page[/] for a page that compares the records in --out with the paper."
+            "the other; [b]page[/] for a page, beside --out, that compares its records with the paper."
         ),
     ],
     quick: Annotated[bool, typer.Option("--quick", help="Less of everything, for a look.")] = False,
@@ -122,5 +122,6 @@ def _write_page(out: Path) -> None:
         raise InvalidSettings(
             f"{out}: no records of studies there; bellcrank study all --out {out}"
         )
-    write_text(out / PAGE_FILE, page_of(records), overwrite=True)
-    notes.print(f"wrote {plain(out / PAGE_FILE)}")
+    page = out.parent / PAGE_FILE
+    write_text(page, page_of(records, pictures=f"{out.name}/"), overwrite=True)
+    notes.print(f"wrote {plain(page)}")

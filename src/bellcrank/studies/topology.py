@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import time
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,7 +108,8 @@ def optimise(
         objective = module.Scaling(scaling=10.0)(reached)
         used = module.EinSum("i->")(smooth)
         limit = module.Scaling(scaling=10.0, maxval=volume * domain.nel)(used)
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # its solvers convert matrices, and say so each time
         module.minimize_mma(density, [objective, limit], network, maxit=iterations, verbosity=0)
     return {
         "density": np.asarray(smooth.state).reshape(up, across).round(4).tolist(),
