@@ -31,7 +31,7 @@ def study(
         str,
         typer.Argument(
             help="Name of a study; [b]list[/] for all names, [b]all[/] for all studies, one after "
-            "the other; [b]page[/] for a page, beside --out, that compares its records with the paper."
+            "the other; [b]page[/] for a page beside --out, made of its records."
         ),
     ],
     quick: Annotated[bool, typer.Option("--quick", help="Less of everything, for a look.")] = False,

@@ -167,7 +167,8 @@ def put_chart(axes: Axes, chart: Chart) -> None:
 
 def _named(chart: Chart) -> int:
     """Return how many lines the legend has."""
-    return sum(bool(each.name) for each in (*chart.series, *chart.levels))
+    names = [each.name for each in chart.series] + [each.name for each in chart.levels]
+    return sum(map(bool, names))
 
 
 def _put_line(axes: Axes, series: Series) -> None:
@@ -262,7 +263,7 @@ def plain_number(value: float, _place: int = 0) -> str:
     Examples
     --------
     >>> plain_number(20000.0), plain_number(0.05), plain_number(1e6)
-    ('20\\u202f000', '0.05', '10⁶')
+    ('20\u202f000', '0.05', '10⁶')
     """
     size = abs(value)
     if size >= MANY or 0.0 < size < 1e-3:
@@ -296,9 +297,9 @@ def _dress(axes: Axes, chart: Chart) -> None:
             size=style.SMALL_SIZE, color=style.INK, family=style.FONT, zorder=8,
         )  # fmt: skip
     if chart.legend is not None and axes.get_legend_handles_labels()[1]:
-        place: Any = chart.legend
+        where: Any = chart.legend
         axes.legend(
-            loc=place, frameon=False, labelcolor=style.INK, handlelength=1.7,
+            loc=where, frameon=False, labelcolor=style.INK, handlelength=1.7,
             prop={"family": style.FONT, "size": style.SMALL_SIZE}, labelspacing=0.35,
         ).set_zorder(9)  # fmt: skip
 

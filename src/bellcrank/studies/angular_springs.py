@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bellcrank.mechanics import Evaluator
 from bellcrank.model import Input, Lattice, Output, Problem, Supports
 from bellcrank.plots.joints import Joint, draw_joints
@@ -35,6 +37,9 @@ CASES: dict[str, dict[str, Any]] = {
 """Directions of the beams of a node in degrees; those that end freely carry nothing."""
 
 
+UP = np.array([0.0, 1.0])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
     """By how much the first beam is turned, in lengths of it."""
@@ -57,11 +62,11 @@ def star(angles: list[int], dead: list[int], turn: float) -> Problem:
     fixed = [0, *(k + 1 for k in range(1, len(angles)) if k + 1 not in free)]
     return Problem(
         name="star",
-        lattice=Lattice(places, beams),
-        supports=Supports(fixed=fixed),
-        input=Input(nodes=[1], direction=[0.0, 1.0], drive="displacement", amount=turn),
-        output=Output(nodes=[last], direction=[0.0, 1.0]),
-        designable=[0],
+        lattice=Lattice(np.array(places), np.array(beams)),
+        supports=Supports(fixed=np.array(fixed)),
+        input=Input(nodes=np.array([1]), direction=UP, drive="displacement", amount=turn),
+        output=Output(nodes=np.array([last]), direction=UP),
+        designable=np.array([0]),
     )
 
 

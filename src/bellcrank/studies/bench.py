@@ -41,6 +41,7 @@ class Bench:
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as place:
     ...     bench = Bench.in_folder(Path(place), "doubling", {"times": 2})

@@ -74,21 +74,24 @@ def box_of(name: str, columns: int, rows: int, stroke: float, spring: float) -> 
     middle = 0.5 * float(places[:, 1].max())
     top, right = float(places[:, 1].max()), float(places[:, 0].max())
 
-    def nearest(*points: tuple[float, float]) -> list[int]:
-        return [int(np.argmin(np.hypot(*(places - point).T))) for point in points]
+    def nearest(*points: tuple[float, float]) -> NDArray[np.int64]:
+        return np.array([int(np.argmin(np.hypot(*(places - point).T))) for point in points])
 
     fixed = nearest((0.5, 0.0), (1.5, 0.0), (0.5, top), (1.5, top))
     drive = Input(
-        nodes=nearest((0.0, middle)), direction=[1.0, 0.0], drive="displacement", amount=stroke
+        nodes=nearest((0.0, middle)),
+        direction=np.array([1.0, 0.0]),
+        drive="displacement",
+        amount=stroke,
     )
     rise = math.sqrt(3.0) / 2.0
     initial = np.ones(lattice.beam_count, dtype=bool)
     void = None
     if name == "inverter":
-        watched, direction = nearest((right, middle)), [[-1.0, 0.0]]
+        watched, direction = nearest((right, middle)), np.array([[-1.0, 0.0]])
     else:
         watched = nearest((right - 0.5, middle + rise), (right - 0.5, middle - rise))
-        direction = [[0.0, -1.0], [0.0, 1.0]]
+        direction = np.array([[0.0, -1.0], [0.0, 1.0]])
         centre = places[lattice.beams].mean(axis=1)
         inside = (np.abs(centre[:, 1] - middle) < rise - 1e-6) & (centre[:, 0] > right - GAP)
         initial &= ~inside

@@ -35,8 +35,8 @@ COLOURS = {"paper": style.INPUT, "basin-hopping": style.BEST}
 class Settings:
     """How many lattices, and how long they are searched."""
 
-    lattices: int = 50
-    steps: int = 3000
+    lattices: int = 60
+    steps: int = 4000
     first: int = 1
 
 

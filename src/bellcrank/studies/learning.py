@@ -2,67 +2,31 @@
 
 from __future__ import annotations
 
-import json
-from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.learning.building import reverse
-from bellcrank.mechanics import Status
-from bellcrank.model import find_problem
 from bellcrank.plots import style
 from bellcrank.plots.charts import Chart, Density, Level, Series
 from bellcrank.plots.sheets import Sheet, draw_sheet
-from bellcrank.search import chain_blocks, make_responder, read_settings
 from bellcrank.studies import published
+from bellcrank.studies.longer import longer_jobs
+from bellcrank.studies.predicting import BINS, Settings, shipped, trained
 from bellcrank.studies.registry import Claim, Figures, Study, register
 from bellcrank.studies.words import count, number, share
-from bellcrank.surrogate.backend import import_torch
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
+    from pathlib import Path
 
     from bellcrank.studies.bench import Bench
-    from bellcrank.surrogate.dataset import Dataset
-
-RECORDS = Path(__file__).parents[3] / "docs" / "surrogate"
-"""Of longer trainings and searches, in a checkout; a wheel has none."""
-BINS = 64
-FIRST = 3_000_000
-"""Seed of the runs that the network which comes along is tested with: it has learnt from others."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """A network, and what it is tested with.
-
-    Parameters
-    ----------
-    runs, steps
-        Searches whose proposals are predicted, half of them backwards.
-    train
-        Whether a small network is trained on them first, and tested on a quarter of the runs;
-        else the one that comes along predicts all of them.
-    model, epochs
-        Of that training.
-    """
-
-    problem: str = "crane"
-    runs: int = 24
-    steps: int = 582
-    train: bool = False
-    model: str = "mlp"
-    epochs: int = 12
 
 
 def run(settings: Settings, bench: Bench) -> Figures:
     """Make runs, predict them, and let the network search."""
     bench.tell("network", 0, 1)
-    found = bench.one("predicted", partial(_trained if settings.train else _shipped, settings))
+    found = bench.one("predicted", partial(trained if settings.train else shipped, settings))
     bench.tell("network", 1, 1)
     return {
         "problem": settings.problem,
@@ -70,154 +34,8 @@ def run(settings: Settings, bench: Bench) -> Figures:
         "steps": settings.steps,
         "trained_here": settings.train,
         **found,
-        "records": {} if settings.train else _records(),
+        "records": {} if settings.train else longer_jobs(),
     }
-
-
-def dataset(settings: Settings) -> Dataset:
-    """Return all that searches there and back proposed."""
-    from bellcrank.surrogate.dataset import Dataset
-
-    problem = find_problem(settings.problem)
-    packed, efficiency, run_of = [], [], []
-    for number_of in range(settings.runs):
-        sign = -1.0 if number_of % 2 else 1.0
-        searched = problem if sign > 0.0 else reverse(problem)
-        told = {"search": "paper", "steps": settings.steps, "seed": FIRST + number_of}
-        search = read_settings({**told, "chains": 1})
-        for _, rows in chain_blocks(make_responder(searched, search), search, 0):
-            sound = rows.status == Status.CONVERGED
-            packed.append(rows.mask[sound])
-            efficiency.append(sign * rows.efficiency[sound])
-            run_of.append(np.full(int(sound.sum()), number_of))
-    return Dataset(problem, np.vstack(packed), np.concatenate(efficiency), np.concatenate(run_of))
-
-
-def _shipped(settings: Settings) -> dict[str, Any]:
-    """Predict with the network that comes along."""
-    from bellcrank.surrogate.predictor import load_models
-
-    data = dataset(settings)
-    model: Any = load_models(data.problem)[0]
-    told = _tested(model.predict(data.packed), data.efficiency)
-    epochs = [
-        {"designs": each["designs"], "r_squared": each["r_squared"]}
-        for each in model.record["epochs"]
-    ]
-    before = model.record.get("before", {}).get("designs", 0)
-    return {
-        "network": model.architecture,
-        "looks": model.seen["designs"],
-        "epochs": [{**each, "designs": each["designs"] + before} for each in epochs],
-        "held_out_by_its_record": model.record["held_out"],
-        **told,
-    }
-
-
-def _trained(settings: Settings) -> dict[str, Any]:
-    """Train a small network on most of the runs, and predict the others."""
-    from bellcrank.surrogate.beginning import begin
-    from bellcrank.surrogate.recipes import recipe_of
-
-    data = dataset(settings)
-    recipe = recipe_of("own", model=settings.model, epochs=settings.epochs, precision="float32")
-    with one_thread():
-        training = begin(data, recipe, device="cpu")
-        for _ in training.run():
-            pass
-        model = training.finish()
-    held_out = training.split.held_out
-    told = _tested(model.predict(data.packed[held_out]), data.efficiency[held_out])
-    epochs = [
-        {"designs": each["designs"], "r_squared": each["r_squared"]}
-        for each in model.record["epochs"]
-    ]
-    return {"network": model.architecture, "looks": model.seen["designs"], "epochs": epochs, **told}
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Keep small networks from waiting for threads."""
-    torch = import_torch()
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-def _tested(predicted: np.ndarray, actual: np.ndarray) -> dict[str, Any]:
-    """Return how predictions agree, as figures and as counts on a grid."""
-    from bellcrank.surrogate.metrics import accuracy
-
-    low = float(min(predicted.min(), actual.min()))
-    high = float(max(predicted.max(), actual.max()))
-    room = 0.02 * (high - low)
-    ends = (low - room, high + room)
-    grid, _, _ = np.histogram2d(predicted, actual, bins=BINS, range=(ends, ends))
-    slope, offset = np.polyfit(actual, predicted, 1)
-    both = [np.histogram(values, bins=BINS, range=ends)[0] for values in (actual, predicted)]
-    return {
-        "accuracy": accuracy(predicted, actual).to_dict(),
-        "fit": [float(slope), float(offset)],
-        "ends": ends,
-        "grid": grid.astype(int).tolist(),
-        "spread": {"mechanics": both[0].tolist(), "network": both[1].tolist()},
-    }
-
-
-def _records() -> dict[str, Any]:
-    """Return what the records of longer jobs say, where there are any."""
-    found: dict[str, Any] = {}
-    for name, read in (("resnet50", _resnet50), ("driven", _driven), ("costs", _costs)):
-        path = RECORDS / f"{name}.json"
-        if path.is_file():
-            told = json.loads(path.read_text(encoding="utf-8"))
-            found[name] = {**read(told), "commit": told["provenance"]["commit"]}
-    return found
-
-
-def _resnet50(told: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "designs": told["data"]["designs"],
-        "looks": told["designs"],
-        "r_squared": told["held_out"]["r_squared"],
-        "epochs": [
-            {"designs": each["designs"], "r_squared": each["r_squared"]} for each in told["epochs"]
-        ],
-    }
-
-
-def _driven(told: Mapping[str, Any]) -> dict[str, Any]:
-    final = [each for each in told["by_network"] if each["offer"] == "final"]
-    mechanics = [each for each in told["by_mechanics"] if each["offer"] == "final"]
-    return {
-        "chains": told["settings"]["chains"],
-        "distance": told["medians"]["final"]["distance"],
-        "distances": [each["distance"] for each in final],
-        "median_network": told["medians"]["final"]["network"],
-        "median_mechanics": told["medians"]["final"]["mechanics"],
-        "mechanics": [each["efficiency"] for each in mechanics],
-        "network": [each["efficiency"] for each in final],
-    }
-
-
-def _costs(told: Mapping[str, Any]) -> dict[str, Any]:
-    rows = {(row["what"], row["where"], row["batch"]): row["microseconds"] for row in told["costs"]}
-    core = "one core"
-    return {
-        "fire": rows["`fire` response", core, 1],
-        "newton": rows["Newton response (default)", core, 1],
-        "resnet18": min(
-            value for (what, where, _), value in rows.items()
-            if where == core and what.startswith("resnet18-w16")
-        ),
-        "resnet50": min(
-            (value for (what, where, _), value in rows.items()
-             if where == core and what.startswith("resnet50")), default=None
-        ),
-    }  # fmt: skip
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
@@ -275,7 +93,7 @@ def _designs(figures: Mapping[str, Any]) -> Chart:
     groups = [("mechanics", style.INPUT), ("network", style.BEST)]
     made = figures["records"].get("driven")
     if made is None:
-        ends = np.linspace(*figures["ends"], BINS + 1)
+        ends = np.linspace(figures["ends"][0], figures["ends"][1], BINS + 1)
         total = sum(figures["spread"]["mechanics"])
         spread = [
             Series(ends[:-1], 100.0 / total * np.array(figures["spread"][name]), kind="steps",

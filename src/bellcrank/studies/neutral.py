@@ -66,7 +66,7 @@ def contour_of(box: Box, density: NDArray[np.float64], area: float) -> shapely.P
 def _at_level(box: Box, density: NDArray[np.float64], level: float) -> shapely.Polygon | None:
     from contourpy import FillType, contour_generator
 
-    rows, columns = density.shape
+    rows, columns = len(density), len(density[0])
     step = (box.high - box.low) / np.array([columns, rows])
     x = box.low[0] + step[0] * (np.arange(-1, columns + 1) + 0.5)
     y = box.low[1] + step[1] * (np.arange(-1, rows + 1) + 0.5)
@@ -75,7 +75,8 @@ def _at_level(box: Box, density: NDArray[np.float64], level: float) -> shapely.P
     y[0], y[-1] = box.low[1] - 1e-3, box.high[1] + 1e-3
     padded = np.pad(density, 1, mode="edge")
     generator = contour_generator(x=x, y=y, z=padded, fill_type=FillType.OuterOffset)
-    points, offsets = generator.filled(level, 2.0)
+    filled: Any = generator.filled(level, 2.0)
+    points, offsets = filled
     pieces = []
     for corners, starts in zip(points, offsets, strict=True):
         rings = [corners[a:b] for a, b in itertools.pairwise(starts)]

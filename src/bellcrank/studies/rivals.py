@@ -96,6 +96,7 @@ def _task(name: str, settings: Settings, bench: Bench) -> dict[str, Any]:
             )
             for k, springs in enumerate(settings.springs)
         },
+        workers=1,  # pyMOTO has one network at a time
     )  # fmt: skip
     scored = bench.all(
         f"{name}-rival-judged",

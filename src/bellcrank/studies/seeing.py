@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.learning.explanation import as_drawn, explain_design
@@ -53,10 +53,10 @@ def run(settings: Settings, bench: Bench) -> Figures:
     rows = []
     bench.tell("designs", 0, settings.chains)
     for chain in range(settings.chains):
-        found = bench.one(f"chain-{chain}", lambda k=chain: run_chain(problem, search, k))
+        found = bench.one(f"chain-{chain}", partial(run_chain, problem, search, chain))
         mask = found["offered"][0]["mask"]
         rows.append(
-            bench.one(f"seen-{chain}", lambda m=mask: _told(settings.problem, m, settings.stride))
+            bench.one(f"seen-{chain}", partial(_told, settings.problem, mask, settings.stride))
         )
         bench.tell("designs", chain + 1, settings.chains)
     names = [name for name in MEASURES if name in rows[0]["agreement"]]

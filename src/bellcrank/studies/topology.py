@@ -42,7 +42,7 @@ def pymoto() -> Any:
 
     # On import pyMOTO chooses a window system for all pictures of the process, or fails.
     chosen = mpl.use
-    mpl.use = lambda *_names, **_more: None  # type: ignore[assignment]
+    mpl.use = lambda *_names, **_more: None
     try:
         import pymoto as module
     except ImportError as missing:
@@ -89,28 +89,29 @@ def optimise(
     step = size / np.array([across, up])
     solid, empty = _passive(box, domain, step, (across, up))
     load, output, held = _ports(box, domain, step)
-    began = time.thread_time()
-    density = module.Signal("x", state=np.full(domain.nel, volume))
-    constant = _springs(load, output, springs)
-    with module.Network() as network:
-        chosen = module.SetValue(indices=solid, value=1.0)(density)
-        chosen = module.SetValue(indices=empty, value=0.0)(chosen)
-        smooth = module.DensityFilter(domain, radius=radius)(chosen)
-        stiff = module.MathExpression(f"{LEAST} + {1.0 - LEAST}*inp0^3")(smooth)
-        matrix = module.AssembleStiffness(
-            domain, e_modulus=1.0, poisson_ratio=POISSON, plane="stress", bc=held,
-            add_constant=constant,
-        )(stiff)  # fmt: skip
-        moved = module.LinSolve(symmetric=True, positive_definite=True)(
-            matrix, module.Signal("f", state=load)
-        )
-        reached = module.EinSum("i,i->")(moved, module.Signal("l", state=-output))
-        objective = module.Scaling(scaling=10.0)(reached)
-        used = module.EinSum("i->")(smooth)
-        limit = module.Scaling(scaling=10.0, maxval=volume * domain.nel)(used)
-    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # its solvers convert matrices, and say so each time
-        module.minimize_mma(density, [objective, limit], network, maxit=iterations, verbosity=0)
+        began = time.thread_time()
+        density = module.Signal("x", state=np.full(domain.nel, volume))
+        constant = _springs(load, output, springs)
+        with module.Network() as network:
+            chosen = module.SetValue(indices=solid, value=1.0)(density)
+            chosen = module.SetValue(indices=empty, value=0.0)(chosen)
+            smooth = module.DensityFilter(domain, radius=radius)(chosen)
+            stiff = module.MathExpression(f"{LEAST} + {1.0 - LEAST}*inp0^3")(smooth)
+            matrix = module.AssembleStiffness(
+                domain, e_modulus=1.0, poisson_ratio=POISSON, plane="stress", bc=held,
+                add_constant=constant,
+            )(stiff)  # fmt: skip
+            moved = module.LinSolve(symmetric=True, positive_definite=True)(
+                matrix, module.Signal("f", state=load)
+            )
+            reached = module.EinSum("i,i->")(moved, module.Signal("l", state=-output))
+            objective = module.Scaling(scaling=10.0)(reached)
+            used = module.EinSum("i->")(smooth)
+            limit = module.Scaling(scaling=10.0, maxval=volume * domain.nel)(used)
+        with contextlib.redirect_stdout(io.StringIO()):
+            module.minimize_mma(density, [objective, limit], network, maxit=iterations, verbosity=0)
     return {
         "density": np.asarray(smooth.state).reshape(up, across).round(4).tolist(),
         "elements": [across, up],
