@@ -112,16 +112,17 @@ def _print(record: Mapping[str, Any]) -> None:
 
 
 def _write_page(out: Path) -> None:
-    """Write the page that compares the records in a folder with the paper."""
+    """Write the page that compares the records in a folder with the paper; draw them anew."""
     from bellcrank.model.storage import write_text
     from bellcrank.studies.page import page_of
-    from bellcrank.studies.records import read_records
+    from bellcrank.studies.records import read_records, refresh
 
-    records = read_records(out)
-    if not records:
+    names = read_records(out)
+    if not names:
         raise InvalidSettings(
             f"{out}: no records of studies there; bellcrank study all --out {out}"
         )
+    records = {name: refresh(out / f"{name}.json") for name in names}
     page = out.parent / PAGE_FILE
     write_text(page, page_of(records, pictures=f"{out.name}/"), overwrite=True)
     notes.print(f"wrote {plain(page)}")

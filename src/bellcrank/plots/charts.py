@@ -310,6 +310,6 @@ def _spell_out(axes: Axes) -> None:
     if high > 32.0 * low:
         return
     powers = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
-    places = [k * 10.0**p for p in powers for k in (1, 2, 3, 5) if low <= k * 10.0**p <= high]
+    places = [k * 10.0**p for p in powers for k in (1, 2, 5) if low <= k * 10.0**p <= high]
     axes.set_xticks(places, [plain_number(place) for place in places])
     axes.xaxis.set_minor_locator(NullLocator())

@@ -100,7 +100,7 @@ def _designs(figures: Mapping[str, Any]) -> Chart:
                    name=f"by {name}", colour=colour)
             for name, colour in groups
         ]  # fmt: skip
-        return Chart("The same designs", "efficiency", "designs, %", spread, legend="upper right")
+        return Chart("The same designs", "efficiency", "designs, %", spread, legend="upper left")
     known = {
         name: np.array([value for value in made[name] if value is not None]) for name, _ in groups
     }

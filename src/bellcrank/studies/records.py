@@ -97,6 +97,32 @@ def run_study(
     return record
 
 
+def refresh(path: Path) -> dict[str, Any]:
+    """Say and draw anew what the figures of a record mean; nothing is computed.
+
+    Returns
+    -------
+    dict
+        The record, as it lies there then.
+
+    Raises
+    ------
+    InvalidFile, StorageError
+    """
+    record = read_record(path)
+    study = studies[str(record["study"])]
+    record |= {
+        "title": study.title,
+        "after": study.after,
+        "runs": study.runs(record["figures"]),
+        "comparison": [claim.to_dict() for claim in study.claims(record["figures"])],
+        "deviations": list(study.deviations),
+    }
+    draw_record(record, path.with_suffix(".png"))
+    write_text(path, as_text(record), overwrite=True)
+    return record
+
+
 def command_of(study: Study, *, quick: bool) -> str:
     """Return what to type."""
     return f"bellcrank study {study.name}" + (" --quick" if quick else "")
