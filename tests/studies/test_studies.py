@@ -125,16 +125,17 @@ def test_lists_of_numbers_take_one_line() -> None:
     assert rounded([float("inf"), np.pi]) == [None, 3.14159]
 
 
-def test_a_large_picture_is_made_smaller() -> None:
+def test_a_large_picture_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
     from io import BytesIO
 
     from PIL import Image
 
-    noise = np.random.default_rng(0).integers(0, 255, (700, 900, 3), dtype=np.uint8)
+    monkeypatch.setattr("bellcrank.studies.records.LARGEST", 1000)
+    noise = np.random.default_rng(0).integers(0, 255, (70, 90, 3), dtype=np.uint8)
     content = BytesIO()
     Image.fromarray(noise).save(content, format="PNG")
     with Image.open(BytesIO(shrunk(content.getvalue()))) as small:
-        assert small.size == (450, 350)
+        assert small.size == (45, 35)
 
 
 def test_a_slope_is_that_of_a_power_law() -> None:
