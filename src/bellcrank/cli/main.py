@@ -27,6 +27,7 @@ from bellcrank.cli import (
     print_part,
     problems,
     serve,
+    study,
     surrogate_search,
     train,
     validate,
@@ -55,6 +56,7 @@ COMMANDS = (
     machine,
     machine_predict,
     library,
+    study,
     problems,
     serve,
 )

@@ -1,0 +1,315 @@
+"""Plain charts in the looks of all other pictures: curves, points, histograms, densities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, NullLocator
+
+from bellcrank.plots import style
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+Kind = Literal["line", "steps", "points", "both", "bars", "histogram"]
+ROOM_FOR_NAME = 0.11
+"""Height that a line of the legend takes over histograms, as a part of the highest bar."""
+MANY = 1.0e5
+"""From here on numbers on an axis are written as powers of ten."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """A row of numbers to be drawn.
+
+    Parameters
+    ----------
+    x, y : (n,) float64
+        Places. Of a histogram, `x` are the (b + 1,) edges of its bins and `y` the values.
+    name
+        In the legend; not there if it is empty.
+    kind
+        How it is drawn.
+    colour
+        As matplotlib reads it.
+    low, high : (n,) float64 or None
+        Ends of a band around a curve, or of bars through points.
+    dashed
+        Whether curves are broken.
+    width
+        Of curves, points; of bars, in units of `x`.
+    level
+        What lies higher covers what lies lower.
+    labels
+        Words over bars or beside points.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    name: str = ""
+    kind: Kind = "line"
+    colour: str = style.BEST
+    low: NDArray[np.float64] | None = None
+    high: NDArray[np.float64] | None = None
+    dashed: bool = False
+    width: float = 1.6
+    level: float = 3.0
+    labels: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A line across a chart at some height, or up at some place.
+
+    Parameters
+    ----------
+    value
+        Where.
+    name
+        In the legend.
+    colour
+        As matplotlib reads it.
+    upright
+        Whether it stands at a place across instead.
+    """
+
+    value: float
+    name: str = ""
+    colour: str = style.HUMAN
+    upright: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Density:
+    """How many points lie in each of the squares of a grid.
+
+    Parameters
+    ----------
+    count : (b, b)
+        First index up, second across.
+    low, high
+        Ends of both axes.
+    """
+
+    count: NDArray[np.float64]
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chart:
+    """What one pair of axes shows.
+
+    Parameters
+    ----------
+    title
+        Over it.
+    across, up
+        What the axes are.
+    series, levels
+        What is drawn.
+    log_x, log_y
+        Whether axes are logarithmic.
+    limits_x, limits_y
+        Ends of axes; None where they follow from what is drawn.
+    names
+        Words below the places 0, 1, 2, ... in place of numbers.
+    density
+        Drawn below all else.
+    legend
+        Where the legend stands, as matplotlib says it; None for none.
+    note
+        Lines written into the upper left corner.
+    """
+
+    title: str
+    across: str
+    up: str
+    series: Sequence[Series] = ()
+    levels: Sequence[Level] = ()
+    log_x: bool = False
+    log_y: bool = False
+    limits_x: tuple[float | None, float | None] = (None, None)
+    limits_y: tuple[float | None, float | None] = (None, None)
+    names: Sequence[str] = ()
+    density: Density | None = None
+    legend: str | None = "best"
+    note: Sequence[str] = field(default=())
+
+
+def put_chart(axes: Axes, chart: Chart) -> None:
+    """Draw a chart into its axes."""
+    if chart.log_x:
+        axes.set_xscale("log")
+    if chart.log_y:
+        axes.set_yscale("log")
+    if chart.density is not None:
+        _put_density(axes, chart.density)
+    for series in chart.series:
+        _DRAWERS[series.kind](axes, series)
+    for level in chart.levels:
+        draw = axes.axvline if level.upright else axes.axhline
+        draw(
+            level.value, color=level.colour, linewidth=1.5, linestyle=(0, (5, 2.5)),
+            label=level.name or None, zorder=4,
+        )  # fmt: skip
+    axes.set_xlim(*chart.limits_x)
+    axes.set_ylim(*chart.limits_y)
+    if chart.legend is not None and any(each.kind == "histogram" for each in chart.series):
+        axes.set_ylim(0.0, axes.get_ylim()[1] * (1.0 + ROOM_FOR_NAME * _named(chart)))
+    _dress(axes, chart)
+
+
+def _named(chart: Chart) -> int:
+    """Return how many lines the legend has."""
+    names = [each.name for each in chart.series] + [each.name for each in chart.levels]
+    return sum(map(bool, names))
+
+
+def _put_line(axes: Axes, series: Series) -> None:
+    looks: dict[str, Any] = {"color": series.colour, "zorder": series.level}
+    if series.low is not None and series.high is not None:
+        axes.fill_between(
+            series.x, series.low, series.high, color=series.colour, alpha=0.18, linewidth=0,
+            zorder=series.level - 0.5,
+        )  # fmt: skip
+    if series.kind == "both":
+        looks |= {"marker": "o", "markersize": 4.2, "markeredgecolor": "white"}
+        looks |= {"markeredgewidth": 0.6}
+    axes.plot(
+        series.x, series.y, linewidth=series.width, label=series.name or None,
+        linestyle=(0, (4, 2)) if series.dashed else "-",
+        drawstyle="steps-post" if series.kind == "steps" else "default",
+        solid_joinstyle="round", **looks,
+    )  # fmt: skip
+
+
+def _put_points(axes: Axes, series: Series) -> None:
+    if series.low is not None and series.high is not None:
+        reach = np.abs(np.array([series.y - series.low, series.high - series.y]))
+        axes.errorbar(
+            series.x, series.y, yerr=reach, fmt="none", ecolor=series.colour, elinewidth=1.3,
+            alpha=0.55, zorder=series.level - 0.1,
+        )  # fmt: skip
+    axes.plot(
+        series.x, series.y, linestyle="none", marker="o", markersize=3.4 * series.width,
+        color=series.colour, markeredgecolor="white", markeredgewidth=0.5,
+        label=series.name or None, zorder=series.level, clip_on=False,
+    )  # fmt: skip
+    for x, y, words in zip(series.x, series.y, series.labels, strict=False):
+        _write(axes, words, (float(x), float(y)), offset=(6.0, 0.0), ha="left", va="center")
+
+
+def _put_bars(axes: Axes, series: Series) -> None:
+    axes.bar(
+        series.x, series.y, width=series.width, color=series.colour, label=series.name or None,
+        zorder=series.level, linewidth=0,
+    )  # fmt: skip
+    for x, y, words in zip(series.x, series.y, series.labels, strict=False):
+        up = float(y) if np.isfinite(y) else 0.0
+        _write(axes, words, (float(x), up), offset=(0.0, 3.0), ha="center", va="bottom")
+
+
+def _put_histogram(axes: Axes, series: Series) -> None:
+    share = np.full(len(series.y), 100.0 / max(len(series.y), 1))
+    looks: dict[str, Any] = {"bins": series.x, "weights": share, "color": series.colour}
+    axes.hist(series.y, **looks, alpha=0.18, zorder=series.level)
+    axes.hist(
+        series.y, **looks, histtype="step", linewidth=1.6, label=series.name or None,
+        zorder=series.level + 0.1,
+    )  # fmt: skip
+
+
+_DRAWERS = {
+    "line": _put_line,
+    "steps": _put_line,
+    "both": _put_line,
+    "points": _put_points,
+    "bars": _put_bars,
+    "histogram": _put_histogram,
+}
+
+
+def _put_density(axes: Axes, density: Density) -> None:
+    """Draw counts in a logarithmic scale of blues."""
+    from matplotlib.colors import LinearSegmentedColormap, LogNorm
+
+    colours = LinearSegmentedColormap.from_list("count", ["#d6e6f2", style.BEST, "#0b2239"])
+    ends = (density.low, density.high)
+    picture: Any = np.ma.masked_less(density.count, 1.0)
+    axes.imshow(
+        picture, origin="lower", extent=(*ends, *ends), cmap=colours, interpolation="nearest",
+        norm=LogNorm(1.0, max(float(density.count.max()), 2.0)), aspect="auto", zorder=2,
+    )  # fmt: skip
+    axes.grid(axis="x", color=style.IDLE_REST, linewidth=0.8)
+
+
+def _write(axes: Axes, words: str, place: tuple[float, float], **looks: Any) -> None:
+    axes.annotate(
+        words, place, xytext=looks.pop("offset"), textcoords="offset points",
+        size=style.SMALL_SIZE - 1.0, color=style.INK, family=style.FONT, zorder=7,
+        annotation_clip=False, **looks,
+    )  # fmt: skip
+
+
+def plain_number(value: float, _place: int = 0) -> str:
+    r"""Write a number as it stands on an axis.
+
+    Examples
+    --------
+    >>> plain_number(20000.0), plain_number(0.05), plain_number(1e6)
+    ('20\u202f000', '0.05', '10⁶')
+    """
+    size = abs(value)
+    if size >= MANY or 0.0 < size < 1e-3:
+        power = round(float(np.log10(size)))
+        return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{value:,.0f}".replace(",", "\u202f") if size >= 1000 else f"{value:g}"
+
+
+def _dress(axes: Axes, chart: Chart) -> None:
+    """Write titles, axes and legend."""
+    axes.set_title(
+        chart.title, size=style.LABEL_SIZE, weight="bold", loc="left", pad=9.0,
+        family=style.FONT, color=style.INK,
+    )  # fmt: skip
+    style.label(axes, chart.across, chart.up, style.LABEL_SIZE - 0.5)
+    style.quieten(axes)
+    for axis, logarithmic in ((axes.xaxis, chart.log_x), (axes.yaxis, chart.log_y)):
+        if logarithmic:
+            axis.set_major_formatter(FuncFormatter(plain_number))
+            axis.set_minor_formatter(NullFormatter())
+        else:
+            axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
+    if chart.log_x:
+        _spell_out(axes)
+    if chart.names:
+        axes.set_xticks(range(len(chart.names)), chart.names, family=style.FONT)
+        axes.tick_params(axis="x", length=0.0, labelcolor=style.INK)
+    for place, line in enumerate(chart.note):
+        axes.text(
+            0.035, 0.955 - 0.075 * place, line, transform=axes.transAxes, va="top", ha="left",
+            size=style.SMALL_SIZE, color=style.INK, family=style.FONT, zorder=8,
+        )  # fmt: skip
+    if chart.legend is not None and axes.get_legend_handles_labels()[1]:
+        where: Any = chart.legend
+        axes.legend(
+            loc=where, frameon=False, labelcolor=style.INK, handlelength=1.7,
+            prop={"family": style.FONT, "size": style.SMALL_SIZE}, labelspacing=0.35,
+        ).set_zorder(9)  # fmt: skip
+
+
+def _spell_out(axes: Axes) -> None:
+    """Put numbers at 1, 2 and 5 times powers of ten where an axis spans less than 1.5 decades."""
+    low, high = axes.get_xlim()
+    if high > 32.0 * low:
+        return
+    powers = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
+    places = [k * 10.0**p for p in powers for k in (1, 2, 5) if low <= k * 10.0**p <= high]
+    axes.set_xticks(places, [plain_number(place) for place in places])
+    axes.xaxis.set_minor_locator(NullLocator())

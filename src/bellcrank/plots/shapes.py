@@ -1,0 +1,129 @@
+"""Shapes of any origin at rest and moved, in panels to one scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.patches import FancyArrow, PathPatch
+from matplotlib.path import Path as Curve
+
+from bellcrank.plots import style
+from bellcrank.plots.legend import add_legend, arrow_entry, strut_entry
+from bellcrank.plots.saving import check_target, save_figure
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+WIDTH, MARGIN, GAP, WORDS, FOOT = 11.0, 0.25, 0.3, 0.78, 0.55
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """A shape and where it goes.
+
+    Parameters
+    ----------
+    title, notes
+        What stands over it; at most two lines of notes.
+    curves
+        Closed curves, (n, 4) each: x and y at rest, x and y moved; outer ones
+        counterclockwise, holes clockwise.
+    inputs, outputs
+        (x, y, direction x, direction y) of each port.
+    held
+        (x, y) of each place that is held.
+    """
+
+    title: str
+    notes: Sequence[str]
+    curves: Sequence[NDArray[np.float64]]
+    inputs: Sequence[tuple[float, float, float, float]]
+    outputs: Sequence[tuple[float, float, float, float]]
+    held: Sequence[tuple[float, float]]
+
+
+def draw_shapes(
+    shapes: Sequence[Shape],
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    note: str = "",
+    overwrite: bool = False,
+) -> None:
+    """Draw shapes in a row, all to one scale.
+
+    Raises
+    ------
+    InvalidSettings, OutputExists, StorageError
+        As `save_figure`.
+    """
+    check_target(path, overwrite=overwrite)
+    places = np.concatenate(
+        [np.concatenate([c[:, :2], c[:, 2:]]) for shape in shapes for c in shape.curves]
+    )
+    low, high = places.min(axis=0), places.max(axis=0)
+    arrow = 0.13 * float((high - low)[0])
+    room = np.array([arrow, 2.0])
+    low, high = low - room, high + room
+    count = len(shapes)
+    scale = (WIDTH - 2 * MARGIN - GAP * (count - 1)) / count / float((high - low)[0])
+    across, up = scale * (high - low)
+    top = MARGIN + style.heading_height(title, note) + 0.14
+    figure = style.new_figure(WIDTH, top + WORDS + up + FOOT)
+    height = float(figure.get_size_inches()[1])
+    style.write_heading(figure, title, note, MARGIN, MARGIN)
+    for place, shape in enumerate(shapes):
+        left = MARGIN + place * (across + GAP)
+        style.write_heading(figure, shape.title, shape.notes[0], left, top)
+        for line, words in enumerate(shape.notes[1:], start=1):
+            style.write_heading(figure, "", words, left, top + 0.27 + 0.2 * line)
+        axes = figure.add_axes((left / WIDTH, FOOT / height, across / WIDTH, up / height))
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        axes.set_axis_off()
+        _put_shape(axes, shape, arrow)
+    entries = [
+        ("at rest", strut_entry(style.REST)), ("moved", strut_entry(style.INK)),
+        ("held", strut_entry(style.GROUND, 6.0)), ("input", arrow_entry(style.INPUT)),
+        ("output, wanted", arrow_entry(style.WANTED)),
+    ]  # fmt: skip
+    add_legend(figure, entries, 0.2, len(entries))
+    save_figure(figure, path, overwrite=overwrite)
+
+
+def _put_shape(axes: Axes, shape: Shape, arrow: float) -> None:
+    for first, colour, level in ((0, style.REST, 1.0), (2, style.INK, 2.0)):
+        corners, codes = [], []
+        for curve in shape.curves:
+            ring = curve[:, first : first + 2]
+            corners.append(np.vstack([ring, ring[:1]]))
+            codes += [Curve.MOVETO, *[Curve.LINETO] * (len(ring) - 1), Curve.CLOSEPOLY]
+        whole = Curve(np.concatenate(corners), codes)
+        axes.add_patch(PathPatch(whole, facecolor=colour, edgecolor="none", zorder=level))
+    for x, y in shape.held:
+        axes.plot(
+            [x], [y], marker="s", markersize=7.0, color=style.GROUND, markeredgecolor="white",
+            zorder=4,
+        )  # fmt: skip
+    for x, y, dx, dy in shape.inputs:
+        _put_arrow(axes, (x - arrow * dx, y - arrow * dy), (dx, dy), arrow, style.INPUT)
+    for x, y, dx, dy in shape.outputs:
+        _put_arrow(axes, (x, y), (dx, dy), 0.9 * arrow, style.WANTED)
+
+
+def _put_arrow(
+    axes: Axes, tail: tuple[float, float], way: tuple[float, float], length: float, colour: str
+) -> None:
+    axes.add_patch(
+        FancyArrow(
+            *tail, length * way[0], length * way[1], width=0.14 * length,
+            head_width=0.42 * length, head_length=0.4 * length, length_includes_head=True,
+            facecolor=colour, edgecolor="white", linewidth=0.6, zorder=6,
+        )
+    )  # fmt: skip
