@@ -14,9 +14,8 @@ import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from bellcrank.cli.machine import find_part
-from bellcrank.machines import Machine, assemble, compare, foretell, predict, simulate
-from bellcrank.machines.showcases import find_plan, showcases
+from bellcrank.machines import Machine, compare, foretell, predict, simulate
+from bellcrank.machines.showcases import showcase, showcases
 from bellcrank.mechanics import CAREFUL, Evaluator
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
@@ -81,11 +80,6 @@ class Row:
     doubts: tuple[str, ...]
 
 
-def build(name: str) -> Machine:
-    """Build a machine that comes along."""
-    return assemble(find_plan(name), lambda entry: find_part(Path(), entry))
-
-
 def designed(machine: Machine, name: str, options: argparse.Namespace) -> float | None:
     """Search on from a machine, or take what a search has found."""
     if not options.steps:
@@ -106,9 +100,9 @@ def designed(machine: Machine, name: str, options: argparse.Namespace) -> float 
 
 def measure(name: str, options: argparse.Namespace) -> Row:
     """Measure one machine."""
-    build(name), predict(build(name))  # read and compiled
+    predict(showcase(name))  # read and compiled
     start = time.perf_counter()
-    machine = build(name)
+    machine = showcase(name)
     built = time.perf_counter()
     problem, mask = machine.design.problem, machine.design.mask
     response = Evaluator(problem).respond(mask, CAREFUL)

@@ -33,17 +33,12 @@ PlanName = Annotated[
 ]
 
 
-STRUT = "strut-"
-
-
 @design_sources.register("struts")
 def design_of_strut(name: str) -> Design | None:
     """Return the strut of a length, like strut-6; None for other names."""
-    if not name.startswith(STRUT) or not name.removeprefix(STRUT).isdecimal():
-        return None
-    from bellcrank.machines.elementary import strut
+    from bellcrank.machines.elementary import strut_named
 
-    return strut(int(name.removeprefix(STRUT))).full_design()
+    return strut_named(name)
 
 
 @machine.command(name="list")

@@ -18,7 +18,7 @@ from bellcrank.model import Input, Output, Problem, Supports, lattices
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.model import Lattice
+    from bellcrank.model import Design, Lattice
 
 HEIGHT = math.sqrt(3.0) / 2.0
 PUSH = 0.02
@@ -120,6 +120,26 @@ def strut(length: int) -> Problem:
         output=Output(nodes=_hexagon(lattice, (0.0, HEIGHT)), direction=down),
         designable=np.arange(lattice.beam_count),
     )  # fmt: skip
+
+
+def strut_named(name: str) -> Design | None:
+    """Return the strut that a name like ``strut-6`` stands for; None for other names.
+
+    Raises
+    ------
+    InvalidSettings
+        If it is too short.
+
+    Examples
+    --------
+    >>> bar = strut_named("strut-6")
+    >>> bar.problem.name, strut_named("lever-6")
+    ('strut-6', None)
+    """
+    kind, _, length = name.partition("-")
+    if kind != "strut" or not length.isdecimal():
+        return None
+    return strut(int(length)).full_design()
 
 
 def _lattice(columns: int, rows: int) -> Lattice:

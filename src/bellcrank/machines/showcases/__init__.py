@@ -14,6 +14,9 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from bellcrank.errors import UnknownName
+from bellcrank.machines.assembly import Machine, assemble
+from bellcrank.machines.elementary import strut_named
+from bellcrank.machines.library import find_entry
 from bellcrank.machines.plan import Plan, read_plan
 
 SUFFIX = ".toml"
@@ -45,3 +48,18 @@ def find_plan(name_or_path: str) -> Plan:
     source = files("bellcrank.machines.showcases") / f"{name_or_path}{SUFFIX}"
     with as_file(source) as path:
         return read_plan(path)
+
+
+def showcase(name: str) -> Machine:
+    """Build a machine that comes with the package.
+
+    Raises
+    ------
+    UnknownName
+
+    Examples
+    --------
+    >>> len(showcase("wave").parts)
+    10
+    """
+    return assemble(find_plan(name), lambda entry: strut_named(entry) or find_entry(entry).design)
