@@ -20,6 +20,7 @@ from bellcrank.model.storage import read_text, write_text
 from bellcrank.web.tracing import Trace
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from bellcrank.model import Design, Problem
@@ -170,7 +171,7 @@ class Jobs:
                 except BellcrankError:
                     continue  # what is damaged is left for a person to look at
 
-    def __iter__(self) -> Any:
+    def __iter__(self) -> Iterator[Job]:
         return iter(sorted(self._jobs.values(), key=lambda job: -job.record.created))
 
     def __len__(self) -> int:

@@ -13,7 +13,6 @@ FileSuffix = Literal["stl", "3mf", "svg", "dxf", "step", "mp4", "gif", "pdf", "j
 Level = Literal["frame", "plane", "solid"]
 Mask = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=4000)]
 Session = Annotated[str, Field(pattern=r"^[a-z0-9-]{1,64}$")]
-RunId = Annotated[str, Field(pattern=r"^[a-z0-9]{12}$")]
 Goals = Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=12)]
 
 MEDIA = {
