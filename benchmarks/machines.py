@@ -25,8 +25,8 @@ from bellcrank.workflows import complete_design, reopen_design, start_design
 RECORD = Path(__file__).parents[1] / "docs" / "machines" / "showcases.json"
 SMALL = 1e-3
 """Part of the stroke in which all is linear."""
-MIRRORED = ("gripper", "wave")
-"""Machines that are to stay symmetric."""
+GOALS = {"gripper": ("mirror x",), "wave": ("mirror x", "connected")}
+"""What machines keep while they are designed further."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +87,9 @@ def designed(machine: Machine, name: str, options: argparse.Namespace) -> float 
     folder = options.work / f"{name}-{options.steps}-{options.chains}"
     if (summary := folder / "summary.json").exists():
         return float(json.loads(summary.read_text())["efficiency"])
-    goals = ("mirror x",) if name in MIRRORED else ()
-    settings = HoppingSettings(steps=options.steps, chains=options.chains, goals=goals)
+    settings = HoppingSettings(
+        steps=options.steps, chains=options.chains, goals=GOALS.get(name, ())
+    )
     if folder.exists():
         run = reopen_design(folder)
     else:
