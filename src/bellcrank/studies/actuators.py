@@ -122,21 +122,21 @@ def _study(name: str, after: str, full: Duel, quick: Duel, deviations: tuple[str
 
 CRANE = _study(
     "crane",
-    "figures 2 and 3",
+    "its first two actuators",
     Duel(problem="crane"),
     Duel(problem="crane", **QUICK),  # type: ignore[arg-type]
     DISPLACED,
 )
 ANTI_PARALLEL = _study(
     "anti-parallel",
-    "figures 2 and 3",
+    "its first two actuators",
     Duel(problem="anti-parallel"),
     Duel(problem="anti-parallel", **QUICK),  # type: ignore[arg-type]
     DISPLACED,
 )
 PLIERS = _study(
     "pliers",
-    "figure 4",
+    "its pliers",
     Duel(problem="pliers", paper_steps=4000, paper_chains=3, steps=4000, chains=3),
     Duel(problem="pliers", paper_steps=600, paper_chains=2, steps=800, chains=2, levels=("frame",)),
     FORCED,

@@ -210,7 +210,7 @@ STUDY = register(
     Study(
         name="amplitude",
         title="Efficiency against input stroke, and buckling",
-        after="supplement",
+        after="amplitude of the input",
         full=Settings(),
         quick=Settings(points=10, steps=1500, chains=2),
         run=run,

@@ -147,7 +147,7 @@ STUDY = register(
     Study(
         name="angular-springs",
         title="Angular springs around a node, before and after removals",
-        after="methods",
+        after="sketch of angular springs",
         full=Settings(),
         quick=Settings(),
         run=run,

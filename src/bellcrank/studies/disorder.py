@@ -160,7 +160,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
     paper, own = told["paper"], told["basin-hopping"]
     return [
         Claim(
-            "disordered lattices make actuators too",
+            "efficiency of designs on disordered lattices",
             "",
             f"efficiency {span(paper['discs']['least'], paper['discs']['largest'])}, median "
             f"{number(paper['discs']['median'])}, by the paper's rule on {figures['usable']} of "
@@ -168,7 +168,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
             "discrete model, cleaned designs",
         ),
         Claim(
-            "against order",
+            "without order and with it",
             "",
             f"by the paper's rule median {number(paper['discs']['median'])} without and "
             f"{number(paper['ordered']['median'])} with it; by the default search "
@@ -182,7 +182,7 @@ STUDY = register(
     Study(
         name="disorder",
         title="Efficiencies on jammed packings of discs",
-        after="supplement",
+        after="disordered lattices",
         full=Settings(),
         quick=Settings(lattices=8, steps=800),
         run=run,

@@ -147,8 +147,8 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
         made = records["driven"]
         found += [
             Claim(
-                "designs made by the network are as efficient as those made by simulation",
-                "similar distributions",
+                "efficiency of designs that the network makes, and that simulation makes",
+                "",
                 f"medians {number(made['median_network'])} by the network, "
                 f"{number(made['median_mechanics'])} by mechanics; "
                 f"{count(made['chains'], 'chain')} each, efficiencies by mechanics",

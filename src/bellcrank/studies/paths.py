@@ -133,7 +133,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
             "settings of `--search paper`",
         ),
         Claim(
-            "the efficiency grows along every path and levels off, at heights that differ",
+            "efficiency at the end of paths from several seeds",
             "",
             f"ends at {span(figures['end']['least'], figures['end']['largest'])}, median "
             f"{number(figures['end']['median'])}, of {count(figures['chains'], 'chain')} after "
@@ -150,7 +150,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
     if figures["above_human"] is not None:
         told.append(
             Claim(
-                "chains end up better than the design by hand",
+                "machine designs pass the one by hand",
                 "",
                 f"{figures['above_human']} of {figures['chains']} pass its "
                 f"{number(figures['human'])}",

@@ -201,7 +201,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
             "that of is not known to us",
         ),
         Claim(
-            "larger lattices bring better actuators",
+            "efficiency that runs reach, against size",
             "",
             f"median best {number(first['best'][1])} with {first['beams']} designable beams, "
             f"{number(last['best'][1])} with {last['beams']}",
@@ -214,7 +214,7 @@ STUDY = register(
     Study(
         name="scaling",
         title="Time and efficiency against the number of beams",
-        after="supplement",
+        after="scaling with size",
         full=Settings(),
         quick=Settings(sizes=(8, 10, 12), runs=2, proposals_per_beam=6, relaxed=2),
         run=run,

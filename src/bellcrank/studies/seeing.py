@@ -149,7 +149,7 @@ STUDY = register(
     Study(
         name="regions",
         title="What a network sees, against exact sensitivities",
-        after="figure 6",
+        after="maps of functional regions",
         full=Settings(),
         quick=Settings(chains=1, stride=8),
         run=run,
