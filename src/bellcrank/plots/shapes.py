@@ -113,8 +113,9 @@ def _put_shape(axes: Axes, shape: Shape, arrow: float) -> None:
         )  # fmt: skip
     for x, y, dx, dy in shape.inputs:
         _put_arrow(axes, (x - arrow * dx, y - arrow * dy), (dx, dy), arrow, style.INPUT)
+    reach = (0.9 if len(shape.outputs) == 1 else 0.45) * arrow
     for x, y, dx, dy in shape.outputs:
-        _put_arrow(axes, (x, y), (dx, dy), 0.9 * arrow, style.WANTED)
+        _put_arrow(axes, (x, y), (dx, dy), reach, style.WANTED)
 
 
 def _put_arrow(

@@ -113,19 +113,24 @@ def _task(name: str, settings: Settings, bench: Bench) -> dict[str, Any]:
         "volume": ours.area / size,
         "ports": _ports(box),
         "ours": {
-            **mine,
+            **_flat(mine),
             "mask": chosen.design.mask_hex,
             "model": chosen.efficiency_after,
             "design_seconds": sum(chain["seconds"] for chain in chains),
         },
         "rival": {
-            **scored[best],
+            **_flat(scored[best]),
             "springs": rivals[best]["springs"],
             "model": rivals[best]["output_over_input"],
             "design_seconds": rivals[best]["seconds"],
             "all_efficiencies": [scored[key].get("efficiency") for key in rivals],
         },
     }
+
+
+def _flat(told: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a judgement whose curves are plain rows of numbers."""
+    return {**told, "drawing": [np.ravel(curve).tolist() for curve in told["drawing"]]}
 
 
 def _judged(box: Box, told: Mapping[str, Any], area: float, settings: Settings) -> dict[str, Any]:
@@ -176,7 +181,9 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
                             f"designed in {row['design_seconds']:.0f} s"
                         ),
                     ],
-                    curves=[np.array(curve) for curve in row["drawing"] if len(curve) > 2],
+                    curves=[
+                        np.reshape(curve, (-1, 4)) for curve in row["drawing"] if len(curve) > 8
+                    ],
                     inputs=[tuple(port) for port in ports["input"]],
                     outputs=[tuple(port) for port in ports["output"]],
                     held=[tuple(place) for place in ports["held"]],
@@ -207,7 +214,8 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
                 f"{number(rival.get('input_force_N'))} N; designed in "
                 f"{ours['design_seconds']:.0f} s and {rival['design_seconds']:.0f} s of one core; "
                 f"area {number(ours['area_mm2'], 0)} and {number(rival.get('area_mm2'), 0)} mm²",
-                _verdict(ours, rival),
+                f"{_verdict(ours, rival)}; pyMOTO by output spring, stiffest first: "
+                + ", ".join(number(value) for value in rival["all_efficiencies"]),
             )
         )
     return found
@@ -225,6 +233,7 @@ def _verdict(ours: Mapping[str, Any], rival: Mapping[str, Any]) -> str:
     for words, key, more in (
         ("efficiency", "efficiency", True),
         ("stress", "von_mises_MPa", False),
+        ("input force (less)", "input_force_N", False),
         ("time", "design_seconds", False),
     ):
         mine, other = ours.get(key), rival.get(key)

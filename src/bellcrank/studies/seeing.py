@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.learning.explanation import as_drawn, explain_design
 from bellcrank.model import Design, find_problem
 from bellcrank.plots.explanation import draw_explanation
+from bellcrank.studies.predicting import one_thread
 from bellcrank.studies.registry import Claim, Figures, Study, register
 from bellcrank.studies.searching import design_of, run_chain
 from bellcrank.studies.words import number, share
@@ -87,7 +88,8 @@ def explained(name: str, mask: str, stride: int) -> Explanation:
     from bellcrank.surrogate.occlusion import Block
 
     design: Design = design_of(find_problem(name), mask)
-    return explain_design(design, block=Block(stride=stride))
+    with one_thread():
+        return explain_design(design, block=Block(stride=stride))
 
 
 def _told(name: str, mask: str, stride: int) -> dict[str, Any]:
