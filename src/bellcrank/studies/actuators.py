@@ -46,6 +46,7 @@ FORCED = (
         "paper's own design by hand, recomputed elsewhere from a description, has 0.2211."
     ),
     "The paper's figures for pliers are of simulations.",
+    "Designs that snap as frames were not followed as printed outlines.",
 )
 
 

@@ -34,12 +34,20 @@ def analyse(design: Design, spec: PartSpec, level: str) -> dict[str, Any]:
 def analyse_all(
     bench: Bench, designs: Mapping[str, Design], spec: PartSpec, levels: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
-    """Analyse designs at several levels; what needs a library that is missing is left out."""
+    """Analyse designs at several levels.
+
+    What needs a library that is missing is left out, and so is what snaps as a frame already at
+    finer levels, where it would take long to find out.
+    """
     found: dict[str, dict[str, Any]] = {name: {} for name in designs}
     for level in levels:
         if level != "frame" and importlib.util.find_spec("ngsolve") is None:
             continue
-        work = {name: partial(analyse, design, spec, level) for name, design in designs.items()}
+        work = {
+            name: partial(analyse, design, spec, level)
+            for name, design in designs.items()
+            if found[name].get("frame", {}).get("status", "converged") == "converged"
+        }
         # NGSolve has one heap for all threads.
         workers = None if level == "frame" else 1
         for name, told in bench.all(level, work, workers=workers).items():

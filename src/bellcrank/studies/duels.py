@@ -159,6 +159,7 @@ def draw(
             [efficiency(figures, by, model) for by in order],
             MODELS[model],
             0.94 * wide,
+            frozenset(i for i, by in enumerate(order) if model in figures["designs"][by]),
         )
         for k, model in enumerate(models)
     ]
@@ -189,10 +190,18 @@ def draw(
     )
 
 
-def _bars(places: Any, values: list[float | None], looks: tuple[str, str], width: float) -> Series:
+def _bars(
+    places: Any,
+    values: list[float | None],
+    looks: tuple[str, str],
+    width: float,
+    known: frozenset[int] = frozenset(),
+) -> Series:
+    """Return bars; those that are known to have no efficiency are of designs that snap."""
     name, colour = looks
     drawn = np.array([0.0 if value is None else value for value in values])
-    labels = ["snaps" if value is None else number(value) for value in values]
+    labels = [("snaps" if k in known else "") if value is None else number(value)
+              for k, value in enumerate(values)]  # fmt: skip
     return Series(places, drawn, name=name, kind="bars", colour=colour, width=width, labels=labels)
 
 
@@ -213,4 +222,5 @@ def in_all_models(figures: Mapping[str, Any], by: str) -> str:
         if efficiency(figures, by, model) is not None
         else f"snaps as {MODELS[model][0]}"
         for model in levels_in(figures)
+        if model in figures["designs"][by]
     )

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from bellcrank.studies.registry import Study
 
 SCHEMA = "bellcrank/study/1"
-COLOURS = 160
-"""In a picture that is kept: enough for thin lines on white, and a third of the bytes."""
 LARGEST = 145_000
 """Bytes of a picture that is kept."""
-SCALES = (1.0, 0.85, 0.72, 0.6, 0.5)
+SIZES = ((1.0, 160), (0.85, 160), (0.72, 160), (0.6, 160), (0.6, 64), (0.5, 64), (0.42, 64))
+"""Parts of a picture's size and numbers of colours, tried in turn: 160 are enough for thin lines on
+white, and take a third of the bytes."""
 DIGITS = 6
 """Of the figures in a record."""
 
@@ -143,10 +143,10 @@ def shrunk(png: bytes) -> bytes:
         picture = opened.convert("RGB")
     width, height = picture.size
     found = b""
-    for part in SCALES:
+    for part, colours in SIZES:
         size = (round(part * width), round(part * height))
         scaled = picture if part == 1.0 else picture.resize(size, Image.Resampling.LANCZOS)
-        few = scaled.quantize(COLOURS, kmeans=1, dither=Image.Dither.NONE)
+        few = scaled.quantize(colours, kmeans=1, dither=Image.Dither.NONE)
         content = BytesIO()
         few.save(content, format="PNG", optimize=True, dpi=(200 * part, 200 * part))
         found = content.getvalue()
