@@ -272,8 +272,8 @@ STUDY = register(
         runs=runs,
         deviations=(
             (
-                "The rival optimises small motions of a sheet under a force, as its examples do; "
-                "it was made for stiffness and volume, not for what is judged here."
+                "The rival maximises small motions of the output under a given input force, as its "
+                "examples do; output over input at a given stroke is what is judged here."
             ),
             (
                 "Its densities are cut at the level that gives bellcrank's mass, or at the highest "

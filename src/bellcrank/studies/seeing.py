@@ -160,7 +160,7 @@ STUDY = register(
         runs=lambda told: f"{len(told['designs'])} designs",
         deviations=(
             "The network is the ResNet-18 that comes along, not the paper's ResNet50.",
-            "The exact change by each flip, which the paper does not show, stands beside.",
+            "The exact change of the efficiency by each flip stands beside the maps.",
         ),
     )
 )
