@@ -37,7 +37,6 @@ NOT_REMADE = """\
 - Prints and measurements: there is no printer and no testing machine here. Files for printing are
   checked by reading and slicing them (`docs/fabrication.md`).
 - The full training of the paper's ResNet50: 8.7 million looks need a GPU.
-- The 100 runs of each size in the paper's scaling: the record says how many there are.
 - Machines that combine actuators have no figure in the paper to compare with; `docs/machines.md`
   describes ours.
 """
