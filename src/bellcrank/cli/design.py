@@ -140,7 +140,10 @@ def design(
         folder = start_design(task, settings, out or Path(Path(task.name).name), part)
     progress = SearchProgress(read_settings(folder.settings))
     with stopping_on_interrupt() as stop, progress:
-        report = complete_design(folder, workers=workers, tell=progress, stop=stop, pareto=measures)
+        report = complete_design(
+            folder, workers=workers, tell=progress, trying=progress.trying, stop=stop,
+            pareto=measures,
+        )  # fmt: skip
     if report is None:
         notes.print(
             "Stopped; what is done is kept. Go on with: "
@@ -204,9 +207,13 @@ def stopping_on_interrupt() -> Iterator[threading.Event]:
 
 def _print_report(report: DesignReport) -> None:
     """Say what was designed, in a few lines."""
+    from bellcrank.workflows.report import part_rows
+
     selection = report.selection
     table = Table.grid(padding=(0, 2))
     table.add_row("efficiency", f"[bold]{selection.efficiency_after:.4f}[/]")
+    for name, value in part_rows(report):
+        table.add_row(name, value)
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
     table.add_row("where the search began", f"{report.initial_efficiency:.4f}")
     if report.human_response is not None:
@@ -226,5 +233,12 @@ def _print_report(report: DesignReport) -> None:
             "[bold yellow]warning:[/] no design was found that moves the output the wanted way; "
             "search longer (--steps) or from another initial design."
         )
+    if report.validation is not None:
+        for warning in report.validation.analyses[0].warnings:
+            notes.print(
+                f"[bold yellow]warning:[/] no design was found that works as this part: "
+                f"{plain(warning)}; search longer (--steps), with more chains (--chains), or for "
+                "other struts (--strut-width)."
+            )
     if not report.verified:
         notes.print("[bold yellow]warning:[/] the minimisers disagree; treat the design with care.")

@@ -32,7 +32,7 @@ class Live:
     def __init__(self, title: str, total: int | None, *columns: ProgressColumn) -> None:
         self._last_line = time.monotonic()
         self._bar = Progress(
-            TextColumn(f"[bold]{title}"),
+            TextColumn("[bold]{task.description}"),
             BarColumn(bar_width=24),
             TextColumn("{task.percentage:3.0f} %"),
             TextColumn("{task.fields[figures]}"),
@@ -41,7 +41,7 @@ class Live:
             console=notes,
             disable=not notes.is_terminal,
         )
-        self._task = self._bar.add_task("", total=total, figures="")
+        self._task = self._bar.add_task(title, total=total, figures="")
 
     def __enter__(self) -> Self:
         self._bar.start()

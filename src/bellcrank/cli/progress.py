@@ -49,6 +49,12 @@ class SearchProgress(Live):
             line = f"searching {share:3.0f} %  {figures}  left {self._time_left():.0f} s"
             self._show(done, self._total, figures, line)
 
+    def trying(self, done: int, total: int) -> None:
+        """Say how many of the best designs have been tried as parts."""
+        self._bar.update(self._task, description="as parts")
+        line = f"trying the best designs as parts: {done} of {total}"
+        self._show(done, total, f"the best designs, {done} of {total}", line)
+
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)
         temperature = f"T {self._temperature:.4f}  " if self._temperature > 0.0 else ""

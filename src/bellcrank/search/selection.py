@@ -21,7 +21,7 @@ from bellcrank.search.cleaning import clean, pieces
 from bellcrank.search.goals import GoalResponder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -56,6 +56,31 @@ class Candidate:
     chain: int
     step: int
     mask: bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finalist:
+    """A candidate that can be built once it is cleaned.
+
+    Parameters
+    ----------
+    found
+        The candidate, as the chain left it.
+    design
+        Cleaned: one piece, nothing loose, no dead ends.
+    response
+        Its response from rest.
+    """
+
+    found: Candidate
+    design: Design
+    response: Response
+
+
+Refusals: TypeAlias = "list[tuple[float, str]]"
+"""Efficiencies of designs that were refused, and why."""
+Choice: TypeAlias = "Callable[[Sequence[Finalist]], tuple[Finalist, Refusals]]"
+"""From finalists, the most efficient first, to one of them and what speaks against others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -221,11 +246,17 @@ def _why_not(judge: Responder, design: Design, response: Response) -> str | None
     return "in several pieces" if pieces(design.problem, design.mask) > 1 else None
 
 
+def most_efficient(finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals]:
+    """Choose the first."""
+    return finalists[0], []
+
+
 def select(
     problem: Problem,
     candidates: Iterable[Candidate],
     objective: str | None = None,
     judge: Responder | None = None,
+    choose: Choice = most_efficient,
 ) -> Selection:
     """Clean the candidates and choose the one that is most efficient afterwards.
 
@@ -237,6 +268,8 @@ def select(
     ----------
     judge
         Who knows the goals and strokes of the search, in the literal model; none by default.
+    choose
+        Who has the last word among those that qualify.
 
     Raises
     ------
@@ -246,31 +279,31 @@ def select(
     candidates = list(candidates)
     evaluator = Evaluator(problem, objective)
     judge = judge or evaluator
-    best: tuple[Candidate, Design, Response] | None = None
-    refused: list[tuple[float, str]] = []
+    finalists: list[Finalist] = []
+    refused: Refusals = []
     for candidate, design in _cleaned(problem, candidates, evaluator, judge):
         response = judge.respond(design.mask, largest_increment=CAREFUL)
         if (reason := _why_not(judge, design, response)) is not None:
             refused.append((response.efficiency, reason))
-        elif best is None or response.efficiency > best[2].efficiency:
-            best = candidate, design, response
-    if best is None:
+        else:
+            finalists.append(Finalist(candidate, design, response))
+    if not finalists:
         raise InvalidSettings(_none_left(problem, len(candidates), refused, judge))
-    candidate, design, response = best
-    reasons = [reason for value, reason in refused if value > response.efficiency]
+    finalists.sort(key=lambda each: each.response.efficiency, reverse=True)
+    chosen, passed_over = choose(finalists)
+    best = chosen.response.efficiency
+    reasons = [reason for value, reason in (*refused, *passed_over) if value > best]
     return Selection(
-        design=design,
-        response=response,
-        found=candidate,
-        efficiency_before=judge.respond(_bits(problem, candidate)).efficiency,
-        efficiency_after=response.efficiency,
+        design=chosen.design,
+        response=chosen.response,
+        found=chosen.found,
+        efficiency_before=judge.respond(_bits(problem, chosen.found)).efficiency,
+        efficiency_after=best,
         refused={reason: reasons.count(reason) for reason in sorted(set(reasons))},
     )
 
 
-def _none_left(
-    problem: Problem, count: int, refused: list[tuple[float, str]], judge: Responder
-) -> str:
+def _none_left(problem: Problem, count: int, refused: Refusals, judge: Responder) -> str:
     """Say why no candidate qualifies."""
     goals = judge.goals if isinstance(judge, GoalResponder) else ()
     if goals and not count:

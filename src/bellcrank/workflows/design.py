@@ -10,7 +10,7 @@ import numpy as np
 from bellcrank.errors import BellcrankError
 from bellcrank.mechanics import CAREFUL, Response, Status
 from bellcrank.model import Design, Problem, human_design, write_design
-from bellcrank.parts import calibrated
+from bellcrank.parts import PartSpec, calibrated
 from bellcrank.provenance import provenance
 from bellcrank.runs import RunFolder, check_free, remove_temporaries
 from bellcrank.search import (
@@ -21,22 +21,24 @@ from bellcrank.search import (
     advance_chain,
     candidates_of,
     make_responder,
+    most_efficient,
     read_settings,
     run_chains,
     searches,
     select,
     start_chain,
 )
+from bellcrank.workflows.choosing import FINE, LEVEL, PartChoice
 from bellcrank.workflows.outcome import DesignReport
 from bellcrank.workflows.pareto import write_front
+from bellcrank.workflows.record import begin_record
 from bellcrank.workflows.report import RESULTS, write_report
+from bellcrank.workflows.validate import validate
 
 if TYPE_CHECKING:
     import threading
     from collections.abc import Callable
     from pathlib import Path
-
-    from bellcrank.parts import PartSpec
 
 
 def prepare(problem: Problem, settings: SearchSettings) -> None:
@@ -100,6 +102,7 @@ def complete_design(
     *,
     workers: int | None = None,
     tell: Callable[[Progress], None] = lambda _progress: None,
+    trying: Callable[[int, int], None] = lambda _done, _total: None,
     stop: threading.Event | None = None,
     pareto: tuple[str, ...] = (),
 ) -> DesignReport | None:
@@ -112,6 +115,9 @@ def complete_design(
         results.
     tell
         Called with the progress of a chain, from its own thread.
+    trying
+        Called with how many of the best designs have been tried as parts, and of how many, where
+        the design is for a part.
     stop
         Set it to end the search after the steps at hand; what is done is kept.
     pareto
@@ -132,7 +138,7 @@ def complete_design(
     try:
         done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
         if done:
-            report = conclude(folder, settings)
+            report = conclude(folder, settings, trying)
             if pareto:
                 write_front(folder, settings, pareto)
             folder.finish()
@@ -187,13 +193,29 @@ def verify(design: Design, settings: SearchSettings, response: Response) -> dict
     return {"newton": response.efficiency, "cg": second.efficiency}
 
 
-def conclude(folder: RunFolder, settings: SearchSettings) -> DesignReport:
-    """Choose, clean, verify and compare, and write the result files."""
+def conclude(
+    folder: RunFolder,
+    settings: SearchSettings,
+    trying: Callable[[int, int], None] = lambda _done, _total: None,
+) -> DesignReport:
+    """Choose, clean, verify and compare, and write the result files.
+
+    Finite elements have the last word on what is designed for a part (`choosing`).
+
+    Raises
+    ------
+    InvalidSettings
+        If no design qualifies.
+    StorageError, CorruptRun
+        If the folder cannot be written, or is damaged.
+    """
     remove_temporaries(folder.path, RESULTS)
     problem = folder.problem
+    spec = _part_of(folder)
     candidates, proposals, best = accepted_candidates(folder, settings)
     judge = judge_for(problem, settings)
-    selection = select(problem, candidates, settings.objective, judge)
+    choose = most_efficient if spec is None else PartChoice(spec, settings, trying)
+    selection = select(problem, candidates, settings.objective, judge, choose)
     literal = judge_for(problem, settings, goals=())
     human = human_design(problem.name)
     human_response = None
@@ -209,20 +231,25 @@ def conclude(folder: RunFolder, settings: SearchSettings) -> DesignReport:
         human_response=human_response,
         proposals=proposals,
         best_by_chain=best,
+        validation=None if spec is None else validate(selection.design, spec, [(LEVEL, FINE)]),
     )
+    part = {} if spec is None else {"part": spec.to_dict()}
     design = replace(
         selection.design,
         efficiency=selection.efficiency_after,
-        provenance=provenance(**_origin(report), **_part_of(folder)),
+        provenance=provenance(**_origin(report), **part),
     )
     write_design(design, folder.path / "design.json", overwrite=True)
+    if report.validation is not None:
+        begin_record(report.validation, folder.path / "validation.json")
     write_report(report, folder)
     return report
 
 
-def _part_of(folder: RunFolder) -> dict[str, Any]:
+def _part_of(folder: RunFolder) -> PartSpec | None:
     """Return the part that a run was begun for, if any."""
-    return {key: value for key, value in folder.provenance.items() if key == "part"}
+    told = folder.provenance.get("part")
+    return None if told is None else PartSpec.from_dict(told, f"{folder.path}: part")
 
 
 def _origin(report: DesignReport) -> dict[str, Any]:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from bellcrank.mechanics import Response
     from bellcrank.model import Design
     from bellcrank.search import SearchSettings, Selection
+    from bellcrank.workflows.validate import Validation
 
 AGREEMENT = 1e-6
 """Largest difference between two minimisers that verify each other, as a part of the efficiency, or
@@ -39,6 +40,8 @@ class DesignReport:
         Its response, under the same objective.
     proposals, best_by_chain
         How many designs were looked at; the best each chain accepted.
+    validation
+        The design as a frame of struts, where it is for a part.
     """
 
     folder: Path
@@ -50,6 +53,7 @@ class DesignReport:
     human_response: Response | None
     proposals: int
     best_by_chain: list[float]
+    validation: Validation | None = None
 
     @property
     def agreement(self) -> float:

@@ -76,6 +76,22 @@ def keep_record(validation: Validation, path: Path) -> None:
         write_text(path, json.dumps(record, indent=1) + "\n", overwrite=True)
 
 
+def begin_record(validation: Validation, path: Path) -> None:
+    """Keep a validation of the design that a folder holds now; a record of another one goes.
+
+    Raises
+    ------
+    StorageError
+        If it cannot be written.
+    """
+    data = validation.to_dict()
+    try:
+        check_record(path, data["problem_hash"], data["mask"])
+    except InvalidFile:
+        path.unlink()
+    keep_record(validation, path)
+
+
 def _key(entry: dict[str, Any]) -> str:
     """Return what makes two analyses the same."""
     return json.dumps([entry[key] for key in KEY], sort_keys=True)

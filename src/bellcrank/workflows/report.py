@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 RESULTS = re.compile(
-    r"design\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png|pareto\.(json|png)"
+    r"(design|validation)\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png|pareto\.(json|png)"
 )
 """Names of the files that conclude a design job."""
 
@@ -36,6 +36,7 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "verified": report.verified,
         "initial_efficiency": _finite(report.initial_efficiency),
         "human_efficiency": human.efficiency if human else None,
+        "as_part": _as_part(report),
         "found": {
             "chain": selection.found.chain,
             "step": selection.found.step,
@@ -47,6 +48,31 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
     }
 
 
+def _as_part(report: DesignReport) -> dict[str, Any] | None:
+    """Return what finite elements say of a design for a part."""
+    if report.validation is None:
+        return None
+    data = report.validation.to_dict()["results"][0]
+    kept = ("level", "theory", "status", "efficiency", "von_mises_MPa", "principal_strain")
+    return {key: data[key] for key in (*kept, "contacts", "warnings", "part")}
+
+
+def part_rows(report: DesignReport) -> list[tuple[str, str]]:
+    """Return what finite elements say of a design for a part, in rows for people."""
+    if report.validation is None:
+        return []
+    spec, analysis = report.validation.spec, report.validation.analyses[0]
+    name = f"as {spec.width:g} mm struts"
+    if not math.isfinite(analysis.efficiency):
+        return [(name, f"not stable: {analysis.status.message}")]
+    last = analysis.last
+    touching = "struts touch" if len(analysis.contacts.pairs) else "nothing touches"
+    return [
+        (name, f"{analysis.efficiency:.4f}"),
+        ("", f"stress {last.stress:.2g} MPa, strain {last.strain:.0%}, {touching}"),
+    ]
+
+
 def _finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
@@ -54,10 +80,12 @@ def _finite(number: float) -> float | None:
 def summary_text(report: DesignReport) -> str:
     """Return the summary as Markdown (``summary.md``)."""
     selection = report.selection
+    began = ("where the search began", f"{report.initial_efficiency:.6f}")
     rows = [
         ("efficiency of the design", f"{selection.efficiency_after:.6f}"),
+        *((name or "there", value) for name, value in part_rows(report)),
         ("the same before cleaning", f"{selection.efficiency_before:.6f}"),
-        ("where the search began", f"{report.initial_efficiency:.6f}"),
+        began,
         *((f"from rest by {name}", f"{value:.9f}") for name, value in report.checks.items()),
         ("beams", str(selection.design.beam_count)),
         ("found by chain, at step", f"{selection.found.chain}, {selection.found.step}"),
@@ -66,7 +94,8 @@ def summary_text(report: DesignReport) -> str:
     if report.settings.goals:
         rows.append(("goals kept", ", ".join(report.settings.goals).replace("|", "/")))
     if report.human_response is not None:
-        rows.insert(3, ("human-designed counterpart", f"{report.human_response.efficiency:.6f}"))
+        human = ("human-designed counterpart", f"{report.human_response.efficiency:.6f}")
+        rows.insert(rows.index(began) + 1, human)
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
     refused = "".join(
         f"\n{count} candidates that looked better were refused: {reason}."
