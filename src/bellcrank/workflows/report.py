@@ -98,7 +98,7 @@ def summary_text(report: DesignReport) -> str:
         rows.insert(rows.index(began) + 1, human)
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
     refused = "".join(
-        f"\n{count} candidates that looked better were refused: {reason}."
+        f"\nRefused, though better in the model: {count} ({reason})."
         for reason, count in selection.refused.items()
     )
     return f"""# {selection.design.problem.name}
