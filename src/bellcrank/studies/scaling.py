@@ -236,7 +236,10 @@ STUDY = register(
         claims=claims,
         runs=lambda told: f"{_how_many(told['runs'])} (of {count(len(told['sizes']), 'size')})",
         deviations=(
-            "The paper averages over 100 runs of each size; ours are fewer of the largest lattices.",
+            (
+                "The paper averages over 100 runs of each size; ours are fewer of the largest "
+                "lattices."
+            ),
             "A run ends after a number of proposals that grows with the lattice.",
         ),
     )
