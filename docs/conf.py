@@ -28,9 +28,11 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
-    "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
+    "mathml",
+    "raw_files",
+    "checked_links",
 ]
 exclude_patterns = ["run", "gallery/*.py", "gallery/*.ipynb", "gallery/*.zip"]
 
@@ -40,6 +42,9 @@ html_theme = "furo"
 html_title = "bellcrank"
 html_static_path = ["static"]
 html_css_files = ["bellcrank.css"]
+html_favicon = "../src/bellcrank/web/static/icon.svg"
+html_logo = html_favicon
+html_math_renderer = "mathml"
 html_show_sphinx = False
 
 myst_enable_extensions = ["dollarmath"]
