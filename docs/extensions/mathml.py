@@ -1,4 +1,4 @@
-r"""Equations as MathML, which browsers draw themselves: no script, nothing fetched from elsewhere."""
+"""Equations as MathML, which browsers draw themselves: no script, nothing from elsewhere."""
 
 from __future__ import annotations
 
