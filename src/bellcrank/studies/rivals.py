@@ -62,9 +62,9 @@ class Settings:
     steps: int = 8000
     chains: int = 3
     element: float = 1.0
-    radii: tuple[float, ...] = (2.0, 1.5, 3.0)
+    radii: tuple[float, ...] = (2.0, 1.5)
     springs: tuple[tuple[float, float], ...] = tuple(
-        itertools.product((0.1, 1.0), (0.01, 0.007, 0.005, 0.0035))
+        itertools.product((0.1, 1.0), (0.007, 0.005))
     )
     iterations: int = 100
     triangle: float = 1.0
