@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from bellcrank.machines import TwoPort
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NETWORK = ROOT / "src" / "bellcrank" / "surrogate" / "pretrained" / "crane.safetensors"
@@ -28,6 +30,11 @@ def three(value: float) -> str:
     """Three digits, with commas where the number is large."""
     rounded = float(f"{value:.3g}")
     return f"{rounded:,.0f}" if rounded >= 1000.0 else f"{rounded:g}"
+
+
+def two(value: float) -> str:
+    """Two digits."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def competition() -> Rows:
@@ -123,6 +130,51 @@ def lengths() -> Rows:
         )  # fmt: skip
 
 
+def strokes() -> Rows:
+    names = {
+        "row": "two in a row",
+        "turned": "second turned by 300 degrees",
+        "gripper": "two jaws on one input",
+        "driven by its output": "second driven by its output",
+        "bridge": "joined by a bridge",
+    }
+    for told in read("machines/strokes")["rows"]:
+        times = "" if told["times"] == 1 else f", x {told['times']}"
+        yield row(
+            names[told["machine"]] + times,
+            *(f"{told[key]:.3f}" for key in ("small_strokes", "full_stroke")),
+            f"{100.0 * told['linear_off']:.1f} %",
+            *(f"{100.0 * told[key]:.2f} %" for key in ("motion", "force", "live_motion")),
+            told["followed_themselves"],
+        )
+
+
+def two_ports() -> Rows:
+    for told in read("machines/two-ports")["rows"]:
+        rest = told["rest"]
+        port = TwoPort(rest["input_stiffness"], rest["efficiency"], rest["output_compliance"])
+        yield row(
+            told["design"], *(f"{value:.4g}" for value in rest_of(port)),
+            f"{port.coupling:.2g}", f"{100.0 * port.best_work_share:.1f} %",
+        )  # fmt: skip
+
+
+def rest_of(port: TwoPort) -> tuple[float, float, float]:
+    return port.efficiency, port.input_stiffness, port.output_compliance
+
+
+def potentials() -> Rows:
+    def told(fit: dict[str, Any]) -> str:
+        largest, typical = 100.0 * max(fit["error"]), 100.0 * max(fit["typical_error"])
+        if largest < 0.01:
+            return f"degree {fit['degree']}, below 0.01 %"
+        return f"degree {fit['degree']}, {two(largest)} % ({two(typical)} %)"
+
+    for each in read("machines/two-ports")["rows"]:
+        if each["potentials"]:
+            yield row(each["design"], *(told(each["potentials"][key]) for key in ("mean", "block")))
+
+
 def costs() -> Rows:
     cost = {
         (each["what"], each["batch"]): each["microseconds"]
@@ -210,7 +262,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (competition,),
     "goals": (goals,),
     "validation": (levels, widths, correlation, searched),
-    "machines": (showcases, lengths),
+    "machines": (showcases, lengths, strokes, two_ports, potentials),
     "surrogate": (costs, shipped, epochs, flips, transfer, driven, elsewhere),
 }
 
