@@ -47,6 +47,7 @@ html_favicon = "../src/bellcrank/web/static/icon.svg"
 html_logo = html_favicon
 html_math_renderer = "mathml"
 html_show_sphinx = False
+smartquotes_action = "qe"  # options keep their two dashes
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
