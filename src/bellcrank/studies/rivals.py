@@ -63,9 +63,7 @@ class Settings:
     chains: int = 3
     element: float = 1.0
     radii: tuple[float, ...] = (2.0, 1.5)
-    springs: tuple[tuple[float, float], ...] = tuple(
-        itertools.product((0.1, 1.0), (0.007, 0.005))
-    )
+    springs: tuple[tuple[float, float], ...] = tuple(itertools.product((0.1, 1.0), (0.007, 0.005)))
     iterations: int = 100
     triangle: float = 1.0
     finer: float = 0.7
