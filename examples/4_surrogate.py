@@ -49,7 +49,8 @@ for told, true in zip(model.predict(data.packed[held_out]), data.efficiency[held
     print(f"predicted {told:+.3f}, in truth {true:+.3f}")
 
 # %%
-# A point on the line is a prediction that is right.
+# A point on the line is a prediction that is right. From so few designs a network learns little;
+# :doc:`/surrogate` shows how much it takes.
 
 tested = model.record["held_out"]
 rows = training.split.held_out

@@ -12,7 +12,14 @@ survives any kill.
 
 from pathlib import Path
 
-from bellcrank.campaign import Store, Watcher, best_designs, complete, read_spec, write_harvest
+from bellcrank.campaign import (
+    Store,
+    Watcher,
+    best_designs,
+    complete,
+    read_spec,
+    write_harvest,
+)
 from bellcrank.plots import draw_comparison
 from bellcrank.workflows import move
 

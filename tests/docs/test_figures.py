@@ -84,6 +84,15 @@ def widths() -> Rows:
         )  # fmt: skip
 
 
+def meshes() -> Rows:
+    for told in read("validation/meshes")["rows"]:
+        size = f"{told['size']:g} mm" + (" (default)" if told["size"] == 1.0 else "")
+        yield row(
+            size, f"{told['unknowns']:,.0f}", f"{told['small_motions']:.6f}",
+            f"{told['efficiency']:.6f}", f"{told['force_N']:.2f}",
+        )  # fmt: skip
+
+
 def correlation() -> Rows:
     for name in ("crane", "anti-parallel"):
         for kind, words in (("paper", "the paper's"), ("calibrated", "of the struts")):
@@ -261,7 +270,7 @@ def elsewhere() -> Rows:
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (competition,),
     "goals": (goals,),
-    "validation": (levels, widths, correlation, searched),
+    "validation": (levels, meshes, widths, correlation, searched),
     "machines": (showcases, lengths, strokes, two_ports, potentials),
     "surrogate": (costs, shipped, epochs, flips, transfer, driven, elsewhere),
 }
