@@ -292,6 +292,7 @@ def _verdict(ours: Mapping[str, Any], rival: Mapping[str, Any]) -> str:
         ("efficiency", "efficiency", True),
         ("stress", "von_mises_MPa", False),
         ("input force (less)", "input_force_N", False),
+        ("width of the narrowest place", "narrowest_mm", True),
         ("time", "design_seconds", False),
     ):
         mine, other = ours.get(key), rival.get(key)
