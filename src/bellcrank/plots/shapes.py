@@ -77,16 +77,17 @@ def draw_shapes(
     scale = (WIDTH - 2 * MARGIN - GAP * (count - 1)) / count / float((high - low)[0])
     across, up = scale * (high - low)
     top = MARGIN + style.heading_height(title, note) + 0.14
-    figure = style.new_figure(WIDTH, top + rows * (WORDS + up) + FOOT)
+    tall = WORDS + up + GAP
+    figure = style.new_figure(WIDTH, top + rows * tall - GAP + FOOT)
     height = float(figure.get_size_inches()[1])
     style.write_heading(figure, title, note, MARGIN, MARGIN)
     for place, shape in enumerate(shapes):
         row, column = divmod(place, IN_A_ROW)
-        left, above = MARGIN + column * (across + GAP), top + row * (WORDS + up)
+        left, above = MARGIN + column * (across + GAP), top + row * tall
         style.write_heading(figure, shape.title, shape.notes[0], left, above)
         for line, words in enumerate(shape.notes[1:], start=1):
             style.write_heading(figure, "", words, left, above + 0.27 + 0.2 * line)
-        below = FOOT + (rows - 1 - row) * (WORDS + up)
+        below = FOOT + (rows - 1 - row) * tall
         axes = figure.add_axes((left / WIDTH, below / height, across / WIDTH, up / height))
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
