@@ -1,6 +1,6 @@
 """How well the discrete model foretells finite elements: ``python -m benchmarks.fidelity``.
 
-Four questions, each a part of the script (``--only correlate,width,search,levels``):
+Five questions, each a part of the script (``--only correlate,width,search,levels,meshes``):
 
 - correlate: over some hundred designs that searches came by, how do the efficiencies of the
   discrete model, with the paper's stiffness and with that of the struts, agree with nonlinear
@@ -10,6 +10,7 @@ Four questions, each a part of the script (``--only correlate,width,search,level
 - search: what is left of the efficiency that a search promises, when it searches with the one
   stiffness or the other, and when frames choose from what it found?
 - levels: what do all levels of finite elements say about each design that comes with the package?
+- meshes: how far does what the plane says of the full crane depend on the size of its triangles?
 
 Designs that snap or touch themselves as frames are counted and listed, not averaged.
 Results go to ``docs/validation/*.json`` and ``*.png``, tables to standard output.
@@ -62,6 +63,8 @@ from bellcrank.workflows import (
 
 FOLDER = Path(__file__).parents[1] / "docs" / "validation"
 PROBLEMS = ("crane", "anti-parallel")
+SIZES = (2.0, 1.4, 1.0, 0.7, 0.5)
+"""Of triangles, mm."""
 WIDTH = 2.0
 WIDTHS = (1.0, 1.5, 2.0, 3.0, 4.0)
 FACTORS = np.round(np.arange(0.30, 1.01, 0.05), 2)
@@ -304,6 +307,28 @@ def level_study(pool: ProcessPoolExecutor) -> None:
     _write("levels", record)
 
 
+def mesh_of(size: float) -> dict[str, object]:
+    """Analyse the full crane in the plane with triangles of a size, mm."""
+    part = PartSpec(width=WIDTH).of(find_problem("crane").full_design())
+    small = levels["plane"](part, FemSettings(size=size, linear=True))
+    whole = levels["plane"](part, FemSettings(size=size))
+    return {
+        "size": size,
+        "unknowns": whole.cost["unknowns"],
+        "small_motions": small.efficiency,
+        "efficiency": whole.efficiency,
+        "force_N": float(np.hypot(*whole.last.force)),
+    }
+
+
+def mesh_study(pool: ProcessPoolExecutor) -> None:
+    """Refine the mesh of the full crane."""
+    rows = list(pool.map(mesh_of, SIZES))
+    for row in rows:
+        print("| " + " | ".join(f"{value:.6g}" for value in row.values()) + " |")
+    _write("meshes", {"width": WIDTH, "rows": rows, "provenance": provenance()})
+
+
 def _short(row: dict[str, object]) -> dict[str, object]:
     """Return what is worth keeping of an analysis."""
     kept = (
@@ -367,6 +392,7 @@ PARTS = {
     "width": width_study,
     "search": search_study,
     "levels": level_study,
+    "meshes": mesh_study,
 }
 
 

@@ -28,9 +28,12 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
-    "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
+    "commands",
+    "mathml",
+    "raw_files",
+    "checked_links",
 ]
 exclude_patterns = ["run", "gallery/*.py", "gallery/*.ipynb", "gallery/*.zip"]
 
@@ -40,7 +43,11 @@ html_theme = "furo"
 html_title = "bellcrank"
 html_static_path = ["static"]
 html_css_files = ["bellcrank.css"]
+html_favicon = "../src/bellcrank/web/static/icon.svg"
+html_logo = html_favicon
+html_math_renderer = "mathml"
 html_show_sphinx = False
+smartquotes_action = "qe"  # options keep their two dashes
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

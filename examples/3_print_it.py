@@ -17,6 +17,8 @@ from bellcrank.fem import FemSettings
 from bellcrank.model import gallery_design
 from bellcrank.parts import PartSpec
 from bellcrank.workflows import validate
+from bellcrank.workflows.card import make_card
+from bellcrank.workflows.figures import draw_validations
 
 crane = gallery_design("machine", "crane")
 spec = PartSpec(width=1.6, thickness=5.0, scale=10.0, material="ninjaflex")
@@ -33,6 +35,7 @@ for finding in check_print(part):
 validation = validate(crane, spec, [("frame", FemSettings())])
 frame = validation.analyses[0]
 print(f"springs {validation.response.efficiency:.2f}, frame {frame.efficiency:.2f}")
+draw_validations([validation], ["machine:crane"], Path("stress.png"))
 
 # %%
 # Files
@@ -43,3 +46,12 @@ print(f"springs {validation.response.efficiency:.2f}, frame {frame.efficiency:.2
 for name in ("crane.3mf", "crane.stl", "crane.dxf"):
     export(part, name)
     print(name, Path(name).stat().st_size // 1000, "kB")
+
+# %%
+# A card goes with the part: how it moves, how large and heavy it is, how to print it.
+
+make_card(crane, spec, Path("card.png"))
+
+# %%
+# On the command line: ``bellcrank validate machine:crane``, ``bellcrank export machine:crane
+# crane.3mf``, ``bellcrank card machine:crane card.pdf`` (:doc:`/fabrication`).

@@ -1,6 +1,6 @@
 """
-Many runs
-=========
+A campaign on a cluster
+=======================
 
 One search is an anecdote. A campaign makes as many as wanted, on one core or a cluster, and
 survives any kill.
@@ -12,7 +12,16 @@ survives any kill.
 
 from pathlib import Path
 
-from bellcrank.campaign import Store, Watcher, best_designs, complete, read_spec
+from bellcrank.campaign import (
+    Store,
+    Watcher,
+    best_designs,
+    complete,
+    read_spec,
+    write_harvest,
+)
+from bellcrank.plots import draw_comparison
+from bellcrank.workflows import move
 
 Path("sizes.toml").write_text("""
 name = "sizes"
@@ -36,8 +45,20 @@ store = Store.create(Path("sizes"), read_spec(Path("sizes.toml")))
 # Where to run
 # ------------
 # An engine only decides where: in this process (``serial``), on all cores (``local``), or on a
-# cluster by Dask. All leave the same bytes. On a cluster, ``bellcrank campaign run sizes.toml
-# --engine slurm`` does it (:doc:`/campaigns`).
+# cluster by Dask. All leave the same bytes, so that a campaign may begin here and end there.
+# This page is made in one process; on a cluster whose machines share the folder, it is
+#
+# .. code-block:: console
+#
+#     $ bellcrank campaign run sizes.toml --engine slurm --workers 200 --slurm queue=short
+#
+# or, as a job array without Dask, in each job
+#
+# .. code-block:: console
+#
+#     $ bellcrank campaign run sizes.toml --shard $SLURM_ARRAY_TASK_ID/100
+#
+# and ``bellcrank campaign watch sizes`` shows from anywhere how it stands (:doc:`/campaigns`).
 
 complete(store, "serial")
 status = Watcher(store).look()
@@ -49,3 +70,11 @@ print(status.runs_done, "runs,", status.steps_done, "steps")
 
 for best in best_designs(store, 4):
     print(f"{best.task}, seed {best.seed}, step {best.step}: {best.efficiency:.3f}")
+
+# %%
+# The best of each task, cleaned of what bears no load and followed again from rest:
+
+small, large = write_harvest(store, Path("designs"))
+draw_comparison(
+    move(small.design, name=small.task), move(large.design, name=large.task), "harvest.png"
+)

@@ -7,7 +7,7 @@ lambda = E I / (2 L) cost, with E I / L the bending stiffness of a strut; where 
 springs in their cyclic order are stiffer against some motions and softer against others than
 struts are, with a mean of lambda = E I / L (1 - 1 / n). Joints of a diluted lattice have few
 struts that bear load. Over some hundred designs from searches, a factor a little above one half
-makes forces and efficiencies agree best with frames (`docs/validation.md` has the figures):
+makes efficiencies agree best with frames (`docs/validation.md` has the figures):
 
     lambda / k = 2 JOINT I / (A L^2) = JOINT w^2 / (6 L^2)
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from bellcrank.plots import style
+from bellcrank.plots.axis_numbers import plain_number, spell_out
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 Kind = Literal["line", "steps", "points", "both", "bars", "histogram"]
 ROOM_FOR_NAME = 0.11
 """Height that a line of the legend takes over histograms, as a part of the highest bar."""
-MANY = 1.0e5
-"""From here on numbers on an axis are written as powers of ten."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -257,21 +256,6 @@ def _write(axes: Axes, words: str, place: tuple[float, float], **looks: Any) -> 
     )  # fmt: skip
 
 
-def plain_number(value: float, _place: int = 0) -> str:
-    r"""Write a number as it stands on an axis.
-
-    Examples
-    --------
-    >>> plain_number(20000.0), plain_number(0.05), plain_number(1e6)
-    ('20\u202f000', '0.05', '10⁶')
-    """
-    size = abs(value)
-    if size >= MANY or 0.0 < size < 1e-3:
-        power = round(float(np.log10(size)))
-        return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{value:,.0f}".replace(",", "\u202f") if size >= 1000 else f"{value:g}"
-
-
 def _dress(axes: Axes, chart: Chart) -> None:
     """Write titles, axes and legend."""
     axes.set_title(
@@ -287,7 +271,7 @@ def _dress(axes: Axes, chart: Chart) -> None:
         else:
             axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     if chart.log_x:
-        _spell_out(axes)
+        spell_out(axes)
     if chart.names:
         axes.set_xticks(range(len(chart.names)), chart.names, family=style.FONT)
         axes.tick_params(axis="x", length=0.0, labelcolor=style.INK)
@@ -302,14 +286,3 @@ def _dress(axes: Axes, chart: Chart) -> None:
             loc=where, frameon=False, labelcolor=style.INK, handlelength=1.7,
             prop={"family": style.FONT, "size": style.SMALL_SIZE}, labelspacing=0.35,
         ).set_zorder(9)  # fmt: skip
-
-
-def _spell_out(axes: Axes) -> None:
-    """Put numbers at 1, 2 and 5 times powers of ten where an axis spans less than 1.5 decades."""
-    low, high = axes.get_xlim()
-    if high > 32.0 * low:
-        return
-    powers = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
-    places = [k * 10.0**p for p in powers for k in (1, 2, 5) if low <= k * 10.0**p <= high]
-    axes.set_xticks(places, [plain_number(place) for place in places])
-    axes.xaxis.set_minor_locator(NullLocator())

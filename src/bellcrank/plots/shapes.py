@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 WIDTH, MARGIN, GAP, WORDS, FOOT = 11.0, 0.25, 0.3, 0.78, 0.55
+IN_A_ROW = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +57,7 @@ def draw_shapes(
     note: str = "",
     overwrite: bool = False,
 ) -> None:
-    """Draw shapes in a row, all to one scale.
+    """Draw shapes in rows of four, all to one scale.
 
     Raises
     ------
@@ -71,19 +72,23 @@ def draw_shapes(
     arrow = 0.13 * float((high - low)[0])
     room = np.array([arrow, 2.0])
     low, high = low - room, high + room
-    count = len(shapes)
+    count = min(len(shapes), IN_A_ROW)
+    rows = -(-len(shapes) // IN_A_ROW)
     scale = (WIDTH - 2 * MARGIN - GAP * (count - 1)) / count / float((high - low)[0])
     across, up = scale * (high - low)
     top = MARGIN + style.heading_height(title, note) + 0.14
-    figure = style.new_figure(WIDTH, top + WORDS + up + FOOT)
+    tall = WORDS + up + GAP
+    figure = style.new_figure(WIDTH, top + rows * tall - GAP + FOOT)
     height = float(figure.get_size_inches()[1])
     style.write_heading(figure, title, note, MARGIN, MARGIN)
     for place, shape in enumerate(shapes):
-        left = MARGIN + place * (across + GAP)
-        style.write_heading(figure, shape.title, shape.notes[0], left, top)
+        row, column = divmod(place, IN_A_ROW)
+        left, above = MARGIN + column * (across + GAP), top + row * tall
+        style.write_heading(figure, shape.title, shape.notes[0], left, above)
         for line, words in enumerate(shape.notes[1:], start=1):
-            style.write_heading(figure, "", words, left, top + 0.27 + 0.2 * line)
-        axes = figure.add_axes((left / WIDTH, FOOT / height, across / WIDTH, up / height))
+            style.write_heading(figure, "", words, left, above + 0.27 + 0.2 * line)
+        below = FOOT + (rows - 1 - row) * tall
+        axes = figure.add_axes((left / WIDTH, below / height, across / WIDTH, up / height))
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         axes.set_axis_off()

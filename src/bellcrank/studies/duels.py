@@ -215,12 +215,17 @@ def runs(figures: Mapping[str, Any]) -> str:
     )
 
 
+def _end(status: str) -> str:
+    """Say how a path without an efficiency ends."""
+    return "snaps" if status == "snapped" else "finds no equilibrium"
+
+
 def in_all_models(figures: Mapping[str, Any], by: str) -> str:
     """Write the efficiencies of a design in all models."""
     return ", ".join(
         f"{number(efficiency(figures, by, model))} {MODELS[model][0]}"
         if efficiency(figures, by, model) is not None
-        else f"snaps as {MODELS[model][0]}"
+        else f"{_end(figures['designs'][by][model]['status'])} as {MODELS[model][0]}"
         for model in levels_in(figures)
         if model in figures["designs"][by]
     )

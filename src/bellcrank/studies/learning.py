@@ -132,45 +132,54 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
             f"determination {number(told['determination'], 3)}",
         ),
     ]
-    if "resnet50" in records:
-        row = records["resnet50"]
-        found.append(
-            Claim(
-                "the same by the paper's own recipe",
-                f"{published.R_SQUARED}",
-                f"{number(row['r_squared'], 3)} after {row['looks']:,} looks at "
-                f"{row['designs']:,} designs",
-                "10 epochs would be 8.7 million looks: no GPU was at hand",
-            )
-        )
-    if "driven" in records:
-        made = records["driven"]
-        found += [
-            Claim(
-                "efficiency of designs that the network makes, and that simulation makes",
-                "",
-                f"medians {number(made['median_network'])} by the network, "
-                f"{number(made['median_mechanics'])} by mechanics; "
-                f"{count(made['chains'], 'chain')} each, efficiencies by mechanics",
-            ),
-            Claim(
-                "beams that tell a design made by the network from the nearest it has learnt from",
-                f"about {published.BEAMS_APART}",
-                f"{number(made['distance'], 0)} in the median",
-            ),
-        ]
-    if "costs" in records:
-        costs = records["costs"]
-        found.append(
-            Claim(
-                "how many times faster the network is than simulation",
-                f"about {published.SPEED_UP}",
-                f"{costs['fire'] / costs['resnet18']:.0f} against first-order relaxation, "
-                f"{costs['newton'] / costs['resnet18']:.2f} against Newton's method",
-                "one core each; the smaller network that comes along, in batches",
-            )
-        )
+    for name, claimed in (("resnet50", _by_recipe), ("driven", _made), ("costs", _speed)):
+        if name in records:
+            found += claimed(records[name])
     return found
+
+
+def _by_recipe(row: Mapping[str, Any]) -> list[Claim]:
+    """Say what the paper's own network and recipe came to."""
+    return [
+        Claim(
+            "the same by the paper's own recipe",
+            f"{published.R_SQUARED}",
+            f"{number(row['r_squared'], 3)} after {row['looks']:,} looks at "
+            f"{row['designs']:,} designs",
+            "10 epochs would be 8.7 million looks: no GPU was at hand",
+        )
+    ]
+
+
+def _made(row: Mapping[str, Any]) -> list[Claim]:
+    """Say what designs a network makes."""
+    return [
+        Claim(
+            "efficiency of designs that the network makes, and that simulation makes",
+            "",
+            f"medians {number(row['median_network'])} by the network, "
+            f"{number(row['median_mechanics'])} by mechanics; "
+            f"{count(row['chains'], 'chain')} each, efficiencies by mechanics",
+        ),
+        Claim(
+            "beams that tell a design made by the network from the nearest it has learnt from",
+            f"about {published.BEAMS_APART}",
+            f"{number(row['distance'], 0)} in the median",
+        ),
+    ]
+
+
+def _speed(row: Mapping[str, Any]) -> list[Claim]:
+    """Say how fast the network is beside two ways to simulate."""
+    return [
+        Claim(
+            "how many times faster the network is than simulation",
+            f"about {published.SPEED_UP}",
+            f"{row['fire'] / row['resnet18']:.0f} against first-order relaxation, "
+            f"{row['newton'] / row['resnet18']:.2f} against Newton's method",
+            "one core each; the smaller network that comes along, in batches",
+        )
+    ]
 
 
 def runs(figures: Mapping[str, Any]) -> str:

@@ -30,8 +30,8 @@ CHORD = 0.02
 """Largest distance of polygons from the arcs they stand for, mm."""
 SMOOTH = 0.35
 """Radius by which corners of contours are rounded, mm."""
-DRAWN = 0.9
-"""Distance of points of the outlines that are kept for pictures, mm."""
+DRAWN = 0.15
+"""How far outlines kept for pictures may be off, mm."""
 
 
 def polygon_of(part: Part) -> shapely.Polygon:
@@ -111,6 +111,21 @@ def _around_ports(box: Box, shape: Any) -> shapely.Polygon | None:
     return None
 
 
+def narrowest(box: Box, shape: shapely.Polygon) -> float:
+    """Return the width of the narrowest place between input, output and a support, mm.
+
+    That is how wide a disc may be that passes from each to each without leaving the shape.
+    """
+    low, high = 0.0, float(box.spec.scale)
+    while high - low > 0.01:
+        middle = 0.5 * (low + high)
+        if _around_ports(box, shape.buffer(-0.5 * middle)) is None:
+            high = middle
+        else:
+            low = middle
+    return round(low, 2)
+
+
 def judge(box: Box, part: Part, shape: shapely.Polygon, size: float, law: str) -> dict[str, Any]:
     """Follow a shape along the stroke of its task.
 
@@ -184,10 +199,21 @@ def drawing(
 def _thinned(
     rest: NDArray[np.float64], ring: NDArray[np.int64], displacement: NDArray[np.float64]
 ) -> list[list[float]]:
-    kept = [int(ring[0])]
-    for node in ring[1:].tolist():
-        if np.hypot(*(rest[node] - rest[kept[-1]])) >= DRAWN:
-            kept.append(node)
-    both = np.column_stack([rest[kept], rest[kept] + displacement[kept]])
-    found: list[list[float]] = both.round(1).tolist()
+    """Leave out points that lie on the way from one to the next (Douglas and Peucker, 1973)."""
+    both = np.column_stack([rest[ring], rest[ring] + displacement[ring]])
+    kept = {0, len(ring) - 1}
+    open_ = [(0, len(ring) - 1)]
+    while open_:
+        first, last = open_.pop()
+        if last - first < 2:
+            continue
+        way = both[last] - both[first]
+        offset = both[first + 1 : last] - both[first]
+        along = np.clip(offset @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+        away = np.linalg.norm(offset - along[:, None] * way, axis=1)
+        farthest = first + 1 + int(away.argmax())
+        if away.max() > DRAWN:
+            kept.add(farthest)
+            open_ += [(first, farthest), (farthest, last)]
+    found: list[list[float]] = both[sorted(kept)].round(1).tolist()
     return found

@@ -24,13 +24,15 @@ reports, what comes out here, the command that remakes it, and where the two dif
 
 This page is made from the records in `docs/studies` by `bellcrank study page --out docs/studies`;
 a test compares them. Each record has the settings, figures, versions and commit; `bellcrank study
-NAME` computes it again, `--quick` in less than a minute, and goes on where it was stopped.
+NAME` computes it again, with `--quick` for a first look, and goes on where it was stopped.
 
 The paper's figures are known to us from its text and at second hand. A dash stands where it
 gives none that we know. Efficiencies of the paper are by finite elements, confirmed by print,
 unless said otherwise; nothing of ours has been printed.
 """
 
+RUNS = 100
+"""Of each size in the paper's scaling."""
 NOT_REMADE = """\
 ## What is not remade
 
@@ -39,7 +41,7 @@ NOT_REMADE = """\
 - The full training of the paper's ResNet50: 8.7 million looks need a GPU.
 - Machines that combine actuators have no figure in the paper to compare with; `docs/machines.md`
   describes ours.
-"""
+{scaling}"""
 
 
 def page_of(records: Mapping[str, Mapping[str, Any]], pictures: str = "") -> str:
@@ -54,7 +56,9 @@ def page_of(records: Mapping[str, Mapping[str, Any]], pictures: str = "") -> str
     """
     parts = [INTRODUCTION, _overview(records)]
     parts += [_section(record, pictures) for record in records.values()]
-    return "\n".join([*parts, NOT_REMADE])
+    runs = records["scaling"]["figures"]["runs"] if "scaling" in records else 0
+    fewer = f"- The {RUNS} runs of each size in the paper's scaling: there are {runs}.\n"
+    return "\n".join([*parts, NOT_REMADE.format(scaling=fewer if runs < RUNS else "")])
 
 
 def _overview(records: Mapping[str, Mapping[str, Any]]) -> str:

@@ -28,9 +28,10 @@ ORDER = ("up-left", "up", "up-right", "right", "down-right", "down", "down-left"
 """Of directions, around a clock."""
 ABOUT = (
     "{} entries, {} of them more efficient than the plain lever of the same task. Each is pushed "
-    "down on the right (orange) and moves its left port (blue); `index.html` beside this page is "
-    "the same to browse. What the figures mean is said in `docs/machines.md`. This page is written "
-    "by `bellcrank library index`. *Touches*: at the full stroke, struts of the part touch."
+    "down on the right (orange) and moves its left port (blue); "
+    '<a href="index.html">a page to browse</a> has the same. What the figures mean is said in '
+    "`docs/machines.md`. This page is written by `bellcrank library index`. *Touches*: at the full "
+    "stroke, struts of the part touch."
 )
 COLUMNS = (
     "", "name", "efficiency", "plain lever", "frame FEM", "input stiffness", "output stiffness",

@@ -1,0 +1,79 @@
+"""The commands of a typer program, as reference: ``.. commands:: MODULE:APP``."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import typer
+from docutils import nodes
+from docutils.statemachine import StringList
+from sphinx.util.docutils import SphinxDirective
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from sphinx.application import Sphinx
+
+
+def entries(command: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """Yield all commands below a command with their full names."""
+    if hasattr(command, "commands"):
+        for each, below in command.commands.items():
+            yield from entries(below, f"{name} {each}")
+    else:
+        yield name, command
+
+
+def usage(name: str, command: Any) -> str:
+    """Return the line to type."""
+    arguments = [each for each in command.params if each.param_type_name == "argument"]
+    words = [called(each) if each.required else f"[{called(each)}]" for each in arguments]
+    return " ".join([name, *words, "[OPTIONS]"])
+
+
+def called(argument: Any) -> str:
+    """Return how an argument is called."""
+    return str(argument.metavar or argument.name.upper())
+
+
+def described(command: Any) -> Iterator[str]:
+    """Yield an entry of a list for each option and argument."""
+    for each in command.params:
+        if getattr(each, "hidden", False) or each.name == "help":
+            continue
+        words = [*each.opts, *each.secondary_opts]
+        if each.param_type_name == "argument":
+            words = [called(each)]
+        told = " ".join((getattr(each, "help", None) or "").split()).replace("*", r"\*")
+        yield f"{', '.join(f'``{word}``' for word in words)}\n    {told or '-'}\n"
+
+
+class Commands(SphinxDirective):
+    """Describes each command in a section of its own."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Return the sections."""
+        module, _, attribute = self.arguments[0].partition(":")
+        program = typer.main.get_command(getattr(import_module(module), attribute))
+        found: list[nodes.Node] = []
+        for name, command in sorted(entries(program, "bellcrank")):
+            section = nodes.section(ids=[name.replace(" ", "-")])
+            section += nodes.title(text=name.removeprefix("bellcrank "))
+            text = inspect.cleandoc(command.help or "").replace("\b", "").split("\f")[0]
+            lines = [
+                ".. code-block:: text", "", f"    {usage(name, command)}", "",
+                *text.splitlines(), "", *"\n".join(described(command)).splitlines(),
+            ]  # fmt: skip
+            self.state.nested_parse(StringList(lines, name), 0, section)
+            found.append(section)
+        return found
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Offer the directive."""
+    app.add_directive("commands", Commands)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
