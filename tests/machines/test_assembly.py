@@ -150,6 +150,18 @@ def test_designable_is_all_but_ports_and_supports() -> None:
             {},
             "nothing holds a, b",
         ),
+        (
+            {**PAIR, "c": {"entry": "full", "join": "b.input", "mirror": True}},
+            [],
+            {"input": {"ports": ["c.input"]}},
+            "port c.input is driven by hand and by a.output",
+        ),
+        (
+            PAIR,
+            [],
+            {"input": {"ports": ["a.input"], "drive": "force"}},
+            "input.amount: must be given, for a is driven by a displacement",
+        ),
         (PAIR, [], {"output": {"ports": ["b.exit"]}}, "no port 'b.exit'"),
         (PAIR, [], {"output": {"ports": ["a.input"]}}, "port 'a.input' is input and output"),
         ({"a": {"entry": "absent"}}, [], {"output": {"ports": ["a.output"]}}, "parts.a.entry: no"),

@@ -102,8 +102,8 @@ def test_a_part_can_be_driven_by_its_output() -> None:
 
 
 def test_forces_are_not_chained_yet() -> None:
-    machine = build({"a": {"entry": "1"}}, input={"ports": ["a.input"], "drive": "force"},
-                    output={"ports": ["a.output"]})  # fmt: skip
+    pushed = {"ports": ["a.input"], "drive": "force", "amount": 0.01}
+    machine = build({"a": {"entry": "1"}}, input=pushed, output={"ports": ["a.output"]})
     with pytest.raises(InvalidFile, match="driven by a displacement"):
         predict(machine)
 

@@ -47,13 +47,25 @@ def supports(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int
 
 
 def drive(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Input:
-    """Return the machine's input; what the plan leaves open is as in its first part."""
+    """Return the machine's input; what the plan leaves open is as in its first part.
+
+    Raises
+    ------
+    InvalidFile
+        If it is driven in another way than that part, and the plan does not say how far.
+    """
     table = plan.table.input
     ids, directions = _region(plan.inputs, parts, nodes, table.direction)
     first = parts[plan.inputs[0].part]
     own = first.design.problem.input
-    amount = table.amount or own.amount * first.placement.scale
-    return Input(ids, directions, table.drive or own.drive, amount)
+    chosen = table.drive or own.drive
+    if table.amount is None and chosen != own.drive:
+        raise InvalidFile(
+            f"{plan.source}: input.amount: must be given, for {first.name} is driven by a "
+            f"{own.drive}, and how much that is says nothing about a {chosen}"
+        )
+    amount = own.amount * first.placement.scale if table.amount is None else table.amount
+    return Input(ids, directions, chosen, amount)
 
 
 def moved(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Output:
@@ -87,12 +99,18 @@ def check_drive(plan: Plan) -> None:
     InvalidFile
     """
     for port in plan.inputs:
-        for link in plan.links:
-            others = {link.first: link.second, link.second: link.first}
-            if port in others and others[port].port == "output":
-                raise InvalidFile(
-                    f"{plan.source}: port {port} is driven by hand and by {others[port]} at once"
-                )
+        here = [port]
+        for place in here:  # grows: what is welded to it is driven with it
+            for link in plan.links:
+                other = {link.first: link.second, link.second: link.first}.get(place)
+                if other is None or other in here:
+                    continue
+                if other.port == "output":
+                    raise InvalidFile(
+                        f"{plan.source}: port {port} is driven by hand and by {other} at once"
+                    )
+                if link.kind == "weld":
+                    here.append(other)
 
 
 def check_held(

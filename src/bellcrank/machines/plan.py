@@ -92,7 +92,10 @@ class LinkTable(Table):
 
 
 class InputTable(Table):
-    """What drives the machine; drive and amount are those of the first part by default."""
+    """What drives the machine; drive and amount are those of the first part by default.
+
+    Who drives it in another way says by how much.
+    """
 
     ports: list[str] = Field(min_length=1)
     direction: Directions | None = None
