@@ -46,7 +46,9 @@ class MakingProgress(Live):
         """Say what became of a task."""
         with self._lock:
             self._finished, self._steps = made.number + 1, 0
-        what = made.note if made.entry is None else entry_line(made.entry)
+        what = made.note
+        if made.entry is not None:
+            what = entry_line(made.entry) + made.note.removeprefix("made")
         notes.print(
             f"{made.number + 1:3d} of {made.total}  {plain(made.task.name)}: {plain(what)}"
             f"  ({made.seconds:.0f} s, {elapsed:.0f} s in all)"
