@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidFile
+from bellcrank.machines.plan import welded
 from bellcrank.model import Input, Output, Supports
 
 if TYPE_CHECKING:
@@ -98,19 +99,19 @@ def check_drive(plan: Plan) -> None:
     ------
     InvalidFile
     """
+    together = {port: ports for ports in welded(plan) for port in ports}
     for port in plan.inputs:
-        here = [port]
-        for place in here:  # grows: what is welded to it is driven with it
-            for link in plan.links:
-                other = {link.first: link.second, link.second: link.first}.get(place)
-                if other is None or other in here:
-                    continue
-                if other.port == "output":
-                    raise InvalidFile(
-                        f"{plan.source}: port {port} is driven by hand and by {other} at once"
-                    )
-                if link.kind == "weld":
-                    here.append(other)
+        others = [other for other in together[port] if other != port]
+        for link in plan.links:
+            others += [
+                there
+                for here, there in ((link.first, link.second), (link.second, link.first))
+                if link.kind == "bridge" and here in together[port]
+            ]
+        if driving := [other for other in others if other.port == "output"]:
+            raise InvalidFile(
+                f"{plan.source}: port {port} is driven by hand and by {driving[0]} at once"
+            )
 
 
 def check_held(
