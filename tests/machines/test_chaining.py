@@ -30,13 +30,30 @@ def actuator(seed: int, columns: int = 7) -> Design:
     return Design(small, mask)
 
 
+def hinged() -> Design:
+    """An actuator that hangs on its support by a single beam."""
+    whole = actuator(1).problem
+    mask = whole.initial.copy()
+    at_supports = np.flatnonzero(whole.lattice.beams_touching(whole.supports.nodes))
+    held = np.isin(whole.lattice.beams[at_supports], whole.supports.nodes).sum(axis=1)
+    mask[at_supports] = False
+    mask[at_supports[held == 1][0]] = True
+    return Design(whole, mask)
+
+
 def build(parts: dict[str, Any], links: list[Any] | None = None, **ends: Any) -> Any:
     told = {
         "name": "chain", "parts": parts, "links": links or [],
         "input": {"ports": ["a.input"]}, "output": {"ports": ["b.output"]}, **ends,
     }  # fmt: skip
     plan = plan_of(MachineTable.model_validate(told), "chain.toml")
-    return assemble(plan, lambda entry: strut_named(entry) or actuator(int(entry)))
+    return assemble(plan, find)
+
+
+def find(entry: str) -> Design:
+    if entry == "hinged":
+        return hinged()
+    return strut_named(entry) or actuator(int(entry))
 
 
 def whole(machine: Any) -> float:
@@ -141,6 +158,13 @@ def test_forces_are_not_chained_yet() -> None:
     pushed = {"ports": ["a.input"], "drive": "force", "amount": 0.01}
     machine = build({"a": {"entry": "1"}}, input=pushed, output={"ports": ["a.output"]})
     with pytest.raises(InvalidFile, match="driven by a displacement"):
+        predict(machine)
+
+
+def test_what_swings_freely_is_refused() -> None:
+    machine = build({"a": {"entry": "1"}, "b": {"entry": "hinged", "at": [-40.0, 0.0]}},
+                    output={"ports": ["a.output"]})  # fmt: skip
+    with pytest.raises(InvalidFile, match="something in the machine swings freely"):
         predict(machine)
 
 
