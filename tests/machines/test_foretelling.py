@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.machines import Foretold, Machine
+    from bellcrank.machines.blocks import Blocks
+    from bellcrank.machines.standing import Stand
+    from bellcrank.machines.stroke import Stroke
 
 POINTS = 8
 STATED = 0.01
@@ -230,6 +234,39 @@ def test_a_table_that_is_known_already_is_not_made_again(folder: Path, tmp_path:
     assert all(stand.fit is known for stand in found.stands)
     assert not list(tmp_path.iterdir())
     assert found.output == pytest.approx(told(built, folder).output, abs=1e-8)
+
+
+def test_parts_are_followed_where_tables_lose_their_stability(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lose(
+        blocks: Blocks, _ways: Any, points: int, _make: Any
+    ) -> tuple[tuple[Stand, ...], Stroke, float]:
+        stands = tuple(linear(member) for member in blocks.members)
+        stroke = follow_stroke(blocks, [stand.element for stand in stands], points)
+        return stands, replace(stroke, status=Status.SNAPPED, reached=0.25), 0.0
+
+    monkeypatch.setattr("bellcrank.machines.foretelling._by_tables", lose)
+    found = told(machine("row"), folder)
+    assert [stand.kind for stand in found.stands] == ["itself", "itself"]
+    assert found.stroke.status is Status.CONVERGED
+    assert [stand.reason for stand in found.stands] == [
+        "by tables, stability is lost at 25.0% of the stroke"
+    ] * 2
+    expected = told(machine("row"), folder, live=True)
+    assert found.output == pytest.approx(expected.output, abs=1e-12)
+
+
+def test_what_ports_that_give_make_of_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    built = machine("row")
+    assert foretell(built, 1, live=True).doubts == ()
+    monkeypatch.setattr(module, "BENT", 1e-3)
+    (doubt,) = foretell(built, 1, live=True).doubts
+    rigid = straight(blocks_of(built), [linear(each).element for each in blocks_of(built).members])
+    assert doubt == (
+        "ports that give make much of it: the linear efficiency is "
+        f"{predict(built).efficiency:.4g}, with rigid ports {rigid.efficiency:.4g}"
+    )
 
 
 def test_where_a_machine_snaps_is_foretold(folder: Path) -> None:
