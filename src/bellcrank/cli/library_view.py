@@ -93,8 +93,8 @@ def print_entries(
     results.print(table)
     worse = len(found) - sum(each.better for each in found)
     said = "1 entry" if len(found) == 1 else f"{len(found)} entries"
-    touching = len(found) - sum(each.clear for each in found)
-    marks = {"* the plain lever is better": worse, "! struts touch": touching}
+    unclear = len(found) - sum(each.clear for each in found)
+    marks = {"* the plain lever is better": worse, "! struts touch, or it may snap": unclear}
     mark = "".join(f"; {text} ({count})" for text, count in marks.items() if count)
     results.print(f"\n{said}, lattice units{mark}")
     warn(known)
