@@ -269,6 +269,20 @@ def test_what_ports_that_give_make_of_it_is_said(monkeypatch: pytest.MonkeyPatch
     )
 
 
+def test_a_comparison_says_how_far_off_it_is_as_far_as_both_go() -> None:
+    built = machine("row")
+    found, whole = foretell(built, 4, live=True), simulate(built, 4)
+    same = replace(whole, output=found.output, input_force=found.input_force)
+    assert (compare(found, same).output_error, compare(found, same).force_error) == (0.0, 0.0)
+    other = replace(same, output=1.25 * found.output, input_force=0.8 * found.input_force)
+    assert compare(found, other).output_error == pytest.approx(0.2)
+    assert compare(found, other).force_error == pytest.approx(0.25)
+    early = replace(other, motion=other.motion[:3], output=other.output[:3].copy(),
+                    input_force=other.input_force[:3])  # fmt: skip
+    early.output[:2] = found.output[:2]
+    assert compare(found, early).output_error == pytest.approx(0.2)
+
+
 def test_where_a_machine_snaps_is_foretold(folder: Path) -> None:
     # Driven 25 times as far as it was made for.
     built = build({"a": STRONG, "b": {**STRONG, "join": "a.output"}}, ["b.output"],
