@@ -57,6 +57,14 @@ def test_a_picture_alone(here: Path, name: str) -> None:
     assert set(files(here)) == {name}
 
 
+def test_no_figure_of_the_table_is_cut_off() -> None:
+    load = "spring:0.012345678"
+    outcome = call("characterise", "human:crane", "--points", 1, "--load", load, width=70)
+    assert "…" not in outcome.out
+    first = "".join(line[2:13].strip() for line in outcome.out.splitlines())
+    assert load in first
+
+
 def test_loads_of_ones_own_and_a_loss_of_stability() -> None:
     words = ("--load", "blocked", "--load", "force:-1e-3", "--load", "spring:2e-3", "--points", 5)
     outcome = call("characterise", "machine:anti-parallel", *words)

@@ -92,6 +92,17 @@ def test_a_design_for_a_part_is_explained_with_the_springs_that_were_learnt(bits
     assert "explained with 5 and 0.1" in outcome.err
 
 
+def test_such_a_design_is_predicted_with_those_springs_too(bits: Path) -> None:
+    told = call("predict", "machine:crane", "--model", bits, "--json")
+    assert told.code == 0, told.err
+    assert "predicted with 5 and 0.1, which the network has learnt" in told.err
+    (row,) = told.data["results"]
+    explained = call("explain", "machine:crane", "--model", bits, "--json").data
+    assert row["mask"] == explained["mask"]
+    assert row["efficiency"] == pytest.approx(explained["predicted"], abs=1e-5)
+    assert call("predict", "crane", "--model", bits, "--json").err == ""
+
+
 def test_what_cannot_be_explained_is_refused(here: Path, pictures: Path, bits: Path) -> None:
     taken = write(here / "taken.png", "mine")
     small = write(here / "small.json", SMALL)

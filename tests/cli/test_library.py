@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bellcrank.machines import elementary
-from bellcrank.machines.library import Library, find_entry, shipped_folder
+from bellcrank.machines.library import Library, find_entry, read_entry, shipped_folder
 from bellcrank.model import read_design, write_design
 
 from .helpers import call, refusal
@@ -124,9 +124,10 @@ def test_a_design_is_added_to_ones_own_folder(lever: Path, own: Path) -> None:
     assert "a design of its own" in outcome.out
     assert len(call("library", "list", "--json").data) == COUNT + 1
     assert call("evaluate", "left-own", "--json").code == 0
-    again = call("library", "add", lever, "--points", 2)
-    assert again.code == 2
-    assert "exists already" in again.err
+    assert "exists already" in refusal("library", "add", lever, "--points", 1, folder=own)
+    assert len(read_entry(path).characterisation.curves[0].motion) == 3
+    assert call("library", "add", lever, "--points", 1, "--overwrite").code == 0
+    assert len(read_entry(path).characterisation.curves[0].motion) == 2
 
 
 def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
@@ -139,6 +140,7 @@ def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
     assert "1 of 1  down-5-free: down-5-free-" in outcome.err
     assert len(list((tmp_path / "made").glob("down-5-free-*.json"))) == 1
     assert "was there" in call(*words).err
+    assert "none better than down-5-free-" in call(*words, "--again").err
     outcome = call("library", "index", "--entries", tmp_path / "made", "--out", tmp_path / "pages")
     assert outcome.code == 0, outcome.err
     page = (tmp_path / "pages" / "index.html").read_text()
@@ -164,6 +166,7 @@ def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
         (("make", "--columns", "nine", "--out", "x"), "--columns nine: expected whole numbers"),
         (("make", "--columns", "3", "--out", "x"), "columns: expected at least 5"),
         (("make", "--workers", "0", "--out", "x"), "workers: expected at least 1"),
+        (("index", "--entries", "nothing", "--out", "x"), "nothing: no entries of a library"),
         (("add", "nothing.json"), "unknown problem 'nothing.json'"),
         (("add", "crane", "--points", "0"), "--points: expected at least one"),
         (("show", "down-9-free", "--out", "picture.gif"), "expected a picture name"),

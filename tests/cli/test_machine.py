@@ -119,7 +119,40 @@ def test_a_stroke_is_refused_before_anything_is_computed(plan: Path, tmp_path: P
     assert "exists" in refusal(*stroke, plan.with_name("lever.json"))
 
 
+def test_a_stroke_that_ends_early_is_said_to(plan: Path, tmp_path: Path, shelf: Path) -> None:
+    plan.write_text(PLAN.replace('ports = ["first.input"]', 'ports = ["first.input"]\namount = 60'))
+    out = tmp_path / "stroke.svg"
+    outcome = call(
+        "machine", "predict", plan, "--stroke", "--live", "--points", 2, "--check", "--out", out
+    )
+    assert outcome.code == 0, outcome.err
+    assert "full stroke" not in outcome.out
+    assert "of the stroke, where stability is lost" in outcome.out
+    assert "note: stability is lost at" in outcome.err
+    assert not shelf.exists()
+
+
+def test_a_machine_that_comes_along_is_built_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "amplifier").mkdir()
+    monkeypatch.chdir(tmp_path)
+    told = call("machine", "build", "amplifier", "--json").data
+    assert told["parts"] == ["first", "second"]
+    kept = json.loads((tmp_path / "amplifier.json").read_text())
+    assert kept["efficiency"] == told["efficiency"]
+
+
+@pytest.mark.parametrize("name", ["", ".", "nosuch"])
+@pytest.mark.parametrize("words", [("build",), ("predict",)])
+def test_what_is_no_plan_is_said(name: str, words: tuple[str, ...]) -> None:
+    assert f"no plan {name!r}: neither a file nor one of amplifier" in refusal(
+        "machine", *words, name
+    )
+
+
 def test_what_is_wrong_is_said_in_one_line(plan: Path, tmp_path: Path) -> None:
+    assert "ending in .json" in refusal("machine", "build", plan, "--out", tmp_path / "two.stl")
     call("machine", "build", plan)
     assert "exists" in refusal("machine", "build", plan)
     assert call("machine", "build", plan, "--overwrite").code == 0

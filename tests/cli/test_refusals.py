@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bellcrank.runs.layout import LOCK
+from bellcrank.runs.locking import locked
+
 from .helpers import LIFT, PROBLEM, SETTINGS, SMALL, call, files, refusal, write
 
 if TYPE_CHECKING:
@@ -212,6 +215,29 @@ def test_a_design_job_needs_either_a_problem_or_a_run(whole: Path) -> None:
             == "error: give one of these: a problem to design for, --from DESIGN, or --resume DIR"
         )
     assert files(whole) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (("--steps", 9000), "steps"),
+        (("--minimum-degree", 3), "minimum-degree"),
+        (("--set", "depth=3"), "depth"),
+        (("--out", "elsewhere"), "out"),
+    ],
+)
+def test_a_run_goes_on_as_it_was_begun(half: Path, words: tuple[str, ...], what: str) -> None:
+    line = refusal("design", "--resume", half, *words, folder=half)
+    assert line.startswith(f"error: {what} is kept from the run's start")
+    assert line.endswith(f"--from {half}")
+
+
+def test_one_process_at_a_time_is_at_work_on_a_run(half: Path) -> None:
+    with locked(half / LOCK):
+        line = refusal("design", "--resume", half, code=1, folder=half)
+    assert line.startswith(f"error: {half}: another process is at work on this run")
+    assert call("design", "--resume", half).code == 0
+    assert not (half / LOCK).exists()
 
 
 # Places where nothing can be written, or should not be.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from bellcrank.machines.assembly import Machine, assemble
 from bellcrank.machines.elementary import elementary
 from bellcrank.machines.plan import MachineTable, PortName, plan_of, read_plan
 from bellcrank.mechanics import Evaluator
+from bellcrank.model import Stiffness, Supports
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,8 +32,27 @@ def thinned(columns: int = 7, seed: int = 0) -> Design:
     return full.with_mask(mask)
 
 
+def rolling() -> Design:
+    """Return an actuator that stands on rollers, but for one node."""
+    problem = elementary(7, "down")
+    nodes = problem.supports.fixed
+    return replace(
+        problem, supports=Supports(fixed=nodes[:1], fixed_y=nodes[1:]), designable=[0]
+    ).full_design()
+
+
+def stiff() -> Design:
+    """Return an actuator of other struts."""
+    return replace(elementary(7, "down"), stiffness=Stiffness(bond=7.0, angle=0.1)).full_design()
+
+
 def find(name: str) -> Design:
-    known = {"full": elementary(7, "down").full_design(), "thin": thinned()}
+    known = {
+        "full": elementary(7, "down").full_design(),
+        "thin": thinned(),
+        "rolling": rolling(),
+        "stiff": stiff(),
+    }
     if name not in known:
         raise UnknownName(f"no design {name!r}")
     return known[name]
@@ -112,6 +133,16 @@ def test_a_bridge_joins_ports_that_are_apart() -> None:
     assert abs(response.efficiency) > 1e-6
 
 
+def test_a_drive_is_that_of_the_first_part_in_its_size_or_what_the_plan_says() -> None:
+    alone: dict[str, Any] = {"output": {"ports": ["a.output"]}}
+    own = elementary(7, "down").input
+    large = build({"a": {"entry": "full", "scale": 2.0}}, **alone).design.problem.input
+    assert (large.drive, large.amount) == ("displacement", 2.0 * own.amount)
+    pushed = {"ports": ["a.input"], "drive": "force", "amount": 0.25}
+    given = build({"a": {"entry": "full", "scale": 2.0}}, input=pushed, **alone)
+    assert (given.design.problem.input.drive, given.design.problem.input.amount) == ("force", 0.25)
+
+
 def test_designable_is_all_but_ports_and_supports() -> None:
     problem = build(PAIR).design.problem
     port = set(build(PAIR).port_nodes(PortName("a", "output")).tolist())
@@ -150,6 +181,18 @@ def test_designable_is_all_but_ports_and_supports() -> None:
             {},
             "nothing holds a, b",
         ),
+        (
+            {**PAIR, "c": {"entry": "full", "join": "b.input", "mirror": True}},
+            [],
+            {"input": {"ports": ["c.input"]}},
+            "port c.input is driven by hand and by a.output",
+        ),
+        (
+            PAIR,
+            [],
+            {"input": {"ports": ["a.input"], "drive": "force"}},
+            "input.amount: must be given, for a is driven by a displacement",
+        ),
         (PAIR, [], {"output": {"ports": ["b.exit"]}}, "no port 'b.exit'"),
         (PAIR, [], {"output": {"ports": ["a.input"]}}, "port 'a.input' is input and output"),
         ({"a": {"entry": "absent"}}, [], {"output": {"ports": ["a.output"]}}, "parts.a.entry: no"),
@@ -162,6 +205,24 @@ def test_designable_is_all_but_ports_and_supports() -> None:
             {},
             "placed on one another in a circle",
         ),
+        (
+            {"a": {"entry": "rolling", "rotate": 60}},
+            [],
+            {"output": {"ports": ["a.output"]}},
+            "part a stands on rollers along an axis and cannot be turned by 60 degrees",
+        ),
+        (
+            {"a": {"entry": "full"}, "b": {"entry": "stiff", "join": "a.output"}},
+            [],
+            {},
+            "parts a and b are made of different struts: stiffness 5 and 0.1 against 7 and 0.1",
+        ),
+        (
+            {"a": {"entry": "full"}, "b": {"entry": "full", "at": [-13.0, 0.0]}},
+            [{"from": "a.output", "to": "b.input", "kind": "bridge"}] * 2,
+            {},
+            "bridge from a.output to b.input: something is in its way at",
+        ),
         ({"a": {"entry": "full", "rotate": 45}}, [], {}, "expected a multiple of 60 degrees"),
         ({"a": {"entry": "full", "join": "z.output"}}, [], {}, "no part 'z'"),
         ({"a": {"entry": "full", "join": "a.output"}}, [], {}, "cannot join itself"),
@@ -172,6 +233,16 @@ def test_bad_plans_get_one_clear_error(
 ) -> None:
     with pytest.raises(InvalidFile, match=told.replace(".", r"\.")):
         build(parts, links, **ends)
+
+
+@pytest.mark.parametrize("rotate", [0, 180])
+def test_rollers_roll_along_their_axis_upside_down_too(rotate: int) -> None:
+    machine = build({"a": {"entry": "rolling", "rotate": rotate}}, output={"ports": ["a.output"]})
+    held = machine.design.problem.supports
+    assert np.array_equal(
+        held.fixed_y, np.sort(machine.nodes["a"][rolling().problem.supports.fixed_y])
+    )
+    assert len(held.fixed_x) == 0
 
 
 def test_ports_can_have_a_direction_each() -> None:

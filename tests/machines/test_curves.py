@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,6 +154,27 @@ def test_a_response_that_could_go_elsewhere_is_a_doubt() -> None:
     # Nothing of the kind in designs that come along: their free curves are beyond doubt.
     for name in ("human:crane", "machine:crane", "machine:discs"):
         assert characterise(actuator(name), [Load("free")], 3).doubts == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "doubt"),
+    [
+        ({"status": Status.SNAPPED}, f"free: {Status.SNAPPED.message}"),
+        ({"displacement": 1.001}, "free: the curve ends on another branch than the response"),
+        ({"displacement": 1.0 + 1e-8}, None),
+    ],
+)
+def test_where_the_response_goes_elsewhere_it_is_said(
+    changes: dict[str, Any], doubt: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    design = actuator("human:crane")
+    response = Evaluator(design.problem).respond(design.mask)
+    if "displacement" in changes:
+        changes = {"displacement": changes["displacement"] * response.displacement}
+    found = replace(response, **changes)
+    monkeypatch.setattr(Evaluator, "respond", lambda *_words: found)
+    told = characterise(design, [Load("free")], 3).doubts
+    assert told == (() if doubt is None else (doubt,))
 
 
 @pytest.mark.parametrize(

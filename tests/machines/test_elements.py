@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from bellcrank.machines.equilibria import Chain
 from bellcrank.machines.members import Arm
 from bellcrank.machines.potential import exponents_of
 from bellcrank.machines.standing import linear
+from bellcrank.mechanics import Rigid
 
 from .actuators import SOFT, STRONG, build, machine
 
@@ -81,6 +83,23 @@ def settled(element: Tabled | Live, q: NDArray[np.float64]) -> Any:
     assert felt is not None
     assert felt.departure < 1e-10
     return felt
+
+
+def test_an_output_that_sits_beside_the_middle_of_its_block_turns_with_it() -> None:
+    rng = np.random.default_rng(3)
+    found = blocks_of(machine("row"))
+    offset = rng.standard_normal(found.offset.shape)
+    angle = rng.uniform(0.0, 2.0 * np.pi, len(offset))
+    direction = np.column_stack([np.cos(angle), np.sin(angle)])
+    blocks = replace(found, offset=offset, direction=direction)
+    q = np.zeros_like(blocks.stroke)
+    (block,) = set(blocks.moved.tolist())
+    q[block] = [0.3, -0.2, 0.7]
+    moved = Rigid(np.arange(len(offset)), offset, np.zeros(2)).place(q[block])
+    assert blocks.output(q) == pytest.approx((moved * direction).sum(axis=1).mean())
+    step = 1e-6 * q
+    difference = (blocks.output(step) - blocks.output(-step)) / 2.0
+    assert blocks.output_slope(step) == pytest.approx(difference, rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["table", "live"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.machines import Foretold, Machine
+    from bellcrank.machines.blocks import Blocks
+    from bellcrank.machines.standing import Stand
+    from bellcrank.machines.stroke import Stroke
 
 POINTS = 8
 STATED = 0.01
@@ -152,7 +156,8 @@ def test_rigid_ports_alone_are_not_enough_and_the_linear_chain_puts_them_right(
     built = machine("row")
     found, whole = told(built, folder), simulate(built, POINTS)
     true = whole.efficiency[-1]
-    assert abs(found.stroke.efficiency[-1] - true) > 5.0 * abs(found.efficiency - true)
+    by_rigid_ports = found.stroke.output[-1] / found.stroke.motion[-1]
+    assert abs(by_rigid_ports - true) > 5.0 * abs(found.efficiency - true)
     assert found.linear.efficiency == predict(built).efficiency
     slope = (found.output[1] - found.output[0]) / found.motion[1]
     assert slope == pytest.approx(found.linear.efficiency, rel=0.01)
@@ -193,7 +198,7 @@ def test_live_parts_of_blocks_are_the_linear_chain_of_blocks_for_small_strokes()
     blocks = blocks_of(built)
     expected = straight(blocks, [linear(member).element for member in blocks.members])
     stroke = follow_stroke(blocks, [Live(member.body.element) for member in blocks.members], 1)
-    assert stroke.efficiency[-1] == pytest.approx(expected.efficiency, rel=1e-3)
+    assert stroke.output[-1] / stroke.motion[-1] == pytest.approx(expected.efficiency, rel=1e-3)
     assert stroke.input_force[-1] / 1e-5 == pytest.approx(expected.input_stiffness, rel=1e-3)
 
 
@@ -229,6 +234,53 @@ def test_a_table_that_is_known_already_is_not_made_again(folder: Path, tmp_path:
     assert all(stand.fit is known for stand in found.stands)
     assert not list(tmp_path.iterdir())
     assert found.output == pytest.approx(told(built, folder).output, abs=1e-8)
+
+
+def test_parts_are_followed_where_tables_lose_their_stability(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lose(
+        blocks: Blocks, _ways: Any, points: int, _make: Any
+    ) -> tuple[tuple[Stand, ...], Stroke, float]:
+        stands = tuple(linear(member) for member in blocks.members)
+        stroke = follow_stroke(blocks, [stand.element for stand in stands], points)
+        return stands, replace(stroke, status=Status.SNAPPED, reached=0.25), 0.0
+
+    monkeypatch.setattr("bellcrank.machines.foretelling._by_tables", lose)
+    found = told(machine("row"), folder)
+    assert [stand.kind for stand in found.stands] == ["itself", "itself"]
+    assert found.stroke.status is Status.CONVERGED
+    assert [stand.reason for stand in found.stands] == [
+        "by tables, stability is lost at 25.0% of the stroke"
+    ] * 2
+    expected = told(machine("row"), folder, live=True)
+    assert found.output == pytest.approx(expected.output, abs=1e-12)
+
+
+def test_what_ports_that_give_make_of_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    built = machine("row")
+    assert foretell(built, 1, live=True).doubts == ()
+    monkeypatch.setattr(module, "BENT", 1e-3)
+    (doubt,) = foretell(built, 1, live=True).doubts
+    rigid = straight(blocks_of(built), [linear(each).element for each in blocks_of(built).members])
+    assert doubt == (
+        "ports that give make much of it: the linear efficiency is "
+        f"{predict(built).efficiency:.4g}, with rigid ports {rigid.efficiency:.4g}"
+    )
+
+
+def test_a_comparison_says_how_far_off_it_is_as_far_as_both_go() -> None:
+    built = machine("row")
+    found, whole = foretell(built, 4, live=True), simulate(built, 4)
+    same = replace(whole, output=found.output, input_force=found.input_force)
+    assert (compare(found, same).output_error, compare(found, same).force_error) == (0.0, 0.0)
+    other = replace(same, output=1.25 * found.output, input_force=0.8 * found.input_force)
+    assert compare(found, other).output_error == pytest.approx(0.2)
+    assert compare(found, other).force_error == pytest.approx(0.25)
+    early = replace(other, motion=other.motion[:3], output=other.output[:3].copy(),
+                    input_force=other.input_force[:3])  # fmt: skip
+    early.output[:2] = found.output[:2]
+    assert compare(found, early).output_error == pytest.approx(0.2)
 
 
 def test_where_a_machine_snaps_is_foretold(folder: Path) -> None:

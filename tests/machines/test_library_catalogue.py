@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidFile, InvalidSettings, UnknownName
-from bellcrank.machines import elementary, mean_ports, two_port_at
+from bellcrank.machines import block_ports, elementary, mean_ports, two_port_at
 from bellcrank.machines.elementary import DIRECTIONS
 from bellcrank.machines.library import (
     Library,
@@ -22,7 +22,7 @@ from bellcrank.machines.library import (
 from bellcrank.machines.library.catalogue import SORTS
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, lever_check
 from bellcrank.machines.library.summary import INDEX, entry_files, read_summary, write_index
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import CAREFUL, Conditions, Evaluator, Status
 from bellcrank.search.goals import Case, GoalResponder
 
 if TYPE_CHECKING:
@@ -70,14 +70,21 @@ def test_an_entry_that_comes_along_is_sound(name: str) -> None:
     assert 2.0 * response.energy / problem.input.amount**2 > LEAST_STIFFNESS
 
     element = mean_ports(entry.design)
-    fresh = two_port_at(element, element.rest())
+    rest = element.rest()
+    assert rest.asymmetry < 1e-10, "reciprocity, before the stiffness is made symmetric"
+    assert np.linalg.eigvalsh(rest.stiffness)[0] >= -1e-10 * np.abs(rest.stiffness).max()
+    moved = Conditions(np.array([True, False]), np.zeros(2), np.zeros(2))
+    answer = element.linear(rest, moved).transfer()
+    assert answer[0, 1] == pytest.approx(-answer[1, 0], rel=1e-8)
+    fresh = two_port_at(element, rest)
     stiffness = entry.characterisation.rest.stiffness
     assert np.allclose(stiffness, fresh.stiffness, rtol=1e-6, atol=1e-12)
-    assert np.abs(stiffness - stiffness.T).max() <= 1e-8 * np.abs(stiffness).max()
     assert np.linalg.eigvalsh(stiffness)[0] >= -1e-8 * np.abs(stiffness).max()
     blocks = entry.characterisation.blocks
     assert blocks is not None
+    assert np.abs(blocks - blocks.T).max() == 0.0
     assert np.linalg.eigvalsh(blocks)[0] >= -1e-8 * np.abs(blocks).max()
+    assert np.allclose(blocks, block_ports(entry.design).rest().stiffness, atol=1e-9)
 
     assert np.isfinite(entry.validation.linear_efficiency)
     assert entry.provenance["settings"]["steps"] > 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +20,8 @@ from bellcrank.machines.library.files import entry_to_dict
 from bellcrank.machines.library.making import WORK, Resisting
 from bellcrank.machines.library.summary import INDEX, entry_files
 from bellcrank.mechanics import Evaluator, Status
+from bellcrank.runs.layout import LOCK
+from bellcrank.runs.locking import locked
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -124,6 +127,49 @@ def test_a_search_with_other_settings_is_not_mixed_in(tmp_path: Path) -> None:
     list(make(ORDER, tmp_path, workers=1, tell=lambda *_: stop.set(), stop=stop))
     with pytest.raises(InvalidSettings, match="was begun with other settings"):
         list(make(replace(ORDER, seed=1), tmp_path))
+
+
+def test_what_is_better_takes_the_place_of_what_was_there(whole: Path, tmp_path: Path) -> None:
+    short = replace(ORDER, kinds=("free",), steps=2, chains=1)
+    (first,) = make(short, tmp_path)
+    better = replace(ORDER, kinds=("free",))
+    (second,) = make(better, tmp_path, again=True)
+    assert first.entry is not None
+    assert second.entry is not None
+    assert second.entry.efficiency > first.entry.efficiency
+    assert second.note == f"made in place of {first.entry.name}"
+    assert [path.stem for path in entry_files(tmp_path)] == [second.entry.name]
+    assert Library((tmp_path,)).readable() == [second.entry.name]
+    assert second.entry.name in told(whole)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    (third,) = make(short, tmp_path, again=True)
+    assert (third.entry, third.note) == (None, f"none better than {second.entry.name}")
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_making_anew_goes_on_after_a_stop(whole: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+    stop, searched = threading.Event(), []
+
+    def tell(task: Task, _progress: Progress) -> None:
+        searched.append(task.name)
+        if task.kind == "light":
+            stop.set()
+
+    made = list(make(ORDER, tmp_path, workers=1, again=True, tell=tell, stop=stop))
+    assert [each.note.startswith("none better than") for each in made] == [True]
+    searched.clear()
+    made = list(make(ORDER, tmp_path, workers=1, again=True, tell=tell))
+    assert [each.note.startswith("none better than") for each in made] == [True, True]
+    assert set(searched) == {"down-5-light"}
+    assert told(tmp_path) == told(whole)
+    assert not (tmp_path / WORK).exists()
+
+
+def test_one_process_at_a_time_makes_entries_in_a_folder(whole: Path) -> None:
+    with locked(whole / LOCK), pytest.raises(StorageError, match="another process makes entries"):
+        list(make(ORDER, whole))
+    assert not (whole / LOCK).exists()
 
 
 def test_orders_for_what_there_cannot_be_are_refused() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -14,10 +16,12 @@ from bellcrank.machines import (
     fit_potential,
     mean_ports,
     sample,
+    sampling,
     two_port_at,
     usual_reach,
 )
-from bellcrank.mechanics import Conditions, Linear, Loose, Superelement, follow
+from bellcrank.machines.potential import answers_of, variables_of
+from bellcrank.mechanics import Conditions, Linear, Loose, State, Superelement, follow
 
 from ..physics.problems import patch  # noqa: TID252 - the tests' own small problems
 from .test_two_port import actuator
@@ -92,6 +96,29 @@ def test_a_potential_tells_states_that_it_has_not_seen() -> None:
         assert energy == pytest.approx(state.energy, abs=1e-3 * 0.12)
     assert found.error.max() < 0.02
     assert (found.typical_error <= found.error).all()
+
+
+def test_its_error_is_measured_on_states_that_had_no_part_in_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    taken: list[State] = []
+
+    def noted(*words: Any) -> tuple[list[State], int]:
+        states, lost = sample(*words)
+        taken.extend(states)
+        return states, lost
+
+    monkeypatch.setattr(sampling, "sample", noted)
+    found = fit(mean_ports(actuator("human:crane")), [3])
+    held_out = taken[::5]
+    assert len(held_out) == found.held_out
+    assert found.samples == len(taken) - len(held_out) - len(taken[1::5])
+    moved = np.array([True, False])
+    true = np.array([answers_of(state, moved) for state in taken])
+    told = np.array([found.potential.answer(variables_of(state, moved)) for state in held_out])
+    missed = (told - true[::5]) / np.abs(true).max(axis=0)
+    assert found.error == pytest.approx(np.abs(missed).max(axis=0))
+    assert found.typical_error == pytest.approx(np.sqrt((missed**2).mean(axis=0)))
 
 
 def test_blocks_are_told_to_a_few_percent() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -11,6 +12,9 @@ from bellcrank.machines import predict
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.showcases import find_plan, showcase, showcases
 from bellcrank.mechanics import CAREFUL, Evaluator, Status
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 SMALL = 1e-3
 """Part of the stroke in which all is linear."""
@@ -62,6 +66,14 @@ def test_one_machine_has_ten_actuators() -> None:
 def test_unknown_plans_list_the_known_ones() -> None:
     with pytest.raises(UnknownName, match=r"no plan 'claw': neither a file nor .*gripper"):
         find_plan("claw")
+
+
+def test_a_folder_of_that_name_hides_no_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gripper").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert find_plan("gripper").table.name == "gripper"
 
 
 def test_struts_have_names() -> None:

@@ -18,6 +18,7 @@ from bellcrank.machines import (
     ports_of,
     trace,
     two_port_at,
+    usual_loads,
 )
 from bellcrank.mechanics import Conditions, Evaluator, Status, follow
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports, gallery_design
@@ -149,6 +150,14 @@ def test_the_matched_spring_takes_the_largest_share_of_the_work() -> None:
     best = port.matched_spring
     assert share(best) == pytest.approx(port.best_work_share)
     assert share(best) > max(share(0.99 * best), share(1.01 * best))
+
+
+@pytest.mark.parametrize("left", [1e-14, 0.0, -1e-14])
+def test_an_input_without_resistance_gives_all_its_work_to_the_softest_spring(left: float) -> None:
+    # As a bar that hangs between its ports; rounding errors leave it some resistance, or less.
+    port = TwoPort(input_stiffness=left, efficiency=1.0, output_compliance=4.0)
+    assert (port.matched_spring, port.best_work_share) == (0.0, 1.0)
+    assert [load.label for load in usual_loads(port)] == ["free", "blocked"]
 
 
 @pytest.mark.parametrize("spring", [0.0, 0.02, 0.5, 100.0])

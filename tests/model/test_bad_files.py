@@ -175,6 +175,12 @@ def test_bad_design_files_are_refused(write, small, change, message):
     [
         ({}, "expected a list 'masks', or 'results' with a 'mask' in each"),
         ({"masks": "ff"}, "expected a list 'masks', or 'results' with a 'mask' in each"),
+        ({"masks": ["ff"], "results": []}, "expected 'masks' or 'results', got both"),
+        (
+            {"masks": ["ff"], "stroke": 2},
+            "unknown key 'stroke'; known here: masks, results, schema",
+        ),
+        ({"mask": "ff"}, "unknown key 'mask'"),
         ({"masks": ["ff", "f"]}, "masks[1]: expected 2 hexadecimal digits for 8 beams, got 1"),
         ({"masks": [255]}, "masks[0]: expected hexadecimal text, got 255"),
         ({"results": [{"mask": "ff"}, {}]}, "results[1].mask: expected hexadecimal text, got None"),

@@ -99,7 +99,7 @@ def test_the_best_after_cleaning_wins_whatever_was_claimed(small: Problem) -> No
 
 
 def test_no_acceptable_candidate_is_an_error(small: Problem) -> None:
-    with pytest.raises(InvalidSettings, match="none of 0 accepted designs"):
+    with pytest.raises(InvalidSettings, match="accepted no design, so that there is none to build"):
         select(small, [])
 
 

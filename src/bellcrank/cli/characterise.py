@@ -120,7 +120,9 @@ def _print(found: Characterisation, name: str) -> None:
         linear.add_row(label, value)
     results.print(linear)
     results.print("at the end of the stroke, forces from outside:")
-    stroke = Table("load", "u_in", "F_in", "u_out", "u_out/u_in", "F_out", "status", box=SIMPLE)
+    stroke = Table(box=SIMPLE)
+    for heading in ("load", "u_in", "F_in", "u_out", "u_out/u_in", "F_out", "status"):
+        stroke.add_column(heading, overflow="fold")  # a figure is not to be cut off
     for curve in found.curves:
         stroke.add_row(*_ending(curve))
     results.print(stroke)

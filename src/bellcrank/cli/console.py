@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
 
 from bellcrank.provenance import other_version
+
+if TYPE_CHECKING:
+    from bellcrank.model import Problem
 
 results = Console(highlight=False, soft_wrap=True, emoji=False)
 notes = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
@@ -29,6 +32,17 @@ def warn_of_another_version(begun: Mapping[str, Any], what: str) -> None:
         notes.print(
             f"[yellow]note:[/] this {what} was begun with another version ({plain(version)}); "
             "what follows may differ from what it would have found."
+        )
+
+
+def warn_of_other_stiffness(own: Problem, learnt: Problem, done: str) -> None:
+    """Say that a network was asked about other springs than a design has, if it was."""
+    there, here = learnt.stiffness, own.stiffness
+    if (here.bond, here.angle) != (there.bond, there.angle):
+        notes.print(
+            f"[yellow]note:[/] the design's springs have stiffness {here.bond:g} and "
+            f"{here.angle:g}, for the part that it was made for; it is {done} with {there.bond:g} "
+            f"and {there.angle:g}, which the network has learnt."
         )
 
 

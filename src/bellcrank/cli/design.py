@@ -122,19 +122,26 @@ def design(
         raise InvalidSettings("--strut-width, --scale and --material are kept from the run's start")
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
+    given = {
+        "steps": steps, "chains": chains, "seed": seed, "objective": objective,
+        "dangling": dangling, "minimiser": minimiser, "cost": cost, "schedule": schedule,
+        "minimum_degree": minimum_degree, "patience": patience,
+        "goals": goal and tuple(goal), "strokes": strokes and _numbers("--strokes", strokes),
+        **settings_of("--set", more),
+    }  # fmt: skip
+    chosen = {key: value for key, value in given.items() if value is not None}
     if resume is not None:
+        if chosen or out is not None:
+            what = next(iter(chosen), "out").replace("_", "-")
+            raise InvalidSettings(
+                f"{what} is kept from the run's start, and cannot be changed with --resume; to "
+                f"search on from its design, begin a new run with --from {resume}"
+            )
         announce_compilation()
         folder = reopen_design(resume)
         warn_of_another_version(folder.provenance, "run")
     else:
-        given = {
-            "steps": steps, "chains": chains, "seed": seed, "objective": objective,
-            "dangling": dangling, "minimiser": minimiser, "cost": cost, "schedule": schedule,
-            "minimum_degree": minimum_degree, "patience": patience,
-            "goals": goal and tuple(goal), "strokes": strokes and _numbers("--strokes", strokes),
-        }  # fmt: skip
-        chosen = {key: value for key, value in given.items() if value is not None}
-        settings = read_settings({"search": search, **chosen, **settings_of("--set", more)})
+        settings = read_settings({"search": search, **chosen})
         task = find_problem(problem) if problem is not None else _task_from(find_design(str(begin)))
         announce_compilation()
         folder = start_design(task, settings, out or Path(Path(task.name).name), part)

@@ -12,10 +12,16 @@ from rich.table import Table
 
 from bellcrank.cli.app import app
 from bellcrank.cli.arguments import DesignName
-from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.cli.console import (
+    announce_compilation,
+    notes,
+    plain,
+    print_json,
+    results,
+    warn_of_other_stiffness,
+)
 
 if TYPE_CHECKING:
-    from bellcrank.model import Design
     from bellcrank.surrogate.explaining import Explanation
 
 ABOUT = {
@@ -74,24 +80,13 @@ def explain(
         design, model, target,
         block=Block(**given) if given else None, device=device, overwrite=overwrite,
     )  # fmt: skip
-    _tell_of_stiffness(design, found.design)
+    warn_of_other_stiffness(design.problem, found.design.problem, "explained")
     if as_json:
         print_json(json.dumps(found.to_dict(), indent=1))
     else:
         _print_agreements(found)
     if target is not None:
         notes.print(f"wrote {plain(target)}")
-
-
-def _tell_of_stiffness(given: Design, explained: Design) -> None:
-    """Say so if the design was explained with other springs than its own."""
-    own, learnt = given.problem.stiffness, explained.problem.stiffness
-    if (own.bond, own.angle) != (learnt.bond, learnt.angle):
-        notes.print(
-            f"[yellow]note:[/] the design's springs have stiffness {own.bond:g} and {own.angle:g}, "
-            f"for the part that it was made for; it is explained with {learnt.bond:g} and "
-            f"{learnt.angle:g}, which the network has learnt."
-        )
 
 
 def _print_agreements(found: Explanation) -> None:

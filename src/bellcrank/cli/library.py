@@ -132,11 +132,14 @@ def show(
 def add(
     design: DesignName,
     points: Annotated[int, typer.Option(help="Along the curves of the two-port.")] = 20,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Measure a design of yours, and keep it in your own folder of the library."""
     from bellcrank.machines.library import measure, user_folder, write_entry
+    from bellcrank.machines.library.entry import name_of
     from bellcrank.machines.library.files import entry_to_dict
+    from bellcrank.model.storage import already_exists
     from bellcrank.runs.files import make_folder
     from bellcrank.workflows import find_design
 
@@ -144,9 +147,12 @@ def add(
     if points < 1:
         raise InvalidSettings(f"--points: expected at least one, got {points}")
     make_folder(user_folder())
+    target = user_folder() / f"{name_of(chosen)}.json"
+    if target.exists() and not overwrite:
+        raise already_exists(target)
     announce_compilation()
     entry = measure(chosen, points=points)
-    path = write_entry(entry, user_folder())
+    path = write_entry(entry, user_folder(), overwrite=overwrite)
     if as_json:
         print_json(json.dumps(entry_to_dict(entry), indent=1))
     else:
@@ -167,6 +173,9 @@ def make(
     workers: Annotated[
         int | None, typer.Option(help="Chains at the same time. \\[all cores]")
     ] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Search for what is there too; keep the better one.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the entries. \\[your own of the library]")
     ] = None,
@@ -190,14 +199,16 @@ def make(
     done = 0
     start = time.monotonic()
     with stopping_on_interrupt() as stop, MakingProgress(order) as progress:
-        for made in make_entries(order, folder, workers=workers, tell=progress, stop=stop):
+        for made in make_entries(
+            order, folder, workers=workers, again=again, tell=progress, stop=stop
+        ):
             progress.finish(made, time.monotonic() - start)
             done += 1
             if stop.is_set():
                 break
     if done < len(order.tasks):
-        again = shlex.join(["bellcrank", *sys.argv[1:]])
-        notes.print(f"Stopped; what is done is kept. Go on with the same words: {plain(again)}")
+        words = shlex.join(["bellcrank", *sys.argv[1:]])
+        notes.print(f"Stopped; what is done is kept. Go on with the same words: {plain(words)}")
         sys.exit(INTERRUPTED)
     notes.print(f"entries are in {plain(folder)}")
 
@@ -217,6 +228,8 @@ def index(
 
     known = whole() if entries is None else Library((entries,))
     warn(known)
+    if not len(known):
+        raise InvalidSettings(f"{entries}: no entries of a library are there")
     announce_compilation()
     for path in write_pages(known, out, overwrite=overwrite):
         notes.print(f"wrote {plain(path)}")

@@ -46,7 +46,9 @@ class MakingProgress(Live):
         """Say what became of a task."""
         with self._lock:
             self._finished, self._steps = made.number + 1, 0
-        what = made.note if made.entry is None else entry_line(made.entry)
+        what = made.note
+        if made.entry is not None:
+            what = entry_line(made.entry) + made.note.removeprefix("made")
         notes.print(
             f"{made.number + 1:3d} of {made.total}  {plain(made.task.name)}: {plain(what)}"
             f"  ({made.seconds:.0f} s, {elapsed:.0f} s in all)"
@@ -91,8 +93,8 @@ def print_entries(
     results.print(table)
     worse = len(found) - sum(each.better for each in found)
     said = "1 entry" if len(found) == 1 else f"{len(found)} entries"
-    touching = len(found) - sum(each.clear for each in found)
-    marks = {"* the plain lever is better": worse, "! struts touch": touching}
+    unclear = len(found) - sum(each.clear for each in found)
+    marks = {"* the plain lever is better": worse, "! struts touch, or it may snap": unclear}
     mark = "".join(f"; {text} ({count})" for text, count in marks.items() if count)
     results.print(f"\n{said}, lattice units{mark}")
     warn(known)

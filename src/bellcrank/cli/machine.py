@@ -14,6 +14,7 @@ from rich.table import Table
 
 from bellcrank.cli.app import app
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.errors import InvalidSettings
 from bellcrank.registry import design_sources
 
 if TYPE_CHECKING:
@@ -73,12 +74,15 @@ def build(
     from bellcrank.model import write_design
     from bellcrank.model.storage import already_exists, check_folder
 
+    found = find_plan(plan)
     target = out or Path(plan).with_suffix(".json")
+    if target.suffix.lower() != ".json":
+        raise InvalidSettings(f"{target}: expected a name ending in .json, as a design is written")
     check_folder(target)
     if target.exists() and not overwrite:
         raise already_exists(target)
     start = time.perf_counter()
-    built = assemble(find_plan(plan), partial(find_part, Path(plan).parent))
+    built = assemble(found, partial(find_part, Path(found.source).parent))
     announce_compilation()
     response = Evaluator(built.design.problem).respond(built.design.mask, CAREFUL)
     seconds = time.perf_counter() - start

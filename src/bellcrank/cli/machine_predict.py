@@ -53,7 +53,8 @@ def predict(
     if points < 1:
         raise InvalidSettings(f"--points: expected at least one, got {points}")
     _check_out(out, overwrite=overwrite)
-    built = assemble(find_plan(plan), partial(find_part, Path(plan).parent))
+    chosen = find_plan(plan)
+    built = assemble(chosen, partial(find_part, Path(chosen.source).parent))
     announce_compilation()
     predict(built)  # the first time, kernels are loaded
     start = time.perf_counter()
@@ -139,12 +140,25 @@ def _say(told: dict[str, Any], linear: Prediction, *, as_json: bool) -> None:
     table.add_row("name", plain(told["name"]))
     table.add_row("efficiency, small strokes", f"{linear.efficiency:.4f}")
     if "stroke" in told:
-        whole = told["stroke"]["efficiency"]
-        at = "" if told["stroke"]["reached"] == 1.0 else f" (of {told['stroke']['reached']:.1%})"
-        table.add_row("efficiency, full stroke", "-" if whole is None else f"{whole:.4f}{at}")
+        whole, reached = told["stroke"]["efficiency"], told["stroke"]["reached"]
+        where = "full stroke" if reached == 1.0 else f"at {reached:.1%} of the stroke"
+        table.add_row(f"efficiency, {where}", "-" if whole is None else f"{whole:.4f}")
     table.add_row("input stiffness", f"{linear.input_stiffness:.4g}")
     table.add_row("chained in", f"{1e3 * told['seconds']:.0f} ms")
     results.print(table)
+
+
+def _simulated(compared: Check, seconds: float) -> str:
+    """Say what the whole machine does, and how far off the parts were."""
+    whole = compared.simulated
+    efficiency = f"{whole.efficiency[-1]:.4f}" if len(whole.motion) > 1 else "-"
+    where = "the end"
+    if whole.reached < 1.0:
+        where = f"{whole.reached:.1%} of the stroke, where stability is lost"
+    return (
+        f"simulated in {1e3 * seconds:.0f} ms: efficiency {efficiency} at {where}; foretold motion "
+        f"off by {compared.output_error:.2%} at most, force by {compared.force_error:.2%}"
+    )
 
 
 def _print(found: Foretold, compared: Check | None, told: dict[str, Any]) -> None:
@@ -170,10 +184,6 @@ def _print(found: Foretold, compared: Check | None, told: dict[str, Any]) -> Non
     results.print(parts)
     results.print(f"the stroke was followed in {1e3 * found.seconds:.0f} ms")
     if compared is not None:
-        results.print(
-            f"simulated in {1e3 * told['simulation_seconds']:.0f} ms: efficiency "
-            f"{compared.simulated.efficiency[-1]:.4f} at the end; foretold motion off by "
-            f"{compared.output_error:.2%} at most, force by {compared.force_error:.2%}"
-        )
+        results.print(_simulated(compared, told["simulation_seconds"]))
     for doubt in found.doubts:
         notes.print(f"[yellow]note:[/] {plain(doubt)}")

@@ -11,7 +11,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
-from bellcrank.cli.console import print_json, results
+from bellcrank.cli.console import print_json, results, warn_of_other_stiffness
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -54,7 +54,8 @@ def predict(
     design = find_design(problem)
     masks = read_masks(designs, design.problem) if designs else [design.mask]
     paths = [file for path in model or () for file in model_files(path)]
-    predictor = load_predictor(design.problem, paths, device=device)
+    predictor = load_predictor(design.problem, paths, device=device, any_stiffness=True)
+    warn_of_other_stiffness(design.problem, predictor.problem, "predicted")
     stacked = np.array(masks, np.bool_).reshape(len(masks), -1)
     found = predictor.predict(stacked)
     if as_json:

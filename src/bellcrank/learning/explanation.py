@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.learning.fitting import model_files
-from bellcrank.model import Design, builtin
+from bellcrank.model import Design
 from bellcrank.plots.agreements import Measure
 from bellcrank.plots.explanation import Explained, draw_explanation
 from bellcrank.plots.saving import check_target
@@ -17,7 +17,6 @@ from bellcrank.plots.shadings import HeatMap, Shading
 from bellcrank.surrogate.explaining import Explanation, explain
 from bellcrank.surrogate.predictor import load_models
 from bellcrank.surrogate.regions import overlap_of_regions
-from bellcrank.surrogate.trained import read_model
 
 if TYPE_CHECKING:
     import os
@@ -91,19 +90,14 @@ def explain_design(
 def _learnt(design: Design, path: str | os.PathLike[str] | None) -> tuple[TrainedModel, Design]:
     """Return the network, and the design with the stiffness that it has learnt."""
     problem = design.problem
-    if path is not None:
-        files = model_files(path)
-        if len(files) > 1:
-            raise InvalidSettings(
-                f"{path}: {len(files)} networks lie there, and only one can be explained at a "
-                f"time; name one of them, for example {files[0]}"
-            )
-        network = read_model(files[0])
-        known = replace(problem, stiffness=network.problem.stiffness)
-    else:
-        as_built_in = builtin[problem.name]().stiffness if problem.name in builtin else None
-        known = replace(problem, stiffness=as_built_in or problem.stiffness)
-        network = load_models(known)[0]
+    files = [] if path is None else model_files(path)
+    if len(files) > 1:
+        raise InvalidSettings(
+            f"{path}: {len(files)} networks lie there, and only one can be explained at a "
+            f"time; name one of them, for example {files[0]}"
+        )
+    (network,) = load_models(problem, files, any_stiffness=True)
+    known = replace(problem, stiffness=network.problem.stiffness)
     return network, Design(known, design.mask)
 
 

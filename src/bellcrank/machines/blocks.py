@@ -16,7 +16,7 @@ import shapely
 
 from bellcrank.errors import InvalidFile
 from bellcrank.machines.members import ALONG, Arm, Body, Member
-from bellcrank.machines.plan import PORTS, PortName
+from bellcrank.machines.plan import PORTS, PortName, welded
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def blocks_of(machine: Machine) -> Blocks:
     for port in machine.ports:
         if len(machine.port_nodes(port)) < 2:
             raise InvalidFile(f"{source}: port {port} is a single node, and no block that can turn")
-    names = _welded(machine)
+    names = welded(machine.plan)
     block = {port: number for number, ports in enumerate(names) for port in ports}
     middles = np.array([_centre(machine, ports[0]) for ports in names])
 
@@ -131,16 +131,6 @@ def blocks_of(machine: Machine) -> Blocks:
         source, names, tuple(members), stroke, driven, reached, problem.input.amount, moved, offset,
         direction,
     )  # fmt: skip
-
-
-def _welded(machine: Machine) -> tuple[tuple[PortName, ...], ...]:
-    """Return the ports of each block: those that welds join, directly or not."""
-    block: dict[PortName, tuple[PortName, ...]] = {port: (port,) for port in machine.ports}
-    for link in machine.plan.links:
-        first, second = block[link.first], block[link.second]
-        if link.kind == "weld" and first != second:
-            block.update(dict.fromkeys(first + second, first + second))
-    return tuple(dict.fromkeys(block.values()))
 
 
 def _centre(machine: Machine, port: PortName) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidFile
+from bellcrank.machines.plan import welded
 from bellcrank.model import Input, Output, Supports
 
 if TYPE_CHECKING:
@@ -47,13 +48,25 @@ def supports(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int
 
 
 def drive(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Input:
-    """Return the machine's input; what the plan leaves open is as in its first part."""
+    """Return the machine's input; what the plan leaves open is as in its first part.
+
+    Raises
+    ------
+    InvalidFile
+        If it is driven in another way than that part, and the plan does not say how far.
+    """
     table = plan.table.input
     ids, directions = _region(plan.inputs, parts, nodes, table.direction)
     first = parts[plan.inputs[0].part]
     own = first.design.problem.input
-    amount = table.amount or own.amount * first.placement.scale
-    return Input(ids, directions, table.drive or own.drive, amount)
+    chosen = table.drive or own.drive
+    if table.amount is None and chosen != own.drive:
+        raise InvalidFile(
+            f"{plan.source}: input.amount: must be given, for {first.name} is driven by a "
+            f"{own.drive}, and how much that is says nothing about a {chosen}"
+        )
+    amount = own.amount * first.placement.scale if table.amount is None else table.amount
+    return Input(ids, directions, chosen, amount)
 
 
 def moved(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Output:
@@ -86,13 +99,19 @@ def check_drive(plan: Plan) -> None:
     ------
     InvalidFile
     """
+    together = {port: ports for ports in welded(plan) for port in ports}
     for port in plan.inputs:
+        others = [other for other in together[port] if other != port]
         for link in plan.links:
-            others = {link.first: link.second, link.second: link.first}
-            if port in others and others[port].port == "output":
-                raise InvalidFile(
-                    f"{plan.source}: port {port} is driven by hand and by {others[port]} at once"
-                )
+            others += [
+                there
+                for here, there in ((link.first, link.second), (link.second, link.first))
+                if link.kind == "bridge" and here in together[port]
+            ]
+        if driving := [other for other in others if other.port == "output"]:
+            raise InvalidFile(
+                f"{plan.source}: port {port} is driven by hand and by {driving[0]} at once"
+            )
 
 
 def check_held(

@@ -1,8 +1,8 @@
 """What a machine does, foretold from what each of its parts does: a chain of superelements.
 
 Every part is condensed to the nodes of its two ports, as `bellcrank.mechanics.Superelement`; the
-machine is the sum of its parts over those nodes, less what they have in common: beams within a
-welded port belong to both parts and count once. In the linear range that is exact where no gap
+machine is the sum of its parts over those nodes, less what they have in common: beams within
+welded ports belong to several parts and count once. In the linear range that is exact where no gap
 between neighbouring beams of a node lies between beams of two parts, as where the hexagons of
 `bellcrank.machines.elementary` are linked side by side; elsewhere the angular springs in such gaps
 are not foreseen.
@@ -60,16 +60,22 @@ def predict(machine: Machine) -> Prediction:
     nodes = np.unique(np.concatenate([machine.port_nodes(port) for port in machine.ports]))
     stiffness = np.zeros((2 * len(nodes), 2 * len(nodes)))
 
-    def add(
-        sign: float, chosen: NDArray[np.bool_], gripped: NDArray[np.int64], what: object
-    ) -> None:
-        """Add some beams of the machine, condensed to some nodes; errors say what they are."""
+    counted = np.zeros(len(present), np.bool_)
+
+    def put(sign: float, chosen: NDArray[np.bool_], gripped: NDArray[np.int64]) -> None:
         rows = np.searchsorted(nodes, gripped)
         rows = (2 * rows[:, None] + np.arange(2)).ravel()
+        stiffness[np.ix_(rows, rows)] += sign * _condensed(problem, chosen, gripped)
+
+    def add(chosen: NDArray[np.bool_], gripped: NDArray[np.int64], what: object) -> None:
+        """Add some beams, condensed to some nodes, each beam once; errors say what they are."""
+        twice = chosen & counted
         try:
-            stiffness[np.ix_(rows, rows)] += sign * _condensed(problem, chosen, gripped)
+            put(1.0, chosen, gripped)
+            put(-1.0, twice, np.intersect1d(beams[twice], gripped))
         except (InvalidProblem, InvalidSettings) as error:
             raise InvalidFile(f"{source}: {what} cannot be chained: {error}") from None
+        counted[chosen] = True
 
     def within(gripped: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return the present beams that begin and end in a port."""
@@ -79,17 +85,13 @@ def predict(machine: Machine) -> Prediction:
         own = np.zeros(len(present), np.bool_)
         own[machine.beams[name][part.design.mask]] = True
         ends = [machine.nodes[name][part.region(port).nodes] for port in ("input", "output")]
-        add(1.0, own, np.concatenate(ends), name)
+        add(own, np.concatenate(ends), name)
     for link in machine.plan.links:
-        ends = [machine.port_nodes(port) for port in (link.first, link.second)]
-        shared = [np.intersect1d(ends[0], ends[1])]
         if link.kind == "bridge":
-            shared = ends
+            ends = [machine.port_nodes(port) for port in (link.first, link.second)]
             own = within(ends[0]) | within(ends[1])
             own[bridge_beams(machine, link)] = True
-            add(1.0, own, np.concatenate(ends), f"the bridge to {link.second}")
-        for each in shared:
-            add(-1.0, within(each), each, link.first)
+            add(own, np.concatenate(ends), f"the bridge to {link.second}")
     return _answer(machine, nodes, stiffness)
 
 

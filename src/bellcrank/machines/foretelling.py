@@ -61,8 +61,6 @@ class Foretold:
         What stood for each part and bridge.
     stroke
         The chain of blocks by itself.
-    rigid
-        The linear answer of that chain, whose ports do not give.
     seconds
         That the stroke took, when all tables were there.
     doubts
@@ -76,7 +74,6 @@ class Foretold:
     energy: NDArray[np.float64]
     stands: tuple[Stand, ...]
     stroke: Stroke
-    rigid: Straight
     seconds: float
     doubts: tuple[str, ...]
 
@@ -153,7 +150,6 @@ def foretell(
         energy=stroke.energy + 0.5 * stiffer * stroke.motion**2,
         stands=stands,
         stroke=stroke,
-        rigid=foreseen,
         seconds=seconds,
         doubts=(*_doubts_of_tables(stands, stroke), *_doubts_of_chain(exact, foreseen, stroke)),
     )

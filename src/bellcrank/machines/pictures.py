@@ -72,14 +72,17 @@ def draw_stroke(
     ------
     InvalidSettings, OutputExists, StorageError
     """
+    whole_way = found.stroke.status is Status.CONVERGED
     told = StrokeOfMachine(
         found.motion,
         found.output,
         found.input_force,
-        complete=found.stroke.status is Status.CONVERGED,
+        complete=whole_way,
     )
-    note = f"efficiency {found.efficiency:.4g} at the full stroke, {found.linear.efficiency:.4g} "
-    note += "for small ones"
+    where = "at the full stroke" if whole_way else f"at {found.stroke.reached:.1%} of the stroke"
+    note = (
+        f"efficiency {found.efficiency:.4g} {where}, {found.linear.efficiency:.4g} for small ones"
+    )
     simulated = None
     if check is not None:
         whole = check.simulated

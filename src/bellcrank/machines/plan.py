@@ -92,7 +92,10 @@ class LinkTable(Table):
 
 
 class InputTable(Table):
-    """What drives the machine; drive and amount are those of the first part by default."""
+    """What drives the machine; drive and amount are those of the first part by default.
+
+    Who drives it in another way says by how much.
+    """
 
     ports: list[str] = Field(min_length=1)
     direction: Directions | None = None
@@ -246,6 +249,28 @@ def port_name(text: str) -> PortName:
     """
     part, _, port = text.rpartition(".")
     return PortName(part, port)
+
+
+def welded(plan: Plan) -> tuple[tuple[PortName, ...], ...]:
+    """Return all ports, those together that welds join, directly or by way of others.
+
+    Examples
+    --------
+    >>> table = MachineTable.model_validate({
+    ...     "name": "fork", "input": {"ports": ["a.input"]}, "output": {"ports": ["b.output"]},
+    ...     "parts": {"a": {"entry": "x"}, "b": {"entry": "x", "join": "a.output"},
+    ...               "c": {"entry": "x", "join": "a.output"}},
+    ... })
+    >>> [" ".join(map(str, ports)) for ports in welded(plan_of(table, "fork.toml"))]
+    ['a.input', 'a.output b.input c.input', 'b.output', 'c.output']
+    """
+    every = [PortName(name, port) for name in plan.table.parts for port in PORTS]
+    together: dict[PortName, tuple[PortName, ...]] = {port: (port,) for port in every}
+    for link in plan.links:
+        first, second = together[link.first], together[link.second]
+        if link.kind == "weld" and first != second:
+            together.update(dict.fromkeys(first + second, first + second))
+    return tuple(dict.fromkeys(together.values()))
 
 
 def _check_part(name: str, part: PartTable, source: str) -> None:

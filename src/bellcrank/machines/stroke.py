@@ -52,13 +52,6 @@ class Stroke:
     status: Status
     reached: float
 
-    @property
-    def efficiency(self) -> NDArray[np.float64]:
-        """(p,) output motion over input motion; nan at rest."""
-        efficiency = np.full_like(self.output, np.nan)
-        efficiency[1:] = self.output[1:] / self.motion[1:]
-        return efficiency
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Straight:

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import State, Superelement
 
+ROUNDED = 1e-8
+"""Of the input stiffness with a blocked output: what rounding may leave of that with a free one."""
+
 
 @dataclass(frozen=True, slots=True)
 class TwoPort:
@@ -97,14 +100,22 @@ class TwoPort:
 
     @property
     def matched_spring(self) -> float:
-        """Stiffness of the spring at the output that takes the largest share of the work."""
-        return math.sqrt(1.0 - self.coupling) * self.output_stiffness
+        """Stiffness of the spring at the output that takes the largest share of the work.
+
+        For an input without resistance that is the softest, which takes it all: 0.
+        """
+        return self._uncoupled * self.output_stiffness
 
     @property
     def best_work_share(self) -> float:
         """That share: energy in the matched spring over work of the input."""
-        root = math.sqrt(1.0 - self.coupling)
-        return (1.0 - root) / (1.0 + root)
+        return (1.0 - self._uncoupled) / (1.0 + self._uncoupled)
+
+    @property
+    def _uncoupled(self) -> float:
+        """The s = sqrt(1 - coupling); rounding may leave a little of no resistance, or less."""
+        rest = 1.0 - self.coupling
+        return 0.0 if rest < ROUNDED else math.sqrt(rest)
 
     @property
     def stiffness(self) -> NDArray[np.float64]:
@@ -132,11 +143,9 @@ class TwoPort:
 
     def efficiency_against(self, spring: float) -> float:
         """Return u_out / u_in against a spring of some stiffness: eta / (1 + k_s C)."""
-        return (
-            self.efficiency / (1.0 + spring * self.output_compliance)
-            if spring
-            else (self.efficiency)
-        )
+        if spring == 0.0:  # also where nothing holds the output
+            return self.efficiency
+        return self.efficiency / (1.0 + spring * self.output_compliance)
 
     def input_stiffness_against(self, spring: float) -> float:
         """Return F_in / u_in against a spring: k + eta^2 k_s / (1 + k_s C)."""
@@ -179,7 +188,7 @@ def two_port_at(element: Superelement, state: State) -> TwoPort:
             "no two-port there"
         )
     answer = linear.transfer()
-    connected = element.reached[OUTPUT]
+    connected = bool(element.reached[OUTPUT])
     return TwoPort(
         input_stiffness=float(answer[INPUT, INPUT]),
         efficiency=float(answer[OUTPUT, INPUT]) if connected else 0.0,

@@ -6,6 +6,7 @@ its distance.
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from bellcrank.errors import InvalidFile
+from bellcrank.machines.plan import welded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,7 +48,10 @@ def unite(
     union = _Union(plan, parts)
     for link in plan.links:
         if link.kind == "weld":
-            union.weld(link)
+            union.check_meets(link)
+    for ports in welded(plan):
+        for first, second in combinations(ports, 2):
+            union.weld(first, second)
     union.join_supports()
     union.check_clear()
     return union.result()
@@ -91,10 +96,9 @@ class _Union:
         self.touching = np.linalg.norm(apart, axis=1) < SAME * spacing
         self.same = np.zeros(len(self.near), np.bool_)
 
-    def weld(self, link: Link) -> None:
-        """Let the nodes of two ports that lie on one another be one."""
-        meet = self.touching & self._between(self._port(link.first), self._port(link.second))
-        if not meet.any():
+    def check_meets(self, link: Link) -> None:
+        """Refuse a weld of ports that share no place."""
+        if not self._meeting(link.first, link.second).any():
             ends = [self.parts[port.part].centre(port.port) for port in (link.first, link.second)]
             raise InvalidFile(
                 f"{self.plan.source}: ports {link.first} and {link.second} do not meet: no node "
@@ -102,13 +106,16 @@ class _Union:
                 f"{np.linalg.norm(ends[1] - ends[0]):.3g} apart); move a part, or link them by "
                 f"a bridge"
             )
-        for port, other in ((link.first, link.second), (link.second, link.first)):
+
+    def weld(self, first: PortName, second: PortName) -> None:
+        """Let the nodes of two ports that lie on one another be one."""
+        for port, other in ((first, second), (second, first)):
             if (self.touching & self._between(self._port(port), self._supports(other.part))).any():
                 raise InvalidFile(
                     f"{self.plan.source}: port {port} lies on supports of {other.part}, which "
                     f"would hold it fast"
                 )
-        self.same |= meet
+        self.same |= self._meeting(first, second)
 
     def join_supports(self) -> None:
         """Let supports of different parts that lie on one another be one."""
@@ -140,6 +147,13 @@ class _Union:
             for (part, start), end in zip(self.first.items(), ends, strict=True)
         }
         return nodes, self.positions[first]
+
+    def _meeting(self, first: PortName, second: PortName) -> NDArray[np.bool_]:
+        """Return which pairs are nodes of two ports that lie on one another."""
+        meeting: NDArray[np.bool_] = self.touching & self._between(
+            self._port(first), self._port(second)
+        )
+        return meeting
 
     def _port(self, port: PortName) -> NDArray[np.int64]:
         nodes: NDArray[np.int64] = self.parts[port.part].region(port.port).nodes

@@ -187,20 +187,35 @@ def write_design(design: Design, path: str | os.PathLike[str], *, overwrite: boo
     _write_json(design_to_dict(design), path, overwrite=overwrite)
 
 
+MASK_FILE_KEYS = ("masks", "results", "schema", "problem", "measures", "note", "provenance")
+"""Of a file with masks: the masks, and what says where they come from."""
+
+
 def read_masks(path: str | os.PathLike[str], problem: Problem) -> list[NDArray[np.bool_]]:
     """Read the masks in a JSON file: its list ``masks``, or ``results[].mask``.
+
+    Such files are made by people and by several commands. What the latter say of a design, beside
+    its mask, is left alone; what somebody may think of as a setting is not.
 
     Returns
     -------
     list of (M,) bool
-        In the order of the file; other keys are left alone.
+        In the order of the file.
 
     Raises
     ------
     InvalidFile
-        If there are neither, or one does not fit the problem.
+        If there are neither or both, a mask does not fit the problem, or a key of the file is none
+        of `MASK_FILE_KEYS`.
     """
     data = read_json(path)
+    for key in data:
+        if key not in MASK_FILE_KEYS:
+            raise InvalidFile(
+                f"{path}: unknown key {key!r}; known here: {', '.join(MASK_FILE_KEYS)}"
+            )
+    if "masks" in data and "results" in data:
+        raise InvalidFile(f"{path}: expected 'masks' or 'results', got both")
     if isinstance(data.get("masks"), list):
         found = [(f"masks[{k}]", mask) for k, mask in enumerate(data["masks"])]
     elif isinstance(data.get("results"), list):

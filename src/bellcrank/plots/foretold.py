@@ -76,27 +76,20 @@ def draw_foretold(
     ...     draw_foretold(lever, (2.0, 3.0), f"{folder}/lever.png", title="lever")
     """
     check_target(path, overwrite=overwrite)
-    width, height = SIZE
-    figure = style.new_figure(width, height)
+    figure = style.new_figure(*SIZE)
     style.write_heading(figure, title, note, MARGIN, 0.22)
-    across = (width - MARGIN - 0.25 - GAP) / 2.0
-    for place, (quantity, words) in enumerate(
-        (("output", "output motion"), ("force", "input force"))
-    ):
-        left = MARGIN + place * (across + GAP)
-        axes = figure.add_axes(
-            (left / width, BOTTOM / height, across / width, (height - TOP - BOTTOM) / height)
-        )
-        _draw(axes, found, simulated, quantity, slopes[place])
+    panels = style.row_of_axes(figure, 2, MARGIN, 0.25, TOP, BOTTOM, GAP)
+    quantities = (("output", "output motion"), ("force", "input force"))
+    for axes, (quantity, words), slope in zip(panels, quantities, slopes, strict=True):
+        _draw(axes, found, simulated, quantity, slope)
         style.label(axes, "input motion", words, style.SMALL_SIZE)
         style.quieten(axes)
         axes.axhline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)
-        if place == 0:
-            axes.legend(
-                loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False,
-                prop={"family": style.FONT, "size": style.SMALL_SIZE}, borderaxespad=0.1,
-                handlelength=1.4, columnspacing=1.2,
-            )  # fmt: skip
+    panels[0].legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False,
+        prop={"family": style.FONT, "size": style.SMALL_SIZE}, borderaxespad=0.1,
+        handlelength=1.4, columnspacing=1.2,
+    )  # fmt: skip
     save_figure(figure, path, overwrite=overwrite)
 
 

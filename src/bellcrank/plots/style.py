@@ -90,6 +90,39 @@ def heading_height(title: str, note: str) -> float:
     return 0.27 * bool(title) + 0.24 * bool(note)
 
 
+def row_of_axes(
+    figure: Figure, count: int, left: float, right: float, top: float, bottom: float, gap: float
+) -> list[Axes]:
+    """Add axes of one size beside each other.
+
+    Parameters
+    ----------
+    left, right, top, bottom
+        Inches kept free at the edges of the figure.
+    gap
+        Inches between two of them.
+
+    Examples
+    --------
+    >>> row = row_of_axes(new_figure(8, 4), 2, left=1, right=1, top=1, bottom=1, gap=2)
+    >>> [axes.get_position().extents.round(3).tolist() for axes in row]
+    [[0.125, 0.25, 0.375, 0.75], [0.625, 0.25, 0.875, 0.75]]
+    """
+    width, height = figure.get_size_inches().tolist()
+    across = (width - left - right - (count - 1) * gap) / count
+    return [
+        figure.add_axes(
+            (
+                (left + place * (across + gap)) / width,
+                bottom / height,
+                across / width,
+                (height - top - bottom) / height,
+            )
+        )
+        for place in range(count)
+    ]
+
+
 def quieten(axes: Axes) -> None:
     """Draw numbers, a grid of levels and two spines so that curves stand out."""
     axes.tick_params(which="both", labelsize=SMALL_SIZE, colors=NOTE, labelfontfamily=FONT)

@@ -97,21 +97,9 @@ def draw_two_port(
     ...     draw_two_port([lever], LoadLine(2.0, 0.5), f"{folder}/lever.png", title="lever")
     """
     check_target(path, overwrite=overwrite)
-    width, height = SIZE
-    figure = style.new_figure(width, height)
+    figure = style.new_figure(*SIZE)
     style.write_heading(figure, title, note, MARGIN, 0.22)
-    across = (width - MARGIN - 0.25 - 2.0 * GAP) / 3.0
-    panels = [
-        figure.add_axes(
-            (
-                (MARGIN + place * (across + GAP)) / width,
-                BOTTOM / height,
-                across / width,
-                (height - TOP - BOTTOM) / height,
-            )
-        )
-        for place in range(3)
-    ]
+    panels = style.row_of_axes(figure, 3, MARGIN, 0.25, TOP, BOTTOM, GAP)
     for curve, colour in zip(curves, _colours(len(curves)), strict=True):
         _draw_curve(panels[0], curve.motion, curve.output, curve, colour)
         _draw_curve(panels[1], curve.motion, curve.input_force, curve, colour)

@@ -5,6 +5,7 @@
     run.json                      problem, settings, provenance, status
     chains/003/00004000.parquet   proposals of chain 3 from step 4000 on, until finished
     history.parquet               all proposals, once finished
+    .lock                         held by the process at work on it
 
 Everything else in the folder belongs to somebody else and is never touched.
 """
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 DESCRIPTION = "run.json"
 HISTORY = "history.parquet"
+LOCK = ".lock"
 CHAINS = "chains"
 SHARD_NAME = re.compile(r"\d{8,}\.parquet")
 CHAIN_NAME = re.compile(r"\d{3,}")

@@ -311,6 +311,11 @@ def _none_left(problem: Problem, count: int, refused: Refusals, judge: Responder
             f"problem {problem.name!r}: the search accepted no design that keeps its goals "
             f"({', '.join(goals)}); relax them, or search longer (--steps)"
         )
+    if not count:
+        return (
+            f"problem {problem.name!r}: the search accepted no design, so that there is none to "
+            "build; search longer (--steps), or begin with another design (--from)"
+        )
     reasons = Counter(reason for _, reason in refused)
     listed = ", ".join(f"{number} {reason}" for reason, number in reasons.most_common(3))
     return (

@@ -14,7 +14,7 @@ Prediction(efficiency=array([-0.06...]), spread=None)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -139,6 +139,7 @@ def load_predictor(
     *,
     device: str = "auto",
     precision: str = "float32",
+    any_stiffness: bool = False,
 ) -> Predictor:
     """Return a predictor for a problem.
 
@@ -146,6 +147,9 @@ def load_predictor(
     ----------
     paths
         Files of trained models; by default the one that comes with bellcrank.
+    any_stiffness
+        Whether a problem of another stiffness will do, as that of a design for a part: networks
+        know one, and the predictor's problem has that.
 
     Raises
     ------
@@ -156,14 +160,20 @@ def load_predictor(
     InvalidSettings
         If PyTorch is not installed.
     """
-    members = [_read(path) for path in paths] or load_models(problem)
-    return Predictor(problem, members, device=device, precision=precision)
+    members = [_read(path) for path in paths] or load_models(problem, any_stiffness=any_stiffness)
+    asked = _as_learnt(members[0].problem, problem) if any_stiffness else problem
+    return Predictor(asked, members, device=device, precision=precision)
 
 
 def load_models(
-    problem: Problem, paths: Sequence[str | os.PathLike[str]] = ()
+    problem: Problem, paths: Sequence[str | os.PathLike[str]] = (), *, any_stiffness: bool = False
 ) -> list[TrainedModel]:
     """Return trained networks for a problem: those in files, or the one that comes with bellcrank.
+
+    Parameters
+    ----------
+    paths, any_stiffness
+        As for `load_predictor`.
 
     Raises
     ------
@@ -175,7 +185,7 @@ def load_models(
     if paths:
         found = [read_model(path) for path in paths]
         for model in found:
-            beams_between(model.problem, problem)
+            _require_fit(model, problem, any_stiffness=any_stiffness)
         return found
     refusals = []
     for name in SHIPPED:
@@ -183,7 +193,7 @@ def load_models(
         with resources.as_file(source) as path:
             model = read_model(path)
         try:
-            beams_between(model.problem, problem)
+            _require_fit(model, problem, any_stiffness=any_stiffness)
         except InvalidModel as error:
             refusals.append(str(error))
         else:
@@ -192,6 +202,17 @@ def load_models(
         f"no trained model for {problem.name!r} comes with bellcrank ({refusals[0]}); train one "
         f"(bellcrank dataset build, bellcrank train) and name its file or folder"
     )
+
+
+def _require_fit(model: TrainedModel, problem: Problem, *, any_stiffness: bool) -> None:
+    """Refuse a network that has learnt something else."""
+    asked = _as_learnt(model.problem, problem) if any_stiffness else problem
+    beams_between(model.problem, asked)
+
+
+def _as_learnt(known: Problem, given: Problem) -> Problem:
+    """Return the problem at hand with the stiffness of the one that is known."""
+    return replace(given, stiffness=known.stiffness)
 
 
 def _read(path: str | os.PathLike[str]) -> TrainedModel | OnnxModel:

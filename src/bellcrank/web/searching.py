@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from bellcrank.errors import BellcrankError, InvalidSettings, first_line
+from bellcrank.runs.locking import locked
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from multiprocessing.connection import Connection
 
     from bellcrank.runs import RunFolder
@@ -183,19 +183,6 @@ def _kept(state: Any) -> str:
     return str(state.mask if isinstance(state.mask, str) else state.mask[-1])
 
 
-@contextlib.contextmanager
-def alone(path: Path) -> Iterator[None]:
-    """Wait until no other process works in a folder: one that outlived its server may."""
-    try:
-        import fcntl
-    except ImportError:  # a system without them has no orphans to wait for either
-        yield
-        return
-    with path.open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-
-
 def run_search(where: str, workers: int, pipe: Connection) -> None:
     """Begin or go on with the search of a job, until it ends or is told to.
 
@@ -211,7 +198,7 @@ def run_search(where: str, workers: int, pipe: Connection) -> None:
         os.nice(NICENESS)
     ears = Ears(pipe)
     try:
-        with alone(Path(where) / "lock"):
+        with locked(Path(where) / "lock"):  # one that has outlived its server may still work there
             outcome = _search(Path(where), workers, pipe, ears)
     except BellcrankError as error:
         outcome = {"kind": "failed", "message": first_line(error)}

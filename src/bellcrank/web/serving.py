@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bellcrank.errors import InvalidSettings, StorageError
+from bellcrank.errors import InvalidSettings
+from bellcrank.runs.files import make_folder
+from bellcrank.runs.locking import locked
 from bellcrank.web.security import is_loopback
 
 if TYPE_CHECKING:
@@ -85,7 +87,9 @@ def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
     from bellcrank.web.app import make_app
 
     token = settings.needed_token
-    with _only_one(settings.folder), _listening(settings) as listener:
+    make_folder(settings.folder)
+    busy = f"{settings.folder}: another server uses it; close that first"
+    with locked(settings.folder / "server.lock", busy), _listening(settings) as listener:
         app = make_app(settings.folder, token=token, searches=settings.searches)
         config = uvicorn.Config(
             app, log_level="warning", ws_max_size=MESSAGE_LIMIT, ws="websockets-sansio",
@@ -115,24 +119,3 @@ def _listening(settings: ServerSettings) -> Iterator[socket.socket]:
         ) from None
     with listener:
         yield listener
-
-
-@contextlib.contextmanager
-def _only_one(folder: Path) -> Iterator[None]:
-    """Refuse a folder that another server uses: both would run its searches."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / "server.lock").open("w")
-    except OSError as error:
-        raise StorageError(f"{folder}: cannot be used ({error.strerror})") from None
-    with file:
-        try:
-            import fcntl
-        except ImportError:
-            yield
-            return
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise StorageError(f"{folder}: another server uses it; close that first") from None
-        yield

@@ -13,6 +13,8 @@ from bellcrank.model import Design, Problem, human_design, write_design
 from bellcrank.parts import PartSpec, calibrated
 from bellcrank.provenance import provenance
 from bellcrank.runs import RunFolder, check_free, remove_temporaries
+from bellcrank.runs.layout import LOCK
+from bellcrank.runs.locking import locked
 from bellcrank.search import (
     Candidate,
     Progress,
@@ -131,23 +133,25 @@ def complete_design(
     Raises
     ------
     StorageError, CorruptRun
-        If the folder cannot be written, or is damaged.
+        If the folder cannot be written, is damaged, or another process is at work on it.
     """
     settings = read_settings(folder.settings)
-    folder.status = "running"
-    try:
-        done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
-        if done:
-            report = conclude(folder, settings, trying)
-            if pareto:
-                write_front(folder, settings, pareto)
-            folder.finish()
-            return report
-    except BaseException:
-        _try_to_mark_stopped(folder)
-        raise
-    folder.status = "stopped"
-    return None
+    busy = f"{folder.path}: another process is at work on this run; let it end, or stop it first"
+    with locked(folder.path / LOCK, busy):
+        folder.status = "running"
+        try:
+            done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
+            if done:
+                report = conclude(folder, settings, trying)
+                if pareto:
+                    write_front(folder, settings, pareto)
+                folder.finish()
+                return report
+        except BaseException:
+            _try_to_mark_stopped(folder)
+            raise
+        folder.status = "stopped"
+        return None
 
 
 def _try_to_mark_stopped(folder: RunFolder) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 from typing import TYPE_CHECKING, Any
@@ -10,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.errors import InvalidFile
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
+from bellcrank.runs.locking import locked
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from bellcrank.workflows.validate import Validation
@@ -67,7 +66,7 @@ def keep_record(validation: Validation, path: Path) -> None:
         If it cannot be written.
     """
     data = validation.to_dict()
-    with _alone(path):
+    with locked(path.with_name(f".{path.name}.lock")):
         old = check_record(path, data["problem_hash"], data["mask"])
         renewed = [_key(entry) for entry in data["results"]]
         kept = [entry for entry in old if _key(entry) not in renewed]
@@ -95,16 +94,3 @@ def begin_record(validation: Validation, path: Path) -> None:
 def _key(entry: dict[str, Any]) -> str:
     """Return what makes two analyses the same."""
     return json.dumps([entry[key] for key in KEY], sort_keys=True)
-
-
-@contextlib.contextmanager
-def _alone(path: Path) -> Iterator[None]:
-    """Keep other processes from the records of a folder, where the system can."""
-    with contextlib.ExitStack() as stack:
-        with contextlib.suppress(ImportError, OSError):
-            import fcntl
-
-            folder = os.open(path.parent, os.O_RDONLY)
-            stack.callback(os.close, folder)
-            fcntl.flock(folder, fcntl.LOCK_EX)
-        yield

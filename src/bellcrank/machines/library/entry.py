@@ -126,7 +126,7 @@ class Entry:
     @property
     def name(self) -> str:
         """``DIRECTION-COLUMNS-KIND-HASH``, without what it has not got."""
-        return f"{stem(self.direction, self.columns, self.kind)}-{self.hash}"
+        return name_of(self.design, self.direction, self.columns, self.kind)
 
     @property
     def efficiency(self) -> float:
@@ -155,6 +155,21 @@ def identity(design: Design, kind: str) -> str:
     """
     told = {"kind": kind, "mask": design.mask_hex, "problem": design.problem.hash}
     return hashlib.sha256(canonical(told).encode()).hexdigest()[:DIGITS]
+
+
+def name_of(
+    design: Design, direction: str | None = None, columns: int | None = None, kind: str = OWN
+) -> str:
+    """Return the name of the entry that a design is or would be; by default somebody's own.
+
+    Examples
+    --------
+    >>> from bellcrank.model import human_design
+    >>> name_of(human_design("crane"))
+    'left-own-48476f52'
+    """
+    whither = direction or direction_of(design.problem.output)
+    return f"{stem(whither, columns, kind)}-{identity(design, kind)}"
 
 
 def canonical(data: Any) -> str:

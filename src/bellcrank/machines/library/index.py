@@ -188,7 +188,8 @@ def _warning(entry: Entry) -> str:
     """Return a mark that tells what a builder should know, when pointed at."""
     told = [*entry.validation.warnings, *entry.characterisation.doubts]
     text = html.escape("; ".join(told))
-    return f' <abbr class="w" title="{text}">touches</abbr>' if told else ""
+    what = "warning" if entry.characterisation.doubts else "touches"
+    return f' <abbr class="w" title="{text}">{what}</abbr>' if told else ""
 
 
 def _longest(entries: list[Entry], entry: Entry) -> float:

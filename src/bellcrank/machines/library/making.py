@@ -20,6 +20,8 @@ from bellcrank.machines.library.measuring import LEAST_STIFFNESS, measure
 from bellcrank.machines.library.summary import entry_files, read_index, read_summary, write_index
 from bellcrank.mechanics import Response, Status
 from bellcrank.runs.files import make_folder
+from bellcrank.runs.layout import LOCK
+from bellcrank.runs.locking import locked
 from bellcrank.search import read_settings, run_chains, select
 from bellcrank.workflows import reopen_design, start_design
 from bellcrank.workflows.design import accepted_candidates, judge_for
@@ -34,12 +36,15 @@ if TYPE_CHECKING:
 
     from bellcrank.machines.library.entry import Entry
     from bellcrank.machines.library.orders import Order, Task
-    from bellcrank.model import Design, Problem
+    from bellcrank.machines.library.summary import Summary
+    from bellcrank.model import Problem
     from bellcrank.runs import RunFolder
-    from bellcrank.search import Candidate, Progress, Responder, SearchSettings
+    from bellcrank.search import Candidate, Progress, Responder, SearchSettings, Selection
 
 WORK = "searches"
 """Folder of the searches, in that of the entries."""
+SAME = 1e-6
+"""Efficiencies that differ by less are of designs that are as good as each other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +58,7 @@ class Made:
     entry
         None if it was there already, or none was found.
     note
-        ``made``, ``was there``, or why there is none.
+        ``made``, ``made in place of NAME``, ``was there``, or why there is none.
     seconds
         That it took.
     """
@@ -71,6 +76,7 @@ def make(
     folder: Path,
     *,
     workers: int | None = None,
+    again: bool = False,
     tell: Callable[[Task, Progress], None] = lambda _task, _progress: None,
     stop: threading.Event | None = None,
 ) -> Iterator[Made]:
@@ -82,6 +88,9 @@ def make(
         Of the entries; the searches are in a folder ``searches`` of it as long as they are needed.
     workers
         Chains that run at the same time; all cores by default. Changes nothing in the results.
+    again
+        Whether to search anew for what is there too, and to put what is more efficient in its
+        place; with other steps, chains or another seed.
     tell
         Called with the progress of a search, from its own thread.
     stop
@@ -90,29 +99,58 @@ def make(
     Raises
     ------
     StorageError
-        If the folder cannot be written.
+        If the folder cannot be written, or another process makes entries in it.
     InvalidSettings
         If a search was begun with other settings.
+    InvalidFile
+        If an entry that is there is damaged.
     """
     make_folder(folder)
-    there = {path.stem.rpartition("-")[0] for path in entry_files(folder)}
-    for number, task in enumerate(order.tasks):
-        start = time.monotonic()
-        place = folder / WORK / task.name
-        entry, note = None, "was there"
-        if task.name not in there:
-            try:
-                entry = _make(task, order, place, workers, tell, stop)
-                note = "made"
-            except _NoneFound as none:
-                note = str(none)
+    with locked(folder / LOCK, f"{folder}: another process makes entries there; let it end"):
+        for number, task in enumerate(order.tasks):
+            start = time.monotonic()
+            place = folder / WORK / task.name
+            old = _best_there(folder, task)
+            entry, note = None, "was there"
+            if old is None or again:
+                try:
+                    found = _search(task, order, place, workers, tell, stop)
+                    if found is None:
+                        return  # stopped
+                    entry, note = _entry(task, *found, old)
+                except _NoneFound as none:
+                    note = str(none)
             if entry is not None:
                 write_entry(entry, folder)
-            elif note == "made":
-                return  # stopped
-        _forget(place)
-        _refresh_index(folder)
-        yield Made(task, number, len(order.tasks), entry, note, time.monotonic() - start)
+                if old is not None:
+                    (folder / f"{old.name}.json").unlink()
+            if not again:
+                _forget(place)
+            _refresh_index(folder)
+            yield Made(task, number, len(order.tasks), entry, note, time.monotonic() - start)
+        # Kept so long: who is stopped need not search again for what was not better.
+        for task in order.tasks:
+            _forget(folder / WORK / task.name)
+
+
+def _best_there(folder: Path, task: Task) -> Summary | None:
+    """Return the most efficient entry of a task that is in a folder, if any."""
+    paths = [path for path in entry_files(folder) if path.stem.rpartition("-")[0] == task.name]
+    return max(map(read_summary, paths), key=_rank, default=None)
+
+
+def _rank(known: Summary) -> float:
+    return known.efficiency if math.isfinite(known.efficiency) else -math.inf
+
+
+def _entry(
+    task: Task, found: Selection, notes: dict[str, Any], old: Summary | None
+) -> tuple[Entry | None, str]:
+    """Measure what was found, if it is better than what is there; also return a note."""
+    if old is not None and not found.efficiency_after > _rank(old) + SAME:
+        return None, f"none better than {old.name}"
+    entry = measure(found.design, task.direction, task.columns, task.kind, notes=notes)
+    return entry, "made" if old is None else f"made in place of {old.name}"
 
 
 def _forget(place: Path) -> None:
@@ -134,15 +172,15 @@ class _NoneFound(Exception):
     """No design of a search can be an entry."""
 
 
-def _make(
+def _search(
     task: Task,
     order: Order,
     place: Path,
     workers: int | None,
     tell: Callable[[Task, Progress], None],
     stop: threading.Event | None,
-) -> Entry | None:
-    """Search, choose and measure; None if it was stopped."""
+) -> tuple[Selection, dict[str, Any]] | None:
+    """Search and choose, and say how the design came about; None if it was stopped."""
     settings = order.settings(kinds[task.kind])
     runs = []
     for name, (problem, chains) in task.starts(order.chains).items():
@@ -152,8 +190,7 @@ def _make(
             runs[-1], own, workers=workers, tell=lambda progress: tell(task, progress), stop=stop
         ):
             return None
-    design, notes = _best(task.problem(), runs, settings)
-    return measure(design, task.direction, task.columns, task.kind, notes=notes)
+    return _best(task.problem(), runs, settings)
 
 
 def _run_of(problem: Problem, settings: SearchSettings, place: Path) -> RunFolder:
@@ -173,7 +210,7 @@ def _run_of(problem: Problem, settings: SearchSettings, place: Path) -> RunFolde
 
 def _best(
     problem: Problem, runs: Sequence[RunFolder], settings: SearchSettings
-) -> tuple[Design, dict[str, Any]]:
+) -> tuple[Selection, dict[str, Any]]:
     """Choose and clean the design of a task's searches, and say how it came about."""
     candidates: list[Candidate] = []
     chains: list[dict[str, Any]] = []
@@ -198,7 +235,7 @@ def _best(
         "efficiency_before_cleaning": chosen.efficiency_before,
         "refused": chosen.refused,
     }
-    return chosen.design, notes
+    return chosen, notes
 
 
 class Resisting:

@@ -39,7 +39,7 @@ def find_plan(name_or_path: str) -> Plan:
     InvalidFile
         As `bellcrank.machines.read_plan`.
     """
-    if Path(name_or_path).exists() or Path(name_or_path).suffix == SUFFIX:
+    if Path(name_or_path).is_file() or Path(name_or_path).suffix == SUFFIX:
         return read_plan(name_or_path)
     if name_or_path not in showcases():
         raise UnknownName(

@@ -24,7 +24,7 @@ from bellcrank.mechanics.kernels.response import (
 from bellcrank.search.blocks import FORBIDDEN
 
 EXPONENTIAL = 0
-NEGATIVE = 1
+"""Of the codes of `bellcrank.search.costs`; the other is the efficiency with its sign changed."""
 
 
 class Rules(NamedTuple):
