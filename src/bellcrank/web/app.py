@@ -15,7 +15,7 @@ from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 
 from bellcrank import __version__
-from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName
+from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName, first_line
 from bellcrank.parts import materials
 from bellcrank.search import default_workers
 from bellcrank.web import design_routes, run_routes, task_routes
@@ -92,6 +92,7 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
         return {
             "version": __version__,
             "ready": shop.ready,
+            "trouble": shop.trouble,
             "processors": default_workers(),
             "searches": shop.scheduler.slots,
             "running": len(shop.scheduler.running),
@@ -106,8 +107,12 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
 
 
 async def _warm(workshop: Workshop) -> None:
-    await workshop.pools.warm()
-    workshop.ready = True
+    try:
+        await workshop.pools.warm()
+    except BellcrankError as error:
+        workshop.trouble = first_line(error)
+    else:
+        workshop.ready = True
 
 
 def _add_pages(app: FastAPI) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
+import signal
 import socket
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +17,7 @@ from bellcrank.web.security import is_loopback
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from types import FrameType
 
 MESSAGE_LIMIT = 2_000_000
 
@@ -66,7 +69,7 @@ def default_folder() -> Path:
 
 
 def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
-    """Serve until interrupted.
+    """Serve until interrupted or told to end; all processes that were started end with it.
 
     Parameters
     ----------
@@ -85,7 +88,7 @@ def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
     from bellcrank.web.app import make_app
 
     token = settings.needed_token
-    with _only_one(settings.folder), _listening(settings) as listener:
+    with _ended_by_hand(), _only_one(settings.folder), _listening(settings) as listener:
         app = make_app(settings.folder, token=token, searches=settings.searches)
         config = uvicorn.Config(
             app, log_level="warning", ws_max_size=MESSAGE_LIMIT, ws="websockets-sansio",
@@ -95,7 +98,27 @@ def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
         port = listener.getsockname()[1]
         host = f"[{settings.host}]" if ":" in settings.host else settings.host
         tell(f"http://{host}:{port}/" + (f"?token={token}" if token else ""))
-        server.run(sockets=[listener])
+        try:
+            server.run(sockets=[listener])
+        finally:  # who presses Ctrl-C twice has the server skip its own end
+            app.state.workshop.pools.close()
+
+
+@contextlib.contextmanager
+def _ended_by_hand() -> Iterator[None]:
+    """Make SIGTERM an exit like others: uvicorn sends it again, and it would cut all short."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def leave(_number: int, _frame: FrameType | None) -> None:
+        raise SystemExit(0)
+
+    before = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextlib.contextmanager

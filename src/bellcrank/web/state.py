@@ -23,6 +23,8 @@ class Workshop:
     ----------
     ready
         Whether the kernels are compiled and loaded.
+    trouble
+        Why they are not, and never will be.
     """
 
     jobs: Jobs
@@ -31,6 +33,7 @@ class Workshop:
     gallery: Gallery
     kept: Kept
     ready: bool = False
+    trouble: str = ""
 
 
 def _workshop(connection: HTTPConnection) -> Workshop:
