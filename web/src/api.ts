@@ -83,6 +83,7 @@ export interface Small {
   problem: string;
   efficiency: number | null;
   beams: number;
+  facets: Record<string, string>;
   picture: { lines: number[]; supports: number[]; input: number[]; output: number[]; box: number[] };
 }
 

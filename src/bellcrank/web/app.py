@@ -19,7 +19,7 @@ from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownNa
 from bellcrank.parts import materials
 from bellcrank.search import default_workers
 from bellcrank.web import design_routes, run_routes, task_routes
-from bellcrank.web.actuators import Actuators, Machines
+from bellcrank.web.actuators import Actuators, Machines, Struts
 from bellcrank.web.gallery import BuiltIn, Gallery, Kept, OwnRuns
 from bellcrank.web.jobs import Jobs
 from bellcrank.web.pools import Busy, TookTooLong, make_pools, plain_error
@@ -57,8 +57,9 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
     """
     jobs = Jobs(folder / "runs")
     kept = Kept(folder / "designs")
-    gallery = Gallery(OwnRuns(jobs), kept, Machines(), Actuators(), BuiltIn())
-    workshop = Workshop(jobs, Scheduler(jobs, searches), make_pools(), gallery, kept)
+    machines = Machines()
+    gallery = Gallery(OwnRuns(jobs), kept, machines, BuiltIn(), Actuators(), Struts())
+    workshop = Workshop(jobs, Scheduler(jobs, searches), make_pools(), gallery, kept, machines)
 
     @contextlib.asynccontextmanager
     async def alive(_app: FastAPI) -> AsyncIterator[None]:

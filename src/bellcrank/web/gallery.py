@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 import secrets
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, get_args
 
 import numpy as np
@@ -49,12 +49,15 @@ class Entry:
         What to call it, and a few words more.
     design
         With efficiency and provenance, as far as they are known.
+    facets
+        By which it can be picked from among many, such as ``{"Size": "9 wide"}``.
     """
 
     key: str
     title: str
     note: str
     design: Design
+    facets: dict[str, str] = field(default_factory=dict)
 
 
 class Source(Protocol):
@@ -238,6 +241,7 @@ def small(source: str, entry: Entry) -> dict[str, Any]:
         "key": entry.key,
         "title": entry.title,
         "note": entry.note,
+        "facets": entry.facets,
         "problem": problem.name,
         "efficiency": None if design.efficiency is None else finite(design.efficiency),
         "beams": design.beam_count,

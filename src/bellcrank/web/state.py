@@ -9,6 +9,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 if TYPE_CHECKING:
+    from bellcrank.web.actuators import Machines
     from bellcrank.web.gallery import Gallery, Kept
     from bellcrank.web.jobs import Jobs
     from bellcrank.web.pools import Pools
@@ -32,6 +33,7 @@ class Workshop:
     pools: Pools
     gallery: Gallery
     kept: Kept
+    machines: Machines
     ready: bool = False
     trouble: str = ""
 
