@@ -275,10 +275,16 @@ export class Editor {
     download(new Blob([text], { type: "text/plain" }), `${fileName(this.task.problem.name)}${suffix}`);
   }
 
+  /** Put the task into a link, and say where that is: a browser copies only on a page it trusts. */
   async link(): Promise<string> {
     const address = `${location.origin}/#/draw/${await toLink(this.task)}`;
-    await navigator.clipboard?.writeText(address);
-    return address;
+    try {
+      await navigator.clipboard.writeText(address);
+      return "Copied";
+    } catch {
+      history.replaceState(null, "", address);
+      return "See the address";
+    }
   }
 
   async load(file: File): Promise<void> {

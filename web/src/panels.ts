@@ -133,8 +133,7 @@ export class Panels {
         button("Save TOML", () => void this.attempt("lattice", () => editor.save(".toml")), "", { "data-key": "toml" }),
         button("Save JSON", () => void this.attempt("lattice", () => editor.save(".json")), "", { "data-key": "json" }),
         button(this.local.link || "Copy link", () => void this.attempt("lattice", async () => {
-          await editor.link();
-          this.local.link = "Copied";
+          this.local.link = await editor.link();
         }), "", { "data-key": "link" })));
   }
 
