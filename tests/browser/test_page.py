@@ -80,6 +80,7 @@ def test_a_task_is_drawn_searched_watched_stopped_played_and_taken(page: Any) ->
     mesh = trimesh.load(io.BytesIO(downloaded(page, "stl")), file_type="stl")
     assert mesh.is_watertight
     assert downloaded(page, "3mf")[:2] == b"PK"
+    assert downloaded(page, "history")[:4] == b"PAR1"
     page.get_by_text("Beam worth").click()
     page.get_by_text("Dark: all depends on it").wait_for()
 

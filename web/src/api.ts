@@ -47,7 +47,6 @@ export interface Run {
   done: number;
   total: number;
   has_design: boolean;
-  has_history: boolean;
   place: number;
 }
 

@@ -121,7 +121,7 @@ export class RunPage {
     this.result?.element.remove();
     this.result = new Result({
       title: whole.title, problem: whole.problem, mask: whole.mask, efficiency: whole.efficiency, provenance: whole.provenance,
-      comparison: whole.comparison, part: whole.part, history: whole.has_history ? whole.id : null, plan: null,
+      comparison: whole.comparison, part: whole.part, history: whole.id, plan: null,
     });
     clear(this.stage, this.result.player.element);
     this.side.prepend(this.result.element);
