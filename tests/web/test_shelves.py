@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 from bellcrank.machines.library import kinds, library
 from bellcrank.machines.showcases import showcase, showcases
 from bellcrank.model import unpack_mask
-from bellcrank.web.actuators import LOADS, Struts
+from bellcrank.web.actuators import LOADS, Actuators, Machines, Struts
+from bellcrank.web.gallery import BuiltIn
 
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
@@ -85,3 +87,14 @@ def test_struts_have_the_length_that_their_name_says() -> None:
         ]
         length = np.linalg.norm(ends[0] - ends[1])
         assert length == pytest.approx(int(entry.key.removeprefix("strut-")))
+
+
+def _count(source: Any) -> int:
+    return len(list(source.entries()))
+
+
+def test_who_looks_at_the_same_time_sees_all_of_a_shelf() -> None:
+    for source in (BuiltIn(), Actuators(), Machines()):
+        with ThreadPoolExecutor(8) as visitors:
+            looks = [visitors.submit(_count, source) for _ in range(16)]
+        assert {look.result() for look in looks} == {_count(source)}

@@ -3,7 +3,7 @@
 import type { Point, Problem } from "./api";
 import { angleOf, arrow, Drawing, isEach, range, unit, where } from "./drawing";
 import { s, say } from "./dom";
-import { mirrorAxes, nextThatWay, rollerLines } from "./marks";
+import { inWords, mirrorAxes, nextThatWay, rollerLines } from "./marks";
 import { directionOf, nodesOf, rowOf, touching, type Region, type Rule, type Task } from "./task";
 
 export type Tool = "supports" | "input" | "output" | "beams" | "hand";
@@ -298,17 +298,6 @@ export class Canvas extends Drawing {
     const found = nextThatWay(total, place, this.cursor, [this.box.x, -this.box.y - this.box.h], [wx, wy]);
     this.cursor = found;
     this.point(beams ? -1 : found, beams ? found : -1);
-    say(this.describe(found));
-  }
-
-  private describe(k: number): string {
-    if (k < 0 || !this.task) return "";
-    const { problem, rules } = this.task;
-    if (this.tool === "hand") return `beam ${k}, ${this.bits[k] ? "present" : "absent"}`;
-    if (this.tool === "beams") return `beam ${k}, ${{ auto: "left to the search", keep: "always there", never: "never there", free: "left to the search" }[rules[k]!]}`;
-    const [x, y] = problem.positions[k]!;
-    const part = (["supports", "input", "output"] as const).find((region) => nodesOf(problem, region).includes(k));
-    const name = part ? { supports: "held", input: "pushed", output: "to move" }[part] : "free";
-    return `node ${k} at ${x.toFixed(1)}, ${y.toFixed(1)}: ${name}`;
+    if (found >= 0) say(inWords(this.task!, this.tool, this.bits, found));
   }
 }

@@ -1,7 +1,8 @@
-// What is drawn around a lattice, and the way from node to node with the arrow keys.
+// What is drawn around a lattice, and how one goes from node to node with the arrow keys.
 
 import type { Point } from "./api";
 import type { Box } from "./drawing";
+import { nodesOf, type Task } from "./task";
 
 /** The ways along which nodes may slide, as a path. */
 export function rollerLines(rest: Float64Array, along_y: number[], along_x: number[]): string {
@@ -41,4 +42,14 @@ export function nextThatWay(total: number, place: (k: number) => Point, at: numb
     if (cost < best) { best = cost; found = k; }
   }
   return found;
+}
+
+/** A node or beam as it is said to who listens. */
+export function inWords({ problem, rules }: Task, tool: string, bits: Uint8Array, k: number): string {
+  if (tool === "hand") return `beam ${k}, ${bits[k] ? "present" : "absent"}`;
+  if (tool === "beams") return `beam ${k}, ${{ auto: "left to the search", keep: "always there", never: "never there", free: "left to the search" }[rules[k]!]}`;
+  const [x, y] = problem.positions[k]!;
+  const part = (["supports", "input", "output"] as const).find((region) => nodesOf(problem, region).includes(k));
+  const name = part ? { supports: "held", input: "pushed", output: "to move" }[part] : "free";
+  return `node ${k} at ${x.toFixed(1)}, ${y.toFixed(1)}: ${name}`;
 }

@@ -6,18 +6,9 @@ import { angleOf, isEach, unit, wayOf } from "./drawing";
 import { button, choice, clear, count, field, figure, h, number, select } from "./dom";
 import type { Editor } from "./editor";
 import { craneRows, moved } from "./lattices";
+import { SearchBox } from "./searchbox";
 import { directionOf, nodesOf, type Hold, type Rule } from "./task";
 import { sentence } from "./words";
-
-const METHODS: [string, string, string][] = [
-  ["basin-hopping", "Basin hopping", "Climbs, disturbs a part, climbs again. The best in most cases."],
-  ["informed", "Informed", "A Metropolis chain that foresees what each flip does."],
-  ["tempering", "Tempering", "Chains at several temperatures that exchange designs."],
-  ["paper", "The paper", "Single random flips, as Bonfanti et al. (2020) published it."],
-];
-const EFFORTS: [string, string, number, number][] = [
-  ["quick", "Quick", 4000, 2], ["usual", "Usual", 20000, 4], ["long", "Thorough", 100000, 4],
-];
 
 interface Named { name: string; group: string; about: string }
 
@@ -25,10 +16,10 @@ export class Panels {
   readonly element = h("aside", { class: "panel", "aria-label": "Task" });
   private problems: Named[] = [];
   private local: Record<string, string> = {};
-  private busy = false;
-  private more = false;
+  private readonly searchBox: SearchBox;
 
   constructor(private readonly editor: Editor) {
+    this.searchBox = new SearchBox(editor, () => this.show());
     void get<Named[]>("/problems").then((found) => { this.problems = found; this.show(); });
   }
 
@@ -41,7 +32,7 @@ export class Panels {
       this.section("input", "Pushed", this.regionSummary("input"), this.input()),
       this.section("output", "Moves", this.regionSummary("output"), this.output()),
       this.section("beams", "Beams", this.beamSummary(), this.beams()),
-      this.search());
+      this.searchBox.make());
     if (label) this.element.querySelector<HTMLElement>(`[data-key="${label}"]`)?.focus({ preventScroll: true });
   }
 
@@ -270,48 +261,5 @@ export class Panels {
       h("div", { class: "row ticks" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")),
       h("div", { class: "buttons" },
         button("Free all beams", () => editor.set({ ...editor.task, rules: editor.task.rules.map(() => "auto") }), "", { "data-key": "free" })));
-  }
-
-  private search(): HTMLElement {
-    const { editor } = this;
-    const { settings } = editor;
-    const update = (changes: Partial<typeof settings>): void => { editor.settings = { ...editor.settings, ...changes }; this.show(); };
-    const whole = (key: "steps" | "chains" | "seed", label: string, least: number, most: number): HTMLElement => {
-      const input = number(settings[key], { min: least, max: most, step: 1 }, (value) => update({ [key]: Math.min(most, Math.max(least, Math.round(value))) }));
-      input.dataset.key = key;
-      return field(label, input);
-    };
-    const effort = EFFORTS.find(([, , steps, chains]) => steps === settings.steps && chains === settings.chains)?.[0] ?? "";
-    const real = h("input", { type: "checkbox", checked: settings.real, "data-key": "real" });
-    real.addEventListener("change", () => update({ real: real.checked }));
-    const method = select(METHODS.map(([key, name]) => [key, name]), settings.method, (picked) => update({ method: picked }));
-    method.dataset.key = "method";
-    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => update({ width: value }));
-    width.dataset.key = "width";
-    const fault = this.local["fault-search"] ?? "";
-    const missing = editor.missing;
-    return h("section", { class: "step search open" },
-      h("h2", { class: "plain" }, "Search"),
-      h("div", { class: "content" },
-        choice("How long", EFFORTS.map(([key, name]) => [key, name]), effort as never, (picked) => {
-          const found = EFFORTS.find(([key]) => key === picked)!;
-          update({ steps: found[2], chains: found[3] });
-        }),
-        h("details", { ...(this.more ? { open: true } : {}), ontoggle: (event: Event) => { this.more = (event.target as HTMLDetailsElement).open; } },
-          h("summary", { "data-key": "more" }, "Method, seed, strut width"),
-          field("Method", method, "", METHODS.find(([key]) => key === settings.method)![2]),
-          h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000), whole("chains", "Chains", 1, 64), whole("seed", "Seed", 0, 2 ** 31)),
-          h("label", { class: "tick" }, real, "With the stiffness of real struts"),
-          settings.real && field("Strut width", width, "mm")),
-        h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !!missing || !!editor.fault || this.busy,
-          onclick: () => void this.begin() }, "Design it"),
-        missing && h("p", { class: "note" }, missing.message),
-        fault && h("p", { class: "fault", role: "alert" }, fault)));
-  }
-
-  private async begin(): Promise<void> {
-    this.busy = true;
-    await this.attempt("search", () => this.editor.begin());
-    this.busy = false;
   }
 }

@@ -9,10 +9,10 @@ from bellcrank.errors import BellcrankError, UnknownName
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.library import library
 from bellcrank.machines.showcases import find_plan, showcase, showcases
-from bellcrank.web.gallery import Entry
+from bellcrank.web.gallery import Entry, Once
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
 STRUT = re.compile(r"strut-([3-9]|[1-3][0-9])")
 OFFERED = ("strut-3", "strut-4", "strut-6", "strut-9")
@@ -30,30 +30,29 @@ class Actuators:
     title = "Elementary actuators"
 
     def __init__(self) -> None:
-        self._entries: dict[str, Entry] = {}
+        self._known = Once(_actuators)
 
     def entries(self) -> Iterable[Entry]:
         """Return all entries that can be read, by name."""
-        if not self._entries:
-            known = library()
-            for summary in known.summaries:
-                try:
-                    design = known.find(summary.name).design
-                except BellcrankError:
-                    continue
-                width = "" if summary.columns is None else f"{summary.columns} wide"
-                load = LOADS.get(summary.kind, summary.kind)
-                title = ", ".join(filter(None, (summary.direction.capitalize(), width)))
-                self._entries[summary.name] = Entry(
-                    summary.name, title, load, design,
-                    facets={"Moves": summary.direction, "Size": width, "Made for": load},
-                )  # fmt: skip
-        return self._entries.values()
+        return self._known().values()
 
     def find(self, key: str) -> Entry | None:
         """Return the one of that name."""
-        self.entries()
-        return self._entries.get(key)
+        return self._known().get(key)
+
+
+def _actuators() -> Iterator[Entry]:
+    known = library()
+    for summary in known.summaries:
+        try:
+            design = known.find(summary.name).design
+        except BellcrankError:
+            continue
+        width = "" if summary.columns is None else f"{summary.columns} wide"
+        load = LOADS.get(summary.kind, summary.kind)
+        title = ", ".join(filter(None, (summary.direction.capitalize(), width)))
+        facets = {"Moves": summary.direction, "Size": width, "Made for": load}
+        yield Entry(summary.name, title, load, design, facets)
 
 
 class Struts:
@@ -81,23 +80,15 @@ class Machines:
     title = "Machines"
 
     def __init__(self) -> None:
-        self._entries: dict[str, Entry] = {}
+        self._known = Once(_machines)
 
     def entries(self) -> Iterable[Entry]:
         """Return all of them, by name."""
-        if not self._entries:
-            for name in showcases():
-                machine = showcase(name)
-                table = machine.plan.table
-                self._entries[name] = Entry(
-                    name, table.name.capitalize(), table.about, machine.design
-                )
-        return self._entries.values()
+        return self._known().values()
 
     def find(self, key: str) -> Entry | None:
         """Return the one of that name."""
-        self.entries()
-        return self._entries.get(key)
+        return self._known().get(key)
 
     def plan(self, key: str) -> dict[str, Any]:
         """Return how a machine is made, its parts named as in the gallery.
@@ -114,3 +105,10 @@ class Machines:
             source = Struts.name if STRUT.fullmatch(part["entry"]) else Actuators.name
             part["entry"] = f"{source}/{part['entry']}"
         return plan
+
+
+def _machines() -> Iterator[Entry]:
+    for name in showcases():
+        machine = showcase(name)
+        table = machine.plan.table
+        yield Entry(name, table.name.capitalize(), table.about, machine.design)

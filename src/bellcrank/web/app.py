@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
+from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 
@@ -108,8 +109,9 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
 
 
 async def _warm(workshop: Workshop) -> None:
+    """Make ready what takes seconds the first time: kernels, and machines of the gallery."""
     try:
-        await workshop.pools.warm()
+        await asyncio.gather(workshop.pools.warm(), run_in_threadpool(workshop.gallery.listing))
     except BellcrankError as error:
         workshop.trouble = first_line(error)
     else:
