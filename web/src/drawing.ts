@@ -79,6 +79,7 @@ export class Drawing {
   private look(view: Box): void {
     this.view = view;
     this.svg.setAttribute("viewBox", `${view.x} ${view.y} ${view.w} ${view.h}`);
+    thicken(this.svg, view.w);
   }
 
   lines(beams: ArrayLike<number>, at: Float64Array = this.at): string {
@@ -178,6 +179,11 @@ export class Drawing {
     });
     return found;
   }
+}
+
+/** Keep lines visible in a picture of a large lattice; `width` is what it shows, in beams. */
+export function thicken(svg: SVGElement, width: number, usual = 32): void {
+  svg.style.setProperty("--thick", Math.min(4, Math.max(1, width / usual)).toFixed(2));
 }
 
 export function range(length: number): number[] {

@@ -171,11 +171,11 @@ export class MachinePage {
     this.undoButton.disabled = !this.history.canUndo;
     this.redoButton.disabled = !this.history.canRedo;
     clear(this.panel,
+      parts.length > 0 && this.machineBox(),
       ...parts.map((part, k) => this.partBox(part, k)),
       !parts.length && h("section", { class: "step open" }, h("h2", { class: "plain" }, "Parts"),
         h("div", { class: "content" }, h("p", {}, "None yet. Any elementary actuator can push any other: their ends have the same shape."),
-          h("p", { class: "note" }, "To make one of your own, draw from one of the tasks “elementary-…” and search it."))),
-      parts.length > 0 && this.machineBox());
+          h("p", { class: "note" }, "To make one of your own, draw from one of the tasks “elementary-…” and search it."))));
     if (focused) this.panel.querySelector<HTMLElement>(`[data-key="${focused}"]`)?.focus({ preventScroll: true });
   }
 

@@ -1,6 +1,7 @@
 // Designs with small pictures, on shelves that can be looked through.
 
 import type { Shelf, Small } from "./api";
+import { thicken } from "./drawing";
 import { button, count, field, figure, h, s, select } from "./dom";
 
 export function thumbnail({ picture }: Small): SVGElement {
@@ -15,11 +16,13 @@ export function thumbnail({ picture }: Small): SVGElement {
     for (let k = 0; k < places.length; k += 2) path += `M${places[k]} ${-places[k + 1]!}h0`;
     return path;
   };
-  return s("svg", { class: "drawing thumbnail", viewBox: `${x0 - margin} ${-y1 - margin} ${x1 - x0 + 2 * margin} ${y1 - y0 + 2 * margin}`, "aria-hidden": "true" },
+  const svg = s("svg", { class: "drawing thumbnail", viewBox: `${x0 - margin} ${-y1 - margin} ${x1 - x0 + 2 * margin} ${y1 - y0 + 2 * margin}`, "aria-hidden": "true" },
     s("path", { class: "beam plain", d }),
     s("path", { class: "dot support", d: dots(picture.supports) }),
     s("path", { class: "dot input", d: dots(picture.input) }),
     s("path", { class: "dot output", d: dots(picture.output) }));
+  thicken(svg, x1 - x0, 20);
+  return svg;
 }
 
 export function tile(small: Small, href: string): HTMLElement {
