@@ -183,7 +183,7 @@ export class Drawing {
 
 /** Keep lines visible in a picture of a large lattice; `width` is what it shows, in beams. */
 export function thicken(svg: SVGElement, width: number, usual = 32): void {
-  svg.style.setProperty("--thick", Math.min(4, Math.max(1, width / usual)).toFixed(2));
+  svg.style.setProperty("--thick", Math.min(2, Math.max(1, width / usual)).toFixed(2));
 }
 
 export function range(length: number): number[] {

@@ -1,6 +1,6 @@
 // Parts that are placed, turned and linked, and built as one design.
 
-import { bitsOf, get, post, type Problem, type Refusal, type Shelf, type Small } from "./api";
+import { bitsOf, get, post, type Point, type Problem, type Refusal, type Shelf, type Small } from "./api";
 import { arrow, Drawing, isEach, where } from "./drawing";
 import { button, choice, clear, field, figure, h, iconButton, number, s, say, select } from "./dom";
 import { emptyPlan, isPlan, MOST, portsOf, readPlan, spoken, withoutPart, withPart, writePlan, type Plan, type PlanEnd, type PlanPart, type Port, type WrittenPlan } from "./plan";
@@ -11,6 +11,7 @@ import { sentence, undoing } from "./words";
 interface Built { problem: Problem; mask: string; efficiency: number | null; status: string; message: string; provenance: Record<string, unknown>; parts: Record<string, number[]> }
 
 const KEY = "bellcrank-machine";
+const NEAR = 2.1;
 /** Designs of a shelf before one asks for all. */
 const SHOWN = 12;
 /** In the order of their use; what is on other shelves fits no machine. */
@@ -261,17 +262,21 @@ function keptPlan(): Plan {
   return emptyPlan();
 }
 
-/** Which way the machine is pushed, or moves: an arrow for each port that has a way of its own. */
+/** Which way the machine is pushed, or moves: an arrow for each port. */
 function arrows(problem: Problem, region: "input" | "output"): SVGElement[] {
   const { nodes, direction } = problem[region];
-  const ways = new Map<string, number[]>();
+  const place = (node: number): Point => problem.positions[node]!;
+  const ports: { nodes: number[]; way: Point }[] = [];
   nodes.forEach((node, k) => {
-    const way = (isEach(direction) ? direction[k]! : direction).join();
-    ways.set(way, [...(ways.get(way) ?? []), node]);
+    const [x, y] = place(node);
+    // Nodes of a port are neighbours; ports are further apart.
+    const port = ports.find((each) => each.nodes.some((other) => Math.hypot(place(other)[0] - x, place(other)[1] - y) < NEAR));
+    if (port) port.nodes.push(node);
+    else ports.push({ nodes: [node], way: isEach(direction) ? direction[k]! : direction });
   });
-  return [...ways].map(([way, group]) => {
-    const [x, y] = group.reduce(([sx, sy], node) => [sx + problem.positions[node]![0] / group.length, sy + problem.positions[node]![1] / group.length], [0, 0]);
-    const [dx, dy] = way.split(",").map(Number) as [number, number];
+  return ports.map(({ nodes: group, way: [dx, dy] }) => {
+    const x = group.reduce((sum, node) => sum + place(node)[0] / group.length, 0);
+    const y = group.reduce((sum, node) => sum + place(node)[1] / group.length, 0);
     return s("g", { class: `arrow ${region}` }, s("path", { class: "shaft", d: arrow([x, y], [2.4 * dx, 2.4 * dy], 0.5) }));
   });
 }
