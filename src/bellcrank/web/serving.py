@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-MESSAGE_LIMIT = 2_000_000
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServerSettings:
@@ -86,12 +84,13 @@ def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
     import uvicorn
 
     from bellcrank.web.app import make_app
+    from bellcrank.web.limits import MESSAGE
 
     token = settings.needed_token
     with _ended_by_hand(), _only_one(settings.folder), _listening(settings) as listener:
         app = make_app(settings.folder, token=token, searches=settings.searches)
         config = uvicorn.Config(
-            app, log_level="warning", ws_max_size=MESSAGE_LIMIT, ws="websockets-sansio",
+            app, log_level="warning", ws_max_size=MESSAGE, ws="websockets-sansio",
             server_header=False, timeout_graceful_shutdown=3, limit_concurrency=400,
         )  # fmt: skip
         server = uvicorn.Server(config)
