@@ -8,7 +8,7 @@ import pytest
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe")
 
-from .driving import task, tool  # noqa: E402
+from .driving import start_search, task, tool  # noqa: E402
 
 if TYPE_CHECKING:
     from .conftest import Server
@@ -35,13 +35,38 @@ def test_axe_finds_nothing_serious(page: Any, server: Server, scheme: str, width
         tool(page, name)
         page.wait_for_timeout(300)
         assert findings(page) == []
-    for place in ("gallery", "machine", "runs", "design/builtin/human-crane"):
+    page.goto(f"{server.address}/#/machine")
+    page.get_by_text("Nothing here yet").wait_for()
+    for place, seen in (
+        ("gallery", ".tile"),
+        ("machine", ".shelves .tile"),
+        ("machine/gripper", ".readout strong"),
+        ("runs", "h1"),
+        ("design/builtin/human-crane", '.player[data-ready="yes"]'),
+        ("run/000000000000", "[role=alert]"),
+    ):
         page.goto(f"{server.address}/#/{place}")
-        page.locator("h1").wait_for()
-        page.wait_for_timeout(700)
+        page.locator(seen).first.wait_for()
+        page.wait_for_timeout(500)
         assert findings(page) == [], place
-        wide = page.evaluate("document.documentElement.scrollWidth")
-        assert wide <= width, place
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, place
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_axe_finds_nothing_serious_in_a_search_and_its_result(page: Any, width: int) -> None:
+    page.emulate_media(reduced_motion="reduce")
+    page.set_viewport_size({"width": width, "height": 900})
+    start_search(page, "Thorough")
+    page.get_by_text("steps/s").wait_for()
+    page.locator(".readout strong").wait_for()
+    assert findings(page) == []
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Take the best").click()
+    page.locator('.player[data-ready="yes"]').wait_for()
+    page.locator(".colour label", has_text="Stress").click()
+    page.locator(".figures td", has_text="MPa").wait_for()
+    assert findings(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_a_task_can_be_drawn_with_the_keyboard_alone(page: Any) -> None:

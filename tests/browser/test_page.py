@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import trimesh
 
+from bellcrank.fem import FemSettings
 from bellcrank.mechanics import CAREFUL, Evaluator
-from bellcrank.model import problem_from_dict, unpack_mask
+from bellcrank.model import problem_from_dict, read_design, unpack_mask
+from bellcrank.parts import PartSpec
+from bellcrank.workflows import validate
 
 from .driving import click, drag, start_search, summary, task, tool, until
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from .conftest import Server
 
 HEIGHT = math.sqrt(3.0) / 2.0
@@ -75,6 +80,7 @@ def test_a_task_is_drawn_searched_watched_stopped_played_and_taken(page: Any) ->
     mesh = trimesh.load(io.BytesIO(downloaded(page, "stl")), file_type="stl")
     assert mesh.is_watertight
     assert downloaded(page, "3mf")[:2] == b"PK"
+    assert downloaded(page, "history")[:4] == b"PAR1"
     page.get_by_text("Beam worth").click()
     page.get_by_text("Dark: all depends on it").wait_for()
 
@@ -161,8 +167,10 @@ def test_a_machine_is_made_of_two_parts(page: Any, server: Server) -> None:
         }"""
         page.evaluate(made, f"elementary-{direction}")
     page.goto(f"{server.address}/#/machine")
+    page.get_by_text("Nothing here yet").wait_for()
     page.locator("button.tile", has_text="elementary-down").click()
     page.get_by_text("first: elementary-down").wait_for()
+    page.get_by_text("Nothing here yet").wait_for(state="hidden")
     page.locator("button.tile", has_text="elementary-left").click()
     page.get_by_text("second: elementary-left").wait_for()
     until(page, "document.querySelector('.readout strong')?.textContent.length > 3")
@@ -187,3 +195,112 @@ def test_the_page_and_its_search_survive_the_end_of_the_server(page: Any, server
     page.locator(f'a[href="#/run/{name}"]').click()
     page.get_by_role("button", name="Stop and take the best").click()
     page.locator('.player[data-ready="yes"]').wait_for()
+
+
+def test_a_machine_that_comes_along_is_taken_apart_and_changed(page: Any, server: Server) -> None:
+    page.goto(f"{server.address}/#/machine")
+    page.locator('button.tile[data-entry="machines/amplifier"]').click()
+    page.locator(".readout strong").wait_for()
+    whole = page.locator(".readout strong").inner_text()
+    page.locator(".panel section", has_text="second").get_by_label("Mirrored").check()
+    page.locator(".complaint", has_text="second").wait_for()
+    page.keyboard.press("Control+z")
+    until(page, f"document.querySelector('.readout strong')?.textContent === '{whole}'")
+    page.reload()
+    page.locator(".panel h2", has_text="second").wait_for()
+    page.get_by_role("button", name="Remove second").click()
+    until(page, f"document.querySelector('.readout strong')?.textContent !== '{whole}'")
+    assert page.locator(".panel h2", has_text="second").count() == 0
+    shelf = page.locator('.shelf[data-source="library"]')
+    shelf.get_by_label("Moves").select_option("up")
+    shelf.get_by_label("Size").select_option("9 wide")
+    assert shelf.locator(".note[role=status]").inner_text() == "3 designs"
+    shelf.locator("button.tile", has_text="easy to drive").click()
+    page.locator(".panel h2", has_text="second: Up, 9 wide").wait_for()
+    page.goto(f"{server.address}/#/design/machines/gripper")
+    page.get_by_role("button", name="Open its parts").click()
+    page.locator(".panel h2", has_text="left-fore").wait_for()
+    page.locator(".readout strong").wait_for()
+
+
+def test_a_whole_search_is_compared_checked_by_finite_elements_and_leaves_its_history(
+    page: Any, tmp_path: Path
+) -> None:
+    tool(page, "By hand")
+    page.locator(".readout .latency").wait_for()
+    click(page, 2.5, 4 * HEIGHT)
+    until(page, "JSON.parse(localStorage.getItem('bellcrank-task')).hand !== null")
+    start_search(page)
+    page.locator(".status.finished").wait_for()
+    page.locator('.player[data-ready="yes"]').wait_for()
+    assert page.locator(".figures tr", has_text="Your own design").count() == 1
+    page.get_by_label("Ask finite elements: Frame").click()
+    row = page.locator(".figures tr", has_text="Frame")
+    row.get_by_text("MPa").wait_for()
+    (tmp_path / "design.json").write_bytes(downloaded(page, "json"))
+    design = read_design(tmp_path / "design.json")
+    part = PartSpec.from_dict(design.provenance["part"])
+    exact = validate(design, part, [("frame", FemSettings())])
+    shown = float(row.locator("td").first.inner_text().replace("−", "-"))
+    assert shown == pytest.approx(exact.analyses[0].efficiency, abs=6e-4)
+    page.get_by_role("button", name="Show stress").click()
+    page.locator(".stress path").first.wait_for(state="attached")
+    assert downloaded(page, "history")[:4] == b"PAR1"
+    assert downloaded(page, "svg").lstrip()[:1] == b"<"
+
+
+def test_a_search_that_finds_nothing_says_why_and_what_to_try(page: Any, server: Server) -> None:
+    name = page.evaluate("""async () => {
+      const problem = await (await fetch("/api/problems/scaling-8")).json();
+      const body = {title: "hopeless", session: "s", problem, steps: 50, chains: 1,
+                    goals: ["input-stiffness >= 1000"]};
+      const headers = {"content-type": "application/json"};
+      const sent = {method: "POST", headers, body: JSON.stringify(body)};
+      return (await (await fetch("/api/runs", sent)).json()).id;
+    }""")
+    page.goto(f"{server.address}/#/run/{name}")
+    said = page.locator(".panel .fault", has_text="What may help")
+    said.wait_for()
+    assert "accepted no design" in said.inner_text()
+    assert "Search longer" in said.inner_text()
+    assert "--" not in said.inner_text()
+    page.get_by_role("link", name="Back to the drawing").click()
+    page.locator("svg.canvas").wait_for()
+
+
+def test_a_link_carries_the_task_to_another_browser(page: Any, server: Server) -> None:
+    tool(page, "Beams")
+    click(page, 2.5, 4 * HEIGHT)
+    page.locator(".step.lattice h2 button").click()
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"], origin=server.address)
+    page.get_by_role("button", name="Copy link").click()
+    page.get_by_role("button", name="Copied").wait_for()
+    link = page.evaluate("navigator.clipboard.readText()")
+    sent = task(page)
+    page.evaluate("localStorage.clear()")
+    page.goto("about:blank")
+    page.goto(link)
+    page.locator("svg.canvas").wait_for()
+    until(page, "localStorage.getItem('bellcrank-task') !== null")
+    assert task(page)["rules"] == sent["rules"]
+    assert task(page)["problem"] == sent["problem"]
+
+
+@pytest.mark.parametrize("kind", ["Disordered", "Discs", "Crane"])
+def test_a_lattice_of_another_kind_keeps_what_is_held_pushed_and_to_move(
+    page: Any, kind: str
+) -> None:
+    page.locator(".step.lattice h2 button").click()
+    page.locator(".lattice .choice label", has_text=kind).click()
+    until(
+        page,
+        "JSON.parse(localStorage['bellcrank-task']).lattice.kind !== 'triangular-rectangle'",
+    )
+    problem = task(page)["problem"]
+    lowest = min(y for _, y in problem["positions"])
+    held = [problem["positions"][node][1] for node in problem["supports"]["fixed"]]
+    assert len(held) >= 5
+    assert max(held) < lowest + 0.8
+    assert problem["input"]["nodes"]
+    assert problem["output"]["nodes"]
+    assert page.get_by_role("button", name="Design it").is_enabled()

@@ -211,6 +211,22 @@ def test_what_is_downloaded_to_print_is_watertight(
     assert mesh.volume > 0.0
 
 
+@pytest.mark.parametrize(
+    ("suffix", "place", "sign"),
+    [
+        ("svg", 0, b"<"), ("dxf", 0, b"0\nSECTION"), ("pdf", 0, b"%PDF"), ("gif", 0, b"GIF8"),
+        ("mp4", 4, b"ftyp"), ("json", 0, b"{"),
+    ],
+)  # fmt: skip
+def test_every_other_file_is_of_its_kind(
+    client: TestClient, crane: dict[str, Any], suffix: str, place: int, sign: bytes
+) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"], "part": {"width": 1.6}}
+    answer = client.post(f"/api/files/{suffix}", json=body)
+    assert answer.status_code == 200, answer.text
+    assert answer.content[place:].replace(b"\r", b"").lstrip().startswith(sign)
+
+
 def test_a_part_that_cannot_be_is_refused_in_a_sentence(
     client: TestClient, crane: dict[str, Any]
 ) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from bellcrank.model import find_problem, read_design
@@ -176,10 +178,15 @@ def test_a_search_that_is_stopped_gives_the_best_it_has_found(
     name = begin(steps=1_000_000, method="paper")
     wait_for(lambda: (client.get(f"/api/runs/{name}").json()["done"]) > 2000)
     assert "running" in client.delete(f"/api/runs/{name}").json()["message"]
+    assert "running" in client.get(f"/api/runs/{name}/history.parquet").json()["message"]
     client.post(f"/api/runs/{name}/stop")
     run = wait_for(lambda: status_is(client, name, "stopped"))
     assert run["mask"]
     assert run["efficiency"] > 0.0
+    history = client.get(f"/api/runs/{name}/history.parquet")
+    found = pq.read_table(io.BytesIO(history.content))
+    assert found.num_rows == run["done"]
+    assert set(found["chain"].to_pylist()) == {0, 1}
     path = client.app.state.workshop.jobs[name].path  # type: ignore[attr-defined]
     assert read_design(path / "run" / "design.json").mask_hex == run["mask"]
     assert client.delete(f"/api/runs/{name}").status_code == 200

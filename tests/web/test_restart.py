@@ -7,7 +7,9 @@ import re
 import signal
 import subprocess
 import sys
+import uuid
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -18,14 +20,27 @@ from .conftest import wait_for  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
+
+
+MARK = "BELLCRANK_TEST_MARK"
 
 
 @contextmanager
-def serving(folder: Path, end: int = signal.SIGTERM) -> Iterator[Any]:
-    """Run `bellcrank serve` and yield who asks it."""
+def serving(
+    folder: Path, end: int = signal.SIGTERM, *, mark: str = "", warm: bool = True
+) -> Iterator[Any]:
+    """Run `bellcrank serve` and yield who asks it.
+
+    Parameters
+    ----------
+    mark
+        In the environment of the server and of all that it starts.
+    warm
+        Wait until it can compute.
+    """
     command = [sys.executable, "-m", "bellcrank", "serve", "--port", "0", "--folder", str(folder)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+    environment = {**os.environ, MARK: mark}
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stderr is not None
         address = ""
         while not address:
@@ -35,7 +50,7 @@ def serving(folder: Path, end: int = signal.SIGTERM) -> Iterator[Any]:
             address = found[0] if found else ""
         try:
             with httpx.Client(base_url=address, timeout=60) as client:
-                wait_for(lambda: _answers(client))
+                wait_for(lambda: not warm or _answers(client))
                 yield client
         finally:
             os.kill(process.pid, end)
@@ -74,3 +89,51 @@ def test_a_folder_has_one_server(tmp_path: Path) -> None:
         second = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert second.returncode == 1
     assert "another server uses it" in second.stderr
+
+
+def marked(mark: str) -> list[str]:
+    """Return the command of every process that lives and has a mark in its environment."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            ours = f"{MARK}={mark}\0".encode() in (path / "environ").read_bytes()
+            command = (path / "cmdline").read_text().replace("\0", " ")
+        except OSError:  # it has ended meanwhile, or is not ours to read
+            continue
+        if ours and command:
+            found.append(command)
+    return found
+
+
+needs_proc = pytest.mark.skipif(
+    not Path("/proc/self/environ").exists(), reason="processes are counted in /proc"
+)
+
+
+@needs_proc
+@pytest.mark.parametrize(
+    "end", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=["ctrl-c", "told", "killed"]
+)
+def test_no_process_outlives_its_server(tmp_path: Path, end: int) -> None:
+    mark = uuid.uuid4().hex
+    with serving(tmp_path, end, mark=mark) as client:
+        crane = client.get("/api/gallery/builtin/human-crane").json()
+        design = {"problem": crane["problem"], "mask": crane["mask"]}
+        assert client.post("/api/validation", json=design).status_code == 200
+        body = {"title": "t", "session": "s", "problem": crane["problem"], "steps": 1_000_000}
+        name = client.post("/api/runs", json=body).json()["id"]
+        wait_for(lambda: client.get(f"/api/runs/{name}").json()["done"] > 0)
+        # Three pools and a search; a resource tracker and the server itself.
+        assert len(marked(mark)) == 6
+    wait_for(lambda: not marked(mark), seconds=30)
+
+
+@needs_proc
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL], ids=["told", "killed"])
+def test_no_process_outlives_a_server_that_was_still_starting_them(
+    tmp_path: Path, end: int
+) -> None:
+    mark = uuid.uuid4().hex
+    with serving(tmp_path, end, mark=mark, warm=False):
+        wait_for(lambda: len(marked(mark)) > 2)
+    wait_for(lambda: not marked(mark), seconds=30)

@@ -47,7 +47,6 @@ export interface Run {
   done: number;
   total: number;
   has_design: boolean;
-  has_history: boolean;
   place: number;
 }
 
@@ -83,6 +82,7 @@ export interface Small {
   problem: string;
   efficiency: number | null;
   beams: number;
+  facets: Record<string, string>;
   picture: { lines: number[]; supports: number[]; input: number[]; output: number[]; box: number[] };
 }
 

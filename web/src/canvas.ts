@@ -3,6 +3,7 @@
 import type { Point, Problem } from "./api";
 import { angleOf, arrow, Drawing, isEach, range, unit, where } from "./drawing";
 import { s, say } from "./dom";
+import { inWords, mirrorAxes, nextThatWay, rollerLines } from "./marks";
 import { directionOf, nodesOf, rowOf, touching, type Region, type Rule, type Task } from "./task";
 
 export type Tool = "supports" | "input" | "output" | "beams" | "hand";
@@ -32,6 +33,7 @@ export class Canvas extends Drawing {
   private readonly arrows = { input: s("g", { class: "arrow input" }), output: s("g", { class: "arrow output" }) };
   private readonly response = s("path", { class: "beam response" });
   private readonly axes = s("path", { class: "axis" });
+  private readonly rollers = s("path", { class: "rollers" });
 
   constructor(private readonly deeds: Deeds) {
     super("The task: a lattice with supports, input and output");
@@ -40,7 +42,7 @@ export class Canvas extends Drawing {
     this.svg.setAttribute("aria-roledescription", "drawing");
     this.svg.classList.add("canvas");
     this.svg.insertBefore(this.response, this.dots);
-    this.overlay.append(this.axes, this.hoverBeam, this.hover, this.band, this.faults);
+    this.overlay.append(this.rollers, this.axes, this.hoverBeam, this.hover, this.band, this.faults);
     this.svg.insertBefore(this.arrows.output, this.dots);
     this.svg.insertBefore(this.arrows.input, this.dots);
     this.svg.addEventListener("pointerdown", (event) => this.down(event));
@@ -99,19 +101,7 @@ export class Canvas extends Drawing {
   }
 
   private showRollers(along_y: number[], along_x: number[]): void {
-    let d = "";
-    for (const [nodes, dx, dy] of [[along_y, 0, 0.34], [along_x, 0.34, 0]] as [number[], number, number][]) {
-      for (const node of nodes) {
-        const [x, y] = [this.rest[2 * node]!, -this.rest[2 * node + 1]!];
-        d += `M${x - dx} ${y - dy}L${x + dx} ${y + dy}`;
-      }
-    }
-    let path = this.overlay.querySelector<SVGPathElement>(".rollers");
-    if (!path) {
-      path = s("path", { class: "rollers" });
-      this.overlay.prepend(path);
-    }
-    path.setAttribute("d", d);
+    this.rollers.setAttribute("d", rollerLines(this.rest, along_y, along_x));
   }
 
   private centre(region: "input" | "output"): Point | null {
@@ -152,18 +142,9 @@ export class Canvas extends Drawing {
   }
 
   private showAxes(): void {
-    const task = this.task!;
-    const { x, y, w, h } = this.box;
-    const beams = task.problem.designable.length ? task.problem.designable : range(this.beams.length);
-    let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
-    for (const k of beams) for (const n of this.beams[k]!) {
-      x0 = Math.min(x0, this.rest[2 * n]!); x1 = Math.max(x1, this.rest[2 * n]!);
-      y0 = Math.min(y0, -this.rest[2 * n + 1]!); y1 = Math.max(y1, -this.rest[2 * n + 1]!);
-    }
-    let d = "";
-    if (task.mirror.x) d += `M${(x0 + x1) / 2} ${y}V${y + h}`;
-    if (task.mirror.y) d += `M${x} ${(y0 + y1) / 2}H${x + w}`;
-    this.axes.setAttribute("d", d);
+    const { problem, mirror } = this.task!;
+    const beams = problem.designable.length ? problem.designable : range(this.beams.length);
+    this.axes.setAttribute("d", mirrorAxes(this.rest, beams.map((k) => this.beams[k]!), this.box, mirror));
   }
 
   private showFaults(nodes: number[]): void {
@@ -314,30 +295,9 @@ export class Canvas extends Drawing {
       return [(this.rest[2 * a]! + this.rest[2 * b]!) / 2, (this.rest[2 * a + 1]! + this.rest[2 * b + 1]!) / 2];
     };
     if (this.cursor >= total) this.cursor = -1;
-    const from: Point = this.cursor >= 0 ? place(this.cursor) : [this.box.x, -this.box.y - this.box.h];
-    let best = Infinity;
-    let found = this.cursor;
-    for (let k = 0; k < total; k++) {
-      const [x, y] = place(k);
-      const along = (x - from[0]) * wx + (y - from[1]) * wy;
-      const across = Math.abs((x - from[0]) * wy) + Math.abs((y - from[1]) * wx);
-      if (k === this.cursor || (this.cursor >= 0 && along < 0.05)) continue;
-      const cost = Math.abs(along) + 2.2 * across;
-      if (cost < best) { best = cost; found = k; }
-    }
+    const found = nextThatWay(total, place, this.cursor, [this.box.x, -this.box.y - this.box.h], [wx, wy]);
     this.cursor = found;
     this.point(beams ? -1 : found, beams ? found : -1);
-    say(this.describe(found));
-  }
-
-  private describe(k: number): string {
-    if (k < 0 || !this.task) return "";
-    const { problem, rules } = this.task;
-    if (this.tool === "hand") return `beam ${k}, ${this.bits[k] ? "present" : "absent"}`;
-    if (this.tool === "beams") return `beam ${k}, ${{ auto: "left to the search", keep: "always there", never: "never there", free: "left to the search" }[rules[k]!]}`;
-    const [x, y] = problem.positions[k]!;
-    const part = (["supports", "input", "output"] as const).find((region) => nodesOf(problem, region).includes(k));
-    const name = part ? { supports: "held", input: "pushed", output: "to move" }[part] : "free";
-    return `node ${k} at ${x.toFixed(1)}, ${y.toFixed(1)}: ${name}`;
+    if (found >= 0) say(inWords(this.task!, this.tool, this.bits, found));
   }
 }

@@ -152,3 +152,8 @@ export function icon(name: keyof typeof paths): SVGElement {
     "stroke-width": 1.8, "stroke-linecap": "round", "stroke-linejoin": "round" },
   s("path", { d: paths[name] }));
 }
+
+/** A button with a picture alone; who cannot see it hears what it says. */
+export function iconButton(name: keyof typeof paths, title: string, press: () => void): HTMLButtonElement {
+  return h("button", { type: "button", class: "quiet icon", title, "aria-label": title.replace(/ \(.*/, ""), onclick: press }, icon(name));
+}

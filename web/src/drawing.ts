@@ -5,6 +5,8 @@ import { s } from "./dom";
 
 export interface Group { name: string; beams: ArrayLike<number> }
 
+export interface Box { x: number; y: number; w: number; h: number }
+
 export const BINS = 12;
 
 /** x and y of all nodes in turn. */
@@ -25,7 +27,9 @@ export class Drawing {
   rest: Float64Array = new Float64Array(0);
   at: Float64Array = new Float64Array(0);
   beams: [number, number][] = [];
-  box = { x: 0, y: 0, w: 10, h: 10 };
+  /** Of the lattice at rest, with a margin; `view` is what is seen. */
+  box: Box = { x: 0, y: 0, w: 10, h: 10 };
+  private view: Box = this.box;
 
   constructor(label: string) {
     this.svg = s("svg", { class: "drawing", role: "img", "aria-label": label, preserveAspectRatio: "xMidYMid meet" });
@@ -46,7 +50,7 @@ export class Drawing {
       y0 = Math.min(y0, y); y1 = Math.max(y1, y);
     }
     this.box = { x: x0 - margin, y: -y1 - margin, w: x1 - x0 + 2 * margin, h: y1 - y0 + 2 * margin };
-    this.svg.setAttribute("viewBox", `${this.box.x} ${this.box.y} ${this.box.w} ${this.box.h}`);
+    this.look(this.box);
   }
 
   /** Put the nodes elsewhere; `null` puts them back. */
@@ -58,6 +62,24 @@ export class Drawing {
     const at = new Float64Array(this.rest.length);
     for (let k = 0; k < at.length; k++) at[k] = this.rest[k]! + times * displacement[k]!;
     this.at = at;
+  }
+
+  /** Enlarge the picture, if need be, so that beams stay inside when they have moved. */
+  makeRoom(beams: ArrayLike<number>, displacement: ArrayLike<number>, margin = 0.6): void {
+    const { x, y, w, h } = this.view;
+    let [x0, y0, x1, y1] = [x, y, x + w, y + h];
+    for (let k = 0; k < beams.length; k++) for (const node of this.beams[beams[k]!]!) {
+      const px = this.rest[2 * node]! + displacement[2 * node]!;
+      const py = -(this.rest[2 * node + 1]! + displacement[2 * node + 1]!);
+      x0 = Math.min(x0, px - margin); x1 = Math.max(x1, px + margin); y0 = Math.min(y0, py - margin); y1 = Math.max(y1, py + margin);
+    }
+    this.look({ x: x0, y: y0, w: x1 - x0, h: y1 - y0 });
+  }
+
+  private look(view: Box): void {
+    this.view = view;
+    this.svg.setAttribute("viewBox", `${view.x} ${view.y} ${view.w} ${view.h}`);
+    thicken(this.svg, view.w);
   }
 
   lines(beams: ArrayLike<number>, at: Float64Array = this.at): string {
@@ -157,6 +179,11 @@ export class Drawing {
     });
     return found;
   }
+}
+
+/** Keep lines visible in a picture of a large lattice; `width` is what it shows, in beams. */
+export function thicken(svg: SVGElement, width: number, usual = 32): void {
+  svg.style.setProperty("--thick", Math.min(2, Math.max(1, width / usual)).toFixed(2));
 }
 
 export function range(length: number): number[] {

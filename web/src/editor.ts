@@ -1,15 +1,16 @@
 // The page on which a task is drawn, and a design by hand.
 
-import { get, post, Refusal, session, Solver, bitsOf, hexOf, type Point, type Problem, type Response } from "./api";
+import { post, Refusal, session, Solver, bitsOf, hexOf, type Point, type Problem, type Response } from "./api";
+import { bare, KEY } from "./begin";
 import { Canvas, type Tool } from "./canvas";
-import { isEach, where } from "./drawing";
-import { choice, clear, download, figure, h, icon, say } from "./dom";
+import { where } from "./drawing";
+import { choice, clear, download, figure, h, iconButton, say } from "./dom";
 import { Panels } from "./panels";
 import {
-  assign, fromLink, goalsOf, History, images, isTask, nodesOf, problemOf, taskOf, toLink, type Hold, type Task,
+  assign, goalsOf, History, images, nodesOf, problemOf, taskOf, toLink, type Hold, type Region, type Task,
 } from "./task";
+import { fileName, sentence, suffixOf, undoing } from "./words";
 
-const KEY = "bellcrank-task";
 const TOOLS: [Tool, string, string][] = [
   ["supports", "Hold", "Click nodes that are held; drag a box for many, double-click for a row."],
   ["input", "Push", "Click nodes that are pushed; drag the orange arrow to aim, longer for a longer stroke."],
@@ -17,6 +18,13 @@ const TOOLS: [Tool, string, string][] = [
   ["beams", "Beams", "Paint beams that must stay or must never be there."],
   ["hand", "By hand", "Click beams away and back; what the real solver says is drawn in at once."],
 ];
+
+const MISSING: [Region, string][] = [
+  ["supports", "Nothing is held yet: choose Hold and click nodes."],
+  ["input", "Nothing is pushed yet: choose Push and click nodes."],
+  ["output", "Nothing is to move yet: choose Move and click nodes."],
+];
+const WELCOME = "To begin with: held below, pushed down on the right, it should move left. Change what you like, or just press Design it.";
 
 export interface Settings { method: string; steps: number; chains: number; seed: number; real: boolean; width: number; material: string }
 
@@ -36,15 +44,15 @@ export class Editor {
   private readonly complaint = h("p", { class: "complaint", role: "alert" });
   private readonly readout = h("div", { class: "readout", "aria-live": "polite" });
   private readonly tools = h("div", { class: "tools" });
-  private readonly undoButton = h("button", { type: "button", class: "quiet icon", title: "Undo (Ctrl+Z)", "aria-label": "Undo", onclick: () => this.undo() }, icon("undo"));
-  private readonly redoButton = h("button", { type: "button", class: "quiet icon", title: "Redo (Ctrl+Shift+Z)", "aria-label": "Redo", onclick: () => this.redo() }, icon("redo"));
+  private readonly undoButton = iconButton("undo", "Undo (Ctrl+Z)", () => this.step("undo"));
+  private readonly redoButton = iconButton("redo", "Redo (Ctrl+Shift+Z)", () => this.step("redo"));
   private checking: AbortController | null = null;
   private timer = 0;
   private checked = "";
   private readonly leaving = (): void => this.keep();
-  private readonly keys = (event: KeyboardEvent): void => this.key(event);
+  private readonly keys = undoing((way) => this.step(way));
 
-  constructor(task: Task) {
+  constructor(task: Task, private readonly fresh = false) {
     this.history = new History(task);
     this.canvas = new Canvas({
       nodes: (region, nodes, add, merge) => this.set(assign(this.task, region, nodes, add, this.hold), merge),
@@ -62,12 +70,11 @@ export class Editor {
 
   get task(): Task { return this.history.value; }
   get problem(): Problem { return problemOf(this.task); }
-  get missing(): string | null {
+  /** What has to be drawn before anything can be searched. */
+  get missing(): { region: Region; message: string } | null {
     const { problem } = this.task;
-    if (!problem.input.nodes.length) return "Nothing is pushed yet: choose Push and click nodes.";
-    if (!problem.output.nodes.length) return "Nothing is to move yet: choose Move and click nodes.";
-    if (!nodesOf(problem, "supports").length) return "Nothing is held yet: choose Hold and click nodes.";
-    return null;
+    const empty = MISSING.find(([region]) => !nodesOf(problem, region).length);
+    return empty ? { region: empty[0], message: empty[1] } : null;
   }
 
   close(): void {
@@ -87,7 +94,8 @@ export class Editor {
     this.element.append(
       h("div", { class: "intro" },
         h("h1", {}, "What should move, when you push where?"),
-        h("p", {}, "Draw it. bellcrank searches which beams to leave out so that one piece of material does it.")),
+        h("p", {}, "Draw what is held, what is pushed and what should move; bellcrank finds which beams to leave out so that one piece of material does it."),
+        this.fresh && h("p", { class: "welcome" }, WELCOME)),
       stage, this.panels.element);
   }
 
@@ -97,6 +105,7 @@ export class Editor {
     this.element.dataset.tool = tool;
     if (tool === "hand" && !this.task.hand) this.set({ ...this.task, hand: this.problem.initial });
     clear(this.tools, choice("Tool", TOOLS.map(([key, text]) => [key, text]), tool, (picked) => this.choose(picked)));
+    this.tools.querySelectorAll("label").forEach((label, k) => label.classList.add("tool", TOOLS[k]![0]));
     this.hint.textContent = TOOLS.find(([key]) => key === tool)![2];
     this.show();
     (this.tools.querySelector("input:checked") as HTMLElement | null)?.focus({ preventScroll: true });
@@ -151,8 +160,11 @@ export class Editor {
     this.set({ ...this.task, problem: { ...problem, [region]: { ...problem[region], ...changes } } });
   }
 
-  undo(): void { this.history.undo(); this.changed(); say("undone"); }
-  redo(): void { this.history.redo(); this.changed(); say("done again"); }
+  private step(way: "undo" | "redo"): void {
+    this.history[way]();
+    this.changed();
+    say(way === "undo" ? "undone" : "done again");
+  }
 
   private changed(): void {
     if (this.tool === "hand" && !this.task.hand) this.history.set({ ...this.task, hand: this.problem.initial }, true);
@@ -218,7 +230,7 @@ export class Editor {
       if (error instanceof DOMException) return;
       const refused = error as Refusal;
       this.checked = "";
-      this.fault = { key: refused.key, message: sentence(refused.message) };
+      this.fault = { key: refused.key, message: inPlainWords(refused.message) };
     }
     if (!asked.signal.aborted) this.show();
   }
@@ -236,14 +248,6 @@ export class Editor {
       h("span", { class: "latency" }, `${latency.toFixed(0)} ms, ${where(bits).length} beams`));
     this.readout.dataset.latency = latency.toFixed(1);
     document.dispatchEvent(new CustomEvent("bellcrank-response", { detail: latency }));
-  }
-
-  private key(event: KeyboardEvent): void {
-    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
-    if (event.target instanceof HTMLInputElement && event.target.type !== "radio" && event.target.type !== "checkbox") return;
-    event.preventDefault();
-    if (event.shiftKey) this.redo();
-    else this.undo();
   }
 
   /** Begin the search, and go to where it can be watched. */
@@ -271,10 +275,16 @@ export class Editor {
     download(new Blob([text], { type: "text/plain" }), `${fileName(this.task.problem.name)}${suffix}`);
   }
 
+  /** Put the task into a link, and say where that is: a browser copies only on a page it trusts. */
   async link(): Promise<string> {
     const address = `${location.origin}/#/draw/${await toLink(this.task)}`;
-    await navigator.clipboard?.writeText(address);
-    return address;
+    try {
+      await navigator.clipboard.writeText(address);
+      return "Copied";
+    } catch {
+      history.replaceState(null, "", address);
+      return "See the address";
+    }
   }
 
   async load(file: File): Promise<void> {
@@ -289,69 +299,8 @@ export class Editor {
   }
 }
 
-/** A task on a lattice of which nothing is said yet. */
-export function bare(lattice: Pick<Problem, "positions" | "beams">, table: Record<string, unknown> | null, like: Task): Task {
-  const { input, output } = like.problem;
-  const problem: Problem = {
-    ...like.problem, ...lattice,
-    supports: { fixed: [], fixed_x: [], fixed_y: [] },
-    input: { ...input, nodes: [], direction: isEach(input.direction) ? [0, -1] : input.direction },
-    output: { ...output, nodes: [], direction: isEach(output.direction) ? [-1, 0] : output.direction },
-    designable: [], initial: hexOf(new Uint8Array(lattice.beams.length).fill(1)),
-  };
-  return { ...like, problem, lattice: table, rules: lattice.beams.map(() => "auto"), hand: null };
-}
-
-export function fileName(title: string): string {
-  return title.trim().toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, "") || "bellcrank";
-}
-
-export function suffixOf(name: string): string {
-  const found = /\.[a-z0-9]+$/i.exec(name);
-  return found ? found[0].toLowerCase() : ".txt";
-}
-
-export function sentence(text: string): string {
-  const trimmed = text.trim();
-  return trimmed.charAt(0).toUpperCase() + trimmed.slice(1) + (/[.!?]$/.test(trimmed) ? "" : ".");
-}
-
-/** A task to begin with: an empty-handed visitor gets one that works. */
-export async function firstTask(link: string): Promise<Task> {
-  if (link) {
-    try {
-      const given = await fromLink(link);
-      if (isTask(given)) return given;
-    } catch { /* not a link of ours: begin as usual */ }
-  }
-  try {
-    const kept = JSON.parse(localStorage.getItem(KEY) ?? "null") as unknown;
-    if (isTask(kept)) return kept;
-  } catch { /* what was kept is no task */ }
-  return exampleTask();
-}
-
-/** A rectangle that stands on its lowest row: pushed down on the right, it should move left. */
-export async function exampleTask(): Promise<Task> {
-  const lattice = { kind: "triangular-rectangle", columns: 8, rows: 9 };
-  const made = await post<Pick<Problem, "positions" | "beams">>("/lattices", { lattice });
-  const problem: Problem = {
-    schema: "bellcrank/problem/1", name: "my actuator", ...made, initial: "", designable: [],
-    stiffness: { bond: 5, angle: 0.1 }, supports: { fixed: [], fixed_x: [], fixed_y: [] },
-    input: { nodes: [], direction: [0, -1], drive: "displacement", amount: 0.3 },
-    output: { nodes: [], direction: [-1, 0], spring: null, spring_kind: null }, aggregate: "mean",
-  };
-  const rows = made.positions.map(([x, y], k) => ({ x, y, k }));
-  const top = Math.max(...rows.map((node) => node.y));
-  const row = (y: number): number[] => rows.filter((n) => Math.abs(n.y - y) < 0.1).sort((a, b) => a.x - b.x).map((n) => n.k);
-  problem.supports.fixed = row(0);
-  problem.input.nodes = row(top).slice(-2);
-  problem.output.nodes = row(top).slice(0, 2);
-  problem.initial = hexOf(new Uint8Array(made.beams.length).fill(1));
-  const task = taskOf(problem, lattice);
-  return { ...task, rules: made.beams.map(() => "auto") };
-}
-
-export async function builtInTask(name: string): Promise<Task> {
-  return taskOf(await get<Problem>(`/problems/${name}`));
+/** Say what is wrong with a mirror as the page calls it; other sentences stay as they are. */
+function inPlainWords(message: string): string {
+  const lonely = /^goal 'mirror .*: (\d+ of \d+) designable beams/.exec(message);
+  return lonely ? `The task is not symmetric: ${lonely[1]} beams have no mirror image. Choose mirrored nodes, or drop the mirror.` : sentence(message);
 }

@@ -1,44 +1,18 @@
-// Designs and searches with small pictures.
+// Designs and searches to open.
 
-import { get, type Run, type Shelf, type Small } from "./api";
-import { ago, count, figure, h, s } from "./dom";
+import { get, type Run, type Shelf } from "./api";
+import { ago, count, figure, h } from "./dom";
+import { shelfView, tile } from "./shelves";
 
-export function thumbnail({ picture }: Small): SVGElement {
-  const [x0, y0, x1, y1] = picture.box as [number, number, number, number];
-  const margin = 0.7;
-  let d = "";
-  for (let k = 0; k < picture.lines.length; k += 4) {
-    d += `M${picture.lines[k]} ${-picture.lines[k + 1]!}L${picture.lines[k + 2]} ${-picture.lines[k + 3]!}`;
-  }
-  const dots = (places: number[]): string => {
-    let path = "";
-    for (let k = 0; k < places.length; k += 2) path += `M${places[k]} ${-places[k + 1]!}h0`;
-    return path;
-  };
-  return s("svg", { class: "drawing thumbnail", viewBox: `${x0 - margin} ${-y1 - margin} ${x1 - x0 + 2 * margin} ${y1 - y0 + 2 * margin}`, "aria-hidden": "true" },
-    s("path", { class: "beam plain", d }),
-    s("path", { class: "dot support", d: dots(picture.supports) }),
-    s("path", { class: "dot input", d: dots(picture.input) }),
-    s("path", { class: "dot output", d: dots(picture.output) }));
-}
-
-export function tile(small: Small, href: string): HTMLElement {
-  return h("a", { class: "tile", href }, thumbnail(small),
-    h("span", { class: "title" }, small.title),
-    h("span", { class: "note" }, small.efficiency === null ? small.note : `${figure(small.efficiency)} · ${small.note}`));
-}
+/** Designs of a shelf before one asks for all: three rows. */
+const SHOWN = 15;
 
 export async function galleryPage(): Promise<HTMLElement> {
   const shelves = await get<Shelf[]>("/gallery");
-  const page = h("div", { class: "page wide" },
-    h("div", { class: "intro" }, h("h1", {}, "Gallery"), h("p", {}, "Open a design to see it move, to take it, or to go on from it.")));
-  for (const { source, title, entries } of shelves) {
-    if (!entries.length) continue;
-    page.append(h("section", { "aria-label": title }, h("h2", {}, title),
-      h("div", { class: "tiles" }, ...entries.map((entry) =>
-        tile(entry, source === "runs" ? `#/run/${entry.key}` : `#/design/${source}/${entry.key}`)))));
-  }
-  return page;
+  return h("div", { class: "page wide" },
+    h("div", { class: "intro" }, h("h1", {}, "Gallery"), h("p", {}, "Open a design to see it move, to take it, or to go on from it.")),
+    ...shelves.filter(({ entries }) => entries.length).map((shelf) => shelfView(shelf, (small) =>
+      tile(small, small.source === "runs" ? `#/run/${small.key}` : `#/design/${small.source}/${small.key}`), SHOWN)));
 }
 
 export class RunsPage {

@@ -1,15 +1,18 @@
 // Which page is shown, and how the server is.
 
 import { get, post, Refusal, type Response, type WholeRun } from "./api";
+import { firstTask, KEY } from "./begin";
 import { clear, count, figure, h } from "./dom";
-import { Editor, firstTask, sentence } from "./editor";
+import { Editor } from "./editor";
 import { galleryPage, RunsPage } from "./gallery";
 import { MachinePage } from "./machine";
 import { designSubject, Result } from "./result";
+import type { WrittenPlan } from "./plan";
 import { RunPage } from "./run";
+import { sentence } from "./words";
 
 interface Page { element: HTMLElement; close?: () => void }
-interface About { ready: boolean; running: number; queued: number; version: string }
+interface About { ready: boolean; trouble: string; running: number; queued: number; version: string }
 
 const place = document.getElementById("page")!;
 const server = document.getElementById("server")!;
@@ -22,10 +25,11 @@ async function open(parts: string[]): Promise<Page> {
     case "run": return new RunPage(await get<WholeRun>(`/runs/${encodeURIComponent(rest[0] ?? "")}`));
     case "runs": return new RunsPage();
     case "gallery": return { element: await galleryPage() };
-    case "machine": return new MachinePage();
+    case "machine": return new MachinePage(rest[0] ? await get<WrittenPlan>(`/machines/${encodeURIComponent(rest[0])}`) : null);
     case "design": return designPage(rest[0] ?? "", rest[1] ?? "");
     default: {
-      const editor = new Editor(await firstTask(rest[0] ?? ""));
+      const fresh = !rest[0] && localStorage.getItem(KEY) === null;
+      const editor = new Editor(await firstTask(rest[0] ?? ""), fresh);
       if (sessionStorage.getItem("bellcrank-tool") === "hand") editor.choose("hand");
       sessionStorage.removeItem("bellcrank-tool");
       return editor;
@@ -43,7 +47,7 @@ async function designPage(source: string, key: string): Promise<Page> {
   const result = new Result(subject);
   const origin = subject.provenance["origin"];
   const element = h("div", { class: "page run" },
-    h("div", { class: "intro" }, h("h1", {}, subject.title), typeof origin === "string" && h("p", {}, origin)),
+    h("div", { class: "intro" }, h("h1", {}, subject.title), h("p", {}, typeof origin === "string" ? origin : sentence(subject.note ?? ""))),
     h("div", { class: "main" }, h("section", { class: "stage", "aria-label": "Design" }, result.player.element)),
     h("div", { class: "side" }, result.element));
   return { element, close: () => result.close() };
@@ -78,8 +82,10 @@ async function watch(): Promise<void> {
   let wait = 3000;
   try {
     const about = await get<About>("/about");
-    server.classList.remove("lost");
-    if (!about.ready) {
+    server.classList.toggle("lost", about.trouble !== "");
+    if (about.trouble) {
+      server.textContent = sentence(about.trouble);
+    } else if (!about.ready) {
       server.textContent = "Getting the solver ready …";
       wait = 500;
     } else if (about.running + about.queued) {

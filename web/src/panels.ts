@@ -1,20 +1,14 @@
 // What stands beside the drawing: the same task in words and numbers.
 
 import { get, post, type Point, type Problem, type Refusal } from "./api";
+import { bare, builtInTask, exampleTask } from "./begin";
 import { angleOf, isEach, unit, wayOf } from "./drawing";
 import { button, choice, clear, count, field, figure, h, number, select } from "./dom";
-import { bare, builtInTask, exampleTask, sentence, type Editor } from "./editor";
+import type { Editor } from "./editor";
+import { craneRows, moved } from "./lattices";
+import { SearchBox } from "./searchbox";
 import { directionOf, nodesOf, type Hold, type Rule } from "./task";
-
-const METHODS: [string, string, string][] = [
-  ["basin-hopping", "Basin hopping", "Climbs, disturbs a part, climbs again. The best in most cases."],
-  ["informed", "Informed", "A Metropolis chain that foresees what each flip does."],
-  ["tempering", "Tempering", "Chains at several temperatures that exchange designs."],
-  ["paper", "The paper", "Single random flips, as Bonfanti et al. (2020) published it."],
-];
-const EFFORTS: [string, string, number, number][] = [
-  ["quick", "Quick", 4000, 2], ["usual", "Usual", 20000, 4], ["long", "Thorough", 100000, 4],
-];
+import { sentence } from "./words";
 
 interface Named { name: string; group: string; about: string }
 
@@ -22,10 +16,10 @@ export class Panels {
   readonly element = h("aside", { class: "panel", "aria-label": "Task" });
   private problems: Named[] = [];
   private local: Record<string, string> = {};
-  private busy = false;
-  private more = false;
+  private readonly searchBox: SearchBox;
 
   constructor(private readonly editor: Editor) {
+    this.searchBox = new SearchBox(editor, () => this.show());
     void get<Named[]>("/problems").then((found) => { this.problems = found; this.show(); });
   }
 
@@ -38,7 +32,7 @@ export class Panels {
       this.section("input", "Pushed", this.regionSummary("input"), this.input()),
       this.section("output", "Moves", this.regionSummary("output"), this.output()),
       this.section("beams", "Beams", this.beamSummary(), this.beams()),
-      this.search());
+      this.searchBox.make());
     if (label) this.element.querySelector<HTMLElement>(`[data-key="${label}"]`)?.focus({ preventScroll: true });
   }
 
@@ -60,7 +54,8 @@ export class Panels {
   private faultOf(key: string): string {
     const { fault, missing } = this.editor;
     if (this.local[`fault-${key}`]) return this.local[`fault-${key}`]!;
-    if (missing || !fault) return "";
+    if (missing) return missing.region === key ? missing.message : "";
+    if (!fault) return "";
     const heads: Record<string, string[]> = {
       lattice: ["lattice", "positions", "beams"], supports: ["supports"], input: ["input"], output: ["output"], beams: ["designable", "initial", "problem"],
     };
@@ -120,8 +115,8 @@ export class Panels {
       kind === "triangular-rows" && Array.isArray(table?.counts) && table.counts.length > 6 && h("div", { class: "row" },
         this.size("Across", Number(table.counts[0]), 5, 40, (value) => craneRows(value, (table.counts as number[]).length - 6)),
         this.size("Rows between", table.counts.length - 6, 1, 40, (value) => craneRows(Number((table.counts as number[])[0]), value))),
-      kind === "jammed-discs" && h("div", { class: "row" }, whole("discs", "Discs", 20, 1000)),
-      (kind === "jammed-discs" || kind === "displaced-delaunay") && h("div", { class: "row" }, whole("seed", "Seed", 0, 100000)),
+      kind === "jammed-discs" && h("div", { class: "row" }, whole("discs", "Discs", 20, 1000), whole("seed", "Seed", 0, 100000)),
+      kind === "displaced-delaunay" && h("div", { class: "row" }, whole("seed", "Seed", 0, 100000)),
       h("div", { class: "row" }, field("Beam length", scale, "mm"),
         field("Name", this.name())),
       h("div", { class: "buttons" },
@@ -129,8 +124,7 @@ export class Panels {
         button("Save TOML", () => void this.attempt("lattice", () => editor.save(".toml")), "", { "data-key": "toml" }),
         button("Save JSON", () => void this.attempt("lattice", () => editor.save(".json")), "", { "data-key": "json" }),
         button(this.local.link || "Copy link", () => void this.attempt("lattice", async () => {
-          await editor.link();
-          this.local.link = "Copied";
+          this.local.link = await editor.link();
         }), "", { "data-key": "link" })));
   }
 
@@ -259,115 +253,13 @@ export class Panels {
         h("div", { class: "buttons" },
           button("Keep this design", () => void this.attempt("beams", () => editor.keepHand(editor.task.problem.name)), "", { "data-key": "keep" }),
           button("All beams again", () => editor.set({ ...editor.task, hand: editor.problem.initial }), "", { "data-key": "all" })),
-        h("div", { class: "row" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")));
+        h("div", { class: "row ticks" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")));
     }
     const brushes: [Rule, string][] = [["keep", "Must stay"], ["never", "Never"], ["auto", "Free"]];
     return h("div", { class: "content" },
       choice("Paint", brushes, editor.brush as Rule, (picked) => { editor.brush = picked as "keep"; }),
-      h("div", { class: "row" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")),
+      h("div", { class: "row ticks" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")),
       h("div", { class: "buttons" },
         button("Free all beams", () => editor.set({ ...editor.task, rules: editor.task.rules.map(() => "auto") }), "", { "data-key": "free" })));
   }
-
-  private search(): HTMLElement {
-    const { editor } = this;
-    const { settings } = editor;
-    const update = (changes: Partial<typeof settings>): void => { editor.settings = { ...editor.settings, ...changes }; this.show(); };
-    const whole = (key: "steps" | "chains" | "seed", label: string, least: number, most: number): HTMLElement => {
-      const input = number(settings[key], { min: least, max: most, step: 1 }, (value) => update({ [key]: Math.min(most, Math.max(least, Math.round(value))) }));
-      input.dataset.key = key;
-      return field(label, input);
-    };
-    const effort = EFFORTS.find(([, , steps, chains]) => steps === settings.steps && chains === settings.chains)?.[0] ?? "";
-    const real = h("input", { type: "checkbox", checked: settings.real, "data-key": "real" });
-    real.addEventListener("change", () => update({ real: real.checked }));
-    const method = select(METHODS.map(([key, name]) => [key, name]), settings.method, (picked) => update({ method: picked }));
-    method.dataset.key = "method";
-    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => update({ width: value }));
-    width.dataset.key = "width";
-    const fault = this.local["fault-search"] ?? "";
-    const missing = editor.missing;
-    return h("section", { class: "step search open" },
-      h("h2", { class: "plain" }, "Search"),
-      h("div", { class: "content" },
-        choice("How long", EFFORTS.map(([key, name]) => [key, name]), effort as never, (picked) => {
-          const found = EFFORTS.find(([key]) => key === picked)!;
-          update({ steps: found[2], chains: found[3] });
-        }),
-        h("details", { ...(this.more ? { open: true } : {}), ontoggle: (event: Event) => { this.more = (event.target as HTMLDetailsElement).open; } },
-          h("summary", { "data-key": "more" }, "Method, seed, strut width"),
-          field("Method", method, "", METHODS.find(([key]) => key === settings.method)![2]),
-          h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000), whole("chains", "Chains", 1, 64), whole("seed", "Seed", 0, 2 ** 31)),
-          h("label", { class: "tick" }, real, "With the stiffness of real struts"),
-          settings.real && field("Strut width", width, "mm")),
-        h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !!missing || !!editor.fault || this.busy,
-          onclick: () => void this.begin() }, "Design it"),
-        missing && h("p", { class: "note" }, missing),
-        fault && h("p", { class: "fault", role: "alert" }, fault)));
-  }
-
-  private async begin(): Promise<void> {
-    this.busy = true;
-    await this.attempt("search", () => this.editor.begin());
-    this.busy = false;
-  }
-}
-
-/** The rows of a lattice like the crane of the paper: a broad base, a body, and arms that reach out. */
-function craneRows(across: number, up: number): Record<string, unknown> {
-  const counts = [across, across + 1, across];
-  const first_x = [0.5, 0, 0.5];
-  for (let row = 0; row < up; row++) {
-    counts.push(row % 2 ? across - 1 : across);
-    first_x.push(row % 2 ? 0.5 : 0);
-  }
-  const shift = up % 2 ? 0.5 : 0;
-  for (const start of [-1 + shift, -0.5 + shift, -1 + shift]) {
-    counts.push(across + (up % 2 ? 0 : 1));
-    first_x.push(start);
-  }
-  return { kind: "triangular-rows", counts, first_x };
-}
-
-/** Find the nodes of a new lattice that lie where some of the old one lay, by their share of the box. */
-function moved(before: Problem, made: Pick<Problem, "positions">, nodes: number[]): number[] {
-  const box = (positions: Point[]): [number, number, number, number] => {
-    const xs = positions.map((p) => p[0]);
-    const ys = positions.map((p) => p[1]);
-    return [Math.min(...xs), Math.min(...ys), Math.max(...xs) - Math.min(...xs) || 1, Math.max(...ys) - Math.min(...ys) || 1];
-  };
-  const [ox, oy, ow, oh] = box(before.positions);
-  const [nx, ny, nw, nh] = box(made.positions);
-  const found = new Set<number>();
-  const height = (positions: Point[]): Map<number, number[]> => {
-    const rows = new Map<number, number[]>();
-    positions.forEach(([, y], k) => { const key = Math.round(10 * y); rows.set(key, [...(rows.get(key) ?? []), k]); });
-    return rows;
-  };
-  // A whole row stays a whole row, however many nodes it has now.
-  const [old, fresh] = [height(before.positions), height(made.positions)];
-  const rows = [...fresh.keys()];
-  const left = new Set(nodes);
-  for (const [key, row] of old) {
-    if (row.length < 3 || !row.every((node) => left.has(node))) continue;
-    const target = key / 10 - oy < 0.5 * oh ? 10 * ny + key - 10 * oy : 10 * (ny + nh) - (10 * (oy + oh) - key);
-    const nearest = rows.reduce((a, b) => (Math.abs(b - target) < Math.abs(a - target) ? b : a));
-    fresh.get(nearest)!.forEach((node) => found.add(node));
-    row.forEach((node) => left.delete(node));
-  }
-  for (const node of left) {
-    const [x, y] = before.positions[node]!;
-    // Near an edge the distance from that edge counts, so that corners stay corners.
-    const fit = (v: number, o: number, w: number, n: number, m: number): number =>
-      v - o < 0.3 * w ? n + (v - o) : o + w - v < 0.3 * w ? n + m - (o + w - v) : n + ((v - o) / w) * m;
-    const [tx, ty] = [fit(x, ox, ow, nx, nw), fit(y, oy, oh, ny, nh)];
-    let best = 0.8;
-    let nearest = -1;
-    made.positions.forEach(([px, py], k) => {
-      const distance = Math.hypot(px - tx, py - ty);
-      if (distance < best) { best = distance; nearest = k; }
-    });
-    if (nearest >= 0) found.add(nearest);
-  }
-  return [...found].sort((a, b) => a - b);
 }

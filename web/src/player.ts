@@ -4,7 +4,7 @@ import { post, type Motion, type Problem } from "./api";
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, where } from "./drawing";
 import { choice, clear, field, figure, h, icon, s } from "./dom";
-import { sentence } from "./editor";
+import { sentence } from "./words";
 
 export type Colour = "plain" | "energy" | "stress" | "beams";
 
@@ -84,25 +84,13 @@ export class Player {
   private async load(): Promise<void> {
     try {
       this.motion = await post<Motion>("/motion", { problem: this.problem, mask: this.mask });
-      this.makeRoom(this.motion);
+      this.drawing.makeRoom(this.beams, this.motion.displacement.at(-1)!);
       this.show();
       this.element.dataset.ready = "yes";
       if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
     } catch (error) {
       this.note(sentence((error as Error).message));
     }
-  }
-
-  /** Enlarge the picture so that the motion stays inside. */
-  private makeRoom(motion: Motion): void {
-    const { box, rest, svg } = this.drawing;
-    let [x0, y0, x1, y1] = [box.x, box.y, box.x + box.w, box.y + box.h];
-    const last = motion.displacement.at(-1)!;
-    for (const beam of this.beams) for (const node of this.problem.beams[beam]!) {
-      const [x, y] = [rest[2 * node]! + last[2 * node]!, -(rest[2 * node + 1]! + last[2 * node + 1]!)];
-      x0 = Math.min(x0, x - 0.6); x1 = Math.max(x1, x + 0.6); y0 = Math.min(y0, y - 0.6); y1 = Math.max(y1, y + 0.6);
-    }
-    svg.setAttribute("viewBox", `${x0} ${y0} ${x1 - x0} ${y1 - y0}`);
   }
 
   private async loadSensitivity(): Promise<void> {

@@ -2,13 +2,15 @@
 
 import { fetchBlob, fetchFile, get, post, type Comparison, type Part, type Problem, type Refusal } from "./api";
 import { bitsOf, hexOf } from "./api";
-import { button, clear, download, duration, field, figure, h, number, select } from "./dom";
-import { fileName, sentence } from "./editor";
+import { KEY } from "./begin";
+import { button, clear, download, field, figure, h, number, select } from "./dom";
 import { Player, type Picture } from "./player";
 import { taskOf } from "./task";
+import { fileName, REMEDIES, sentence } from "./words";
 
 export interface Subject {
   title: string;
+  note?: string;
   problem: Problem;
   mask: string;
   efficiency: number | null;
@@ -16,13 +18,15 @@ export interface Subject {
   comparison: Comparison | null;
   part: Part | null;
   history: string | null;
+  /** Of the machine that it is, if it comes along. */
+  plan: string | null;
 }
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null }
 interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[] }
 
 const FILES: [string, string, string][] = [
-  ["stl", "STL", "to print"], ["3mf", "3MF", "to print, with units"], ["svg", "SVG", "to cut or draw"], ["dxf", "DXF", "to cut"],
+  ["stl", "STL", "to print"], ["3mf", "3MF", "with units"], ["svg", "SVG", "to cut or draw"], ["dxf", "DXF", "to cut"],
   ["mp4", "MP4", "the motion"], ["gif", "GIF", "the motion"], ["pdf", "Card", "all on a page"], ["json", "design.json", "for bellcrank"],
 ];
 const LEVELS: [string, string, string][] = [["frame", "Frame", "seconds"], ["plane", "Printed outline", "up to a minute"], ["solid", "Solid", "minutes"]];
@@ -45,7 +49,7 @@ export class Result {
     this.player.note = (text) => { this.trouble.textContent = text; };
     this.player.want = (colour) => { if (colour === "stress") void this.validate("frame"); };
     this.element.append(
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Efficiency"), this.headline(), this.table, this.trouble),
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Efficiency"), this.headline(), this.verdict(), this.table, this.trouble),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "The part"), this.partBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Take it"), this.filesBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Go on"), this.onward()));
@@ -63,6 +67,16 @@ export class Result {
       ? "The output moves this many times as far as the input is pushed."
       : "What comes out for what is put in.";
     return h("p", { class: "headline" }, h("strong", {}, figure(efficiency, 2)), h("span", {}, words));
+  }
+
+  /** What is to be said about a design that is not what was asked for, and what to try. */
+  private verdict(): HTMLElement | null {
+    const { efficiency, comparison } = this.subject;
+    if (efficiency === null) return null;
+    const better = comparison?.efficiency ?? null;
+    const said = efficiency <= 0 ? "It moves against its arrow, or not at all."
+      : better !== null && better > efficiency ? "The design drawn by hand moves further." : "";
+    return said ? h("div", { class: "advice" }, h("p", {}, said), h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text)))) : null;
   }
 
   private showTable(): void {
@@ -179,11 +193,13 @@ export class Result {
       const task = taskOf(problem, null, this.part.scale);
       const whole = hexOf(new Uint8Array(problem.beams.length).fill(1));
       const from = byHand ? { ...task, hand: mask } : { ...task, problem: { ...problem, initial: problem.initial || whole } };
-      localStorage.setItem("bellcrank-task", JSON.stringify(from));
+      localStorage.setItem(KEY, JSON.stringify(from));
       if (byHand) sessionStorage.setItem("bellcrank-tool", "hand");
       location.hash = "#/draw";
     };
+    const { plan } = this.subject;
     return h("div", { class: "content buttons" },
+      plan && button("Open its parts", () => { location.hash = `#/machine/${plan}`; }, "strong"),
       button("Open as a new task", () => open(false)),
       button("Change it by hand", () => open(true)));
   }
@@ -196,8 +212,6 @@ function given(subject: Subject): Partial<Part> {
 
 /** A design from the gallery. */
 export async function designSubject(source: string, key: string): Promise<Subject> {
-  const whole = await get<{ title: string; problem: Problem; mask: string; efficiency: number | null; provenance: Record<string, unknown> }>(`/gallery/${source}/${key}`);
-  return { ...whole, comparison: null, part: null, history: null };
+  const whole = await get<{ title: string; problem: Problem; note: string; mask: string; efficiency: number | null; provenance: Record<string, unknown> }>(`/gallery/${source}/${key}`);
+  return { ...whole, comparison: null, part: null, history: null, plan: source === "machines" ? key : null };
 }
-
-export { duration };

@@ -5,8 +5,8 @@ import { bitsOf } from "./api";
 import { Chart } from "./chart";
 import { Drawing, where } from "./drawing";
 import { button, choice, clear, count, duration, figure, h, say } from "./dom";
-import { sentence } from "./editor";
 import { Result } from "./result";
+import { plainly, REMEDIES, sentence } from "./words";
 
 const WORDS: Record<Run["status"], string> = {
   queued: "waiting for its turn", running: "searching", paused: "resting", stopped: "stopped early", finished: "finished", failed: "failed",
@@ -98,6 +98,7 @@ export class RunPage {
     this.drawing.ghost("possible", where(bits, 0));
     this.drawing.ghost("rest", where(bits));
     this.drawing.move(displacement);
+    if (displacement) this.drawing.makeRoom(where(bits), displacement);
     const gone = where(Uint8Array.from(bits, (bit, k) => (old[k] && !bit ? 1 : 0)));
     const came = where(Uint8Array.from(bits, (bit, k) => (!old[k] && bit ? 1 : 0)));
     this.drawing.draw([{ name: "plain", beams: where(bits) }, { name: "gone", beams: gone }, { name: "came", beams: came }]);
@@ -120,7 +121,7 @@ export class RunPage {
     this.result?.element.remove();
     this.result = new Result({
       title: whole.title, problem: whole.problem, mask: whole.mask, efficiency: whole.efficiency, provenance: whole.provenance,
-      comparison: whole.comparison, part: whole.part, history: whole.has_history ? whole.id : null,
+      comparison: whole.comparison, part: whole.part, history: whole.id, plan: null,
     });
     clear(this.stage, this.result.player.element);
     this.side.prepend(this.result.element);
@@ -156,12 +157,19 @@ export class RunPage {
     }
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
-    if (run.message && run.status !== "running") this.trouble.textContent = sentence(run.message);
+    if (run.message && run.status !== "running") this.explain(run);
     if (!this.result) {
       const moved = this.news?.moved;
-      clear(this.readout, h("strong", {}, figure(moved?.efficiency ?? run.efficiency ?? this.chart.best, 3)),
-        h("span", {}, running ? (run.method === "basin-hopping" ? "best design so far, moved" : "the design at hand, moved") : WORDS[run.status]));
+      const value = moved?.efficiency ?? run.efficiency ?? this.chart.best;
+      clear(this.readout, value !== null && h("strong", {}, figure(value, 3)), h("span", {}, this.stateInWords(run, value !== null, done)));
     }
+  }
+
+  /** Say why a search has no design to show, and what to try. */
+  private explain(run: Run): void {
+    const none = /accepted|found/.test(run.message);
+    clear(this.trouble, plainly(run.message), none && h("span", { class: "advice" }, " What may help: ",
+      ...REMEDIES.flatMap((text) => [h("br"), text]), h("br"), h("a", { href: "#/draw" }, "Back to the drawing")));
   }
 
   private showSwitcher(): void {
@@ -172,6 +180,12 @@ export class RunPage {
       this.chain = picked === "human" ? "best" : picked;
       this.drawLive();
     }));
+  }
+
+  private stateInWords(run: Run, known: boolean, done: number): string {
+    if (run.status !== "running") return WORDS[run.status];
+    if (known) return run.method === "basin-hopping" ? "best design so far, moved" : "the design at hand, moved";
+    return done ? "No design that holds together and moves has been found yet." : "The search is starting …";
   }
 
   private showControls(run: Run): void {

@@ -295,6 +295,21 @@ class RunFolder:
         delete_shards(self.path)
         self.status = "finished"
 
+    def copy_history(self, folder: Path) -> None:
+        """Write the proposals made so far as ``history.parquet`` of another folder.
+
+        For a run that rests: it stays as it is, and may go on.
+
+        Raises
+        ------
+        CorruptRun
+            If a shard is damaged or missing.
+        StorageError
+            If there is no room for it.
+        """
+        found = {chain: shards for chain in self.chains if (shards := self._shards(chain))}
+        write_history(folder, self._description, found)
+
     def _history(self) -> History | None:
         return read_history(self.path, self.spec)
 

@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
+from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 
 from bellcrank import __version__
-from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName
+from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName, first_line
 from bellcrank.parts import materials
 from bellcrank.search import default_workers
 from bellcrank.web import design_routes, run_routes, task_routes
-from bellcrank.web.actuators import Actuators, Machines
+from bellcrank.web.actuators import Actuators, Machines, Struts
 from bellcrank.web.gallery import BuiltIn, Gallery, Kept, OwnRuns
 from bellcrank.web.jobs import Jobs
 from bellcrank.web.pools import Busy, TookTooLong, make_pools, plain_error
@@ -57,8 +58,9 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
     """
     jobs = Jobs(folder / "runs")
     kept = Kept(folder / "designs")
-    gallery = Gallery(OwnRuns(jobs), kept, Machines(), Actuators(), BuiltIn())
-    workshop = Workshop(jobs, Scheduler(jobs, searches), make_pools(), gallery, kept)
+    machines = Machines()
+    gallery = Gallery(OwnRuns(jobs), kept, machines, BuiltIn(), Actuators(), Struts())
+    workshop = Workshop(jobs, Scheduler(jobs, searches), make_pools(), gallery, kept, machines)
 
     @contextlib.asynccontextmanager
     async def alive(_app: FastAPI) -> AsyncIterator[None]:
@@ -92,6 +94,7 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
         return {
             "version": __version__,
             "ready": shop.ready,
+            "trouble": shop.trouble,
             "processors": default_workers(),
             "searches": shop.scheduler.slots,
             "running": len(shop.scheduler.running),
@@ -106,8 +109,13 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
 
 
 async def _warm(workshop: Workshop) -> None:
-    await workshop.pools.warm()
-    workshop.ready = True
+    """Make ready what takes seconds the first time: kernels, and machines of the gallery."""
+    try:
+        await asyncio.gather(workshop.pools.warm(), run_in_threadpool(workshop.gallery.listing))
+    except BellcrankError as error:
+        workshop.trouble = first_line(error)
+    else:
+        workshop.ready = True
 
 
 def _add_pages(app: FastAPI) -> None:

@@ -94,6 +94,12 @@ async def keep_design(body: KeepBody, shop: Shop) -> dict[str, str]:
     return {"source": shop.kept.name, "key": await run_in_threadpool(keep)}
 
 
+@router.get("/machines/{name}")
+async def get_plan(name: str, shop: Shop) -> dict[str, Any]:
+    """Return the plan of a machine that comes along, to go on from."""
+    return shop.machines.plan(name)
+
+
 @router.post("/machines")
 async def build_machine(body: PlanBody, shop: Shop) -> dict[str, Any]:
     """Make one design of several parts."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 import json
 import re
 import secrets
-from dataclasses import dataclass, replace
+import threading
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, get_args
 
 import numpy as np
@@ -27,7 +28,7 @@ from bellcrank.model.gallery import Kind
 from bellcrank.web.solving import finite
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
     from bellcrank.web.jobs import Jobs
@@ -49,12 +50,15 @@ class Entry:
         What to call it, and a few words more.
     design
         With efficiency and provenance, as far as they are known.
+    facets
+        By which it can be picked from among many, such as ``{"Size": "9 wide"}``.
     """
 
     key: str
     title: str
     note: str
     design: Design
+    facets: dict[str, str] = field(default_factory=dict)
 
 
 class Source(Protocol):
@@ -75,6 +79,28 @@ class Source(Protocol):
         """Return the entry of that name, if there is one."""
 
 
+class Once:
+    """Entries that are read when somebody first looks, once, whoever looks at the same time.
+
+    Parameters
+    ----------
+    read
+        That reads them.
+    """
+
+    def __init__(self, read: Callable[[], Iterable[Entry]]) -> None:
+        self._read = read
+        self._lock = threading.Lock()
+        self._entries: dict[str, Entry] | None = None
+
+    def __call__(self) -> dict[str, Entry]:
+        """Return all, by their keys."""
+        with self._lock:
+            if self._entries is None:
+                self._entries = {entry.key: entry for entry in self._read()}
+        return self._entries
+
+
 class BuiltIn:
     """Designs that come with the package."""
 
@@ -82,24 +108,24 @@ class BuiltIn:
     title = "Comes with bellcrank"
 
     def __init__(self) -> None:
-        self._entries: dict[str, Entry] = {}
+        self._known = Once(_built_in)
 
     def entries(self) -> Iterable[Entry]:
-        """Return those of all built-in problems; read once."""
-        if not self._entries:
-            for problem in builtin:
-                for kind in get_args(Kind):
-                    design = gallery_design(kind, problem)
-                    if design is not None:
-                        key = f"{kind}-{problem}"
-                        note = "drawn by hand" if kind == "human" else "found by a search"
-                        self._entries[key] = Entry(key, problem, note, design)
-        return self._entries.values()
+        """Return those of all built-in problems."""
+        return self._known().values()
 
     def find(self, key: str) -> Entry | None:
         """Return the one of that name."""
-        self.entries()
-        return self._entries.get(key)
+        return self._known().get(key)
+
+
+def _built_in() -> Iterator[Entry]:
+    for problem in builtin:
+        for kind in get_args(Kind):
+            design = gallery_design(kind, problem)
+            if design is not None:
+                note = "drawn by hand" if kind == "human" else "found by a search"
+                yield Entry(f"{kind}-{problem}", problem, note, design)
 
 
 class OwnRuns:
@@ -124,8 +150,9 @@ class OwnRuns:
         try:
             job = self._jobs[key]
             made = (job.path / "run" / "design.json").stat().st_mtime
-            if key in self._read and self._read[key][0] == made:
-                return self._read[key][1]
+            at_hand = self._read.get(key)
+            if at_hand is not None and at_hand[0] == made:
+                return at_hand[1]
             design = job.design()
         except (BellcrankError, OSError):
             return None
@@ -238,6 +265,7 @@ def small(source: str, entry: Entry) -> dict[str, Any]:
         "key": entry.key,
         "title": entry.title,
         "note": entry.note,
+        "facets": entry.facets,
         "problem": problem.name,
         "efficiency": None if design.efficiency is None else finite(design.efficiency),
         "beams": design.beam_count,

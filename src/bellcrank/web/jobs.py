@@ -133,7 +133,6 @@ class Job:
             "done": self.told.get("done", record.done),
             "total": settings["steps"] * settings["chains"],
             "has_design": (self.path / "run" / "design.json").exists(),
-            "has_history": (self.path / "run" / "history.parquet").exists(),
         }
 
     def problem(self) -> Problem:

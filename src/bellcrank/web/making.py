@@ -33,7 +33,7 @@ def design_file(
     Parameters
     ----------
     suffix
-        One of `bellcrank.web.tables.FILES`, with a dot.
+        One of `bellcrank.web.tables.FileSuffix`, with a dot.
     part
         Size and material, as `PartSpec.from_dict` reads them.
     about
@@ -47,7 +47,7 @@ def design_file(
         provenance=about.get("provenance") or {},
     )
     spec = PartSpec.from_dict(part)
-    makers = {".json": _json, ".mp4": _movie, ".gif": _movie, ".pdf": _card, ".png": _card}
+    makers = {".json": _json, ".mp4": _movie, ".gif": _movie, ".pdf": _card}
     with TemporaryDirectory(prefix="bellcrank-") as folder:
         path = Path(folder) / f"part{suffix}"
         try:

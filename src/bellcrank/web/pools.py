@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import multiprocessing
 import os
 import signal
+import threading
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -17,6 +19,7 @@ from bellcrank.web import solving
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from multiprocessing.connection import Connection
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -44,10 +47,22 @@ def limited(seconds: int, function: Callable[[], T]) -> T:
         signal.alarm(0)
 
 
-def _begin(niceness: int) -> None:
+def _begin(niceness: int, leash: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server stops its processes itself
     if hasattr(os, "nice"):
         os.nice(niceness)
+    threading.Thread(target=_end_with, args=(leash,), daemon=True).start()
+
+
+def _end_with(leash: Connection) -> None:
+    """End this process when the server lets go of its end of a pipe, or dies in whatever way.
+
+    An executor tells its processes to end from a thread, which a signal may cut short; the
+    system closes a pipe always.
+    """
+    with contextlib.suppress(EOFError, OSError):
+        leash.recv_bytes()
+    os._exit(0)
 
 
 class Pool:
@@ -58,7 +73,7 @@ class Pool:
     processes
         How many.
     seconds
-        That a call may take.
+        That a call may take; 0 for as long as it wants.
     waiting
         Calls that are taken at once, running ones included.
     niceness
@@ -79,6 +94,22 @@ class Pool:
         self._niceness, self._recycle = niceness, recycle
         self._taken = 0
         self._executor: ProcessPoolExecutor | None = None
+        self._leash: Connection | None = None
+
+    async def warm(self) -> None:
+        """Start the processes, and compile or load what they need.
+
+        Compiling may take minutes on a slow machine. A process that dies over it is replaced
+        once: what it had compiled is kept.
+        """
+        for _ in range(2):
+            executor = self._started()
+            tasks = [executor.submit(solving.warm) for _ in range(self.processes)]
+            with contextlib.suppress(BrokenProcessPool):
+                await asyncio.gather(*map(asyncio.wrap_future, tasks))
+                return
+            self._drop(executor)
+        raise RunFailed("the solver does not start: its processes end at once; is memory short?")
 
     async def call(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Call a function of a module in one of the processes.
@@ -98,8 +129,7 @@ class Pool:
             submitted = executor.submit(limited, self.seconds, partial(function, *args, **kwargs))
             return await asyncio.wrap_future(submitted)
         except BrokenProcessPool:
-            if self._executor is executor:
-                self._executor = None
+            self._drop(executor)
             raise TookTooLong(
                 f"this took more than {self.seconds} s or too much memory and was ended; "
                 "try something smaller"
@@ -109,17 +139,27 @@ class Pool:
 
     def _started(self) -> ProcessPoolExecutor:
         if self._executor is None:
+            context = multiprocessing.get_context("spawn")
+            theirs, self._leash = context.Pipe(duplex=False)
             self._executor = ProcessPoolExecutor(
                 self.processes,
-                mp_context=multiprocessing.get_context("spawn"),
+                mp_context=context,
                 initializer=_begin,
-                initargs=(self._niceness,),
+                initargs=(self._niceness, theirs),
                 max_tasks_per_child=self._recycle,
             )
         return self._executor
 
+    def _drop(self, executor: ProcessPoolExecutor) -> None:
+        """Forget processes of which one has died, so that the next call starts others."""
+        if self._executor is executor:
+            self.close()
+
     def close(self) -> None:
-        """End the processes; what waits is dropped."""
+        """End the processes, also those that are at work; what waits is dropped."""
+        if self._leash is not None:
+            self._leash.close()
+            self._leash = None
         if self._executor is not None:
             self._executor.shutdown(wait=False, cancel_futures=True)
             self._executor = None
@@ -145,8 +185,8 @@ class Pools:
 
     async def warm(self) -> None:
         """Start what must answer at once, and compile or load the kernels."""
-        await self.quick.call(solving.warm)
-        await self.thorough.call(solving.warm)
+        await self.quick.warm()
+        await self.thorough.warm()
 
     def close(self) -> None:
         """End all processes."""

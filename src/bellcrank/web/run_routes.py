@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import json
+import shutil
+from pathlib import Path
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse
 from pydantic import Field
+from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 
 from bellcrank.errors import BellcrankError, InvalidSettings, UnknownName
@@ -25,6 +29,7 @@ if TYPE_CHECKING:
     from bellcrank.web.jobs import Job
     from bellcrank.web.state import Workshop
 
+HISTORY = "history.parquet"
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
 RunName = Annotated[str, Field(pattern=r"^[a-z0-9]{12}$")]
@@ -153,12 +158,25 @@ async def delete_run(name: RunName, shop: Shop) -> dict[str, str]:
 
 
 @router.get("/{name}/history.parquet", response_class=FileResponse)
-def get_history(name: RunName, shop: Shop) -> FileResponse:
-    """Return every proposal of a finished search."""
-    path = shop.jobs[name].path / "run" / "history.parquet"
-    if not path.is_file():
-        raise UnknownName("the history is complete when the search has made all its steps")
-    return FileResponse(path, media_type="application/vnd.apache.parquet")
+async def get_history(name: RunName, shop: Shop) -> FileResponse:
+    """Return every proposal of a search that has ended, or rests."""
+    job = shop.jobs[name]
+    if name in shop.scheduler.running:
+        raise InvalidSettings("this search is running; stop it first, or let it rest")
+    run = job.path / "run"
+    media = "application/vnd.apache.parquet"
+    if (run / HISTORY).is_file():
+        return FileResponse(run / HISTORY, media_type=media)
+    if not (run / "run.json").is_file():
+        raise UnknownName("this search has not begun, and has no history")
+    folder = Path(await run_in_threadpool(mkdtemp, prefix="bellcrank-"))
+    clean = BackgroundTask(shutil.rmtree, folder, ignore_errors=True)
+    try:
+        await shop.pools.slow.call(tracing.copy_history, run, folder)
+    except BaseException:
+        await clean()
+        raise
+    return FileResponse(folder / HISTORY, media_type=media, background=clean)
 
 
 @router.websocket("/{name}/live")

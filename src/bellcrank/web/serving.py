@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
+import signal
 import socket
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,8 +19,7 @@ from bellcrank.web.security import is_loopback
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-
-MESSAGE_LIMIT = 2_000_000
+    from types import FrameType
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +69,7 @@ def default_folder() -> Path:
 
 
 def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
-    """Serve until interrupted.
+    """Serve until interrupted or told to end; all processes that were started end with it.
 
     Parameters
     ----------
@@ -85,21 +86,43 @@ def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
     import uvicorn
 
     from bellcrank.web.app import make_app
+    from bellcrank.web.limits import MESSAGE
 
     token = settings.needed_token
     make_folder(settings.folder)
     busy = f"{settings.folder}: another server uses it; close that first"
-    with locked(settings.folder / "server.lock", busy), _listening(settings) as listener:
+    lock = locked(settings.folder / "server.lock", busy)
+    with _ended_by_hand(), lock, _listening(settings) as listener:
         app = make_app(settings.folder, token=token, searches=settings.searches)
         config = uvicorn.Config(
-            app, log_level="warning", ws_max_size=MESSAGE_LIMIT, ws="websockets-sansio",
+            app, log_level="warning", ws_max_size=MESSAGE, ws="websockets-sansio",
             server_header=False, timeout_graceful_shutdown=3, limit_concurrency=400,
         )  # fmt: skip
         server = uvicorn.Server(config)
         port = listener.getsockname()[1]
         host = f"[{settings.host}]" if ":" in settings.host else settings.host
         tell(f"http://{host}:{port}/" + (f"?token={token}" if token else ""))
-        server.run(sockets=[listener])
+        try:
+            server.run(sockets=[listener])
+        finally:  # who presses Ctrl-C twice has the server skip its own end
+            app.state.workshop.pools.close()
+
+
+@contextlib.contextmanager
+def _ended_by_hand() -> Iterator[None]:
+    """Make SIGTERM an exit like others: uvicorn sends it again, and it would cut all short."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def leave(_number: int, _frame: FrameType | None) -> None:
+        raise SystemExit(0)
+
+    before = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextlib.contextmanager

@@ -9,6 +9,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 if TYPE_CHECKING:
+    from bellcrank.web.actuators import Machines
     from bellcrank.web.gallery import Gallery, Kept
     from bellcrank.web.jobs import Jobs
     from bellcrank.web.pools import Pools
@@ -23,6 +24,8 @@ class Workshop:
     ----------
     ready
         Whether the kernels are compiled and loaded.
+    trouble
+        Why they are not, and never will be.
     """
 
     jobs: Jobs
@@ -30,7 +33,9 @@ class Workshop:
     pools: Pools
     gallery: Gallery
     kept: Kept
+    machines: Machines
     ready: bool = False
+    trouble: str = ""
 
 
 def _workshop(connection: HTTPConnection) -> Workshop:

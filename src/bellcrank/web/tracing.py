@@ -86,3 +86,10 @@ def read_run_curves(path: Path) -> dict[str, Any]:
     from bellcrank.runs import RunFolder
 
     return {"curves": read_curves(RunFolder.open(path)) if (path / "run.json").exists() else {}}
+
+
+def copy_history(path: Path, target: Path) -> None:
+    """Write what the run in a folder has proposed so far into another folder."""
+    from bellcrank.runs import RunFolder
+
+    RunFolder.open(path).copy_history(target)

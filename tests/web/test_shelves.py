@@ -1,0 +1,100 @@
+"""Designs that come along: elementary actuators, struts, and machines made of them."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from bellcrank.machines.library import kinds, library
+from bellcrank.machines.showcases import showcase, showcases
+from bellcrank.model import unpack_mask
+from bellcrank.web.actuators import LOADS, Actuators, Machines, Struts
+from bellcrank.web.gallery import BuiltIn
+
+if TYPE_CHECKING:
+    from starlette.testclient import TestClient
+
+
+@pytest.fixture(scope="module")
+def shelves(client: TestClient) -> dict[str, list[dict[str, Any]]]:
+    """Return the entries of each shelf of the gallery."""
+    return {shelf["source"]: shelf["entries"] for shelf in client.get("/api/gallery").json()}
+
+
+def test_every_actuator_of_the_library_is_on_its_shelf(shelves: dict[str, Any]) -> None:
+    known = {summary.name: summary for summary in library().summaries}
+    assert {entry["key"] for entry in shelves["library"]} == set(known)
+    for entry in shelves["library"]:
+        summary = known[entry["key"]]
+        assert entry["facets"]["Moves"] == summary.direction
+        assert entry["facets"]["Size"] == (f"{summary.columns} wide" if summary.columns else "")
+        assert entry["title"].lower().startswith(summary.direction)
+        assert entry["picture"]["lines"]
+        assert entry["efficiency"] is not None
+
+
+def test_every_kind_of_actuator_is_called_something_a_person_understands() -> None:
+    assert set(LOADS) == set(kinds)
+
+
+def test_machines_say_what_they_do(shelves: dict[str, Any]) -> None:
+    assert [entry["key"] for entry in shelves["machines"]] == showcases()
+    assert all(len(entry["note"]) > 20 for entry in shelves["machines"])
+
+
+@pytest.mark.parametrize("name", showcases())
+def test_the_plan_of_a_machine_builds_that_machine(client: TestClient, name: str) -> None:
+    plan = client.get(f"/api/machines/{name}").json()
+    built = client.post("/api/machines", json={"plan": plan}).json()
+    exact = showcase(name).design
+    problem = built["problem"]
+    assert np.array_equal(problem["beams"], exact.problem.lattice.beams)
+    assert np.allclose(problem["positions"], exact.problem.lattice.positions)
+    assert np.array_equal(unpack_mask(built["mask"], len(problem["beams"])), exact.mask)
+    found = client.get(f"/api/gallery/machines/{name}").json()
+    assert found["mask"] == built["mask"]
+
+
+def test_an_actuator_is_opened_as_the_library_keeps_it(
+    client: TestClient, shelves: dict[str, Any]
+) -> None:
+    key = shelves["library"][0]["key"]
+    found = client.get(f"/api/gallery/library/{key}").json()
+    assert found["mask"] == library().find(key).design.mask_hex
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "gallery/library/none", "gallery/machines/none", "gallery/struts/strut-99999999",
+        "gallery/struts/strut-2", "gallery/struts/..%2Fstrut-4", "machines/none",
+        "machines/..%2Fgripper", "machines/gripper.toml",
+    ],
+)  # fmt: skip
+def test_names_that_nothing_has_are_not_found(client: TestClient, address: str) -> None:
+    assert client.get(f"/api/{address}").status_code == 404
+
+
+def test_struts_have_the_length_that_their_name_says() -> None:
+    for entry in Struts().entries():
+        problem = entry.design.problem
+        ends = [
+            problem.lattice.positions[nodes].mean(axis=0)
+            for nodes in (problem.input.nodes, problem.output.nodes)
+        ]
+        length = np.linalg.norm(ends[0] - ends[1])
+        assert length == pytest.approx(int(entry.key.removeprefix("strut-")))
+
+
+def _count(source: Any) -> int:
+    return len(list(source.entries()))
+
+
+def test_who_looks_at_the_same_time_sees_all_of_a_shelf() -> None:
+    for source in (BuiltIn(), Actuators(), Machines()):
+        with ThreadPoolExecutor(8) as visitors:
+            looks = [visitors.submit(_count, source) for _ in range(16)]
+        assert {look.result() for look in looks} == {_count(source)}
