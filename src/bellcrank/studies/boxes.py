@@ -54,7 +54,9 @@ class Box:
         return self.problem.lattice.positions * self.spec.scale
 
 
-def box_of(name: str, columns: int, rows: int, stroke: float, spring: float) -> Box:
+def box_of(
+    name: str, columns: int, rows: int, stroke: float, spring: float, width: float = 2.0
+) -> Box:
     """Return a task.
 
     Parameters
@@ -67,9 +69,11 @@ def box_of(name: str, columns: int, rows: int, stroke: float, spring: float) -> 
         Of the input, lattice units.
     spring
         Against the output, in units of the discrete model.
+    width
+        Of the struts, mm.
     """
     lattice = lattices["triangular-rectangle"](columns=columns, rows=rows)
-    spec = PartSpec()
+    spec = PartSpec(width=width)
     places = lattice.positions
     middle = 0.5 * float(places[:, 1].max())
     top, right = float(places[:, 1].max()), float(places[:, 0].max())

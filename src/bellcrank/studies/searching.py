@@ -18,6 +18,7 @@ from bellcrank.search import (
     candidates_of,
     is_done,
     make_responder,
+    most_efficient,
     read_settings,
     searches,
     select,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
-    from bellcrank.search import SearchSettings, Selection
+    from bellcrank.search import Choice, Responder, SearchSettings, Selection
     from bellcrank.studies.bench import Bench
 
 POINTS = 160
@@ -117,8 +118,20 @@ def run_chains(
     return list(bench.all(what, work).values())
 
 
-def best_design(problem: Problem, chains: Sequence[Mapping[str, Any]]) -> Selection:
+def best_design(
+    problem: Problem,
+    chains: Sequence[Mapping[str, Any]],
+    judge: Responder | None = None,
+    choose: Choice = most_efficient,
+) -> Selection:
     """Clean and compare what chains offer, and return the most efficient design.
+
+    Parameters
+    ----------
+    judge
+        Who knows the goals of the search; none by default.
+    choose
+        Who has the last word among those that qualify.
 
     Raises
     ------
@@ -130,7 +143,7 @@ def best_design(problem: Problem, chains: Sequence[Mapping[str, Any]]) -> Select
         for number, chain in enumerate(chains)
         for each in chain["offered"]
     ]
-    return select(problem, offers)
+    return select(problem, offers, None, judge, choose)
 
 
 def design_of(problem: Problem, mask: str) -> Design:

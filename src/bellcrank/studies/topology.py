@@ -27,7 +27,7 @@ LEAST = 1e-6
 """Stiffness of emptiness."""
 POISSON = 0.3
 PAD = 1.7
-"""Radius round ports and supports that is solid, mm: as wide as what bellcrank keeps there."""
+"""Radius round ports and supports that is solid, mm: a little more than bellcrank keeps there."""
 
 
 def pymoto() -> Any:
