@@ -68,6 +68,7 @@ export interface News {
   chains: Record<string, { step: number; efficiency: number | null; best: number | null; temperature: number; accepted: number; mask: string }>;
   speed: number | null;
   left: number | null;
+  tried: [number, number] | null;
   moved: { mask: string; efficiency: number | null; displacement: number[] | null } | null;
   error?: { message: string };
 }

@@ -57,7 +57,11 @@ export class Result {
     this.showPart();
     this.showFiles();
     void this.describe();
+    if (this.meant) void this.validate("frame", false);
   }
+
+  /** Whether the design was searched for a part, so that frames have chosen it already. */
+  private get meant(): boolean { return Boolean(this.subject.part ?? this.subject.provenance["part"]); }
 
   close(): void { this.player.close(); }
 
@@ -100,19 +104,20 @@ export class Result {
     if (known === "asked") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), "computing …"));
     if (typeof known === "string") return h("tr", {}, heading, h("td", { colspan: 2, class: "fault" }, known));
     const stress = known.von_mises_MPa === null ? "" : `${figure(known.von_mises_MPa, 2)} MPa, ${figure(100 * (known.principal_strain ?? 0), 0)} % strain`;
-    const said = known.efficiency === null ? sentence(known.warnings[0] ?? known.status) : stress;
+    const warning = known.warnings[0];
+    const said = known.efficiency === null ? sentence(warning ?? known.status) : warning ? `${stress}. ${sentence(warning)}` : stress;
     return h("tr", {}, heading, h("td", {}, figure(known.efficiency, 3)), h("td", { class: "more" }, said,
       known.picture && h("span", {}, " ", button("Show stress", () => this.player.showStress(known.picture), "quiet small"))));
   }
 
-  private async validate(level: string): Promise<void> {
+  private async validate(level: string, show = true): Promise<void> {
     this.fems[level] = "asked";
     this.showTable();
     try {
       const { problem, mask } = this.subject;
       const found = await post<Fem>("/validation", { problem, mask, part: this.part, level });
       this.fems[level] = found;
-      if (found.picture) this.player.showStress(found.picture);
+      if (show && found.picture) this.player.showStress(found.picture);
     } catch (error) {
       this.fems[level] = sentence((error as Refusal).message);
     }

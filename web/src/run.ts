@@ -143,10 +143,12 @@ export class RunPage {
     const done = run.status === "finished" ? run.total : Math.max(run.done, made);
     const share = Math.min(1, done / run.total);
     const running = run.status === "running";
+    const tried = this.news?.tried;
+    const last: [string, string] = tried ? ["trying as parts", `${tried[0]} of ${tried[1]}`] : ["time left", duration(this.news?.left)];
     const rows: [string, string][] = [
       ["best so far", figure(run.efficiency ?? this.chart.best, 3)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
-      ...(running ? [["speed", this.news?.speed ? `${Math.round(this.news.speed).toLocaleString("en")} steps/s` : "starting …"], ["time left", duration(this.news?.left)]] as [string, string][] : []),
+      ...(running ? [["speed", this.news?.speed ? `${Math.round(this.news.speed).toLocaleString("en")} steps/s` : "starting …"], last] as [string, string][] : []),
       ["method", `${run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
       ...(settings.goals.length ? [["keeps", settings.goals.join(", ")]] as [string, string][] : []),
     ];

@@ -250,5 +250,6 @@ def _news(
         "chains": job.told.get("chains", {}),
         "speed": told.get("speed"),
         "left": told.get("left"),
+        "tried": told.get("tried"),
         "moved": job.moved,
     }

@@ -78,6 +78,7 @@ class Reporter:
         self._made = 0
         self._start = time.monotonic()
         self._moved_at, self._moved_mask = 0.0, ""
+        self._tried: tuple[int, int] | None = None
         self._done = {chain: folder.progress(chain)[0] for chain in range(settings.chains)}
         self._points.update(self._beginnings(settings))
         self._end = threading.Event()
@@ -121,6 +122,11 @@ class Reporter:
             point = (state.step, now, best, round(progress.temperature, 6))
             self._points.setdefault(progress.chain, []).append(point)
 
+    def trying(self, done: int, total: int) -> None:
+        """Take in how many of the best designs have been tried as parts, and of how many."""
+        with self._lock:
+            self._tried = done, total
+
     def _pass_on(self) -> None:
         while not self._end.wait(INTERVAL):
             with contextlib.suppress(OSError, BrokenPipeError):
@@ -134,7 +140,7 @@ class Reporter:
                 return
             points, self._points = self._points, {}
             chains = {chain: dict(state) for chain, state in self._chains.items()}
-            done, made = sum(self._done.values()), self._made
+            done, made, tried = sum(self._done.values()), self._made, self._tried
         speed = made / max(time.monotonic() - self._start, 1e-9)
         message: dict[str, Any] = {
             "kind": "progress",
@@ -144,6 +150,7 @@ class Reporter:
             "done": done,
             "total": self._total,
             "left": round((self._total - done) / max(speed, 1e-9), 1),
+            "tried": tried,
         }
         best = max(chains.values(), key=lambda each: _number(each["best"]))
         if time.monotonic() - self._moved_at > MOVED_INTERVAL and best["kept"] != self._moved_mask:
@@ -217,13 +224,15 @@ def _search(where: Path, workers: int, pipe: Connection, ears: Ears) -> dict[str
     folder = _begin_or_reopen(where)
     settings = read_settings(folder.settings)
     with Reporter(pipe, folder, settings) as reporter:
-        report = complete_design(folder, workers=workers, tell=reporter, stop=ears.stop)
-    if report is None and ears.told == "stop":
-        try:
-            report = conclude(folder, settings)
-        except InvalidSettings:
-            return {"kind": "paused", "message": TOO_EARLY}
-        return {"kind": "stopped", "efficiency": report.selection.efficiency_after}
+        report = complete_design(
+            folder, workers=workers, tell=reporter, trying=reporter.trying, stop=ears.stop
+        )
+        if report is None and ears.told == "stop":
+            try:
+                report = conclude(folder, settings, reporter.trying)
+            except InvalidSettings:
+                return {"kind": "paused", "message": TOO_EARLY}
+            return {"kind": "stopped", "efficiency": report.selection.efficiency_after}
     if report is None:
         return {"kind": "paused"}
     return {"kind": "finished", "efficiency": report.selection.efficiency_after}
