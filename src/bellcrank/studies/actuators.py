@@ -138,7 +138,7 @@ ANTI_PARALLEL = _study(
 PLIERS = _study(
     "pliers",
     "its pliers",
-    Duel(problem="pliers"),
+    Duel(problem="pliers", paper_chains=4, steps=8000),
     Duel(problem="pliers", paper_steps=600, paper_chains=2, steps=800, chains=2, levels=("frame",)),
     FORCED,
 )
