@@ -11,6 +11,7 @@ import trimesh
 
 from bellcrank.mechanics import CAREFUL, Evaluator
 from bellcrank.model import find_problem, human_design, problem_to_dict
+from bellcrank.parts import calibrated
 from bellcrank.web.texts import read_task, write_task
 
 if TYPE_CHECKING:
@@ -282,3 +283,18 @@ def test_two_parts_make_a_machine_and_parts_that_do_not_fit_are_named(client: Te
     assert "second" in message
     parts["second"]["entry"] = "/etc/passwd"
     refusal(client.post("/api/machines", json={"plan": plan}), 404)
+
+
+def test_a_task_for_a_part_is_answered_with_the_stiffness_of_its_struts(client: TestClient) -> None:
+    problem = client.get("/api/problems/crane").json()
+    part = {"width": 1.6, "thickness": 5.0, "scale": 10.0, "material": "ninjaflex"}
+    plain = client.post("/api/tasks/check", json={"problem": problem}).json()
+    meant = client.post("/api/tasks/check", json={"problem": problem, "part": part}).json()
+    assert plain["stiffness"] == problem["stiffness"]
+    expected = calibrated(find_problem("crane"), 1.6).stiffness
+    assert meant["stiffness"] == {"bond": expected.bond, "angle": expected.angle}
+    assert meant["response"]["efficiency"] != plain["response"]["efficiency"]
+    wide = client.post("/api/tasks/check", json={"problem": problem, "part": {**part, "width": 12}})
+    message, about = refusal(wide)
+    assert message.startswith("width: expected more than 0 and less than")
+    assert about == "width"

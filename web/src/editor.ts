@@ -1,6 +1,6 @@
 // The page on which a task is drawn, and a design by hand.
 
-import { post, Refusal, session, Solver, bitsOf, hexOf, type Point, type Problem, type Response } from "./api";
+import { post, Refusal, session, Solver, bitsOf, hexOf, type Part, type Point, type Problem, type Response } from "./api";
 import { bare, KEY } from "./begin";
 import { Canvas, type Tool } from "./canvas";
 import { where } from "./drawing";
@@ -33,13 +33,14 @@ export class Editor {
   tool: Tool = "supports";
   hold: Hold = "fixed";
   brush: "keep" | "never" | "auto" = "keep";
-  settings: Settings = { method: "basin-hopping", steps: 20000, chains: 4, seed: 0, real: false, width: 2, material: "ninjaflex" };
+  settings: Settings = { method: "basin-hopping", steps: 20000, chains: 4, seed: 0, real: true, width: 2, material: "ninjaflex" };
   fault: { key: string; message: string } | null = null;
   response: Response | null = null;
   private history: History<Task>;
   private readonly canvas: Canvas;
   private readonly panels: Panels;
   private readonly solver: Solver;
+  private stiffness: Problem["stiffness"] | null = null;
   private readonly hint = h("p", { class: "hint" });
   private readonly complaint = h("p", { class: "complaint", role: "alert" });
   private readonly readout = h("div", { class: "readout", "aria-live": "polite" });
@@ -70,6 +71,18 @@ export class Editor {
 
   get task(): Task { return this.history.value; }
   get problem(): Problem { return problemOf(this.task); }
+
+  /** The problem with the stiffness of the part that it is for, as the server says it is. */
+  private get meant(): Problem { return this.settings.real && this.stiffness ? { ...this.problem, stiffness: this.stiffness } : this.problem; }
+
+  private get part(): Part {
+    return { width: this.settings.width, thickness: 5, scale: this.task.scale, material: this.settings.material };
+  }
+
+  /** Take up another stiffness. */
+  restiffen(): void {
+    void this.check().then(() => this.ask());
+  }
   /** What has to be drawn before anything can be searched. */
   get missing(): { region: Region; message: string } | null {
     const { problem } = this.task;
@@ -186,7 +199,7 @@ export class Editor {
   }
 
   private ask(): void {
-    if (this.task.hand && !this.missing) this.solver.ask(this.problem, this.task.hand);
+    if (this.task.hand && !this.missing) this.solver.ask(this.meant, this.task.hand);
   }
 
   private show(): void {
@@ -216,16 +229,20 @@ export class Editor {
       this.show();
       return;
     }
-    const body = { problem: this.problem, goals: goalsOf(this.task) };
+    const body = { problem: this.problem, goals: goalsOf(this.task), part: this.settings.real ? this.part : null };
     const text = JSON.stringify(body);
     if (text === this.checked) return;
     const asked = new AbortController();
     this.checking = asked;
     try {
-      const found = await post<{ response: Response | null }>("/tasks/check", body, asked.signal);
+      const found = await post<{ response: Response | null; stiffness: Problem["stiffness"] | null }>("/tasks/check", body, asked.signal);
       this.checked = found.response ? text : "";
       this.fault = null;
       this.response = found.response;
+      if (found.stiffness && JSON.stringify(found.stiffness) !== JSON.stringify(this.stiffness)) {
+        this.stiffness = found.stiffness;
+        this.ask();
+      }
     } catch (error) {
       if (error instanceof DOMException) return;
       const refused = error as Refusal;
@@ -256,16 +273,16 @@ export class Editor {
     const body = {
       title: task.problem.name, session: session(), problem: this.problem, goals: goalsOf(task),
       method: settings.method, steps: settings.steps, chains: settings.chains, seed: settings.seed,
-      part: { width: settings.width, thickness: 5, scale: task.scale, material: settings.material },
+      part: settings.real ? this.part : null,
       reference: task.hand && task.hand !== this.problem.initial ? task.hand : null,
     };
-    const { id } = await post<{ id: string }>("/runs", settings.real ? body : { ...body, part: null });
+    const { id } = await post<{ id: string }>("/runs", body);
     location.hash = `#/run/${id}`;
   }
 
   async keepHand(title: string): Promise<void> {
     const kept = await post<{ source: string; key: string }>("/gallery", {
-      problem: this.problem, mask: this.task.hand, title, provenance: { kind: "drawn" },
+      problem: this.meant, mask: this.task.hand, title, provenance: { kind: "drawn", ...(this.settings.real ? { part: this.part } : {}) },
     });
     location.hash = `#/design/${kept.source}/${kept.key}`;
   }

@@ -36,10 +36,10 @@ export class SearchBox {
     };
     const effort = EFFORTS.find(([, , steps, chains]) => steps === settings.steps && chains === settings.chains)?.[0] ?? "";
     const real = h("input", { type: "checkbox", checked: settings.real, "data-key": "real" });
-    real.addEventListener("change", () => update({ real: real.checked }));
+    real.addEventListener("change", () => { update({ real: real.checked }); editor.restiffen(); });
     const method = select(METHODS.map(([key, name]) => [key, name]), settings.method, (picked) => update({ method: picked }));
     method.dataset.key = "method";
-    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => update({ width: value }));
+    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => { update({ width: value }); editor.restiffen(); });
     width.dataset.key = "width";
     const { missing } = editor;
     return h("section", { class: "step search open" },
@@ -54,8 +54,9 @@ export class SearchBox {
           h("summary", { "data-key": "more" }, "Method, seed, strut width"),
           field("Method", method, "", METHODS.find(([key]) => key === settings.method)![2]),
           h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000), whole("chains", "Chains", 1, 64), whole("seed", "Seed", 0, 2 ** 31)),
-          h("label", { class: "tick" }, real, "With the stiffness of real struts"),
-          settings.real && field("Strut width", width, "mm")),
+          h("label", { class: "tick" }, real, "For a part with struts this wide"),
+          settings.real ? field("Strut width", width, "mm", "The best designs are tried as such a part, and the best part is taken.")
+            : h("p", { class: "note" }, "The springs have the stiffness of the task, the paper's by default.")),
         h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !!missing || !!editor.fault || this.busy,
           onclick: () => void this.begin() }, "Design it"),
         missing && h("p", { class: "note" }, missing.message),

@@ -58,10 +58,11 @@ class TextBody(Body):
 
 
 class TaskBody(Body):
-    """A task, with what its design must keep."""
+    """A task, with what its design must keep and the part that it is for."""
 
     problem: dict[str, Any]
     goals: Goals = ()
+    part: dict[str, Any] | None = None
 
 
 class SaveBody(Body):

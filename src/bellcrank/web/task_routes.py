@@ -12,6 +12,7 @@ from bellcrank.errors import UnknownName
 from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.model import builtin, lattices, problem_to_dict
 from bellcrank.model.calls import call_with_keys
+from bellcrank.parts import PartSpec, calibrated
 from bellcrank.web import solving
 from bellcrank.web.limits import check_lattice, check_size
 from bellcrank.web.state import Shop
@@ -95,9 +96,21 @@ async def save_task(body: SaveBody) -> dict[str, str]:
 
 @router.post("/tasks/check")
 async def check_task(body: TaskBody, shop: Shop) -> dict[str, Any]:
-    """Say what is wrong with a task, or else how its initial design moves."""
-    text = json.dumps(body.problem)
-    await run_in_threadpool(problem_of, body.problem)
+    """Say what is wrong with a task, or else how its initial design moves.
+
+    For a part, also with which stiffness its designs will move.
+    """
+
+    def meant() -> dict[str, Any]:
+        problem = problem_of(body.problem)
+        if body.part is None:
+            return body.problem
+        spec = PartSpec.from_dict(body.part, "part")
+        stiffness = calibrated(problem, spec.width, spec.scale).stiffness
+        return {**body.problem, "stiffness": {"bond": stiffness.bond, "angle": stiffness.angle}}
+
+    problem = await run_in_threadpool(meant)
+    known = {"stiffness": problem.get("stiffness"), "response": None}
     if not shop.ready:
-        return {"response": None}
-    return await shop.pools.quick.call(solving.check, text, body.goals)
+        return known
+    return {**known, **await shop.pools.quick.call(solving.check, json.dumps(problem), body.goals)}
