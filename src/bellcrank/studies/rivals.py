@@ -283,8 +283,8 @@ STUDY = register(
                 "about as wide as the narrowest places of the rival's designs."
             ),
             (
-                "Width decides: with struts 2 mm wide, chosen by the model alone, bellcrank had 3.81, "
-                "2.21 and 2.26, and the rival at that mass 4.04, 2.59 and 3.26 "
+                "Width decides: with struts 2 mm wide, chosen by the model alone, bellcrank had "
+                "3.81, 2.21 and 2.26, and the rival at that mass 4.04, 2.59 and 3.26 "
                 "(`docs/studies/wide/rivals.json`)."
             ),
             "Struts that touch pass through each other, on both sides.",
