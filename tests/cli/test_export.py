@@ -10,7 +10,7 @@ import pytest
 from bellcrank.fabricate import Export, exporters, slicer
 from bellcrank.fabricate.gcode import read_gcode
 from bellcrank.fabricate.profiles import profiles
-from bellcrank.model import Design, find_problem, write_design
+from bellcrank.model import Design, find_problem, human_design, write_design
 from bellcrank.parts import PartSpec, materials
 
 from .helpers import call, files, refusal, write
@@ -35,6 +35,21 @@ def test_every_format_is_written_by_its_suffix(here: Path, name: str) -> None:
     assert ("no whole number of layers" in outcome.err) == printed
     assert list(files(here)) == [file]
     assert (here / file).stat().st_size > 3000
+
+
+def test_a_folder_with_the_name_of_a_problem_is_told_from_the_problem(here: Path) -> None:
+    human = human_design("crane")
+    assert human is not None
+    (here / "crane").mkdir()
+    write_design(human, here / "crane" / "design.json")
+    whole = call("export", "crane", "whole.svg")
+    assert (
+        "crane is the built-in problem with all its beams; for the design in the folder, write"
+        in (" ".join(whole.err.split()))
+    )
+    part = call("export", "crane/", "part.svg")
+    assert "note:" not in part.err
+    assert (here / "part.svg").read_bytes() != (here / "whole.svg").read_bytes()
 
 
 def test_the_part_is_as_wide_and_thick_as_said(here: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from bellcrank.cli.app import app
+from bellcrank.cli.arguments import design_named
 from bellcrank.cli.console import announce_compilation, notes, plain
 from bellcrank.cli.live import Live
 from bellcrank.errors import InvalidSettings
@@ -66,7 +67,6 @@ def animate(
 ) -> None:
     """Film a design from rest to its full stroke and back, or the search that found one."""
     from bellcrank.plots.movies import check_movie, movie_settings
-    from bellcrank.workflows import find_design
     from bellcrank.workflows.animate import Looks, animate_motion
     from bellcrank.workflows.animate_search import animate_search
 
@@ -81,7 +81,7 @@ def animate(
     looks = Looks(objective, magnify)
     check_movie(out, overwrite=overwrite)
     names = [what] if beside is None else [what, beside]
-    designs = [] if search else [(name, find_design(name)) for name in names]
+    designs = [] if search else [(name, design_named(name)) for name in names]
     announce_compilation()
     with MovieProgress() as tell:
         if search:

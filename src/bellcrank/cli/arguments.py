@@ -14,6 +14,7 @@ from bellcrank.errors import InvalidSettings
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from bellcrank.model import Design
     from bellcrank.parts import PartSpec
 
 DesignName = Annotated[
@@ -34,6 +35,27 @@ Fillet = Annotated[str | None, typer.Option(help="Radius in corners between stru
 MaterialName = Annotated[
     str | None, typer.Option(help="ninjaflex, tpu-95a, pla or petg. \\[ninjaflex]")
 ]
+
+
+def design_named(text: str) -> Design:
+    """Return the design that a word on the command line means.
+
+    Says what is meant where a result folder has the name of a built-in problem.
+
+    Raises
+    ------
+    UnknownName, InvalidFile, InvalidProblem
+    """
+    from bellcrank.cli.console import notes, plain
+    from bellcrank.model import builtin
+    from bellcrank.workflows import find_design
+
+    if text in builtin and (Path(text) / "design.json").exists():
+        notes.print(
+            f"[yellow]note:[/] {plain(text)} is the built-in problem with all its beams; for the "
+            f"design in the folder, write {plain(text)}/"
+        )
+    return find_design(text)
 
 
 def part_of(

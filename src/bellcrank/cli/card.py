@@ -16,6 +16,7 @@ from bellcrank.cli.arguments import (
     Scale,
     Thickness,
     Width,
+    design_named,
     part_of,
 )
 from bellcrank.cli.console import announce_compilation, notes, plain
@@ -37,10 +38,10 @@ def card(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the card.")] = False,
 ) -> None:
     """Put on one page what there is to say about a design as a part."""
-    from bellcrank.workflows import find_design, spec_for
+    from bellcrank.workflows import spec_for
     from bellcrank.workflows.card import make_card
 
-    chosen = find_design(design)
+    chosen = design_named(design)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material)
     target = out or Path(f"{chosen.problem.name}.pdf")

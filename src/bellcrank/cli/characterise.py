@@ -12,7 +12,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
-from bellcrank.cli.arguments import DesignName
+from bellcrank.cli.arguments import DesignName, design_named
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.errors import InvalidSettings
 
@@ -58,9 +58,8 @@ def characterise(
         write_characterisation,
     )
     from bellcrank.machines.pictures import draw_characterisation
-    from bellcrank.workflows import find_design
 
-    chosen = find_design(design)
+    chosen = design_named(design)
     loads = None if load is None else [Load.read(text) for text in load]
     if points < 1:
         raise InvalidSettings(f"--points: expected at least one, got {points}")

@@ -17,7 +17,7 @@ import typer
 from rich.table import Table
 
 from bellcrank.cli.app import INTERRUPTED, app
-from bellcrank.cli.arguments import settings_of
+from bellcrank.cli.arguments import design_named, settings_of
 from bellcrank.cli.console import (
     announce_compilation,
     notes,
@@ -110,7 +110,7 @@ def design(
     from bellcrank.cli.progress import SearchProgress
     from bellcrank.model import find_problem
     from bellcrank.search import read_settings
-    from bellcrank.workflows import complete_design, find_design, reopen_design, start_design
+    from bellcrank.workflows import complete_design, reopen_design, start_design
 
     if sum(given is not None for given in (problem, begin, resume)) != 1:
         raise InvalidSettings(
@@ -142,7 +142,9 @@ def design(
         warn_of_another_version(folder.provenance, "run")
     else:
         settings = read_settings({"search": search, **chosen})
-        task = find_problem(problem) if problem is not None else _task_from(find_design(str(begin)))
+        task = (
+            find_problem(problem) if problem is not None else _task_from(design_named(str(begin)))
+        )
         announce_compilation()
         folder = start_design(task, settings, out or Path(Path(task.name).name), part)
     progress = SearchProgress(read_settings(folder.settings))

@@ -11,7 +11,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
-from bellcrank.cli.arguments import DesignName
+from bellcrank.cli.arguments import DesignName, design_named
 from bellcrank.cli.console import (
     announce_compilation,
     notes,
@@ -62,9 +62,8 @@ def explain(
 ) -> None:
     """Say which beams matter, to a trained network and by mechanics, and how far they agree."""
     from bellcrank.surrogate.backend import import_torch
-    from bellcrank.workflows import find_design
 
-    design = find_design(what)
+    design = design_named(what)
     import_torch()
     from bellcrank.learning.explanation import explain_design
     from bellcrank.surrogate.occlusion import Block

@@ -16,6 +16,7 @@ from bellcrank.cli.arguments import (
     Scale,
     Thickness,
     Width,
+    design_named,
     part_of,
 )
 from bellcrank.cli.console import announce_compilation, notes, plain
@@ -80,11 +81,11 @@ def export(
     from bellcrank.fabricate import export as write
     from bellcrank.model.storage import check_folder
     from bellcrank.parts import read_length
-    from bellcrank.workflows import find_design, spec_for
+    from bellcrank.workflows import spec_for
     from bellcrank.workflows.fabricate import bundle_of
 
     exporter_for(out)
-    chosen = find_design(design)
+    chosen = design_named(design)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material)
     grips = grips_of(plate, screws, screw_diameter, pad, pointer)

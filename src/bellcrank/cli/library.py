@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from bellcrank.cli.app import INTERRUPTED, app
-from bellcrank.cli.arguments import DesignName
+from bellcrank.cli.arguments import DesignName, design_named
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json
 from bellcrank.cli.library_view import MakingProgress, print_entries, print_entry, warn
 from bellcrank.errors import InvalidSettings
@@ -141,9 +141,8 @@ def add(
     from bellcrank.machines.library.files import entry_to_dict
     from bellcrank.model.storage import already_exists
     from bellcrank.runs.files import make_folder
-    from bellcrank.workflows import find_design
 
-    chosen = find_design(design)
+    chosen = design_named(design)
     if points < 1:
         raise InvalidSettings(f"--points: expected at least one, got {points}")
     make_folder(user_folder())

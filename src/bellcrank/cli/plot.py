@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bellcrank.cli.app import app
+from bellcrank.cli.arguments import design_named
 from bellcrank.cli.console import announce_compilation, notes, plain
 from bellcrank.errors import InvalidSettings
 
@@ -36,7 +37,7 @@ def plot(
 ) -> None:
     """Draw a design at rest and moved, a problem, or the paths of a search."""
     from bellcrank.plots import draw_comparison, draw_design, draw_motion
-    from bellcrank.workflows import draw_run, find_design, move
+    from bellcrank.workflows import draw_run, move
 
     if beside is not None and (paths or rest):
         raise InvalidSettings("--beside compares motions; leave out --rest and --paths")
@@ -47,7 +48,7 @@ def plot(
         target = out or folder / "paths.png"
         draw_run(folder, target, overwrite=overwrite)
     else:
-        design = find_design(what)
+        design = design_named(what)
         target = out or Path(f"{design.problem.name}.png")
         if rest:
             draw_design(design, target, overwrite=overwrite)
@@ -57,7 +58,7 @@ def plot(
             if beside is None:
                 draw_motion(first, target, overwrite=overwrite)
             else:
-                second = move(find_design(beside), objective, name=beside, magnify=magnify)
+                second = move(design_named(beside), objective, name=beside, magnify=magnify)
                 draw_comparison(
                     move(design, objective, name=what, magnify=magnify),
                     second,

@@ -11,6 +11,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
+from bellcrank.cli.arguments import design_named
 from bellcrank.cli.console import print_json, results, warn_of_other_stiffness
 
 if TYPE_CHECKING:
@@ -49,9 +50,8 @@ def predict(
     from bellcrank.learning.fitting import model_files
     from bellcrank.model import read_masks
     from bellcrank.surrogate.predictor import load_predictor
-    from bellcrank.workflows import find_design
 
-    design = find_design(problem)
+    design = design_named(problem)
     masks = read_masks(designs, design.problem) if designs else [design.mask]
     paths = [file for path in model or () for file in model_files(path)]
     predictor = load_predictor(design.problem, paths, device=device, any_stiffness=True)

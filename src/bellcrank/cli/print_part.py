@@ -18,6 +18,7 @@ from bellcrank.cli.arguments import (
     Scale,
     Thickness,
     Width,
+    design_named,
     part_of,
 )
 from bellcrank.cli.console import announce_compilation, notes, plain, results
@@ -55,7 +56,7 @@ def print_(
 ) -> None:
     """Slice a design for a printer, and say what it takes."""
     from bellcrank.parts import read_length
-    from bellcrank.workflows import find_design, spec_for
+    from bellcrank.workflows import spec_for
     from bellcrank.workflows.fabricate import (
         bundle_of,
         findings_about,
@@ -63,7 +64,7 @@ def print_(
         profile_for,
     )
 
-    chosen = find_design(design)
+    chosen = design_named(design)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material)
     given = {"nozzle": nozzle, "layer": layer, "bead_width": bead_width}

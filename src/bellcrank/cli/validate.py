@@ -22,6 +22,7 @@ from bellcrank.cli.arguments import (
     Scale,
     Thickness,
     Width,
+    design_named,
     part_of,
 )
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
@@ -92,17 +93,17 @@ def validate(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Check a design by finite elements: does the part move as it should."""
-    from bellcrank.workflows import check_plan, find_design, spec_for, validate, with_stroke
+    from bellcrank.workflows import check_plan, spec_for, validate, with_stroke
     from bellcrank.workflows.figures import draw_validations, prepare_targets, write_vtu
 
-    chosen = find_design(design)
+    chosen = design_named(design)
     prepare_targets(picture, vtu, overwrite=overwrite)
     target = record or record_beside(design)
     _check_record(target, chosen, asked=record is not None)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material, young, poisson)
     plan = _plan(level, theory, law, linear=linear, elements=elements, size=size)
-    others = [find_design(beside)] if beside is not None else []
+    others = [design_named(beside)] if beside is not None else []
     if others and picture is None:
         raise InvalidSettings("--beside is for the picture; give --picture FILE too")
     drives = {one.problem.input.drive for one in (chosen, *others)}
