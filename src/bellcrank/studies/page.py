@@ -56,9 +56,12 @@ def page_of(records: Mapping[str, Mapping[str, Any]], pictures: str = "") -> str
     """
     parts = [INTRODUCTION, _overview(records)]
     parts += [_section(record, pictures) for record in records.values()]
-    runs = records["scaling"]["figures"]["runs"] if "scaling" in records else 0
-    fewer = f"- The {RUNS} runs of each size in the paper's scaling: there are {runs}.\n"
-    return "\n".join([*parts, NOT_REMADE.format(scaling=fewer if runs < RUNS else "")])
+    runs = records["scaling"]["figures"]["runs"] if "scaling" in records else [RUNS]
+    fewer = (
+        f"- All of the {RUNS} runs of each size in the paper's scaling: there are "
+        f"{', '.join(map(str, runs))}, from the smallest size to the largest.\n"
+    )
+    return "\n".join([*parts, NOT_REMADE.format(scaling=fewer if min(runs) < RUNS else "")])
 
 
 def _overview(records: Mapping[str, Mapping[str, Any]]) -> str:
