@@ -110,12 +110,14 @@ def searched() -> Rows:
         for kind, words in (
             ("paper", "the paper's stiffness"),
             ("calibrated", "that of the struts"),
+            ("chosen", "that of the struts, frames choose"),
         ):
             told = read("validation/search")[f"{name}, {kind}"]
             yield row(
                 name, words, f"{told['promised']:.2f}", f"{told['frame']:.2f}",
                 f"{100.0 * told['median_deviation']:.0f} %",
                 f"{told['not_stable_as_frames']} of {len(told['rows'])}",
+                f"{told['touching_as_frames']} of {len(told['rows'])}",
             )  # fmt: skip
 
 
