@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from bellcrank.mechanics import CAREFUL, Evaluator
-from bellcrank.model import Design, Problem, read_problem, unpack_mask
+from bellcrank.model import Design, Problem, pack_mask, read_problem, unpack_mask
 from bellcrank.parts import PartSpec, calibrated
 from bellcrank.search import Candidate, Finalist, HoppingSettings, read_settings
 from bellcrank.workflows import complete_design, start_design
@@ -95,6 +96,16 @@ def test_where_no_part_is_sound_one_is_chosen_nevertheless(task: Problem) -> Non
     chosen, refused = PartChoice(SPEC, HoppingSettings())([best])
     assert chosen is best
     assert refused == []
+
+
+def test_what_hangs_on_no_support_is_no_part(task: Problem) -> None:
+    held = np.isin(task.lattice.beams, task.supports.nodes).any(axis=1)
+    bridge = finalist(task, pack_mask(~held))
+    works = finalist(task, WORKS)
+    chosen, refused = PartChoice(SPEC, HoppingSettings())([bridge, works])
+    assert chosen is works
+    assert refused == [(bridge.response.efficiency, "hangs on no support")]
+    assert PartChoice(SPEC, HoppingSettings())([bridge]) == (bridge, [])
 
 
 def test_a_strain_beyond_the_material_is_a_fault(task: Problem) -> None:

@@ -12,13 +12,16 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings, levels
 from bellcrank.fem.path import PathStatus
+from bellcrank.parts.pieces import require_held
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from bellcrank.fem import Analysis
+    from bellcrank.model import Design
     from bellcrank.parts import PartSpec
     from bellcrank.search import Finalist, Refusals, SearchSettings
 
@@ -84,6 +87,22 @@ def fault_of(analysis: Analysis) -> str | None:
     return None
 
 
+def stands(design: Design) -> bool:
+    """Return whether all of a design hangs on supports, without which it is no part.
+
+    Examples
+    --------
+    >>> from bellcrank.model import human_design
+    >>> stands(human_design("crane"))
+    True
+    """
+    try:
+        require_held(design)
+    except InvalidSettings:
+        return False
+    return True
+
+
 def shortlist(finalists: Sequence[Finalist]) -> list[Finalist]:
     """Return the finalists to be tried: of each chain the best, turn by turn.
 
@@ -124,7 +143,10 @@ class PartChoice:
 
     def __call__(self, finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals]:
         """Return the best part, and why others that seemed better were passed over."""
-        listed = shortlist(finalists)
+        standing = [each for each in finalists if stands(each.design)]
+        if not standing:
+            return finalists[0], []
+        listed = shortlist(standing)
         trials = []
         for done, finalist in enumerate(listed):
             self.tell(done, len(listed))
@@ -137,7 +159,8 @@ class PartChoice:
             for trial in trials
             if trial.finalist is not chosen
         ]
-        return chosen, refused
+        hanging = [each.response.efficiency for each in finalists if not stands(each.design)]
+        return chosen, [*refused, *((value, "hangs on no support") for value in hanging)]
 
     def trial(self, finalist: Finalist, settings: FemSettings = FINE) -> Trial:
         """Follow a finalist as a part."""

@@ -30,12 +30,12 @@ from bellcrank.search import (
     select,
     start_chain,
 )
-from bellcrank.workflows.choosing import FINE, LEVEL, PartChoice
+from bellcrank.workflows.choosing import FINE, LEVEL, PartChoice, stands
 from bellcrank.workflows.outcome import DesignReport
 from bellcrank.workflows.pareto import write_front
 from bellcrank.workflows.record import begin_record
 from bellcrank.workflows.report import RESULTS, write_report
-from bellcrank.workflows.validate import validate
+from bellcrank.workflows.validate import Validation, validate
 
 if TYPE_CHECKING:
     import threading
@@ -235,7 +235,7 @@ def conclude(
         human_response=human_response,
         proposals=proposals,
         best_by_chain=best,
-        validation=None if spec is None else validate(selection.design, spec, [(LEVEL, FINE)]),
+        validation=_validated(selection.design, spec),
     )
     part = {} if spec is None else {"part": spec.to_dict()}
     design = replace(
@@ -248,6 +248,13 @@ def conclude(
         begin_record(report.validation, folder.path / "validation.json")
     write_report(report, folder)
     return report
+
+
+def _validated(design: Design, spec: PartSpec | None) -> Validation | None:
+    """Return what a frame says of a design for a part; None if it is for none, or is none."""
+    if spec is None or not stands(design):
+        return None
+    return validate(design, spec, [(LEVEL, FINE)])
 
 
 def _part_of(folder: RunFolder) -> PartSpec | None:

@@ -41,7 +41,7 @@ class DesignReport:
     proposals, best_by_chain
         How many designs were looked at; the best each chain accepted.
     validation
-        The design as a frame of struts, where it is for a part.
+        The design as a frame of struts, where it is for a part and hangs on its supports.
     """
 
     folder: Path
