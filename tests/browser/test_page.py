@@ -79,10 +79,21 @@ def test_a_task_is_drawn_searched_watched_stopped_played_and_taken(page: Any) ->
     assert before is not None
     mesh = trimesh.load(io.BytesIO(downloaded(page, "stl")), file_type="stl")
     assert mesh.is_watertight
-    assert downloaded(page, "3mf")[:2] == b"PK"
+    assert closed_in_3mf(downloaded(page, "3mf"))
     assert downloaded(page, "history")[:4] == b"PAR1"
     page.get_by_text("Beam worth").click()
     page.get_by_text("Dark: all depends on it").wait_for()
+
+
+def closed_in_3mf(content: bytes) -> bool:
+    """Whether the one body of a file is closed, as the 3MF Consortium's own library reads it."""
+    lib3mf = pytest.importorskip("lib3mf")
+    model = lib3mf.get_wrapper().CreateModel()
+    model.QueryReader("3mf").ReadFromBuffer(content)
+    bodies = model.GetMeshObjects()
+    assert bodies.Count() == 1
+    bodies.MoveNext()
+    return bool(bodies.GetCurrentMeshObject().IsManifoldAndOriented())
 
 
 def _at(page: Any, x: float, y: float) -> tuple[float, float]:
@@ -234,8 +245,7 @@ def test_a_whole_search_is_compared_checked_by_finite_elements_and_leaves_its_hi
     page.locator(".status.finished").wait_for()
     page.locator('.player[data-ready="yes"]').wait_for()
     assert page.locator(".figures tr", has_text="Your own design").count() == 1
-    page.get_by_label("Ask finite elements: Frame").click()
-    row = page.locator(".figures tr", has_text="Frame")
+    row = page.locator(".figures tr", has_text="Frame")  # it was chosen by its frame
     row.get_by_text("MPa").wait_for()
     (tmp_path / "design.json").write_bytes(downloaded(page, "json"))
     design = read_design(tmp_path / "design.json")
