@@ -95,8 +95,10 @@ def print_entries(
     said = "1 entry" if len(found) == 1 else f"{len(found)} entries"
     unclear = len(found) - sum(each.clear for each in found)
     marks = {"* the plain lever is better": worse, "! struts touch, or it may snap": unclear}
-    mark = "".join(f"; {text} ({count})" for text, count in marks.items() if count)
-    results.print(f"\n{said}, lattice units{mark}")
+    results.print(f"\n{said}, lattice units")
+    for text, count in marks.items():
+        if count:
+            results.print(f"{text} ({count})")
     warn(known)
 
 
