@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from bellcrank.fem import FemSettings, levels
 from bellcrank.mechanics import CAREFUL, Evaluator
 from bellcrank.model import Design, Problem, pack_mask, read_problem, unpack_mask
 from bellcrank.parts import PartSpec, calibrated
 from bellcrank.search import Candidate, Finalist, HoppingSettings, read_settings
 from bellcrank.workflows import complete_design, start_design
-from bellcrank.workflows.choosing import PartChoice, fault_of, shortlist
+from bellcrank.workflows.choosing import (
+    COARSE,
+    FINE,
+    PartChoice,
+    Trial,
+    fault_of,
+    shortlist,
+)
 from bellcrank.workflows.design import conclude
 
 if TYPE_CHECKING:
@@ -98,6 +106,22 @@ def test_where_no_part_is_sound_one_is_chosen_nevertheless(task: Problem) -> Non
     assert refused == []
 
 
+def test_what_closer_analysis_finds_worse_is_passed_over_for_what_it_found(
+    task: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    best, works = finalist(task, TURNS_OVER), finalist(task, WORKS)
+    close = PartChoice.trial
+
+    def blind(self: PartChoice, each: Finalist, settings: FemSettings = FINE) -> Trial:
+        seen = close(self, works if settings is COARSE else each, settings)
+        return Trial(each, seen.analysis, each.response.efficiency)
+
+    monkeypatch.setattr(PartChoice, "trial", blind)
+    chosen, refused = PartChoice(SPEC, HoppingSettings())([best, works])
+    assert chosen is works
+    assert refused == [(best.response.efficiency, "struts touch as a frame")]
+
+
 def test_what_hangs_on_no_support_is_no_part(task: Problem) -> None:
     held = np.isin(task.lattice.beams, task.supports.nodes).any(axis=1)
     bridge = finalist(task, pack_mask(~held))
@@ -109,8 +133,6 @@ def test_what_hangs_on_no_support_is_no_part(task: Problem) -> None:
 
 
 def test_a_strain_beyond_the_material_is_a_fault(task: Problem) -> None:
-    from bellcrank.fem import FemSettings, levels
-
     design = finalist(task, WORKS).design
     soft = levels["frame"](SPEC.of(design), FemSettings(elements=3))
     brittle = levels["frame"](
@@ -144,7 +166,9 @@ def test_a_search_for_a_part_ends_with_its_validation(task: Problem, tmp_path: P
     [result] = record["results"]
     assert summary["as_part"]["efficiency"] == result["efficiency"]
     assert result["part"]["width"] == 2.0
-    assert "| as 2 mm struts |" in (folder.path / "summary.md").read_text()
+    told = (folder.path / "summary.md").read_text()
+    assert f"| as 2 mm struts | {result['efficiency']:.4f} |" in told
+    assert f"| stress and strain there | {result['von_mises_MPa']:.2g} MPa" in told
 
 
 def test_the_record_of_a_former_winner_goes(task: Problem, tmp_path: Path) -> None:

@@ -242,12 +242,11 @@ def _print_report(report: DesignReport) -> None:
             "[bold yellow]warning:[/] no design was found that moves the output the wanted way; "
             "search longer (--steps) or from another initial design."
         )
-    if report.validation is not None:
-        for warning in report.validation.analyses[0].warnings:
-            notes.print(
-                f"[bold yellow]warning:[/] no design was found that works as this part: "
-                f"{plain(warning)}; search longer (--steps), with more chains (--chains), or for "
-                "other struts (--strut-width)."
-            )
+    if report.validation is not None and (doubts := report.validation.analyses[0].warnings):
+        notes.print(
+            "[bold yellow]warning:[/] no design was found that works as this part: "
+            f"{plain('; '.join(doubts))}. Search longer (--steps), with more chains (--chains), or "
+            "for other struts (--strut-width)."
+        )
     if not report.verified:
         notes.print("[bold yellow]warning:[/] the minimisers disagree; treat the design with care.")

@@ -235,6 +235,7 @@ def conclude(
         human_response=human_response,
         proposals=proposals,
         best_by_chain=best,
+        part=spec,
         validation=_validated(selection.design, spec),
     )
     part = {} if spec is None else {"part": spec.to_dict()}

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import Response
     from bellcrank.model import Design
+    from bellcrank.parts import PartSpec
     from bellcrank.search import SearchSettings, Selection
     from bellcrank.workflows.validate import Validation
 
@@ -40,8 +41,10 @@ class DesignReport:
         Its response, under the same objective.
     proposals, best_by_chain
         How many designs were looked at; the best each chain accepted.
+    part
+        What the design is for, if for a part.
     validation
-        The design as a frame of struts, where it is for a part and hangs on its supports.
+        Its frame, if it is for a part and hangs on supports.
     """
 
     folder: Path
@@ -53,6 +56,7 @@ class DesignReport:
     human_response: Response | None
     proposals: int
     best_by_chain: list[float]
+    part: PartSpec | None = None
     validation: Validation | None = None
 
     @property

@@ -59,17 +59,19 @@ def _as_part(report: DesignReport) -> dict[str, Any] | None:
 
 def part_rows(report: DesignReport) -> list[tuple[str, str]]:
     """Return what finite elements say of a design for a part, in rows for people."""
-    if report.validation is None:
+    if report.part is None:
         return []
-    spec, analysis = report.validation.spec, report.validation.analyses[0]
-    name = f"as {spec.width:g} mm struts"
+    name = f"as {report.part.width:g} mm struts"
+    if report.validation is None:
+        return [(name, "it hangs on no support, and is no part")]
+    analysis = report.validation.analyses[0]
     if not math.isfinite(analysis.efficiency):
         return [(name, f"not stable: {analysis.status.message}")]
     last = analysis.last
     touching = "struts touch" if len(analysis.contacts.pairs) else "nothing touches"
     return [
         (name, f"{analysis.efficiency:.4f}"),
-        ("", f"stress {last.stress:.2g} MPa, strain {last.strain:.0%}, {touching}"),
+        ("stress and strain there", f"{last.stress:.2g} MPa, {last.strain:.0%}; {touching}"),
     ]
 
 
@@ -83,7 +85,7 @@ def summary_text(report: DesignReport) -> str:
     began = ("where the search began", f"{report.initial_efficiency:.6f}")
     rows = [
         ("efficiency of the design", f"{selection.efficiency_after:.6f}"),
-        *((name or "there", value) for name, value in part_rows(report)),
+        *part_rows(report),
         ("the same before cleaning", f"{selection.efficiency_before:.6f}"),
         began,
         *((f"from rest by {name}", f"{value:.9f}") for name, value in report.checks.items()),
