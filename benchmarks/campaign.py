@@ -32,7 +32,7 @@ from bellcrank.campaign import (
 )
 from bellcrank.campaign.spec import SEGMENT
 from bellcrank.model import problem_from_dict
-from bellcrank.search import advance_chain, make_responder, read_settings, start_chain
+from bellcrank.search import advance_chain, make_evaluator, read_settings, start_chain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -152,9 +152,9 @@ def overhead(place: Path, effort: Effort) -> Overhead:
 def search_alone(chosen: Run) -> float:
     """Return the seconds that the steps of a run take, and nothing else."""
     settings = read_settings(chosen.settings)
-    responder = make_responder(problem_from_dict(chosen.task.problem, "it"), settings)
+    evaluator = make_evaluator(problem_from_dict(chosen.task.problem, "it"), settings)
     start = time.perf_counter()
-    advance_chain(responder, settings, 0, start_chain(responder, settings, 0))
+    advance_chain(evaluator, settings, 0, start_chain(evaluator, settings, 0))
     return time.perf_counter() - start
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.search import MetropolisSettings, chain_blocks
 
@@ -55,7 +55,7 @@ class Recording:
 @cache
 def record(name: str, steps: int, seed: int = 0) -> Recording:
     """Run a chain with the paper's settings, as the program runs it."""
-    evaluator = Evaluator(find_problem(name))
+    evaluator = SpringEvaluator(find_problem(name))
     settings = MetropolisSettings(steps=steps, seed=seed)
     next(chain_blocks(evaluator, MetropolisSettings(steps=20), 0))  # compiles
     start = time.perf_counter()
@@ -72,20 +72,20 @@ def record(name: str, steps: int, seed: int = 0) -> Recording:
     )
 
 
-def walk(evaluator: Evaluator, stretch: Recording) -> NDArray[np.float64]:
+def walk(evaluator: SpringEvaluator, stretch: Recording) -> NDArray[np.float64]:
     """Responses along a stretch, each from the last accepted one; returns the efficiencies."""
-    evaluator.respond(stretch.masks[0])
-    evaluator.remember()
+    evaluator.evaluate(stretch.masks[0])
+    evaluator.set_reference()
     return walk_on(evaluator, stretch)
 
 
-def walk_on(evaluator: Evaluator, stretch: Recording) -> NDArray[np.float64]:
+def walk_on(evaluator: SpringEvaluator, stretch: Recording) -> NDArray[np.float64]:
     """As `walk`, from the equilibrium that is already remembered."""
     efficiency = np.empty(len(stretch.masks) - 1)
     for step, (mask, accepted) in enumerate(
         zip(stretch.masks[1:], stretch.accepted[1:], strict=True)
     ):
-        efficiency[step] = evaluator.respond_nearby(mask).efficiency
+        efficiency[step] = evaluator.evaluate(mask, warm_start=True).efficiency
         if accepted:
-            evaluator.remember()
+            evaluator.set_reference()
     return efficiency

@@ -24,7 +24,7 @@ from typing import get_args
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from bellcrank.mechanics import CAREFUL, Dangling, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status, UnloadedBeams
 from bellcrank.model import builtin, find_problem
 from bellcrank.search import (
     DEFAULT_SEARCH,
@@ -32,7 +32,7 @@ from bellcrank.search import (
     FORESEEN,
     SearchSettings,
     advance_chain,
-    make_responder,
+    make_evaluator,
     read_settings,
     start_chain,
 )
@@ -103,7 +103,7 @@ class Play:
 
     problem: str
     search: str
-    dangling: str
+    unloaded_beams: str
     seed: int
     responses: int
     seconds: float = 0.0
@@ -112,23 +112,23 @@ class Play:
     def settings(self) -> SearchSettings:
         """Settings of the search; a chain that may go on has no end."""
         steps = FOR_EVER if self.search == PLAIN else self.responses
-        chosen = {"search": self.search, "dangling": self.dangling, "seed": self.seed}
+        chosen = {"search": self.search, "unloaded_beams": self.unloaded_beams, "seed": self.seed}
         return read_settings({**chosen, "steps": steps})
 
 
 def play(game: Play) -> Game:
     """Search once, until both responses and processor time are spent."""
     problem, settings = find_problem(game.problem), game.settings
-    responder = make_responder(problem, settings)
+    evaluator = make_evaluator(problem, settings)
     warm_up(game)
     judge = Judge(game)
-    state = start_chain(responder, settings, 0)
+    state = start_chain(evaluator, settings, 0)
     current, best = state.efficiency, -np.inf
     responses, seconds = 0, 0.0
     found: list[Record] = []
     while state.step < settings.steps and (responses < game.responses or seconds < game.seconds):
         start = time.process_time()
-        state, rows = advance_chain(responder, settings, 0, state)
+        state, rows = advance_chain(evaluator, settings, 0, state)
         spent = time.process_time() - start
         for index in range(len(rows.status)):
             evaluated = rows.status[index] not in (FORBIDDEN, FORESEEN)
@@ -148,9 +148,9 @@ def play(game: Play) -> Game:
 def warm_up(game: Play) -> None:
     """Load compiled kernels before the clock starts."""
     settings = replace(game.settings, steps=2)
-    responder = make_responder(find_problem(game.problem), settings)
-    advance_chain(responder, settings, 0, start_chain(responder, settings, 0))
-    responder.screen(responder.problem.initial)
+    evaluator = make_evaluator(find_problem(game.problem), settings)
+    advance_chain(evaluator, settings, 0, start_chain(evaluator, settings, 0))
+    evaluator.predict_flips(evaluator.problem.initial)
 
 
 class Judge:
@@ -158,7 +158,9 @@ class Judge:
 
     def __init__(self, game: Play) -> None:
         self._problem = find_problem(game.problem)
-        self._evaluator = Evaluator(self._problem, dangling=game.settings.dangling)
+        self._evaluator = SpringEvaluator(
+            self._problem, unloaded_beams=game.settings.unloaded_beams
+        )
         self._known: dict[bytes, bool] = {}
 
     def stands(self, packed: np.ndarray) -> bool:
@@ -166,21 +168,24 @@ class Judge:
         key = packed.tobytes()
         if key not in self._known:
             mask = np.unpackbits(packed)[: self._problem.lattice.beam_count].astype(bool)
-            response = self._evaluator.respond(mask, CAREFUL)
+            response = self._evaluator.evaluate(mask, VERIFICATION_INCREMENT)
             self._known[key] = response.status is Status.CONVERGED
         return self._known[key]
 
 
-def contest(name: str, dangling: str, seeds: int, share: float, pool: ProcessPoolExecutor) -> dict:
+def contest(
+    name: str, unloaded_beams: str, seeds: int, share: float, pool: ProcessPoolExecutor
+) -> dict:
     """Let both searches play a problem; return figures and games."""
     responses = int(RESPONSES[name] * share)
-    new = [Play(name, DEFAULT_SEARCH, dangling, seed, responses) for seed in range(seeds)]
+    new = [Play(name, DEFAULT_SEARCH, unloaded_beams, seed, responses) for seed in range(seeds)]
     ours = list(pool.map(play, new))
     seconds = float(np.median([game.seconds for game in ours]))
     old = [replace(game, search=PLAIN, seconds=seconds) for game in new]
     theirs = list(pool.map(play, old))
     result = {
-        "problem": name, "dangling": dangling, "responses": responses, "seconds": seconds,
+        "problem": name, "unloaded_beams": unloaded_beams,
+        "responses": responses, "seconds": seconds,
         "equal responses": figures(ours, theirs, responses, np.inf),
         "equal time": figures(ours, theirs, np.inf, seconds),
     }  # fmt: skip
@@ -208,7 +213,8 @@ def print_row(result: dict) -> None:
         f = result[kind]
         budget = result["responses"] if kind == "equal responses" else f"{result['seconds']:.1f} s"
         print(
-            f"| {result['problem']} | {result['dangling']} | {budget} | {f['plain median']:.3f} "
+            f"| {result['problem']} | {result['unloaded_beams']} | {budget} "
+            f"| {f['plain median']:.3f} "
             f"| {f['median']:.3f} | {f['ratio']:.2f} | {f['tenth percentile']:.3f} "
             f"| {f['p']:.1e} |",
             flush=True,
@@ -219,7 +225,7 @@ def main() -> None:
     """Play all problems, or those that are named."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("problems", nargs="*", default=list(RESPONSES))
-    parser.add_argument("--dangling", default="stripped", choices=get_args(Dangling))
+    parser.add_argument("--unloaded-beams", default="prune_all", choices=get_args(UnloadedBeams))
     parser.add_argument("--seeds", type=int, default=30)
     parser.add_argument("--quick", action="store_true", help="A tenth of it; leaves no files.")
     options = parser.parse_args()
@@ -228,11 +234,11 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|")
     with ProcessPoolExecutor(2) as pool:
         for name in options.problems:
-            result = contest(name, options.dangling, seeds, share, pool)
+            result = contest(name, options.unloaded_beams, seeds, share, pool)
             print_row(result)
             if not options.quick:
                 FOLDER.mkdir(parents=True, exist_ok=True)
-                target = FOLDER / f"{name}-{options.dangling}.json"
+                target = FOLDER / f"{name}-{options.unloaded_beams}.json"
                 target.write_text(json.dumps(rounded(result), indent=None))
 
 

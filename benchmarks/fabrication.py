@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bellcrank.fabricate import Export, exporters
-from bellcrank.fabricate.profiles import profiles
+from bellcrank.export import Export, exporters
+from bellcrank.export.profiles import profiles
 from bellcrank.model import find_problem
 from bellcrank.model.builtin.scaling import scaling
-from bellcrank.parts import PartSpec
+from bellcrank.part import PartSpec
 from bellcrank.plots.movies import movie_settings
 from bellcrank.workflows import find_design
 from bellcrank.workflows.animate import Looks, animate_motion

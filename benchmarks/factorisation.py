@@ -23,7 +23,7 @@ from scipy.sparse.linalg import splu
 
 from bellcrank.machines import Machine, assemble, elementary
 from bellcrank.machines.plan import MachineTable, plan_of
-from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.mechanics.kernels import cholesky
 from bellcrank.mechanics.kernels._compile import entry
 from bellcrank.model import Design
@@ -109,7 +109,7 @@ def row(part: Design, actuators: int) -> Machine:
     return assemble(plan_of(MachineTable.model_validate(told), "row"), lambda _entry: part)
 
 
-def stiffness_of(evaluator: Evaluator) -> csc_array:
+def stiffness_of(evaluator: SpringEvaluator) -> csc_array:
     """Return the stiffness that was assembled last, as scipy has it."""
     structure, scratch = evaluator.structure, evaluator.scratch
     blocks = int(evaluator.system.block.max()) + 1
@@ -154,8 +154,8 @@ def measure(part: Design, actuators: int, repeats: int) -> Row:
     """Measure one length of row."""
     machine = row(part, actuators)
     problem, mask = machine.design.problem, machine.design.mask
-    evaluator = Evaluator(problem)
-    evaluator.respond(mask)
+    evaluator = SpringEvaluator(problem)
+    evaluator.evaluate(mask)
     matrix = stiffness_of(evaluator)
     structure, scratch = evaluator.structure, evaluator.scratch
     assert factorise(structure, scratch)
@@ -166,9 +166,9 @@ def measure(part: Design, actuators: int, repeats: int) -> Row:
         beams=machine.design.beam_count,
         unknowns=matrix.shape[0],
         assembly=milliseconds(lambda: row(part, actuators), repeats),
-        preparation=milliseconds(lambda: Evaluator(problem), repeats),
-        response=milliseconds(lambda: evaluator.respond(mask), repeats),
-        careful=milliseconds(lambda: evaluator.respond(mask, CAREFUL), 1),
+        preparation=milliseconds(lambda: SpringEvaluator(problem), repeats),
+        response=milliseconds(lambda: evaluator.evaluate(mask), repeats),
+        careful=milliseconds(lambda: evaluator.evaluate(mask, VERIFICATION_INCREMENT), 1),
         sparse=milliseconds(lambda: factorise(structure, scratch), repeats),
         banded=milliseconds(lambda: cholesky_banded(band, lower=True), repeats),
         superlu=milliseconds(
@@ -180,7 +180,7 @@ def measure(part: Design, actuators: int, repeats: int) -> Row:
     )
 
 
-def _error(evaluator: Evaluator, matrix: csc_array) -> float:
+def _error(evaluator: SpringEvaluator, matrix: csc_array) -> float:
     right = np.random.default_rng(1).normal(size=evaluator.scratch.step.shape)
     evaluator.scratch.step[:] = right
     solve(evaluator.structure, evaluator.scratch)

@@ -29,7 +29,7 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from bellcrank.fem import FemSettings, levels
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import (
     Design,
     Problem,
@@ -40,15 +40,15 @@ from bellcrank.model import (
     pack_mask,
     unpack_mask,
 )
-from bellcrank.parts import PartSpec, calibrated
-from bellcrank.parts.calibration import JOINT
+from bellcrank.part import PartSpec, calibrated
+from bellcrank.part.calibration import JOINT
 from bellcrank.plots import style
 from bellcrank.plots.saving import save_figure
 from bellcrank.provenance import provenance
 from bellcrank.search import (
     SearchSettings,
     advance_chain,
-    make_responder,
+    make_evaluator,
     read_settings,
     start_chain,
 )
@@ -80,10 +80,10 @@ def sampled(name: str) -> list[str]:
     for search, count in CHAINS.items():
         for seed in range(count):
             settings = read_settings({"search": search, "steps": STEPS, "seed": seed})
-            responder = make_responder(problem, settings)
-            state = start_chain(responder, settings, 0)
+            evaluator = make_evaluator(problem, settings)
+            state = start_chain(evaluator, settings, 0)
             while state.step < STEPS:
-                state, rows = advance_chain(responder, settings, 0, state)
+                state, rows = advance_chain(evaluator, settings, 0, state)
                 taken = np.flatnonzero(rows.accepted & (rows.status == Status.CONVERGED))
                 if len(taken):
                     bits = np.unpackbits(rows.mask[taken[-1]])[: problem.lattice.beam_count]
@@ -112,10 +112,12 @@ def frame_of(job: tuple[str, str, float, float | None]) -> dict[str, object]:
 
 def discrete(problem: Problem, masks: list[str]) -> np.ndarray:
     """Efficiency of each design by the discrete model; nan where it is not unique."""
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     found = []
     for mask in masks:
-        response = evaluator.respond(unpack_mask(mask, problem.lattice.beam_count), CAREFUL)
+        response = evaluator.evaluate(
+            unpack_mask(mask, problem.lattice.beam_count), VERIFICATION_INCREMENT
+        )
         found.append(response.efficiency if response.status is Status.CONVERGED else np.nan)
     return np.array(found)
 
@@ -224,17 +226,17 @@ def designed(problem: Problem, settings: SearchSettings) -> tuple[float, str]:
 
 def promising(task: Problem, settings: SearchSettings) -> tuple[float, str]:
     """Return efficiency and mask of the best design of a chain in the model alone."""
-    responder = make_responder(task, settings)
-    state = start_chain(responder, settings, 0)
+    evaluator = make_evaluator(task, settings)
+    state = start_chain(evaluator, settings, 0)
     best, mask = -np.inf, ""
-    judge = Evaluator(task)
+    judge = SpringEvaluator(task)
     while state.step < settings.steps:
-        state, rows = advance_chain(responder, settings, 0, state)
+        state, rows = advance_chain(evaluator, settings, 0, state)
         for index in np.flatnonzero(rows.accepted & (rows.status == Status.CONVERGED)):
             if rows.efficiency[index] > best:
                 bits = np.unpackbits(rows.mask[index])[: task.lattice.beam_count].astype(bool)
                 cleaned = clean(Design(task, bits))
-                response = judge.respond(cleaned.mask, CAREFUL)
+                response = judge.evaluate(cleaned.mask, VERIFICATION_INCREMENT)
                 if response.status is Status.CONVERGED and response.efficiency > best:
                     best, mask = response.efficiency, pack_mask(cleaned.mask)
     return float(best), mask

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from bellcrank.machines import Machine, compare, foretell, predict, simulate
 from bellcrank.machines.showcases import showcase, showcases
-from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
 from bellcrank.search import HoppingSettings
@@ -108,7 +108,7 @@ def measure(name: str, options: argparse.Namespace) -> Row:
     machine = showcase(name)
     built = time.perf_counter()
     problem, mask = machine.design.problem, machine.design.mask
-    response = Evaluator(problem).respond(mask, CAREFUL)
+    response = SpringEvaluator(problem).evaluate(mask, VERIFICATION_INCREMENT)
     simulated = time.perf_counter()
     small = replace(problem, input=replace(problem.input, amount=SMALL * problem.input.amount))
     linear = predict(machine)
@@ -125,7 +125,7 @@ def measure(name: str, options: argparse.Namespace) -> Row:
         all_beams=problem.lattice.beam_count,
         building=built - start,
         simulating=simulated - built,
-        small=Evaluator(small).respond(mask).efficiency,
+        small=SpringEvaluator(small).evaluate(mask).efficiency,
         foretold_small=linear.efficiency,
         efficiency=response.efficiency,
         foretold=tables.efficiency,

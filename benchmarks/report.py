@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import spearmanr
 
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import find_problem
 from benchmarks.chains import Recording, record, walk_on
 
@@ -65,13 +65,13 @@ def time_walk(name: str, minimiser: str, stretches: list[Recording]) -> tuple[fl
     The equilibrium at the start of each stretch comes from Newton, untimed.
     """
     newton, evaluator = (
-        Evaluator(find_problem(name)),
-        Evaluator(find_problem(name), minimiser=minimiser),
+        SpringEvaluator(find_problem(name)),
+        SpringEvaluator(find_problem(name), minimiser=minimiser),
     )
     seconds, efficiencies = 0.0, []
     for stretch in stretches:
-        newton.respond(stretch.masks[0])
-        newton.remember()
+        newton.evaluate(stretch.masks[0])
+        newton.set_reference()
         for source, target in zip(newton.known, evaluator.known, strict=True):
             target[:] = source
         start = time.perf_counter()
@@ -161,7 +161,7 @@ def print_minimisers(crane: Recording, effort: Effort) -> None:
 
 
 def foresee(name: str, run: Recording, start: int) -> tuple[int, float, float, float, float]:
-    """Screen all flips of the design that is current at a step of a chain.
+    """FlipWorkspace all flips of the design that is current at a step of a chain.
 
     Returns
     -------
@@ -172,23 +172,23 @@ def foresee(name: str, run: Recording, start: int) -> tuple[int, float, float, f
     screened, first_order
         Rank correlation of what is foreseen, and of the sensitivity, with the true changes.
     """
-    evaluator = Evaluator(find_problem(name))
+    evaluator = SpringEvaluator(find_problem(name))
     mask = run.stretch(start, 1).masks[0] if start else evaluator.problem.initial
-    before = evaluator.respond(mask).efficiency
+    before = evaluator.evaluate(mask).efficiency
     slope = evaluator.sensitivity(mask)[evaluator.problem.designable]
-    evaluator.screen(mask)
+    evaluator.predict_flips(mask)
     clock = time.perf_counter()
     for _ in range(20):
-        screening = evaluator.screen(mask)
+        screening = evaluator.predict_flips(mask)
     seconds = (time.perf_counter() - clock) / 20
     assert screening is not None
-    evaluator.remember()
+    evaluator.set_reference()
     gained = np.full(len(screening.beams), np.nan)
     clock = time.perf_counter()
     for index, beam in enumerate(screening.beams):
         flipped = mask.copy()
         flipped[beam] ^= True
-        response = evaluator.respond_nearby(flipped)
+        response = evaluator.evaluate(flipped, warm_start=True)
         if response.status is Status.CONVERGED:
             gained[index] = response.efficiency - before
     response_seconds = (time.perf_counter() - clock) / len(gained)

@@ -11,11 +11,10 @@ import json
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.machines.actuators import KINDS, machine
-
 from bellcrank.machines import compare, foretell, predict, simulate
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
+from tests.machines.actuators import KINDS, machine
 
 RECORD = Path(__file__).parents[1] / "docs" / "machines" / "strokes.json"
 POINTS = 20

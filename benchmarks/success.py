@@ -56,10 +56,12 @@ def draw(axes: Axes, result: dict[str, Any], measure: str) -> None:
         axes.spines[side].set_visible(False)
 
 
-def draw_all(dangling: str) -> None:
+def draw_all(unloaded_beams: str) -> None:
     """Draw all problems that were played with one kind of response."""
     paths = [
-        FOLDER / f"{name}-{dangling}.json" for name in RESPONSES if not name.startswith("discs-")
+        FOLDER / f"{name}-{unloaded_beams}.json"
+        for name in RESPONSES
+        if not name.startswith("discs-")
     ]
     results = [json.loads(path.read_text()) for path in paths if path.exists()]
     if not results:
@@ -73,9 +75,9 @@ def draw_all(dangling: str) -> None:
     for row in grid:
         row[0].set_ylabel("best efficiency so far", size=style.SMALL_SIZE, color=style.INK)
     figure.tight_layout()
-    figure.savefig(TARGET / f"competition-{dangling}.png", dpi=110)
+    figure.savefig(TARGET / f"competition-{unloaded_beams}.png", dpi=110)
 
 
 if __name__ == "__main__":
-    for kind in ("stripped", "ignored", "counted"):
+    for kind in ("prune_all", "prune_dead_ends", "keep"):
         draw_all(kind)

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.provenance import provenance
 from bellcrank.surrogate.backend import find_precision
@@ -172,18 +172,18 @@ def measure_mechanics(masks: NDArray[np.bool_], effort: Effort) -> list[Cost]:
     rows = np.linspace(0, len(masks) - 1, effort.responses).astype(int)
     costs = []
     for name, text in (("fire", "`fire` response"), ("newton", "Newton response (default)")):
-        evaluator = Evaluator(find_problem(PROBLEM), minimiser=name)
-        evaluator.respond(masks[rows[0]])
+        evaluator = SpringEvaluator(find_problem(PROBLEM), minimiser=name)
+        evaluator.evaluate(masks[rows[0]])
         start = time.process_time()
         for row in rows:
-            evaluator.respond(masks[row])
+            evaluator.evaluate(masks[row])
         seconds = (time.process_time() - start) / len(rows)
         costs.append(Cost(text, "one core", 1, 1e6 * seconds))
     seconds, flips = 0.0, 0
-    evaluator.screen(masks[rows[0]])
+    evaluator.predict_flips(masks[rows[0]])
     for row in rows:
         start = time.process_time()
-        screening = evaluator.screen(masks[row])
+        screening = evaluator.predict_flips(masks[row])
         if screening is not None:
             seconds += time.process_time() - start
             flips += len(screening.beams)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bellcrank.mechanics import Evaluator, minimisers
+from bellcrank.mechanics import SpringEvaluator, minimisers
 from bellcrank.model import find_problem
 from bellcrank.search import MetropolisSettings, advance_chain, chain_blocks
 from benchmarks.chains import record, walk, walk_on
@@ -21,21 +21,21 @@ BURN_IN = 500
 @pytest.mark.parametrize("minimiser", list(minimisers))
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_response_from_rest(benchmark: Benchmark, name: str, minimiser: str) -> None:
-    evaluator = Evaluator(find_problem(name), minimiser=minimiser)
+    evaluator = SpringEvaluator(find_problem(name), minimiser=minimiser)
     mask = record(name, BURN_IN + 250).masks[BURN_IN]
-    evaluator.respond(mask)
+    evaluator.evaluate(mask)
     benchmark.pedantic(evaluator.respond, args=(mask,), rounds=20 if minimiser == "newton" else 1)
 
 
 @pytest.mark.parametrize("minimiser", list(minimisers))
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_ten_responses_along_a_chain(benchmark: Benchmark, name: str, minimiser: str) -> None:
-    evaluator = Evaluator(find_problem(name), minimiser=minimiser)
+    evaluator = SpringEvaluator(find_problem(name), minimiser=minimiser)
     stretch = record(name, BURN_IN + 250).stretch(BURN_IN, 10)
     if minimiser == "newton":
         walk(evaluator, stretch)
-    evaluator.respond(stretch.masks[0])
-    evaluator.remember()
+    evaluator.evaluate(stretch.masks[0])
+    evaluator.set_reference()
     benchmark.pedantic(
         walk_on, args=(evaluator, stretch), rounds=20 if minimiser == "newton" else 1
     )
@@ -43,7 +43,7 @@ def test_ten_responses_along_a_chain(benchmark: Benchmark, name: str, minimiser:
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_block_of_250_metropolis_steps(benchmark: Benchmark, name: str) -> None:
-    evaluator = Evaluator(find_problem(name))
+    evaluator = SpringEvaluator(find_problem(name))
     settings = MetropolisSettings(steps=BURN_IN + 250)
     for state, _ in chain_blocks(evaluator, MetropolisSettings(steps=BURN_IN), 0):
         after = state
@@ -52,7 +52,7 @@ def test_block_of_250_metropolis_steps(benchmark: Benchmark, name: str) -> None:
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_screening_of_all_flips(benchmark: Benchmark, name: str) -> None:
-    evaluator = Evaluator(find_problem(name))
+    evaluator = SpringEvaluator(find_problem(name))
     mask = record(name, BURN_IN + 250).masks[BURN_IN]
-    evaluator.respond(mask)
+    evaluator.evaluate(mask)
     benchmark.pedantic(evaluator.screen, args=(mask,), rounds=50, warmup_rounds=1)

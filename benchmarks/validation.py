@@ -17,7 +17,7 @@ from bellcrank.fem.frame.equilibrium import solve_linear
 from bellcrank.fem.frame.mesh import frame_mesh
 from bellcrank.fem.frame.system import frame_system
 from bellcrank.model.builtin.scaling import scaling
-from bellcrank.parts import PartSpec
+from bellcrank.part import PartSpec
 from bellcrank.workflows import find_design
 
 SIZES = (8, 12, 16, 20, 28, 40)

@@ -12,7 +12,7 @@ A problem is a lattice, what holds it, what pushes it, and what should move.
 
 from pathlib import Path
 
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.plots import draw_design, draw_motion
 from bellcrank.search import HoppingSettings
@@ -46,7 +46,7 @@ draw_design(lift.full_design(), "task.png", title="the task")
 # %%
 # The whole lattice is stiff, and its output hardly moves.
 
-whole = Evaluator(lift).respond(lift.initial)
+whole = SpringEvaluator(lift).evaluate(lift.initial)
 print(f"all beams: efficiency {whole.efficiency:.3f}")
 
 # %%

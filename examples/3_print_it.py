@@ -12,10 +12,10 @@ A design becomes a part: struts of some width, a thickness, a scale, a material.
 
 from pathlib import Path
 
-from bellcrank.fabricate import check_print, export
+from bellcrank.export import check_print, export
 from bellcrank.fem import FemSettings
 from bellcrank.model import gallery_design
-from bellcrank.parts import PartSpec
+from bellcrank.part import PartSpec
 from bellcrank.workflows import validate
 from bellcrank.workflows.card import make_card
 from bellcrank.workflows.figures import draw_validations

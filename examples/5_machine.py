@@ -16,7 +16,7 @@ from pathlib import Path
 from bellcrank.machines import assemble, mean_ports, predict, two_port_at
 from bellcrank.machines.library import library
 from bellcrank.machines.plan import read_plan
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.plots import draw_motion
 from bellcrank.workflows import move
 
@@ -66,7 +66,7 @@ print(f"by all nodes of the ports: {predict(machine).efficiency:.2f}")
 # -----------
 # The machine is an ordinary design: one piece, which every other command takes.
 
-response = Evaluator(machine.design.problem).respond(machine.design.mask)
+response = SpringEvaluator(machine.design.problem).evaluate(machine.design.mask)
 print(f"the whole lattice, along its whole stroke: {response.efficiency:.2f}")
 draw_motion(move(machine.design), "two-stage.png", title="two stages")
 

@@ -55,6 +55,6 @@ def test_nothing_loads_a_web_server_before_it_serves() -> None:
     assert not imported_by("import bellcrank.cli.main") & {"fastapi", "starlette", "uvicorn"}
 
 
-@pytest.mark.parametrize("module", ["bellcrank.cli", "bellcrank.model", "bellcrank.runs"])
+@pytest.mark.parametrize("module", ["bellcrank.cli", "bellcrank.model", "bellcrank.storage"])
 def test_light_layers_leave_compiler_and_plotting_alone(module: str) -> None:
     assert not imported_by(f"import {module}") & {"numba", "matplotlib", "scipy", "torch"}

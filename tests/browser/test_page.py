@@ -11,9 +11,9 @@ import pytest
 import trimesh
 
 from bellcrank.fem import FemSettings
-from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model import problem_from_dict, read_design, unpack_mask
-from bellcrank.parts import PartSpec, calibrated
+from bellcrank.part import PartSpec, calibrated
 from bellcrank.workflows import validate
 
 from .driving import click, drag, start_search, summary, task, tool, until
@@ -114,7 +114,9 @@ def test_a_design_is_changed_by_hand_and_the_real_solver_answers(page: Any) -> N
     problem = problem_from_dict({**kept["problem"], "designable": _free(kept)})
     mask = unpack_mask(kept["hand"], problem.lattice.beam_count)
     assert mask.sum() == len(mask) - 3
-    exact = Evaluator(calibrated(problem, 2.0)).respond(mask, CAREFUL).efficiency
+    exact = (
+        SpringEvaluator(calibrated(problem, 2.0)).evaluate(mask, VERIFICATION_INCREMENT).efficiency
+    )
     shown = float(page.locator(".readout strong").inner_text().replace("−", "-"))
     assert shown == pytest.approx(exact, abs=6e-4)
     page.keyboard.press("Control+z")

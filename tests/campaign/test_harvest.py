@@ -10,7 +10,7 @@ import pytest
 
 from bellcrank.campaign import Store, work, write_harvest
 from bellcrank.errors import InvalidSettings, OutputExists
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import Design, read_design
 from bellcrank.search import clean, pieces, plateau_ends
 
@@ -28,11 +28,11 @@ def test_each_task_gives_its_best_design_cleaned_and_checked(
     assert [entry.task for entry in found] == ["scaling-8-paper", "large"]
     for entry in found:
         design = read_design(entry.path)
-        response = Evaluator(design.problem).respond(design.mask, CAREFUL)
+        response = SpringEvaluator(design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
         assert response.status is Status.CONVERGED
         assert response.efficiency == pytest.approx(design.efficiency, abs=1e-9)
         assert pieces(design.problem, design.mask) == 1
-        assert np.array_equal(clean(design, Evaluator(design.problem)).mask, design.mask)
+        assert np.array_equal(clean(design, SpringEvaluator(design.problem)).mask, design.mask)
         assert design.provenance["settings"]["seed"] == entry.seed
 
 
@@ -41,14 +41,14 @@ def test_the_design_is_the_best_that_the_runs_offer(tmp_path: Path, finished: Pa
     problem = entry.design.problem
     rows = pq.read_table(finished / "proposals").to_pandas()
     rows = rows[(rows["task"] == entry.task) & rows["accepted"] & (rows["status"] == 0)]
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     best = -np.inf
     for _, run in rows.sort_values(["seed", "step"]).groupby("seed"):
         for index in plateau_ends(run["efficiency"].to_numpy(), np.empty((0, 0), np.uint8)):
             bits = np.unpackbits(np.frombuffer(run["mask"].iloc[index], np.uint8))
             mask = bits[: problem.lattice.beam_count].astype(bool)
             cleaned = clean(Design(problem, mask), evaluator)
-            response = evaluator.respond(cleaned.mask, CAREFUL)
+            response = evaluator.evaluate(cleaned.mask, VERIFICATION_INCREMENT)
             if response.status is Status.CONVERGED and pieces(problem, cleaned.mask) == 1:
                 best = max(best, response.efficiency)
     assert entry.design.efficiency == pytest.approx(best, abs=1e-9)

@@ -14,10 +14,10 @@ import pytest
 from bellcrank.campaign import Store, Watcher, best_designs, complete, verify, work
 from bellcrank.campaign.compaction import compact, expand, read_parts
 from bellcrank.errors import CorruptRun, InvalidSettings
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem, unpack_mask
-from bellcrank.runs import Proposals
-from bellcrank.search import chain_blocks, make_responder, read_settings
+from bellcrank.search import chain_blocks, make_evaluator, read_settings
+from bellcrank.storage import Proposals
 
 from .helpers import ROWS, RUNS, SEGMENTS, Killed, content, everything, killed_at
 
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 def test_the_store_holds_what_the_search_proposes(finished: Path, spec: Spec) -> None:
     run = spec.run(1)
     settings = read_settings(run.settings)
-    responder = make_responder(find_problem("scaling-8"), settings)
-    blocks = [proposals for _, proposals in chain_blocks(responder, settings, 0)]
+    evaluator = make_evaluator(find_problem("scaling-8"), settings)
+    blocks = [proposals for _, proposals in chain_blocks(evaluator, settings, 0)]
     expected = Proposals(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
     found = pq.read_table(finished / "proposals", filters=[("run", "=", run.id)])
     assert found.column("step").to_pylist() == list(range(600))
@@ -181,7 +181,7 @@ def test_a_ranked_design_has_the_efficiency_it_is_ranked_by(tabled: Path) -> Non
     best = best_designs(Store.open(tabled), 1, "large")[0]
     problem = find_problem("crane")
     mask = unpack_mask(best.mask, problem.lattice.beam_count)
-    response = Evaluator(problem, dangling="counted").respond(mask)
+    response = SpringEvaluator(problem, unloaded_beams="keep").evaluate(mask)
     assert response.efficiency == pytest.approx(best.efficiency, abs=1e-8)
 
 

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from bellcrank.plots.movies import movie_settings
-from bellcrank.runs import RunFolder
 from bellcrank.search import read_settings
+from bellcrank.storage import RunFolder
 from bellcrank.workflows.animate_search import read_story, search_movie
 
 from .helpers import PROBLEM, call, design_of, files, refusal, write

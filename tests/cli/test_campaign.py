@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 import pytest
+
 from tests.campaign.helpers import ROWS, SPEC, rotten, write_spec
 
 from .helpers import call

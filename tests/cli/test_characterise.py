@@ -92,7 +92,9 @@ def test_bad_input_is_refused_in_one_line(here: Path) -> None:
         "characterise", "crane", "--points", 0
     )
     assert "load 'heavy': expected free" in refusal("characterise", "crane", "--load", "heavy")
-    assert "dangling must be one of" in refusal("characterise", "crane", "--dangling", "some")
+    assert "unloaded_beams must be one of" in refusal(
+        "characterise", "crane", "--unloaded-beams", "some"
+    )
     assert "unknown" in refusal("characterise", "nowhere")
     assert "a.txt: expected a record ending in .json" in refusal(
         "characterise", "crane", "--out", "a.txt"

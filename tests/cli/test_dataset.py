@@ -70,7 +70,7 @@ def test_bad_words_are_refused_in_one_line(built: Path, here: Path) -> None:
     assert "is a file" in refusal("dataset", "export", built, "--png", "text")
     assert "runs: expected at least 1" in refusal("dataset", "build", PROBLEM, "--runs", 0)
     assert "workers: expected at least 1" in refusal("dataset", "build", PROBLEM, "--workers", 0)
-    words = ("dataset", "build", PROBLEM, "--set", "dangling=ignored")
-    assert "dangling: with 'ignored'" in refusal(*words)
+    words = ("dataset", "build", PROBLEM, "--set", "unloaded_beams=ignored")
+    assert "unloaded_beams: with 'prune_dead_ends'" in refusal(*words)
     assert "expected KEY=VALUE" in refusal("dataset", "build", PROBLEM, "--set", "x")
     assert list(here.iterdir()) == [here / "text"]

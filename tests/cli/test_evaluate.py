@@ -89,7 +89,7 @@ def test_designs_are_evaluated_in_the_order_they_are_given(
     assert len(set(masks)) == 3
     content = {"masks": masks} if form == "masks" else {"results": [{"mask": m} for m in masks]}
     write(here / "masks.json", content)
-    as_searched = ("--dangling", "stripped")
+    as_searched = ("--unloaded-beams", "prune_all")
     results = results_of(
         call("evaluate", "scaling-8", "--designs", "masks.json", "--json", *as_searched)
     )

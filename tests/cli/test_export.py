@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bellcrank.fabricate import Export, exporters, slicer
-from bellcrank.fabricate.gcode import read_gcode
-from bellcrank.fabricate.profiles import profiles
+from bellcrank.export import Export, exporters, slicer
+from bellcrank.export.gcode import read_gcode
+from bellcrank.export.profiles import profiles
 from bellcrank.model import Design, find_problem, human_design, write_design
-from bellcrank.parts import PartSpec, materials
+from bellcrank.part import PartSpec, materials
 
 from .helpers import call, files, refusal, write
 

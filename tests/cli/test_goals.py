@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Core, Evaluator, output_stiffness
+from bellcrank.mechanics import Core, SpringEvaluator, output_stiffness
 from bellcrank.model import read_design, unpack_mask
 from bellcrank.search import pieces
 from bellcrank.search.goals import mass_of, mirror_images, near_pairs
@@ -35,8 +35,8 @@ def light(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_design_keeps_its_goals(light: Path) -> None:
     design = read_design(light / "design.json")
-    evaluator = Evaluator(design.problem)
-    moved = design.problem.lattice.positions + evaluator.respond(design.mask).displacement
+    evaluator = SpringEvaluator(design.problem)
+    moved = design.problem.lattice.positions + evaluator.evaluate(design.mask).displacement
     assert mass_of(design.problem, Core(evaluator).of(design.mask)) <= 0.6
     near, _ = near_pairs(moved, design.problem.lattice.beams[design.mask], 0.2)
     assert len(near) == 0
@@ -48,7 +48,7 @@ def test_the_efficiency_is_the_mean_over_the_strokes(light: Path) -> None:
     summary = json.loads((light / "summary.json").read_text())
     assert design.efficiency == summary["efficiency"]
     assert summary["verified"]
-    full = Evaluator(design.problem).respond(design.mask).efficiency
+    full = SpringEvaluator(design.problem).evaluate(design.mask).efficiency
     assert abs(full - summary["efficiency"]) > 1e-5
     assert "| goals kept | mass <= 0.6, no-contact 0.2 |" in (light / "summary.md").read_text()
 
@@ -57,12 +57,12 @@ def test_the_front_holds_designs_that_no_other_beats_with_true_values(light: Pat
     data = json.loads((light / "pareto.json").read_text())
     design = read_design(light / "design.json")
     problem = design.problem
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     core = Core(evaluator)
     points = []
     for entry in data["results"]:
         mask = unpack_mask(entry["mask"], problem.lattice.beam_count)
-        evaluator.respond(mask)
+        evaluator.evaluate(mask)
         assert entry["stiffness"] == pytest.approx(output_stiffness(evaluator), rel=1e-6)
         assert entry["mass"] == pytest.approx(mass_of(problem, core.of(mask)))
         assert entry["mass"] <= 0.6

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bellcrank.machines import elementary
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import read_design, write_design
 
 from .helpers import call, refusal
@@ -52,7 +52,7 @@ def test_a_plan_becomes_a_design_that_every_command_takes(plan: Path) -> None:
     assert (told["beams"], told["nodes"]) == (
         design.beam_count, design.problem.lattice.node_count,
     )  # fmt: skip
-    found = Evaluator(design.problem).respond(design.mask).efficiency
+    found = SpringEvaluator(design.problem).evaluate(design.mask).efficiency
     assert told["efficiency"] == pytest.approx(found, abs=1e-8)
     evaluated = call("evaluate", plan.with_suffix(".json"), "--json").data["results"][0]
     assert evaluated["efficiency"] == told["efficiency"]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bellcrank.runs.layout import LOCK
-from bellcrank.runs.locking import locked
+from bellcrank.storage.layout import LOCK
+from bellcrank.storage.locking import locked
 
 from .helpers import LIFT, PROBLEM, SETTINGS, SMALL, call, files, refusal, write
 
@@ -161,13 +161,16 @@ def test_a_missing_file_of_designs_is_refused(small: str) -> None:
         ("--search", f"unknown search 'best'; known: {SEARCHES}"),
         ("--schedule", "unknown schedule 'best'; known: linear, geometric, constant"),
         ("--cost", "unknown cost 'best'; known: exponential, negative"),
-        ("--dangling", "dangling must be one of counted, ignored, stripped; got 'best'"),
+        (
+            "--unloaded-beams",
+            "unloaded_beams must be one of counted, ignored, stripped; got 'best'",
+        ),
     ],
 )
 def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: str) -> None:
     chain = ("--search", "paper") if option in ("--schedule", "--cost") else ()
     assert refusal("design", PROBLEM, *chain, option, "best") == f"error: {message}"
-    if option in ("--minimiser", "--objective", "--dangling"):
+    if option in ("--minimiser", "--objective", "--unloaded-beams"):
         assert refusal("evaluate", PROBLEM, option, "best") == f"error: {message}"
 
 

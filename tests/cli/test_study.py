@@ -3,7 +3,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from bellcrank.studies import studies
+from reproduction import studies
 
 from .helpers import call
 

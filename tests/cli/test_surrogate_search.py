@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bellcrank.learning import finding
-from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model import find_problem, read_design, write_problem
 from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import Dataset
@@ -34,8 +34,8 @@ def data() -> Dataset:
     rng = np.random.default_rng(2)
     masks = np.repeat(problem.initial[None], 80, axis=0)
     masks[:, problem.designable] = rng.random((80, len(problem.designable))) < 0.9
-    evaluator = Evaluator(problem)
-    efficiency = [evaluator.respond(mask).efficiency for mask in masks]
+    evaluator = SpringEvaluator(problem)
+    efficiency = [evaluator.evaluate(mask).efficiency for mask in masks]
     return Dataset(problem, np.packbits(masks, axis=1), np.array(efficiency), np.arange(80) // 20)
 
 
@@ -66,7 +66,7 @@ def test_a_search_leaves_record_design_and_picture(here: Path, model: Path, data
     for words in ("as predicted", "as checked", "by mechanics", "beams from the dataset", "best: "):
         assert words in outcome.out
     design = read_design(folder / "design.json")
-    response = Evaluator(design.problem).respond(design.mask, CAREFUL)
+    response = SpringEvaluator(design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
     assert design.efficiency == response.efficiency
     assert f"{response.efficiency:.4f}" in outcome.out
     refused = refusal("surrogate-search", PROBLEM, "--model", model, *QUICK)

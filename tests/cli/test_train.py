@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from tests.learning.tiny import tiny_dataset, tiny_model, tiny_problem
-from tests.surrogate.helpers import random_dataset, same_weights, untrained
 
 from bellcrank.model import find_problem, pack_mask, write_problem
 from bellcrank.surrogate.trained import read_model
+from tests.learning.tiny import tiny_dataset, tiny_model, tiny_problem
+from tests.surrogate.helpers import random_dataset, same_weights, untrained
 
 from .helpers import Outcome, call, refusal
 

@@ -17,7 +17,7 @@ import pytest
 from bellcrank.errors import StorageError
 from bellcrank.fem import FemSettings
 from bellcrank.model import Design, find_problem, human_design, read_design, write_design
-from bellcrank.parts import PartSpec
+from bellcrank.part import PartSpec
 from bellcrank.workflows import find_design, keep_record, validate
 from bellcrank.workflows import record as record_module
 
@@ -338,7 +338,7 @@ def test_all_levels_stand_in_one_table() -> None:
 @pytest.mark.parametrize("option", ["--picture", "--vtu", "--record"])
 def test_files_in_missing_folders_are_refused_before_anything_is_computed(option: str) -> None:
     name = {"--picture": "none/a.png", "--vtu": "none/a.vtu", "--record": "none/a.json"}[option]
-    with mock.patch("bellcrank.workflows.validate.Evaluator", side_effect=AssertionError):
+    with mock.patch("bellcrank.workflows.validate.SpringEvaluator", side_effect=AssertionError):
         assert "(no folder none)" in refusal("validate", "crane", option, name, code=1)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from bellcrank.errors import InvalidProblem, InvalidSettings, UnknownName
 from bellcrank.mechanics import (
-    Evaluator,
+    SpringEvaluator,
     Status,
     efficiency_of,
     minimisers,
@@ -57,10 +57,10 @@ def test_every_objective_gives_a_number_or_says_why_not(objective: str, drive: s
     problem = tiny(drive)
     if not suits(objective, drive):
         with pytest.raises(InvalidSettings, match=objective):
-            Evaluator(problem, objective)
+            SpringEvaluator(problem, objective)
         return
-    evaluator = Evaluator(problem, objective)
-    response = evaluator.respond(problem.initial)
+    evaluator = SpringEvaluator(problem, objective)
+    response = evaluator.evaluate(problem.initial)
     assert response.status is Status.CONVERGED
     assert np.isfinite(response.efficiency)
     measured = efficiency_of(problem, response.displacement, objective)
@@ -83,23 +83,23 @@ def test_every_objective_turns_its_sign_with_the_output(objective: str, drive: s
 @pytest.mark.parametrize("minimiser", list(minimisers))
 def test_every_minimiser_finds_the_same_response(minimiser: str, drive: str) -> None:
     problem = tiny(drive)
-    evaluator, newton = Evaluator(problem, minimiser=minimiser), Evaluator(problem)
+    evaluator, newton = SpringEvaluator(problem, minimiser=minimiser), SpringEvaluator(problem)
     for removed in ([], [1], [2], [1, 2], [4], [1, 4]):
         mask = problem.initial.copy()
         mask[removed] = False
-        found, expected = evaluator.respond(mask), newton.respond(mask)
+        found, expected = evaluator.evaluate(mask), newton.evaluate(mask)
         assert found.status is expected.status
         assert found.efficiency == pytest.approx(expected.efficiency, abs=1e-6, nan_ok=True)
-        evaluator.remember()
-        again = evaluator.respond_nearby(mask)
+        evaluator.set_reference()
+        again = evaluator.evaluate(mask, warm_start=True)
         assert again.efficiency == pytest.approx(found.efficiency, abs=1e-6, nan_ok=True)
 
 
 @pytest.mark.parametrize("minimiser", list(minimisers))
 def test_every_minimiser_answers_twice_with_the_same_bits(minimiser: str) -> None:
     problem = tiny("displacement")
-    first = Evaluator(problem, minimiser=minimiser).respond(problem.initial)
-    second = Evaluator(problem, minimiser=minimiser).respond(problem.initial)
+    first = SpringEvaluator(problem, minimiser=minimiser).evaluate(problem.initial)
+    second = SpringEvaluator(problem, minimiser=minimiser).evaluate(problem.initial)
     assert first.efficiency == second.efficiency
     assert first.energy == second.energy
     assert (first.displacement == second.displacement).all()
@@ -109,7 +109,7 @@ def test_every_minimiser_answers_twice_with_the_same_bits(minimiser: str) -> Non
 def test_every_minimiser_knows_a_mechanism(minimiser: str) -> None:
     problem = tiny("force")
     none = np.zeros(len(BEAMS), dtype=bool)
-    response = Evaluator(problem, minimiser=minimiser).respond(none)
+    response = SpringEvaluator(problem, minimiser=minimiser).evaluate(none)
     assert response.status is Status.MECHANISM
     assert np.isnan(response.efficiency)
 
@@ -118,7 +118,7 @@ def test_every_minimiser_knows_a_mechanism(minimiser: str) -> None:
 def test_every_minimiser_leaves_loose_pieces_at_rest(minimiser: str) -> None:
     problem = tiny("displacement")
     cut = np.array([True, True, True, True, True, False, False])
-    response = Evaluator(problem, minimiser=minimiser).respond(cut)
+    response = SpringEvaluator(problem, minimiser=minimiser).evaluate(cut)
     assert response.status is Status.CONVERGED
     assert response.efficiency == 0.0
     assert (response.displacement[:4] == 0.0).all()
@@ -138,15 +138,15 @@ def test_every_status_has_a_word_and_a_sentence(status: Status) -> None:
         ({"objective": "directional:1.5"}, InvalidSettings),
         ({"objective": "directional:much"}, InvalidSettings),
         ({"minimiser": "hope"}, UnknownName),
-        ({"dangling": "sometimes"}, InvalidSettings),
+        ({"unloaded_beams": "sometimes"}, InvalidSettings),
     ],
 )
 def test_what_does_not_exist_is_refused_by_name(options: dict[str, str], error: type) -> None:
     value = next(iter(options.values()))
     with pytest.raises(error, match=value.split(":")[0]):
-        Evaluator(tiny("displacement"), **options)
+        SpringEvaluator(tiny("displacement"), **options)
 
 
 def test_a_mask_of_the_wrong_length_is_refused() -> None:
     with pytest.raises(InvalidProblem, match=r"expected shape \(7,\)"):
-        Evaluator(tiny("displacement")).respond(np.ones(8, dtype=bool))
+        SpringEvaluator(tiny("displacement")).evaluate(np.ones(8, dtype=bool))

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from tests.search.snapping import Snapping
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import CAREFUL, Evaluator, Response, Screening, Status
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    FlipPrediction,
+    Response,
+    SpringEvaluator,
+    Status,
+)
 from bellcrank.model import Problem, find_problem
-from bellcrank.runs import Proposals
 from bellcrank.search import (
     BLOCK,
     SearchSettings,
@@ -20,12 +25,14 @@ from bellcrank.search import (
     advance_chain,
     chain_blocks,
     is_done,
-    make_responder,
+    make_evaluator,
     read_settings,
     read_state,
     searches,
     start_chain,
 )
+from bellcrank.storage import Proposals
+from tests.search.snapping import Snapping
 
 STEPS = 3 * BLOCK + 10
 
@@ -45,7 +52,7 @@ def joined(parts: list[Proposals]) -> Proposals:
 
 
 def whole(problem: Problem, settings: SearchSettings, chain: int = 0) -> tuple[State, Proposals]:
-    blocks = list(chain_blocks(make_responder(problem, settings), settings, chain))
+    blocks = list(chain_blocks(make_evaluator(problem, settings), settings, chain))
     return blocks[-1][0], joined([proposals for _, proposals in blocks])
 
 
@@ -62,7 +69,7 @@ def test_settings_survive_json(settings: SearchSettings) -> None:
 
 
 def test_only_the_paper_s_search_feeds_on_what_carries_no_load(settings: SearchSettings) -> None:
-    assert settings.dangling == ("counted" if settings.name == "paper" else "stripped")
+    assert settings.unloaded_beams == ("keep" if settings.name == "paper" else "prune_all")
 
 
 def test_an_unknown_setting_is_refused(settings: SearchSettings) -> None:
@@ -74,10 +81,10 @@ def test_a_chain_resumed_from_json_is_the_same_to_the_last_bit(
     small: Problem, settings: SearchSettings
 ) -> None:
     end, proposals = whole(small, settings)
-    state, parts = start_chain(make_responder(small, settings), settings, 0), []
+    state, parts = start_chain(make_evaluator(small, settings), settings, 0), []
     while not is_done(state, settings):
         state = read_state(settings, json.loads(json.dumps(state.to_dict())))
-        state, rows = advance_chain(make_responder(small, settings), settings, 0, state)
+        state, rows = advance_chain(make_evaluator(small, settings), settings, 0, state)
         parts.append(rows)
     assert state == end
     assert same(joined(parts), proposals)
@@ -87,7 +94,7 @@ def test_blocks_end_at_fixed_steps_with_one_row_for_each(
     small: Problem, settings: SearchSettings
 ) -> None:
     ends, rows = [], 0
-    for state, proposals in chain_blocks(make_responder(small, settings), settings, 0):
+    for state, proposals in chain_blocks(make_evaluator(small, settings), settings, 0):
         ends.append(state.step)
         rows += len(proposals.status)
         assert rows == state.step
@@ -98,12 +105,12 @@ def test_accepted_designs_have_the_efficiency_that_was_recorded(
     small: Problem, settings: SearchSettings
 ) -> None:
     state, proposals = whole(small, settings)
-    evaluator = Evaluator(small, dangling=settings.dangling)
+    evaluator = SpringEvaluator(small, unloaded_beams=settings.unloaded_beams)
     bits = np.unpackbits(proposals.mask, axis=1)[:, : small.lattice.beam_count].astype(bool)
     taken = np.flatnonzero(proposals.accepted)
     assert len(taken) == state.accepted > 20
     for index in taken[::7]:
-        response = evaluator.respond(bits[index])
+        response = evaluator.evaluate(bits[index])
         assert response.status is Status.CONVERGED
         assert response.efficiency == pytest.approx(proposals.efficiency[index], abs=1e-8)
     assert (proposals.status[taken] == Status.CONVERGED).all()
@@ -126,9 +133,9 @@ def test_seeds_and_chains_differ(small: Problem, settings: SearchSettings) -> No
 
 
 def test_designs_that_snap_are_never_accepted(small: Problem, settings: SearchSettings) -> None:
-    responder = Snapping(small, 3)
-    state = start_chain(responder, settings, 0)
-    _, proposals = advance_chain(responder, settings, 0, state)
+    evaluator = Snapping(small, 3)
+    state = start_chain(evaluator, settings, 0)
+    _, proposals = advance_chain(evaluator, settings, 0, state)
     snapped = proposals.status == Status.SNAPPED
     assert snapped.sum() > 20
     assert not proposals.accepted[snapped].any()
@@ -139,12 +146,12 @@ def test_a_search_that_can_foresee_nothing_goes_on(
     small: Problem, settings: SearchSettings
 ) -> None:
     class Blind(Snapping):
-        def screen(self, mask: np.ndarray) -> Screening | None:  # noqa: ARG002
+        def predict_flips(self, mask: np.ndarray) -> FlipPrediction | None:  # noqa: ARG002
             return None
 
-    responder = Blind(small, 3)
-    state = start_chain(responder, settings, 0)
-    _, proposals = advance_chain(responder, settings, 0, state)
+    evaluator = Blind(small, 3)
+    state = start_chain(evaluator, settings, 0)
+    _, proposals = advance_chain(evaluator, settings, 0, state)
     assert len(proposals.status) == BLOCK
 
 
@@ -152,8 +159,11 @@ def test_a_search_cannot_start_from_a_design_without_response(
     small: Problem, settings: SearchSettings
 ) -> None:
     class Broken(Snapping):
-        def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
-            return replace(super().respond(mask, largest_increment), status=Status.MECHANISM)
+        def evaluate(
+            self, mask: np.ndarray, largest_increment: float = 1.0, **start: Any
+        ) -> Response:
+            response = super().evaluate(mask, largest_increment, **start)
+            return response if start else replace(response, status=Status.MECHANISM)
 
     with pytest.raises(InvalidSettings, match="cannot start"):
         start_chain(Broken(small, 3), settings, 0)
@@ -162,10 +172,10 @@ def test_a_search_cannot_start_from_a_design_without_response(
 def test_a_state_between_blocks_is_the_only_one_to_go_on_from(
     small: Problem, settings: SearchSettings
 ) -> None:
-    responder = make_responder(small, settings)
-    state = replace(start_chain(responder, settings, 0), step=7)
+    evaluator = make_evaluator(small, settings)
+    state = replace(start_chain(evaluator, settings, 0), step=7)
     with pytest.raises(InvalidSettings, match="a state at step 7 is not between blocks"):
-        advance_chain(responder, settings, 0, state)
+        advance_chain(evaluator, settings, 0, state)
 
 
 def test_what_a_search_offers_stands_up_to_a_closer_look(
@@ -176,6 +186,8 @@ def test_what_a_search_offers_stands_up_to_a_closer_look(
     offered = searches[settings.name].offers(proposals.efficiency[taken], proposals.mask[taken])
     best = max(offered, key=lambda index: proposals.efficiency[taken][index])
     mask = np.unpackbits(proposals.mask[taken[best]])[: small.lattice.beam_count].astype(bool)
-    response = Evaluator(small, dangling=settings.dangling).respond(mask, CAREFUL)
+    response = SpringEvaluator(small, unloaded_beams=settings.unloaded_beams).evaluate(
+        mask, VERIFICATION_INCREMENT
+    )
     assert response.efficiency == pytest.approx(proposals.efficiency[taken[best]], abs=1e-8)
     assert response.efficiency > 0.1

@@ -9,6 +9,7 @@ import subprocess
 from typing import TYPE_CHECKING
 
 import numpy as np
+
 from tests.fem.nodes import positions_of, quadratic
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.fem.continuum.mesh import ContinuumMesh
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 # Integrals of the functions of corners and of edge midpoints over a tetrahedron, by its volume.
 CORNER, MIDDLE = -1.0 / 20.0, 1.0 / 5.0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 
 def respond(

@@ -9,11 +9,12 @@ import skfem
 from scipy.sparse import block_array, csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
+
 from tests.fem.nodes import positions_of, quadratic
 
 if TYPE_CHECKING:
     from bellcrank.fem.continuum.mesh import ContinuumMesh
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 
 def respond(

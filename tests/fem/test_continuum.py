@@ -17,8 +17,6 @@ if importlib.util.find_spec("ngsolve") is None:
     pytest.skip("NGSolve is not installed", allow_module_level=True)
 
 import ngsolve as ng
-from tests.fem import calculix
-from tests.fem.nodes import at_nodes, quadratic
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.continuum.backend import ngsolve
@@ -34,11 +32,13 @@ from bellcrank.fem.frame.equilibrium import FrameEquations
 from bellcrank.fem.frame.mesh import frame_mesh
 from bellcrank.fem.frame.system import frame_system
 from bellcrank.fem.path import PathStatus, Stepping, follow
-from bellcrank.geometry import Loop, Outline
 from bellcrank.model import Input, Lattice, Output, Problem, Supports
-from bellcrank.parts.materials import Material
-from bellcrank.parts.part import Part
-from bellcrank.parts.section import Section
+from bellcrank.part.materials import Material
+from bellcrank.part.outline import Loop, Outline
+from bellcrank.part.part import Part
+from bellcrank.part.section import Section
+from tests.fem import calculix
+from tests.fem.nodes import at_nodes, quadratic
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,7 +12,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from tests.fem import opensees
 
 from bellcrank.fem.frame.elements import energy, forces_and_stiffness
 from bellcrank.fem.frame.equilibrium import FrameEquations, FrameState, solve_linear
@@ -31,9 +30,10 @@ from bellcrank.model import (
     find_problem,
     read_problem,
 )
-from bellcrank.parts.materials import Material
-from bellcrank.parts.part import Part
-from bellcrank.parts.section import Section
+from bellcrank.part.materials import Material
+from bellcrank.part.part import Part
+from bellcrank.part.section import Section
+from tests.fem import opensees
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "crane.problem.json"
 RUBBER = Material(name="rubber", young=12.0, poisson=0.48)

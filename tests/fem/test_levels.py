@@ -12,7 +12,7 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings, PathStatus, levels
 from bellcrank.fem.contact import find_contacts
 from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem, human_design
-from bellcrank.parts import Material, Part, PartSpec, Section
+from bellcrank.part import Material, Part, PartSpec, Section
 
 RUBBER = Material(name="rubber", young=12.0, poisson=0.48, strain_limit=0.01)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, Status, load_bearing_core
+from bellcrank.mechanics import SpringEvaluator, Status, load_bearing_core
 from bellcrank.model import find_problem, human_design
 
 ROW_HEIGHT = np.sqrt(3.0) / 2.0
@@ -132,7 +132,7 @@ def test_the_design_is_one_piece(design):
 
 
 def test_efficiency_is_as_noted_and_the_path_is_stable(design):
-    response = Evaluator(design.problem).respond(design.mask, largest_increment=1 / 64)
+    response = SpringEvaluator(design.problem).evaluate(design.mask, largest_increment=1 / 64)
     assert response.status is Status.CONVERGED
     assert response.efficiency == pytest.approx(EFFICIENCY[design.problem.name], abs=1e-6)
 
@@ -143,16 +143,16 @@ def test_the_note_says_how_it_works(design):
 
 
 def test_the_design_beats_the_full_lattice(design):
-    evaluator = Evaluator(design.problem)
-    full = evaluator.respond(design.problem.initial).efficiency
-    assert full < 0.05 < evaluator.respond(design.mask).efficiency
+    evaluator = SpringEvaluator(design.problem)
+    full = evaluator.evaluate(design.problem.initial).efficiency
+    assert full < 0.05 < evaluator.evaluate(design.mask).efficiency
 
 
 @pytest.mark.parametrize("name", ["crane", "anti-parallel"])
 def test_the_output_moves_mainly_the_wanted_way(name):
     design = human_design(name)
     output = design.problem.output
-    response = Evaluator(design.problem).respond(design.mask)
+    response = SpringEvaluator(design.problem).evaluate(design.mask)
     moved = response.displacement[output.nodes].mean(axis=0)
     assert moved @ output.direction[0] > abs(moved @ output.direction[0][::-1])
 
@@ -160,14 +160,16 @@ def test_the_output_moves_mainly_the_wanted_way(name):
 def test_the_handle_and_the_jaw_of_the_pliers_both_move_to_the_mirror_line():
     design = human_design("pliers")
     problem = design.problem
-    response = Evaluator(problem).respond(design.mask)
+    response = SpringEvaluator(problem).evaluate(design.mask)
     for region in (problem.input, problem.output):
         assert response.displacement[region.nodes, 1].mean() < 0.0
 
 
 def test_ordinary_pliers_in_one_piece_would_open_since_the_halves_do_not_cross():
     problem = find_problem("pliers")
-    response = Evaluator(problem).respond(mask_of(problem, PLAIN_LEVER), largest_increment=1 / 64)
+    response = SpringEvaluator(problem).evaluate(
+        mask_of(problem, PLAIN_LEVER), largest_increment=1 / 64
+    )
     assert response.status is Status.CONVERGED
     assert response.efficiency == pytest.approx(-0.73992, abs=1e-5)
 

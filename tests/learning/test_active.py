@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.surrogate.helpers import moved
 
 from bellcrank.errors import InvalidDataset, InvalidModel, InvalidSettings
 from bellcrank.learning import proposing
 from bellcrank.learning.active import learn_actively
 from bellcrank.learning.knowledge import Knowledge, begin_learning
 from bellcrank.learning.proposing import ActiveSettings, label_designs, propose_designs
-from bellcrank.mechanics import Evaluator, Response, Status
+from bellcrank.mechanics import Response, SpringEvaluator, Status
 from bellcrank.surrogate.predictor import Predictor
+from tests.surrogate.helpers import moved
 
 from .tiny import RECIPE, tiny_dataset, tiny_model, tiny_problem
 
@@ -55,10 +55,10 @@ def test_the_most_disputed_and_the_best_are_chosen() -> None:
 def test_labels_are_those_of_the_mechanics_and_each_chain_is_a_run() -> None:
     one = predictor(1)
     data = label_designs(one, propose_designs(one, SETTINGS), SETTINGS)
-    evaluator = Evaluator(tiny_problem())
+    evaluator = SpringEvaluator(tiny_problem())
     for packed, efficiency in zip(data.packed[::7], data.efficiency[::7], strict=True):
         mask = np.unpackbits(packed, count=tiny_problem().lattice.beam_count)
-        assert evaluator.respond(mask.astype(bool)).efficiency == efficiency
+        assert evaluator.evaluate(mask.astype(bool)).efficiency == efficiency
     assert data.run_count == 5
     assert data.origin["active"]["seed"] == 9
 
@@ -117,15 +117,15 @@ def test_a_stopped_round_is_none(what: str) -> None:
     assert ended is None or what == "training"  # a short training may be over before it is asked
 
 
-class Snapping(Evaluator):
+class Snapping(SpringEvaluator):
     """Finds that everything snaps."""
 
-    def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
-        return replace(super().respond(mask, largest_increment), status=Status.SNAPPED)
+    def evaluate(self, mask: np.ndarray, largest_increment: float = 1.0, **start: Any) -> Response:
+        return replace(super().evaluate(mask, largest_increment, **start), status=Status.SNAPPED)
 
 
 def test_designs_that_all_snap_are_no_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(proposing, "Evaluator", Snapping)
+    monkeypatch.setattr(proposing, "SpringEvaluator", Snapping)
     chosen = [tiny_dataset().packed[:3]]
     with pytest.raises(InvalidDataset, match="none of 3 designs"):
         label_designs(predictor(1), chosen, SETTINGS)

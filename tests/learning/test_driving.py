@@ -18,7 +18,7 @@ from bellcrank.learning.driving_files import keep_driven, picture_of
 from bellcrank.learning.driving_settings import Driving
 from bellcrank.learning.scoring import Judge, NetworkScorer, Truth
 from bellcrank.learning.stretches import Confirmer
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import find_problem, read_design, unpack_mask
 from bellcrank.search.populations import start_population
 from bellcrank.search.scorers import MechanicsScorer
@@ -46,10 +46,10 @@ def driven() -> Driven:
 
 
 def test_all_that_is_offered_is_checked_by_the_mechanics(driven: Driven) -> None:
-    evaluator = Evaluator(tiny_problem())
+    evaluator = SpringEvaluator(tiny_problem())
     assert len(driven.by_network) == len(driven.by_mechanics) == 4 * len(OFFERS)
     for made in (*driven.by_network, *driven.by_mechanics):
-        response = evaluator.respond(mask_of(made), CAREFUL)
+        response = evaluator.evaluate(mask_of(made), VERIFICATION_INCREMENT)
         assert made.truth.status == response.status.label
         sound = response.status is Status.CONVERGED
         assert made.truth.efficiency == (response.efficiency if sound else None)
@@ -128,7 +128,7 @@ def test_the_folder_holds_record_design_and_picture(driven: Driven, tmp_path: Pa
     design = read_design(tmp_path / "made" / "design.json")
     assert design.efficiency == max(made.truth.rank for made in driven.by_network)
     assert design.provenance["found"]["by"].startswith("search driven by a network, checked")
-    response = Evaluator(tiny_problem()).respond(design.mask, CAREFUL)
+    response = SpringEvaluator(tiny_problem()).evaluate(design.mask, VERIFICATION_INCREMENT)
     assert response.efficiency == design.efficiency
     assert (tmp_path / "made" / "driven.png").stat().st_size > 10_000
     with pytest.raises(OutputExists):
@@ -212,8 +212,8 @@ def test_training_designs_for_another_problem_are_refused() -> None:
 def test_stretches_that_lower_the_true_efficiency_are_taken_back() -> None:
     cold = {"schedule": "constant", "cold": 1e-9}
     settings = replace(SETTINGS, confirm=5, compare=False, search=cold, steps=60)
-    evaluator, problem = Evaluator(tiny_problem()), tiny_problem()
-    at_start = evaluator.respond(problem.initial).efficiency
+    evaluator, problem = SpringEvaluator(tiny_problem()), tiny_problem()
+    at_start = evaluator.evaluate(problem.initial).efficiency
     driven = drive(problem, ensemble(), settings)
     assert driven.network.responses == (12,) * 4
     finals = [made.truth.rank for made in driven.offered("final")]
@@ -227,7 +227,7 @@ def test_a_confirmer_keeps_to_metropolis_rule() -> None:
     """A right scorer is confirmed as often as the rule says, a design without response never."""
     problem = tiny_problem()
     rule = replace(SETTINGS, chains=400).rule
-    scorer = MechanicsScorer(Evaluator(problem))
+    scorer = MechanicsScorer(SpringEvaluator(problem))
     start = start_population(problem, scorer, rule)
     worse = start.masks.copy()
     chances = []
@@ -239,7 +239,7 @@ def test_a_confirmer_keeps_to_metropolis_rule() -> None:
     chance, beam = min(chances, key=lambda each: abs(each[0] - 0.5))
     assert 0.2 < chance < 0.9
     worse[:, beam] ^= True
-    confirmer = Confirmer.at(Evaluator(problem), rule, 1, start)
+    confirmer = Confirmer.at(SpringEvaluator(problem), rule, 1, start)
     after = confirmer.confirm(replace(start, step=10, masks=worse))
     kept = (after.masks == worse).all(axis=1)
     assert abs(kept.mean() - chance) < 4.0 * math.sqrt(chance * (1.0 - chance) / 400)

@@ -17,7 +17,7 @@ from bellcrank.learning.driven import OFFERS, Driven, Effort
 from bellcrank.learning.driving import DrivingProgress, drive
 from bellcrank.learning.driving_files import keep_driven, picture_of
 from bellcrank.learning.driving_settings import FIRST_CHAIN, Driving
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import read_design, unpack_mask
 from bellcrank.search import MetropolisSettings, chain_blocks
 from bellcrank.search.screened import screened_blocks
@@ -28,8 +28,8 @@ from .tiny import tiny_model, tiny_problem
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bellcrank.runs import Proposals
     from bellcrank.search.screened import ScreenedState
+    from bellcrank.storage import Proposals
 
 STEPS = 270
 SETTINGS = Driving(chains=3, steps=STEPS, checked=3, seed=2, exact=True, search={"doubt": 0.002})
@@ -62,7 +62,7 @@ def alone() -> list[list[tuple[ScreenedState, Proposals]]]:
     """The same chains one after the other."""
     scorer, rule = Weights(network(), 0.0), SETTINGS.screened_rule
     return [
-        list(screened_blocks(Evaluator(tiny_problem()), scorer, rule, FIRST_CHAIN + row))
+        list(screened_blocks(SpringEvaluator(tiny_problem()), scorer, rule, FIRST_CHAIN + row))
         for row in range(3)
     ]
 
@@ -95,10 +95,10 @@ def test_a_chain_offers_the_best_that_the_mechanics_computed(
 
 
 def test_all_that_is_offered_is_checked_in_small_steps(driven: Driven) -> None:
-    evaluator, beams = Evaluator(tiny_problem()), tiny_problem().lattice.beam_count
+    evaluator, beams = SpringEvaluator(tiny_problem()), tiny_problem().lattice.beam_count
     assert len(driven.by_network) == len(driven.by_mechanics) == 3 * len(OFFERS)
     for made in (*driven.by_network, *driven.by_mechanics):
-        response = evaluator.respond(unpack_mask(made.mask, beams), CAREFUL)
+        response = evaluator.evaluate(unpack_mask(made.mask, beams), VERIFICATION_INCREMENT)
         sound = response.status is Status.CONVERGED
         assert made.truth.efficiency == (response.efficiency if sound else None)
     masks = np.array([unpack_mask(made.mask, beams) for made in driven.by_network])
@@ -110,7 +110,7 @@ def test_it_is_compared_with_plain_chains_of_the_same_rule(driven: Driven) -> No
     rule = MetropolisSettings(steps=STEPS, chains=3, seed=2)
     last = []
     for chain in range(FIRST_CHAIN, FIRST_CHAIN + 3):
-        *_, (state, _) = chain_blocks(Evaluator(tiny_problem()), rule, chain)
+        *_, (state, _) = chain_blocks(SpringEvaluator(tiny_problem()), rule, chain)
         last.append(state)
     made = driven.offered("final", by_network=False)
     assert [each.mask for each in made] == [state.mask for state in last]

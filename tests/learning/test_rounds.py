@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import torch
-from tests.surrogate.helpers import equal, same_weights, untrained
 
 from bellcrank.errors import (
     BellcrankError,
@@ -42,6 +41,7 @@ from bellcrank.surrogate.dataset import Dataset, read_dataset
 from bellcrank.surrogate.folder import data_hash
 from bellcrank.surrogate.predictor import Prediction, Predictor
 from bellcrank.surrogate.trained import read_model
+from tests.surrogate.helpers import equal, same_weights, untrained
 
 from .tiny import RECIPE, tiny_dataset, tiny_model
 

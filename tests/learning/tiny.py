@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.learning.building import reverse
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Input, Output, Problem, Supports, lattices
 from bellcrank.search import MetropolisSettings, chain_blocks
 from bellcrank.surrogate.beginning import begin
@@ -46,7 +46,7 @@ def tiny_dataset() -> Dataset:
         sign = -1.0 if number % 2 else 1.0
         searched = problem if sign > 0.0 else reverse(problem)
         settings = MetropolisSettings(steps=STEPS, seed=number)
-        for _, rows in chain_blocks(Evaluator(searched), settings, 0):
+        for _, rows in chain_blocks(SpringEvaluator(searched), settings, 0):
             sound = rows.status == Status.CONVERGED
             packed.append(rows.mask[sound])
             efficiency.append(sign * rows.efficiency[sound])

@@ -12,7 +12,7 @@ from bellcrank.errors import BellcrankError, InvalidFile, InvalidSettings, Unkno
 from bellcrank.machines.assembly import Machine, assemble
 from bellcrank.machines.elementary import elementary
 from bellcrank.machines.plan import MachineTable, PortName, plan_of, read_plan
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Stiffness, Supports
 
 if TYPE_CHECKING:
@@ -80,10 +80,10 @@ def test_two_parts_share_the_nodes_of_their_ports_and_nothing_else() -> None:
 
 def test_a_machine_is_an_ordinary_design() -> None:
     machine = build(PAIR)
-    response = Evaluator(machine.design.problem).respond(machine.design.mask)
-    assert response.counts
+    response = SpringEvaluator(machine.design.problem).evaluate(machine.design.mask)
+    assert response.is_admissible
     assert np.isfinite(response.efficiency)
-    again = Evaluator(machine.design.problem).respond(machine.design.mask)
+    again = SpringEvaluator(machine.design.problem).evaluate(machine.design.mask)
     assert again.efficiency == response.efficiency
 
 
@@ -93,8 +93,8 @@ def test_a_machine_of_one_part_does_what_the_part_does(rotate: int, mirror: bool
     placed = {"a": {"entry": "thin", "rotate": rotate, "mirror": mirror, "at": [3.0, -2.0]}}
     machine = build(placed, output={"ports": ["a.output"]})
     alone, here = thinned(), machine.design
-    expected = Evaluator(alone.problem).respond(alone.mask).efficiency
-    found = Evaluator(here.problem).respond(here.mask).efficiency
+    expected = SpringEvaluator(alone.problem).evaluate(alone.mask).efficiency
+    found = SpringEvaluator(here.problem).evaluate(here.mask).efficiency
     assert found == pytest.approx(expected, abs=1e-9)
     centre = here.problem.lattice.positions[machine.port_nodes(PortName("a", "input"))].mean(axis=0)
     assert centre == pytest.approx([3.0, -2.0], abs=1e-12)
@@ -129,7 +129,7 @@ def test_a_bridge_joins_ports_that_are_apart() -> None:
         np.diff(machine.design.problem.lattice.positions[ends], axis=1)[:, 0], axis=1
     )
     assert length == pytest.approx(np.ones(len(ends)))  # one grid: the lattice goes on
-    response = Evaluator(machine.design.problem).respond(machine.design.mask)
+    response = SpringEvaluator(machine.design.problem).evaluate(machine.design.mask)
     assert abs(response.efficiency) > 1e-6
 
 

@@ -13,7 +13,7 @@ from bellcrank.machines import assemble, elementary, foretell
 from bellcrank.machines.chaining import predict
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.plan import MachineTable, PortName, plan_of
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Design
 
 STROKE = 1e-5
@@ -57,7 +57,7 @@ def find(entry: str) -> Design:
 
 
 def whole(machine: Any) -> float:
-    return Evaluator(machine.design.problem).respond(machine.design.mask).efficiency
+    return SpringEvaluator(machine.design.problem).evaluate(machine.design.mask).efficiency
 
 
 @pytest.mark.parametrize(("rotate", "within"), [(0, 1e-3), (300, 0.03)])

@@ -19,7 +19,7 @@ from bellcrank.machines import (
     two_port_at,
     usual_loads,
 )
-from bellcrank.mechanics import Conditions, Evaluator, Status, follow
+from bellcrank.mechanics import Conditions, SpringEvaluator, Status, follow
 from bellcrank.mechanics.strain import strain_of
 from bellcrank.model import Design
 
@@ -36,8 +36,8 @@ def test_a_free_curve_is_that_of_the_responses(name: str) -> None:
     assert curve.reached == 1.0
     for number, motion in enumerate(curve.motion[1:], start=1):
         stroke = replace(design.problem, input=replace(design.problem.input, amount=motion))
-        evaluator = Evaluator(stroke)
-        response = evaluator.respond(design.mask)
+        evaluator = SpringEvaluator(stroke)
+        response = evaluator.evaluate(design.mask)
         assert curve.efficiency[number] == pytest.approx(response.efficiency, abs=1e-8)
         assert curve.energy[number] == pytest.approx(response.energy, abs=1e-10)
         force = strain_of(evaluator).input_force
@@ -51,7 +51,7 @@ def test_a_force_driven_curve_goes_up_to_the_whole_force() -> None:
     curve = trace(mean_ports(design), Load("free"), 4)
     total = problem.input.amount * len(problem.input.nodes)
     assert curve.input_force == pytest.approx(total * np.linspace(0.0, 1.0, 5), abs=1e-12)
-    response = Evaluator(bare, "displacement").respond(design.mask)
+    response = SpringEvaluator(bare, "displacement").evaluate(design.mask)
     given = (response.displacement[problem.input.nodes] * problem.input.direction).sum()
     wanted = (response.displacement[problem.output.nodes] * problem.output.direction).sum()
     assert curve.motion[-1] == pytest.approx(given / len(problem.input.nodes), abs=1e-9)
@@ -168,11 +168,11 @@ def test_where_the_response_goes_elsewhere_it_is_said(
     changes: dict[str, Any], doubt: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     design = actuator("human:crane")
-    response = Evaluator(design.problem).respond(design.mask)
+    response = SpringEvaluator(design.problem).evaluate(design.mask)
     if "displacement" in changes:
         changes = {"displacement": changes["displacement"] * response.displacement}
     found = replace(response, **changes)
-    monkeypatch.setattr(Evaluator, "respond", lambda *_words: found)
+    monkeypatch.setattr(SpringEvaluator, "respond", lambda *_words: found)
     told = characterise(design, [Load("free")], 3).doubts
     assert told == (() if doubt is None else (doubt,))
 
@@ -210,10 +210,10 @@ def test_dead_ends_count_or_not_as_asked() -> None:
     extra = np.flatnonzero(~design.mask)[:40]
     mask = design.mask.copy()
     mask[extra] = True
-    evaluator = Evaluator(problem, dangling="ignored")
+    evaluator = SpringEvaluator(problem, unloaded_beams="prune_dead_ends")
     core = evaluator.load_bearing(mask)
     assert core.sum() < mask.sum()
-    found = characterise(Design(problem, mask), [Load("free")], 2, dangling="ignored")
+    found = characterise(Design(problem, mask), [Load("free")], 2, unloaded_beams="prune_dead_ends")
     same = characterise(Design(problem, core), [Load("free")], 2)
     assert found.rest.efficiency == pytest.approx(same.rest.efficiency, rel=1e-10)
     literal = characterise(Design(problem, mask), [Load("free")], 2)

@@ -7,7 +7,7 @@ import pytest
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.machines import DIRECTIONS, elementary, strut
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 
 
 @pytest.mark.parametrize("columns", [5, 6, 7, 12])
@@ -37,7 +37,7 @@ def test_a_loaded_task_has_springs_on_its_output() -> None:
 
 def test_a_strut_passes_a_motion_on() -> None:
     bar = strut(5)
-    assert Evaluator(bar).respond(bar.initial).efficiency == pytest.approx(1.0)
+    assert SpringEvaluator(bar).evaluate(bar.initial).efficiency == pytest.approx(1.0)
     ends = [bar.lattice.positions[region.nodes].mean(axis=0) for region in (bar.input, bar.output)]
     assert (ends[0] - ends[1]).tolist() == pytest.approx([5.0, 0.0])
     with pytest.raises(InvalidSettings, match="length: expected at least 3, got 2"):

@@ -22,8 +22,8 @@ from bellcrank.machines.library import (
 from bellcrank.machines.library.catalogue import SORTS
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, lever_check
 from bellcrank.machines.library.summary import INDEX, entry_files, read_summary, write_index
-from bellcrank.mechanics import CAREFUL, Conditions, Evaluator, Status
-from bellcrank.search.goals import Case, GoalResponder
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Conditions, SpringEvaluator, Status
+from bellcrank.search.goals import Case, GoalEvaluator
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,7 +63,7 @@ def test_an_entry_that_comes_along_is_sound(name: str) -> None:
     entry = SHIPPED.find(name)
     problem, mask = entry.design.problem, entry.design.mask
     kind = kinds[entry.kind]
-    response = GoalResponder([Case(problem)], kind.goals).respond(mask, CAREFUL)
+    response = GoalEvaluator([Case(problem)], kind.goals).evaluate(mask, VERIFICATION_INCREMENT)
     assert response.status is Status.CONVERGED, "stable, and keeps the goals of its kind"
     assert entry.efficiency == pytest.approx(response.efficiency, abs=1e-8)
     assert problem.output.spring == kind.spring
@@ -96,7 +96,7 @@ def test_the_lever_of_an_entry_is_that_of_its_task(name: str) -> None:
     fresh = lever_check(entry.design.problem, kinds[entry.kind].goals)
     assert entry.lever.efficiency == pytest.approx(fresh.efficiency, abs=1e-8, nan_ok=True)
     assert entry.better == (not fresh.efficiency >= entry.efficiency)
-    response = Evaluator(entry.design.problem).respond(
+    response = SpringEvaluator(entry.design.problem).evaluate(
         np.unpackbits(np.frombuffer(bytes.fromhex(entry.lever.mask), np.uint8))[
             : len(entry.design.mask)
         ].astype(bool)

@@ -12,7 +12,7 @@ from bellcrank.machines import elementary, mean_ports, two_port_at
 from bellcrank.machines.elementary import DIRECTIONS
 from bellcrank.machines.library import plain_lever
 from bellcrank.machines.library.lever import ARMS, LEVER, Shape, lever_law, lever_of, shapes
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import Problem, Stiffness
 
 
@@ -70,20 +70,20 @@ def test_stiff_joints_make_a_lever_worse_than_its_law() -> None:
 def test_none_of_the_family_is_better(direction: str) -> None:
     problem = elementary(7, direction, 0.02)
     best = plain_lever(problem)
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     found = {}
     for shape in shapes(problem):
-        response = evaluator.respond(lever_of(problem, shape).mask, CAREFUL)
+        response = evaluator.evaluate(lever_of(problem, shape).mask, VERIFICATION_INCREMENT)
         if response.status is Status.CONVERGED:
             found[shape] = response.efficiency
     assert best.efficiency == max(found.values())
     assert {shape.arms for shape in found} <= set(ARMS)
-    assert best.efficiency == evaluator.respond(best.mask, CAREFUL).efficiency
+    assert best.efficiency == evaluator.evaluate(best.mask, VERIFICATION_INCREMENT).efficiency
 
 
 def test_a_bar_between_the_ports_only_follows() -> None:
     problem = elementary(9, "down")
-    response = Evaluator(problem).respond(lever_of(problem, Shape("bar")).mask)
+    response = SpringEvaluator(problem).evaluate(lever_of(problem, Shape("bar")).mask)
     assert response.efficiency == pytest.approx(1.0, abs=1e-9)
     assert response.energy == pytest.approx(0.0, abs=1e-12)
 
@@ -103,7 +103,7 @@ def test_a_lever_keeps_the_goals_that_it_is_given() -> None:
     problem = elementary(9, "up")
     free, light = plain_lever(problem), plain_lever(problem, ["input-stiffness <= 0.1"])
     for lever, keeps in ((free, False), (light, True)):
-        response = Evaluator(problem).respond(lever.mask)
+        response = SpringEvaluator(problem).evaluate(lever.mask)
         stiffness = 2.0 * response.energy / problem.input.amount**2
         assert (stiffness <= 0.1) == keeps
     assert free.efficiency is not None

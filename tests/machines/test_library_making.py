@@ -19,9 +19,9 @@ from bellcrank.machines.library import Library, Order, Task, make
 from bellcrank.machines.library.files import entry_to_dict
 from bellcrank.machines.library.making import WORK, Resisting
 from bellcrank.machines.library.summary import INDEX, entry_files
-from bellcrank.mechanics import Evaluator, Status
-from bellcrank.runs.layout import LOCK
-from bellcrank.runs.locking import locked
+from bellcrank.mechanics import SpringEvaluator, Status
+from bellcrank.storage.layout import LOCK
+from bellcrank.storage.locking import locked
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -72,7 +72,7 @@ def test_each_task_makes_one_entry_and_leaves_nothing_else(whole: Path) -> None:
     begun = [chain["begun_with"] for chain in free.provenance["chains"]]
     assert begun == ["full", "lever"]
     assert free.efficiency == pytest.approx(
-        Evaluator(free.design.problem).respond(free.design.mask).efficiency, abs=1e-8
+        SpringEvaluator(free.design.problem).evaluate(free.design.mask).efficiency, abs=1e-8
     )
 
 
@@ -196,7 +196,7 @@ def test_a_task_may_leave_supports_unused() -> None:
     assert (full[1], lever[1]) == (2, 2)
     kept = np.flatnonzero(~np.isin(np.arange(len(problem.initial)), problem.designable))
     assert lever[0].initial[kept].all()
-    response = Evaluator(lever[0]).respond(lever[0].initial)
+    response = SpringEvaluator(lever[0]).evaluate(lever[0].initial)
     assert response.status is Status.CONVERGED
     assert response.efficiency > 1.0
 
@@ -206,9 +206,9 @@ def test_what_merely_follows_its_input_is_forbidden() -> None:
     from bellcrank.machines.library.lever import Shape, lever_of
 
     problem = elementary(7, "down")
-    judge = Resisting(Evaluator(problem))
+    judge = Resisting(SpringEvaluator(problem))
     bar = lever_of(problem, Shape("bar")).mask
-    assert Evaluator(problem).respond(bar).status is Status.CONVERGED
-    assert judge.respond(bar).status is Status.FORBIDDEN
-    assert judge.respond(problem.initial).status is Status.CONVERGED
+    assert SpringEvaluator(problem).evaluate(bar).status is Status.CONVERGED
+    assert judge.evaluate(bar).status is Status.FORBIDDEN
+    assert judge.evaluate(problem.initial).status is Status.CONVERGED
     assert judge.load_bearing(bar).any(), "all else is the judge's"

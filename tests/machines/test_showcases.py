@@ -11,7 +11,7 @@ from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.machines import predict
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.showcases import find_plan, showcase, showcases
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,7 +25,7 @@ def test_parts_foretell_small_strokes_of_every_machine(name: str) -> None:
     machine = showcase(name)
     problem = machine.design.problem
     drive = replace(problem.input, amount=SMALL * problem.input.amount)
-    response = Evaluator(replace(problem, input=drive)).respond(machine.design.mask)
+    response = SpringEvaluator(replace(problem, input=drive)).evaluate(machine.design.mask)
     assert response.status is Status.CONVERGED
     assert predict(machine).efficiency == pytest.approx(response.efficiency, rel=0.05)
 
@@ -33,14 +33,18 @@ def test_parts_foretell_small_strokes_of_every_machine(name: str) -> None:
 @pytest.mark.parametrize("name", showcases())
 def test_every_machine_goes_its_whole_stroke(name: str) -> None:
     machine = showcase(name)
-    response = Evaluator(machine.design.problem).respond(machine.design.mask, CAREFUL)
+    response = SpringEvaluator(machine.design.problem).evaluate(
+        machine.design.mask, VERIFICATION_INCREMENT
+    )
     assert response.status is Status.CONVERGED
     assert response.efficiency > 1.0
 
 
 def test_the_amplifier_amplifies() -> None:
     machine = showcase("amplifier")
-    response = Evaluator(machine.design.problem).respond(machine.design.mask, CAREFUL)
+    response = SpringEvaluator(machine.design.problem).evaluate(
+        machine.design.mask, VERIFICATION_INCREMENT
+    )
     assert len(machine.parts) == 2
     assert response.efficiency > 8.0
 
@@ -50,7 +54,7 @@ def test_the_sorter_sorts_by_the_key() -> None:
     for key in ("left", "right"):
         machine = showcase(f"sorter-{key}")
         problem = machine.design.problem
-        moved = Evaluator(problem).respond(machine.design.mask).displacement
+        moved = SpringEvaluator(problem).evaluate(machine.design.mask).displacement
         motions.append(moved[problem.output.nodes].mean(axis=0) / problem.input.amount)
     left, right = motions
     assert right[0] > 1.0

@@ -20,7 +20,7 @@ from bellcrank.machines import (
     two_port_at,
     usual_loads,
 )
-from bellcrank.mechanics import Conditions, Evaluator, Status, follow
+from bellcrank.mechanics import Conditions, SpringEvaluator, Status, follow
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports, gallery_design
 
 from .chains import joined, mirrored
@@ -80,7 +80,7 @@ def test_free_efficiency_is_that_of_the_response_in_the_limit_of_small_strokes(n
         output=replace(problem.output, spring=None, spring_kind=None),
         aggregate="mean",
     )
-    response = Evaluator(small, "displacement").respond(design.mask)
+    response = SpringEvaluator(small, "displacement").evaluate(design.mask)
     # The efficiency is linear in so small a stroke up to the stroke itself.
     assert port.efficiency == pytest.approx(response.efficiency, rel=1e-4)
 
@@ -108,8 +108,8 @@ def test_blocked_force_is_that_of_an_output_whose_nodes_are_held() -> None:
         supports=replace(problem.supports, fixed_x=[node]),
         output=Output(watched, [-1.0, 0.0]),
     )
-    evaluator = Evaluator(held)
-    response = evaluator.respond(design.mask)
+    evaluator = SpringEvaluator(held)
+    response = evaluator.evaluate(design.mask)
     assert curve.energy[-1] == pytest.approx(response.energy, abs=1e-10)
     # The force on it, from the energy of the held design by moving the roller: Castigliano.
     h = 1e-4
@@ -226,7 +226,7 @@ def test_a_chain_of_two_two_ports_moves_as_the_lattice_of_both() -> None:
     second = mirrored(first, rows[0] + rows[-1], -9.0)
     whole = joined(first, second)
     small = replace(whole.problem, input=replace(whole.problem.input, amount=1e-5))
-    response = Evaluator(small).respond(whole.mask)
+    response = SpringEvaluator(small).evaluate(whole.mask)
     assert response.status is Status.CONVERGED
     link, entry = ports_of(first)[1], ports_of(second)[0]
     arm = entry.centre - link.centre

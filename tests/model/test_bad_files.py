@@ -93,7 +93,11 @@ def test_files_of_impossible_problems_are_refused(write, small, key, value, mess
         ('"triangular-rows"', "3", "lattice.kind: expected a name, got 3"),
         ('"triangular-rows"', '"cubic"', "unknown lattice 'cubic'; known: "),
         ("[5, 6, 5, 6, 5, 6]", "[5, 6.5]", "lattice.counts[1]: expected a valid integer"),
-        ("[5, 6, 5, 6, 5, 6]", '"many"', "lattice.counts: expected a valid list, got 'many'"),
+        (
+            "[5, 6, 5, 6, 5, 6]",
+            '"many"',
+            "lattice.is_admissible: expected a valid list, got 'many'",
+        ),
         ("first_x = [0.5,", "first_x = [nan,", "lattice.first_x[0]: expected a finite number"),
         ("amount = 0.433", "amount = inf", "input.amount: expected a finite number, got inf"),
         ("{ row = 0 }", "{ raw = 0 }", "supports.fixed[0]: expected one of the keys row, rows"),

@@ -13,7 +13,7 @@ from bellcrank.model import (
     read_problem,
     write_problem,
 )
-from bellcrank.parts import calibrated
+from bellcrank.part import calibrated
 
 # Committed designs rely on this numbering.
 INPUT = [106, 107, 108, 117, 118, 119, 120, 130, 131, 132]

@@ -101,7 +101,11 @@ def test_contacts_have_only_the_three_lengths_that_two_sizes_allow():
 @pytest.mark.parametrize(
     ("kind", "changes", "message"),
     [
-        ("triangular-rows", {"counts": [3, 0, 3]}, r"lattice.counts\[1\]: expected at least 1"),
+        (
+            "triangular-rows",
+            {"counts": [3, 0, 3]},
+            r"lattice.is_admissible\[1\]: expected at least 1",
+        ),
         ("triangular-rows", {"counts": [3]}, "expected as many counts as first_x"),
         ("triangular-rows", {"counts": [], "first_x": []}, "at least one of each"),
         ("triangular-rows", {"spacing": 0.0}, "lattice.spacing: expected a number greater than 0"),

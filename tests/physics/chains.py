@@ -11,12 +11,12 @@ from bellcrank.search import MetropolisSettings, metropolis, start_chain
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Evaluator
-    from bellcrank.runs import Proposals
+    from bellcrank.mechanics import SpringEvaluator
+    from bellcrank.storage import Proposals
 
 
 def run_chain(
-    evaluator: Evaluator, steps: int, seed: int, settings: MetropolisSettings | None = None
+    evaluator: SpringEvaluator, steps: int, seed: int, settings: MetropolisSettings | None = None
 ) -> tuple[NDArray[np.bool_], Proposals]:
     """Advance a chain from the problem's initial design; return all that it proposed.
 
@@ -31,7 +31,7 @@ def run_chain(
     return np.unpackbits(proposals.mask, axis=1, count=beams).astype(bool), proposals
 
 
-def has_loose_piece(evaluator: Evaluator, mask: NDArray[np.bool_]) -> bool:
+def has_loose_piece(evaluator: SpringEvaluator, mask: NDArray[np.bool_]) -> bool:
     """Whether some present beam hangs together with neither support nor input."""
     problem = evaluator.problem
     beams = problem.lattice.beams[mask]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, Status, load_bearing_core
+from bellcrank.mechanics import SpringEvaluator, Status, load_bearing_core
 from bellcrank.model import Design, Problem, find_problem
 from bellcrank.search import clean
 
@@ -61,9 +61,12 @@ def test_a_core_is_its_own_core(problem: Problem) -> None:
 
 
 def test_ignoring_dead_ends_is_counting_those_of_the_core(problem: Problem) -> None:
-    ignored, counted = Evaluator(problem, dangling="ignored"), Evaluator(problem)
+    ignored, counted = (
+        SpringEvaluator(problem, unloaded_beams="prune_dead_ends"),
+        SpringEvaluator(problem),
+    )
     for mask in random_masks(problem, 0.55, 6):
-        first, second = ignored.respond(mask), counted.respond(core_of(problem, mask))
+        first, second = ignored.evaluate(mask), counted.evaluate(core_of(problem, mask))
         assert first.status is second.status
         assert first.efficiency == pytest.approx(second.efficiency, abs=1e-9, nan_ok=True)
         assert first.energy == pytest.approx(second.energy, abs=1e-12, nan_ok=True)
@@ -83,13 +86,13 @@ def with_other_dead_ends(
 
 
 def test_all_designs_with_one_core_respond_the_same(problem: Problem) -> None:
-    evaluator = Evaluator(problem, dangling="ignored")
+    evaluator = SpringEvaluator(problem, unloaded_beams="prune_dead_ends")
     rng = np.random.default_rng(7)
     for mask in random_masks(problem, 0.55, 3):
         core = core_of(problem, mask)
         other = with_other_dead_ends(problem, core, rng)
         assert (other != core).any()
-        first, second = evaluator.respond(core), evaluator.respond(other)
+        first, second = evaluator.evaluate(core), evaluator.evaluate(other)
         assert first.status is second.status
         np.testing.assert_array_equal(first.efficiency, second.efficiency)
         np.testing.assert_array_equal(first.displacement, second.displacement)
@@ -98,20 +101,26 @@ def test_all_designs_with_one_core_respond_the_same(problem: Problem) -> None:
 def test_counted_dead_ends_do_matter() -> None:
     problem = find_problem("crane")
     mask = random_masks(problem, 0.6, 1)[0]
-    counted, ignored = Evaluator(problem), Evaluator(problem, dangling="ignored")
-    assert counted.respond(mask).status is Status.CONVERGED
-    assert abs(counted.respond(mask).efficiency - ignored.respond(mask).efficiency) > 1e-6
+    counted, ignored = (
+        SpringEvaluator(problem),
+        SpringEvaluator(problem, unloaded_beams="prune_dead_ends"),
+    )
+    assert counted.evaluate(mask).status is Status.CONVERGED
+    assert abs(counted.evaluate(mask).efficiency - ignored.evaluate(mask).efficiency) > 1e-6
 
 
 @pytest.mark.parametrize("name", ["crane", "pliers", "discs", "scaling-8"])
 def test_a_stripped_design_responds_as_the_cleaned_one(name: str) -> None:
     problem = find_problem(name)
-    counted, stripped = Evaluator(problem), Evaluator(problem, dangling="stripped")
+    counted, stripped = (
+        SpringEvaluator(problem),
+        SpringEvaluator(problem, unloaded_beams="prune_all"),
+    )
     moved = 0
     for share in (0.5, 0.65, 0.8, 0.95):
         for mask in random_masks(problem, share, 15):
-            expected = counted.respond(clean(Design(problem, mask), counted).mask)
-            found = stripped.respond(mask)
+            expected = counted.evaluate(clean(Design(problem, mask), counted).mask)
+            found = stripped.evaluate(mask)
             assert found.status is expected.status
             assert found.efficiency == pytest.approx(expected.efficiency, abs=1e-9, nan_ok=True)
             moved += found.efficiency != 0.0
@@ -132,9 +141,10 @@ def test_a_triangle_that_hangs_by_a_node_softens_nothing_when_stripped() -> None
     )
     bare = np.array([True, True, False, False, False])
     counted, ignored, stripped = (
-        Evaluator(problem, "displacement", kind) for kind in ("counted", "ignored", "stripped")
+        SpringEvaluator(problem, "displacement", kind)
+        for kind in ("keep", "prune_dead_ends", "prune_all")
     )
-    expected = counted.respond(bare).efficiency
-    assert stripped.respond(problem.initial).efficiency == pytest.approx(expected, abs=1e-9)
+    expected = counted.evaluate(bare).efficiency
+    assert stripped.evaluate(problem.initial).efficiency == pytest.approx(expected, abs=1e-9)
     for evaluator in (counted, ignored):
-        assert abs(evaluator.respond(problem.initial).efficiency - expected) > 1e-3
+        assert abs(evaluator.evaluate(problem.initial).efficiency - expected) > 1e-3

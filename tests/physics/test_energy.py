@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Problem, Supports, find_problem
 
 from .compiled import assemble_stiffness, energy_and_gradient
@@ -32,15 +32,15 @@ def make_problem(name: str) -> Problem:
     return by_hand[name]() if name in by_hand else find_problem(name)
 
 
-def driven_designs(evaluator: Evaluator, count: int) -> list[NDArray[np.bool_]]:
+def driven_designs(evaluator: SpringEvaluator, count: int) -> list[NDArray[np.bool_]]:
     """Random designs that are no mechanism, the full one among them."""
     masks = [evaluator.problem.initial]
     for share in (0.85, 0.7):
         masks += random_masks(evaluator.problem, share, count)
-    return [m for m in masks if evaluator.respond(m).status is not Status.MECHANISM]
+    return [m for m in masks if evaluator.evaluate(m).status is not Status.MECHANISM]
 
 
-def random_displacement(evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
+def random_displacement(evaluator: SpringEvaluator, seed: int) -> NDArray[np.float64]:
     """Small random motion of the free coordinates that the drive can reach, and of the input."""
     problem, structure = evaluator.problem, evaluator.structure
     free = free_coordinates(problem, structure.active == 1)
@@ -53,21 +53,23 @@ def random_displacement(evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
     return u
 
 
-def kernel_energy(evaluator: Evaluator, mask: NDArray[np.bool_], u: NDArray[np.float64]) -> float:
+def kernel_energy(
+    evaluator: SpringEvaluator, mask: NDArray[np.bool_], u: NDArray[np.float64]
+) -> float:
     return energy_and_gradient(
         evaluator.system, mask.astype(np.uint8), u, evaluator.structure, evaluator.scratch
     )
 
 
 def kernel_gradient(
-    evaluator: Evaluator, mask: NDArray[np.bool_], u: NDArray[np.float64]
+    evaluator: SpringEvaluator, mask: NDArray[np.bool_], u: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     kernel_energy(evaluator, mask, u)
     return evaluator.scratch.gradient.copy()
 
 
 def kernel_stiffness(
-    evaluator: Evaluator, mask: NDArray[np.bool_], u: NDArray[np.float64]
+    evaluator: SpringEvaluator, mask: NDArray[np.bool_], u: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Dense (2 N, 2 N) matrix from the blocks the kernel assembles."""
     system, structure, scratch = evaluator.system, evaluator.structure, evaluator.scratch
@@ -88,9 +90,9 @@ def kernel_stiffness(
 
 @pytest.mark.parametrize("name", NAMES)
 def test_energy_equals_the_paper_s_formula(name: str) -> None:
-    evaluator = Evaluator(make_problem(name))
+    evaluator = SpringEvaluator(make_problem(name))
     for seed, mask in enumerate(driven_designs(evaluator, 4)):
-        evaluator.respond(mask)
+        evaluator.evaluate(mask)
         u = random_displacement(evaluator, seed)
         expected = Twin(evaluator.problem, mask).energy(u)
         assert kernel_energy(evaluator, mask, u) == pytest.approx(expected, rel=1e-12)
@@ -110,10 +112,10 @@ def test_the_twin_s_gradient_is_the_derivative_of_its_energy(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_gradient_is_the_derivative_of_the_energy(name: str) -> None:
-    evaluator = Evaluator(make_problem(name))
+    evaluator = SpringEvaluator(make_problem(name))
     problem = evaluator.problem
     for seed, mask in enumerate(driven_designs(evaluator, 3)):
-        evaluator.respond(mask)
+        evaluator.evaluate(mask)
         free = free_coordinates(problem, evaluator.structure.active == 1)
         u = random_displacement(evaluator, seed)
         expected = np.zeros(u.size)
@@ -124,10 +126,10 @@ def test_gradient_is_the_derivative_of_the_energy(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["patch", "force", "isotropic", "rollers", "scaling-8"])
 def test_stiffness_is_the_derivative_of_the_gradient(name: str) -> None:
-    evaluator = Evaluator(make_problem(name))
+    evaluator = SpringEvaluator(make_problem(name))
     problem = evaluator.problem
     for seed, mask in enumerate(driven_designs(evaluator, 2)):
-        evaluator.respond(mask)
+        evaluator.evaluate(mask)
         free = free_coordinates(problem, evaluator.structure.active == 1)
         u = random_displacement(evaluator, seed)
         found = kernel_stiffness(evaluator, mask, u)[np.ix_(free, free)]
@@ -138,22 +140,22 @@ def test_stiffness_is_the_derivative_of_the_gradient(name: str) -> None:
 
 def test_reported_energy_is_that_of_the_reported_displacement() -> None:
     for name in ("patch", "isotropic", "scaling-8"):
-        evaluator = Evaluator(make_problem(name))
+        evaluator = SpringEvaluator(make_problem(name))
         for mask in driven_designs(evaluator, 4):
-            response = evaluator.respond(mask)
+            response = evaluator.evaluate(mask)
             twin = Twin(evaluator.problem, mask)
             assert response.energy == pytest.approx(twin.energy(response.displacement), abs=1e-13)
 
 
 @pytest.mark.parametrize("name", ["patch", "force", "rollers", "scaling-8", "discs"])
 def test_reported_equilibria_are_balanced_and_stable(name: str) -> None:
-    evaluator = Evaluator(make_problem(name))
+    evaluator = SpringEvaluator(make_problem(name))
     problem = evaluator.problem
     load = np.zeros_like(problem.lattice.positions)
     if problem.input.drive == "force":
         load[problem.input.nodes] = problem.input.amount * problem.input.direction
     for mask in driven_designs(evaluator, 3):
-        response = evaluator.respond(mask)
+        response = evaluator.evaluate(mask)
         if response.status is not Status.CONVERGED:
             continue
         free = free_coordinates(problem, evaluator.structure.active == 1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Lattice, Problem, Supports, find_problem
 
 from .problems import patch, random_masks, with_lattice
@@ -34,8 +34,8 @@ def problem(request: pytest.FixtureRequest) -> Problem:
 
 
 def efficiencies(problem: Problem, masks: list[NDArray[np.bool_]]) -> NDArray[np.float64]:
-    evaluator = Evaluator(problem)
-    return np.array([evaluator.respond(mask).efficiency for mask in masks])
+    evaluator = SpringEvaluator(problem)
+    return np.array([evaluator.evaluate(mask).efficiency for mask in masks])
 
 
 def designs(problem: Problem) -> list[NDArray[np.bool_]]:
@@ -95,8 +95,8 @@ def test_efficiency_survives_new_numbers_of_nodes_and_beams(problem: Problem) ->
 def test_displacements_turn_with_the_problem() -> None:
     problem = find_problem("scaling-8")
     mask = random_masks(problem, 0.8, 1)[0]
-    straight = Evaluator(problem).respond(mask).displacement
-    turned = Evaluator(moved(problem, TURN, (0.0, 0.0))).respond(mask).displacement
+    straight = SpringEvaluator(problem).evaluate(mask).displacement
+    turned = SpringEvaluator(moved(problem, TURN, (0.0, 0.0))).evaluate(mask).displacement
     np.testing.assert_allclose(turned, straight @ TURN.T, rtol=0, atol=1e-10)
 
 
@@ -104,6 +104,6 @@ def test_sensitivity_survives_new_numbers_of_nodes_and_beams() -> None:
     problem = patch()
     again, _, old_beam = relabelled(problem, np.random.default_rng(4))
     mask = random_masks(problem, 0.8, 1)[0]
-    straight = Evaluator(problem).sensitivity(mask)
-    found = Evaluator(again).sensitivity(mask[old_beam])
+    straight = SpringEvaluator(problem).sensitivity(mask)
+    found = SpringEvaluator(again).sensitivity(mask[old_beam])
     np.testing.assert_allclose(found, straight[old_beam], rtol=0, atol=1e-7)

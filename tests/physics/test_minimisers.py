@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, minimisers
+from bellcrank.mechanics import SpringEvaluator, minimisers
 from bellcrank.model import Problem, Supports, find_problem
 
 from .problems import patch, random_masks
@@ -41,9 +41,9 @@ def cases() -> dict[str, tuple[Problem, list[NDArray[np.bool_]]]]:
 @pytest.mark.parametrize("minimiser", FIRST_ORDER)
 def test_all_minimisers_agree_from_rest(name: str, minimiser: str) -> None:
     problem, masks = cases()[name]
-    newton, other = Evaluator(problem), Evaluator(problem, minimiser=minimiser)
+    newton, other = SpringEvaluator(problem), SpringEvaluator(problem, minimiser=minimiser)
     for mask in masks:
-        expected, found = newton.respond(mask), other.respond(mask)
+        expected, found = newton.evaluate(mask), other.evaluate(mask)
         assert found.status is expected.status
         assert found.efficiency == pytest.approx(expected.efficiency, abs=SAME, nan_ok=True)
         assert found.energy == pytest.approx(expected.energy, abs=1e-10, nan_ok=True)
@@ -52,23 +52,23 @@ def test_all_minimisers_agree_from_rest(name: str, minimiser: str) -> None:
 @pytest.mark.parametrize("minimiser", list(minimisers))
 def test_all_minimisers_agree_from_a_neighbour(minimiser: str) -> None:
     problem = patch()
-    newton, other = Evaluator(problem), Evaluator(problem, minimiser=minimiser)
+    newton, other = SpringEvaluator(problem), SpringEvaluator(problem, minimiser=minimiser)
     mask = problem.initial.copy()
-    other.respond(mask)
-    other.remember()
+    other.evaluate(mask)
+    other.set_reference()
     rng = np.random.default_rng(2)
     for beam in rng.choice(problem.designable, 20):
         mask[beam] ^= True
-        expected, found = newton.respond(mask), other.respond_nearby(mask)
-        other.remember()
+        expected, found = newton.evaluate(mask), other.evaluate(mask, warm_start=True)
+        other.set_reference()
         assert found.status is expected.status
         assert found.efficiency == pytest.approx(expected.efficiency, abs=SAME, nan_ok=True)
 
 
 def test_tightening_the_load_steps_changes_nothing() -> None:
     for problem, masks in cases().values():
-        evaluator = Evaluator(problem)
+        evaluator = SpringEvaluator(problem)
         for mask in masks:
-            coarse, fine = evaluator.respond(mask), evaluator.respond(mask, 1 / 64)
+            coarse, fine = evaluator.evaluate(mask), evaluator.evaluate(mask, 1 / 64)
             assert coarse.status is fine.status
             assert coarse.efficiency == pytest.approx(fine.efficiency, abs=1e-8, nan_ok=True)

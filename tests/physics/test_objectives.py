@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Problem, find_problem
 
 from .problems import patch, random_masks
@@ -38,9 +38,9 @@ def test_directional_efficiency_is_equation_2(name: str, exponent: float, aggreg
     problem = patch(force=True) if name == "force-driven" else find_problem(name)
     problem = replace(problem, aggregate=aggregate)
     gather = np.mean if aggregate == "mean" else np.sum
-    evaluator = Evaluator(problem, f"directional:{exponent}")
+    evaluator = SpringEvaluator(problem, f"directional:{exponent}")
     for mask in random_masks(problem, 0.85, 4):
-        response = evaluator.respond(mask)
+        response = evaluator.evaluate(mask)
         u = response.displacement
         expected = gather(weighted_motion(problem, u, exponent)) / gather(input_motion(problem, u))
         assert response.efficiency == pytest.approx(expected, abs=1e-12)
@@ -49,9 +49,12 @@ def test_directional_efficiency_is_equation_2(name: str, exponent: float, aggreg
 @pytest.mark.parametrize("name", ["crane", "discs"])
 def test_directional_efficiency_with_exponent_2_is_the_displacement_efficiency(name: str) -> None:
     problem = find_problem(name)
-    plain, directional = Evaluator(problem, "displacement"), Evaluator(problem, "directional:2")
+    plain, directional = (
+        SpringEvaluator(problem, "displacement"),
+        SpringEvaluator(problem, "directional:2"),
+    )
     for mask in random_masks(problem, 0.8, 4):
-        assert directional.respond(mask).efficiency == plain.respond(mask).efficiency
+        assert directional.evaluate(mask).efficiency == plain.evaluate(mask).efficiency
 
 
 @pytest.mark.parametrize("aggregate", ["mean", "sum"])
@@ -60,10 +63,10 @@ def test_directional_efficiency_with_exponent_2_is_the_displacement_efficiency(n
 def test_force_efficiency_is_equation_3(kind: str, exponent: float, aggregate: str) -> None:
     problem = replace(patch(force=True, kind=kind), aggregate=aggregate)
     gather = np.mean if aggregate == "mean" else np.sum
-    evaluator = Evaluator(problem, f"force:{exponent}")
+    evaluator = SpringEvaluator(problem, f"force:{exponent}")
     applied = gather(np.full(len(problem.input.nodes), problem.input.amount))
     for mask in random_masks(problem, 0.9, 4):
-        response = evaluator.respond(mask)
+        response = evaluator.evaluate(mask)
         moved = gather(weighted_motion(problem, response.displacement, exponent))
         expected = problem.output.spring * moved / applied
         assert response.efficiency == pytest.approx(expected, abs=1e-12)
@@ -76,7 +79,7 @@ def test_forces_in_balance_bound_what_a_straight_chain_passes_on() -> None:
     for spring in (0.1, 1.0, 10.0, 1e3, 1e5):
         problem = patch(force=True)
         problem = replace(problem, output=replace(problem.output, spring=spring))
-        efficiencies.append(Evaluator(problem, "force").respond(problem.initial).efficiency)
+        efficiencies.append(SpringEvaluator(problem, "force").evaluate(problem.initial).efficiency)
     growth = np.diff(np.abs(efficiencies))
     assert (growth > 0).all()
     assert growth[-1] < 0.01 * abs(efficiencies[-1])
@@ -84,4 +87,4 @@ def test_forces_in_balance_bound_what_a_straight_chain_passes_on() -> None:
 
 def test_force_efficiency_needs_a_force_and_a_spring() -> None:
     with pytest.raises(InvalidSettings, match="drive = 'force'"):
-        Evaluator(find_problem("crane"), "force")
+        SpringEvaluator(find_problem("crane"), "force")

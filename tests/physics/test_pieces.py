@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem
 
 from .problems import arm_on, frame, patch, random_masks
@@ -31,9 +31,9 @@ def connected_to(
 
 def springs_of(problem: Problem, mask: NDArray[np.bool_]) -> dict[tuple[int, int, int], float]:
     """Weight of each angular spring by node and beams, in units of lambda."""
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     structure = evaluator.structure
-    evaluator.respond(mask)
+    evaluator.evaluate(mask)
     front, back = structure.sizes[3:5]
     listed = [*range(front), *range(back, len(structure.spring_node))]
     return {
@@ -74,14 +74,14 @@ def test_one_beam_has_no_spring() -> None:
 
 
 def test_removing_and_adding_a_beam_again_restores_the_response_exactly() -> None:
-    evaluator = Evaluator(find_problem("scaling-8"))
+    evaluator = SpringEvaluator(find_problem("scaling-8"))
     mask = random_masks(evaluator.problem, 0.9, 1)[0]
-    before = evaluator.respond(mask)
+    before = evaluator.evaluate(mask)
     for beam in evaluator.problem.designable[::20]:
         other = mask.copy()
         other[beam] ^= True
-        evaluator.respond(other)
-        after = evaluator.respond(mask)
+        evaluator.evaluate(other)
+        after = evaluator.evaluate(mask)
         assert after.efficiency == before.efficiency
         assert after.energy == before.energy
         assert (after.displacement == before.displacement).all()
@@ -90,10 +90,10 @@ def test_removing_and_adding_a_beam_again_restores_the_response_exactly() -> Non
 @pytest.mark.parametrize("name", ["crane", "scaling-8", "discs", "pliers"])
 @pytest.mark.parametrize("share", [0.3, 0.5])
 def test_what_the_drive_cannot_reach_stays_exactly_at_rest(name: str, share: float) -> None:
-    evaluator = Evaluator(find_problem(name))
+    evaluator = SpringEvaluator(find_problem(name))
     problem = evaluator.problem
     for mask in random_masks(problem, share, 6):
-        response = evaluator.respond(mask)
+        response = evaluator.evaluate(mask)
         reached = connected_to(problem, mask, problem.input.nodes)
         if response.status is not Status.MECHANISM:
             assert not reached.all()
@@ -101,15 +101,15 @@ def test_what_the_drive_cannot_reach_stays_exactly_at_rest(name: str, share: flo
 
 
 def test_a_loose_output_means_efficiency_exactly_zero() -> None:
-    evaluator = Evaluator(find_problem("crane"))
+    evaluator = SpringEvaluator(find_problem("crane"))
     problem = evaluator.problem
     cut = problem.initial.copy()
     x = problem.lattice.positions[problem.lattice.beams[:, :], 0]
     cut[problem.designable] = ~((x[problem.designable] < 3.5).any(axis=1))
     assert not connected_to(problem, cut, problem.input.nodes)[problem.output.nodes].any()
-    evaluator.respond(problem.initial)
-    evaluator.remember()
-    for response in (evaluator.respond(cut), evaluator.respond_nearby(cut)):
+    evaluator.evaluate(problem.initial)
+    evaluator.set_reference()
+    for response in (evaluator.evaluate(cut), evaluator.evaluate(cut, warm_start=True)):
         assert response.status is Status.CONVERGED
         assert response.efficiency == 0.0
         assert (response.displacement[problem.output.nodes] == 0.0).all()
@@ -124,7 +124,7 @@ def hanging_chain() -> tuple[Problem, NDArray[np.bool_]]:
 
 def test_a_piece_that_hangs_from_one_moved_node_follows_as_a_rigid_body() -> None:
     problem, mask = hanging_chain()
-    response = Evaluator(problem).respond(mask)
+    response = SpringEvaluator(problem).evaluate(mask)
     assert response.status is Status.CONVERGED
     assert response.energy == pytest.approx(0.0, abs=1e-25)
     piece = np.arange(13, 18)
@@ -141,7 +141,7 @@ def test_a_piece_that_hangs_from_one_moved_node_follows_as_a_rigid_body() -> Non
 def test_a_hanging_piece_takes_the_place_nearest_to_rest() -> None:
     problem, mask = hanging_chain()
     piece = np.arange(13, 17)
-    u = Evaluator(problem).respond(mask).displacement
+    u = SpringEvaluator(problem).evaluate(mask).displacement
     rest = problem.lattice.positions
     arm = (rest + u)[piece] - (rest + u)[17]
 
@@ -154,12 +154,12 @@ def test_a_hanging_piece_takes_the_place_nearest_to_rest() -> None:
 
 def test_a_hanging_piece_is_reproducible_whatever_came_before() -> None:
     problem, mask = hanging_chain()
-    evaluator = Evaluator(problem)
-    first = evaluator.respond(mask)
+    evaluator = SpringEvaluator(problem)
+    first = evaluator.evaluate(mask)
     for before in [problem.initial, *random_masks(problem, 0.7, 5)]:
-        evaluator.respond(before)
-        evaluator.remember()
-        again = evaluator.respond_nearby(mask)
+        evaluator.evaluate(before)
+        evaluator.set_reference()
+        again = evaluator.evaluate(mask, warm_start=True)
         assert again.status is first.status
         assert again.efficiency == first.efficiency
         assert (again.displacement == first.displacement).all()
@@ -169,13 +169,13 @@ def test_a_forced_piece_without_support_is_a_mechanism() -> None:
     problem = patch(force=True)
     problem = replace(problem, output=replace(problem.output, spring=None, spring_kind=None))
     _, loose = hanging_chain()
-    evaluator = Evaluator(problem)
-    response = evaluator.respond(loose)
+    evaluator = SpringEvaluator(problem)
+    response = evaluator.evaluate(loose)
     assert response.status is Status.MECHANISM
     assert np.isnan(response.efficiency)
-    assert evaluator.respond(problem.initial).status is Status.CONVERGED
-    evaluator.remember()
-    assert evaluator.respond_nearby(loose).status is Status.MECHANISM
+    assert evaluator.evaluate(problem.initial).status is Status.CONVERGED
+    evaluator.set_reference()
+    assert evaluator.evaluate(loose, warm_start=True).status is Status.MECHANISM
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def test_a_forced_piece_needs_all_three_rigid_motions_held(
     supports: dict[str, list[int]], status: Status
 ) -> None:
     problem = arm_on(**supports)
-    assert Evaluator(problem).respond(problem.initial).status is status
+    assert SpringEvaluator(problem).evaluate(problem.initial).status is status
 
 
 def test_springs_at_the_output_hold_a_forced_piece_as_supports_do() -> None:
@@ -207,6 +207,6 @@ def test_springs_at_the_output_hold_a_forced_piece_as_supports_do() -> None:
         force=True,
         spring=1.0,
     )
-    response = Evaluator(clamped_by_spring).respond(clamped_by_spring.initial)
+    response = SpringEvaluator(clamped_by_spring).evaluate(clamped_by_spring.initial)
     assert response.status is Status.CONVERGED
     assert response.displacement[1, 1] == pytest.approx(2e-3, rel=0.02)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import find_problem
 
 from .problems import arm_on, patch, random_masks
@@ -73,9 +73,9 @@ def newton_step(problem: Problem, mask: NDArray[np.bool_], beam: int, u: NDArray
 def test_the_prediction_is_one_newton_step(share: float) -> None:
     problem = patch()
     mask = problem.initial if share == 1.0 else random_masks(problem, share, 1, seed=3)[0]
-    evaluator = Evaluator(problem)
-    response = evaluator.respond(mask)
-    screening = evaluator.screen(mask, np.arange(problem.lattice.beam_count))
+    evaluator = SpringEvaluator(problem)
+    response = evaluator.evaluate(mask)
+    screening = evaluator.predict_flips(mask, np.arange(problem.lattice.beam_count))
     compared = 0
     for beam, predicted in enumerate(screening.change):
         ends = problem.lattice.beams[beam]
@@ -93,14 +93,14 @@ def with_small_input(problem: Problem) -> Problem:
     return replace(problem, input=replace(problem.input, amount=1e-5 * problem.input.amount))
 
 
-def predicted_and_gained(problem: Problem, mask: NDArray[np.bool_], dangling: str):
+def predicted_and_gained(problem: Problem, mask: NDArray[np.bool_], unloaded_beams: str):
     """(beam, predicted, gained) of each flip that leaves a design with a response."""
     problem = with_small_input(problem)
-    evaluator = Evaluator(problem, dangling=dangling)
-    before = evaluator.respond(mask).efficiency
-    screening = evaluator.screen(mask, np.arange(problem.lattice.beam_count))
+    evaluator = SpringEvaluator(problem, unloaded_beams=unloaded_beams)
+    before = evaluator.evaluate(mask).efficiency
+    screening = evaluator.predict_flips(mask, np.arange(problem.lattice.beam_count))
     for beam, predicted in enumerate(screening.change):
-        after = evaluator.respond(flipped(mask, beam))
+        after = evaluator.evaluate(flipped(mask, beam))
         if after.status is Status.CONVERGED:
             yield beam, predicted, after.efficiency - before
 
@@ -108,7 +108,7 @@ def predicted_and_gained(problem: Problem, mask: NDArray[np.bool_], dangling: st
 def test_predictions_are_exact_for_small_strokes() -> None:
     problem, mask = sparse_patch()
     kinds = set()
-    for beam, predicted, gained in predicted_and_gained(problem, mask, "counted"):
+    for beam, predicted, gained in predicted_and_gained(problem, mask, "keep"):
         kinds.add(kind_of_flip(problem, mask, beam))
         assert predicted == pytest.approx(gained, abs=1e-5, rel=1e-4), beam
     assert kinds == {"present", "absent", "present dead end", "absent dead end"}
@@ -119,7 +119,7 @@ def test_predictions_are_exact_for_small_forces() -> None:
     mask = random_masks(problem, 0.9, 1)[0]
     compared = [
         (predicted, gained)
-        for beam, predicted, gained in predicted_and_gained(problem, mask, "counted")
+        for beam, predicted, gained in predicted_and_gained(problem, mask, "keep")
         if kind_of_flip(problem, mask, beam) in ("present", "absent")
     ]
     assert len(compared) > 20
@@ -130,7 +130,7 @@ def test_predictions_are_exact_for_small_forces() -> None:
 def test_dead_ends_are_foreseen_to_change_nothing_where_they_do_not_count() -> None:
     problem, mask = sparse_patch()
     dead = 0
-    for beam, predicted, gained in predicted_and_gained(problem, mask, "ignored"):
+    for beam, predicted, gained in predicted_and_gained(problem, mask, "prune_dead_ends"):
         if kind_of_flip(problem, mask, beam).endswith("dead end"):
             dead += 1
             assert predicted == gained == 0.0
@@ -141,19 +141,19 @@ def test_a_beam_to_a_support_of_its_own_is_foreseen() -> None:
     problem = prop()
     problem = replace(problem, input=replace(problem.input, amount=1e-6))
     mask = np.array([True, True, True, False])
-    evaluator = Evaluator(problem)
-    before = evaluator.respond(mask).efficiency
-    predicted = evaluator.screen(mask, [3]).change[0]
-    gained = evaluator.respond(problem.initial).efficiency - before
+    evaluator = SpringEvaluator(problem)
+    before = evaluator.evaluate(mask).efficiency
+    predicted = evaluator.predict_flips(mask, [3]).change[0]
+    gained = evaluator.evaluate(problem.initial).efficiency - before
     assert predicted == pytest.approx(gained, rel=1e-3)
 
 
 def test_strain_is_that_of_the_beam_and_of_the_gap() -> None:
     problem = patch()
     mask = random_masks(problem, 0.8, 1, seed=3)[0]
-    evaluator = Evaluator(problem)
-    moved = problem.lattice.positions + evaluator.respond(mask).displacement
-    screening = evaluator.screen(mask)
+    evaluator = SpringEvaluator(problem)
+    moved = problem.lattice.positions + evaluator.evaluate(mask).displacement
+    screening = evaluator.predict_flips(mask)
     a, b = problem.lattice.beams[screening.beams].T
     length = np.linalg.norm(moved[b] - moved[a], axis=1)
     expected = length / problem.lattice.rest_length[screening.beams] - 1
@@ -164,10 +164,10 @@ def test_strain_is_that_of_the_beam_and_of_the_gap() -> None:
 def test_predictions_rank_the_flips_of_the_crane(share: float, least: float) -> None:
     crane = find_problem("crane")
     mask = crane.initial if share == 1.0 else random_masks(crane, share, 1, seed=1)[0]
-    evaluator = Evaluator(crane)
-    before = evaluator.respond(mask).efficiency
-    screening, slope = evaluator.screen(mask), evaluator.sensitivity(mask)[crane.designable]
-    gained = [evaluator.respond(flipped(mask, b)).efficiency - before for b in screening.beams]
+    evaluator = SpringEvaluator(crane)
+    before = evaluator.evaluate(mask).efficiency
+    screening, slope = evaluator.predict_flips(mask), evaluator.sensitivity(mask)[crane.designable]
+    gained = [evaluator.evaluate(flipped(mask, b)).efficiency - before for b in screening.beams]
     predicted = spearmanr(screening.change, gained).statistic
     assert predicted > least
     assert predicted > spearmanr(slope, gained).statistic
@@ -175,6 +175,6 @@ def test_predictions_rank_the_flips_of_the_crane(share: float, least: float) -> 
 
 def test_an_unstable_design_has_no_predictions() -> None:
     problem = arm_on(fixed=[0])
-    evaluator = Evaluator(problem)
-    assert evaluator.respond(problem.initial).status is Status.MECHANISM
-    assert evaluator.screen(problem.initial) is None
+    evaluator = SpringEvaluator(problem)
+    assert evaluator.evaluate(problem.initial).status is Status.MECHANISM
+    assert evaluator.predict_flips(problem.initial) is None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 
 from .problems import arm_on, frame, patch, random_masks
 from .twin import Blend, Twin, efficiency, solve
@@ -49,7 +49,7 @@ def blended_efficiency(
 
 def slope(problem: Problem, mask: NDArray[np.bool_], beam: int) -> float:
     """One-sided derivative of third order: an absent beam cannot be less than absent."""
-    rest = Evaluator(problem).respond(mask)
+    rest = SpringEvaluator(problem).evaluate(mask)
     values = [
         blended_efficiency(problem, mask, beam, share * STEP, rest.displacement)
         for share in (1, 2, 3)
@@ -69,7 +69,7 @@ def kind_of_flip(problem: Problem, mask: NDArray[np.bool_], beam: int) -> str:
 def compare(problem: Problem, mask: NDArray[np.bool_]) -> dict[str, int]:
     """Compare all flips with the twin; count them by kind."""
     counts: dict[str, int] = {}
-    found = Evaluator(problem).sensitivity(mask)
+    found = SpringEvaluator(problem).sensitivity(mask)
     moved = reached(problem, mask)
     for beam, ends in enumerate(problem.lattice.beams):
         if not moved[ends].any():
@@ -109,9 +109,9 @@ def test_every_flip_of_a_patch_with_dead_ends() -> None:
 def test_every_flip_under_a_force_against_springs(kind: str) -> None:
     problem = patch(force=True, kind=kind)
     mask = random_masks(problem, 0.9, 1)[0]
-    evaluator = Evaluator(problem, "displacement")
+    evaluator = SpringEvaluator(problem, "displacement")
     found = evaluator.sensitivity(mask)
-    displacement = evaluator.respond(mask).displacement
+    displacement = evaluator.evaluate(mask).displacement
     at_rest = efficiency(problem, displacement)
     for beam in np.flatnonzero(reached(problem, mask)[problem.lattice.beams].all(axis=1)):
         eta = [
@@ -136,7 +136,7 @@ def prop() -> Problem:
 def test_a_beam_to_a_support_that_nothing_reached_yet_is_no_dead_end() -> None:
     problem = prop()
     mask = np.array([True, True, True, False])
-    found = Evaluator(problem).sensitivity(mask)[3]
+    found = SpringEvaluator(problem).sensitivity(mask)[3]
     assert found == pytest.approx(slope(problem, mask, 3), abs=2e-4, rel=2e-4)
 
 
@@ -145,9 +145,9 @@ def test_sensitivity_of_other_objectives_is_that_of_their_formula() -> None:
     mask = random_masks(problem, 0.9, 1)[0]
     beams = np.flatnonzero(mask)[10:20]
     for objective in ("directional:3", "directional:6"):
-        evaluator = Evaluator(problem, objective)
+        evaluator = SpringEvaluator(problem, objective)
         found = evaluator.sensitivity(mask)
-        rest = evaluator.respond(mask)
+        rest = evaluator.evaluate(mask)
         for beam in beams:
             blend = Blend(Twin(problem, mask), Twin(problem, flipped(mask, beam)), STEP)
             ahead = solve(blend, reached(problem, mask), rest.displacement)
@@ -169,6 +169,6 @@ def directional_efficiency(problem: Problem, u: NDArray[np.float64], objective: 
 
 def test_a_mechanism_has_no_sensitivity() -> None:
     problem = arm_on(fixed=[0])
-    assert Evaluator(problem).respond(problem.initial).status is Status.MECHANISM
+    assert SpringEvaluator(problem).evaluate(problem.initial).status is Status.MECHANISM
     with pytest.raises(InvalidSettings, match="rigid body"):
-        Evaluator(problem).sensitivity(problem.initial)
+        SpringEvaluator(problem).sensitivity(problem.initial)

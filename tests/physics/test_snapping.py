@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Problem, Stiffness, gallery_design, human_design
 
 from .problems import frame
@@ -52,19 +52,19 @@ def test_a_column_that_stayed_straight_is_not_taken_for_stable(minimiser: str) -
 
 
 def status(problem: Problem, minimiser: str = "newton") -> Status:
-    return Evaluator(problem, minimiser=minimiser).respond(problem.initial).status
+    return SpringEvaluator(problem, minimiser=minimiser).evaluate(problem.initial).status
 
 
 def test_a_buckled_column_ends_in_a_stable_state_off_the_axis() -> None:
     problem = column(1.15 * buckling_shortening(0.1))
-    response = Evaluator(problem).respond(problem.initial)
+    response = SpringEvaluator(problem).evaluate(problem.initial)
     assert abs(response.displacement[2, 1]) > 0.05
     straight = 2 * K * (problem.input.amount / 2) ** 2
     assert response.energy < straight
 
 
 def test_a_stiff_column_is_not_flagged() -> None:
-    response = Evaluator(column(0.4, joint=1.0)).respond(np.ones(3, dtype=bool))
+    response = SpringEvaluator(column(0.4, joint=1.0)).evaluate(np.ones(3, dtype=bool))
     assert response.status is Status.CONVERGED
     assert response.displacement[2, 1] == 0.0
 
@@ -107,7 +107,7 @@ def test_a_shallow_truss_snaps_through_at_its_limit_load(height: float, minimise
 
 def test_a_truss_that_snapped_hangs_below_its_supports() -> None:
     snapped = truss(1.2 * limit_load(HEIGHT))
-    response = Evaluator(snapped).respond(snapped.initial)
+    response = SpringEvaluator(snapped).evaluate(snapped.initial)
     assert HEIGHT + response.displacement[1, 1] < -0.3
 
 
@@ -123,9 +123,9 @@ def test_a_truss_with_stiff_joints_does_not_snap() -> None:
 
 def test_finer_increments_do_not_change_the_verdict() -> None:
     for problem in (column(0.2), column(0.26), truss(0.8 * limit_load(HEIGHT)), truss(0.2)):
-        evaluator = Evaluator(problem)
-        coarse = evaluator.respond(problem.initial)
-        fine = evaluator.respond(problem.initial, largest_increment=1 / 200)
+        evaluator = SpringEvaluator(problem)
+        coarse = evaluator.evaluate(problem.initial)
+        fine = evaluator.evaluate(problem.initial, largest_increment=1 / 200)
         assert coarse.status is fine.status
         if coarse.status is Status.CONVERGED:
             assert coarse.efficiency == pytest.approx(fine.efficiency, abs=1e-8)
@@ -133,14 +133,14 @@ def test_finer_increments_do_not_change_the_verdict() -> None:
 
 def test_sensitivity_is_defined_on_either_side_of_a_snap() -> None:
     problem = truss(1.2 * limit_load(HEIGHT))
-    assert np.isfinite(Evaluator(problem).sensitivity(problem.initial)).all()
+    assert np.isfinite(SpringEvaluator(problem).sensitivity(problem.initial)).all()
 
 
 @pytest.mark.parametrize("parts", [20, 24, 28, 30, 32, 48])
 def test_any_increment_leads_to_the_full_stroke(parts: int) -> None:
     design = human_design("crane")
     assert design is not None
-    response = Evaluator(design.problem).respond(design.mask, 1.0 / parts)
+    response = SpringEvaluator(design.problem).evaluate(design.mask, 1.0 / parts)
     assert response.status is Status.CONVERGED
 
 
@@ -149,5 +149,5 @@ def test_soft_designs_reach_the_full_load_in_fine_increments(name: str) -> None:
     design = gallery_design("machine", name)
     assert design is not None
     for parts in (24, 32):
-        response = Evaluator(design.problem).respond(design.mask, 1.0 / parts)
+        response = SpringEvaluator(design.problem).evaluate(design.mask, 1.0 / parts)
         assert response.status is Status.CONVERGED

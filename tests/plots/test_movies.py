@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from bellcrank.errors import InvalidProblem, InvalidSettings, OutputExists, StorageError
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.mechanics.strain import strain_of
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Stiffness, Supports
 from bellcrank.plots.movies import (
@@ -59,8 +59,8 @@ def changing():
     present = np.repeat(design.mask[None], 8, axis=0)
     for k in range(8):
         present[k, design.problem.designable[: 5 * k]] = False
-    evaluator = Evaluator(design.problem)
-    moved = np.array([evaluator.respond(mask).displacement for mask in present])
+    evaluator = SpringEvaluator(design.problem)
+    moved = np.array([evaluator.evaluate(mask).displacement for mask in present])
     course = Course(
         design.problem, present, present, moved, None, "search", tuple("abcdefgh"), ("",) * 8
     )
@@ -102,8 +102,8 @@ def spring_energy(problem, u):
 )
 def test_the_energies_of_the_beams_add_up_to_that_of_the_structure(name):
     design = find_design(name)
-    evaluator = Evaluator(design.problem)
-    response = evaluator.respond(design.mask)
+    evaluator = SpringEvaluator(design.problem)
+    response = evaluator.evaluate(design.mask)
     energy = strain_of(evaluator).energy
     springs = spring_energy(design.problem, response.displacement)
     assert energy.min() >= 0.0
@@ -113,12 +113,12 @@ def test_the_energies_of_the_beams_add_up_to_that_of_the_structure(name):
 
 def test_the_energies_of_the_beams_of_diluted_lattices_add_up():
     problem = find_design("crane").problem
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     rng = np.random.default_rng(3)
     for _ in range(20):
         mask = problem.initial.copy()
         mask[rng.choice(problem.designable, 60, replace=False)] = False
-        response = evaluator.respond(mask)
+        response = evaluator.evaluate(mask)
         assert strain_of(evaluator).energy.sum() == pytest.approx(response.energy, rel=1e-10)
 
 
@@ -128,8 +128,8 @@ def test_the_input_force_is_the_derivative_of_the_energy():
 
     def at(stroke):
         moved = replace(design.problem, input=replace(design.problem.input, amount=stroke))
-        evaluator = Evaluator(moved)
-        return evaluator.respond(design.mask).energy, strain_of(evaluator).input_force
+        evaluator = SpringEvaluator(moved)
+        return evaluator.evaluate(design.mask).energy, strain_of(evaluator).input_force
 
     slope = (at(amount + h)[0] - at(amount - h)[0]) / (2 * h)
     assert at(amount)[1] == pytest.approx(slope, rel=1e-6)
@@ -137,8 +137,8 @@ def test_the_input_force_is_the_derivative_of_the_energy():
 
 def test_the_structure_pushes_back_as_hard_as_it_is_pushed():
     design = find_design("machine:pliers")
-    evaluator = Evaluator(design.problem)
-    evaluator.respond(design.mask)
+    evaluator = SpringEvaluator(design.problem)
+    evaluator.evaluate(design.mask)
     pushed = design.problem.input.amount * len(design.problem.input.nodes)
     assert strain_of(evaluator).input_force == pytest.approx(pushed, rel=1e-8)
 
@@ -191,7 +191,7 @@ def test_of_few_designs_all_are_chosen(count):
 def test_the_first_frame_is_rest_and_the_middle_one_the_full_stroke(movie):
     course = movie.courses[0]
     design = find_design("human:crane")
-    full = Evaluator(design.problem).respond(design.mask)
+    full = SpringEvaluator(design.problem).evaluate(design.mask)
     middle = movie.order[len(movie.order) // 2]
     assert (course.displacement[movie.order[0]] == 0.0).all()
     assert np.allclose(course.displacement[middle], full.displacement, atol=1e-9)
@@ -204,7 +204,7 @@ def test_each_frame_shows_the_response_to_a_part_of_the_stroke():
     design = find_design("machine:discs")
     way = load_design(design, np.array([0.0, 0.3, 1.0]))
     given = replace(design.problem.input, amount=0.3 * design.problem.input.amount)
-    response = Evaluator(replace(design.problem, input=given)).respond(design.mask)
+    response = SpringEvaluator(replace(design.problem, input=given)).evaluate(design.mask)
     assert np.allclose(way.displacement[1], response.displacement, atol=1e-9)
     assert way.efficiency[1] == pytest.approx(response.efficiency, abs=1e-7)
     assert way.efficiency[0] == pytest.approx(way.efficiency[1], rel=0.1)

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.image import imread
 
 from bellcrank.errors import InvalidProblem, InvalidSettings, OutputExists, StorageError
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Design, Lattice, Output, builtin, find_problem, human_design
 from bellcrank.plots import (
     ChainPath,
@@ -27,7 +27,7 @@ from bellcrank.plots.scene import beam_kinds, input_arrows, motion_arrows, wante
 @pytest.fixture(scope="module")
 def motion():
     design = human_design("crane")
-    response = Evaluator(design.problem).respond(design.mask)
+    response = SpringEvaluator(design.problem).evaluate(design.mask)
     return Motion(design, response.displacement, response.efficiency, name="human")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, Status, minimisers
+from bellcrank.mechanics import SpringEvaluator, Status, minimisers
 from bellcrank.model import find_problem
 
 # independent implementation, force 1e-10
@@ -29,7 +29,7 @@ FULL_LATTICES = {
 def test_full_lattices_respond_as_the_independent_implementation_says(name: str) -> None:
     efficiency, energy = FULL_LATTICES[name]
     problem = find_problem(name)
-    response = Evaluator(problem).respond(problem.initial)
+    response = SpringEvaluator(problem).evaluate(problem.initial)
     assert problem.initial.all()
     assert response.status is Status.CONVERGED
     assert response.efficiency == pytest.approx(efficiency, abs=2e-7)
@@ -39,12 +39,12 @@ def test_full_lattices_respond_as_the_independent_implementation_says(name: str)
 @pytest.mark.parametrize("minimiser", list(minimisers))
 def test_every_minimiser_reproduces_the_full_crane(minimiser: str) -> None:
     problem = find_problem("crane")
-    response = Evaluator(problem, minimiser=minimiser).respond(problem.initial)
+    response = SpringEvaluator(problem, minimiser=minimiser).evaluate(problem.initial)
     assert response.efficiency == pytest.approx(-0.0640859, abs=2e-7)
 
 
 def test_the_crane_and_its_anti_parallel_variant_move_alike() -> None:
     crane, other = find_problem("crane"), find_problem("anti-parallel")
-    first = Evaluator(crane).respond(crane.initial).displacement
-    second = Evaluator(other).respond(other.initial).displacement
+    first = SpringEvaluator(crane).evaluate(crane.initial).displacement
+    second = SpringEvaluator(other).evaluate(other.initial).displacement
     np.testing.assert_array_equal(first, second)

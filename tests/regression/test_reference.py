@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Problem, read_problem, unpack_mask
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference"
@@ -44,9 +44,9 @@ def load(name: str) -> tuple[Problem, list[dict[str, Any]]]:
     return read_problem(REFERENCE / f"{name}.problem.json"), json.loads(text)["results"]
 
 
-def check(evaluator: Evaluator, line: dict[str, Any]) -> None:
+def check(evaluator: SpringEvaluator, line: dict[str, Any]) -> None:
     mask = unpack_mask(line["mask"], evaluator.problem.lattice.beam_count)
-    response = evaluator.respond(mask)
+    response = evaluator.evaluate(mask)
     if line.get("snaps"):
         assert response.status is Status.SNAPPED
         return
@@ -60,7 +60,7 @@ def check(evaluator: Evaluator, line: dict[str, Any]) -> None:
 @pytest.mark.parametrize("name", names())
 def test_newton_agrees_with_every_reference_response(name: str) -> None:
     problem, lines = load(name)
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     for line in lines:
         check(evaluator, line)
 
@@ -69,7 +69,7 @@ def test_newton_agrees_with_every_reference_response(name: str) -> None:
 @pytest.mark.parametrize("name", FIRST_ORDER_LINES)
 def test_first_order_minimisers_agree_with_the_reference(name: str, minimiser: str) -> None:
     problem, lines = load(name)
-    evaluator = Evaluator(problem, minimiser=minimiser)
+    evaluator = SpringEvaluator(problem, minimiser=minimiser)
     for line in lines[FIRST_ORDER_LINES[name]]:
         check(evaluator, line)
 
@@ -79,22 +79,22 @@ def test_the_reference_design_that_snaps_is_recognised(minimiser: str) -> None:
     problem, lines = load("crane")
     snapping = [line for line in lines if line.get("snaps")]
     assert len(snapping) == 1
-    check(Evaluator(problem, minimiser=minimiser), snapping[0])
+    check(SpringEvaluator(problem, minimiser=minimiser), snapping[0])
 
 
 def test_the_snapping_design_snaps_however_finely_it_is_loaded() -> None:
     problem, lines = load("crane")
     mask = unpack_mask(lines[-1]["mask"], problem.lattice.beam_count)
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     for increment in (1.0, 1 / 16, 1 / 100, 1 / 1000):
-        assert evaluator.respond(mask, increment).status is Status.SNAPPED
+        assert evaluator.evaluate(mask, increment).status is Status.SNAPPED
 
 
 def test_no_other_reference_design_is_flagged_at_fine_increments() -> None:
     for name in ("crane", "scaling8", "discs1000", "crane_force"):
         problem, lines = load(name)
-        evaluator = Evaluator(problem)
+        evaluator = SpringEvaluator(problem)
         for line in lines:
             mask = unpack_mask(line["mask"], problem.lattice.beam_count)
-            fine = evaluator.respond(mask, 1 / 50)
+            fine = evaluator.evaluate(mask, 1 / 50)
             assert (fine.status is Status.SNAPPED) == bool(line.get("snaps"))

@@ -1,15 +1,15 @@
-"""A responder that lies now and then."""
+"""A evaluator that lies now and then."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from bellcrank.mechanics import Evaluator, Response, Screening, Status
+from bellcrank.mechanics import FlipPrediction, Response, SpringEvaluator, Status
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from bellcrank.model import Problem
 
 
@@ -24,21 +24,20 @@ class Snapping:
 
     def __init__(self, problem: Problem, every: int) -> None:
         self.problem = problem
-        self._inner = Evaluator(problem)
+        self._inner = SpringEvaluator(problem)
         self._every = every
         self._asked = 0
 
-    def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
-        return self._inner.respond(mask, largest_increment)
-
-    def respond_nearby(self, mask: np.ndarray, least: float = -np.inf) -> Response:
+    def evaluate(self, mask: np.ndarray, largest_increment: float = 1.0, **start: Any) -> Response:
+        response = self._inner.evaluate(mask, largest_increment, **start)
+        if not start:
+            return response
         self._asked += 1
-        response = self._inner.respond_nearby(mask, least)
         snaps = self._asked % self._every == 1
         return replace(response, status=Status.SNAPPED) if snaps else response
 
-    def screen(self, mask: np.ndarray) -> Screening | None:
-        return self._inner.screen(mask)
+    def predict_flips(self, mask: np.ndarray) -> FlipPrediction | None:
+        return self._inner.predict_flips(mask)
 
-    def remember(self) -> None:
-        self._inner.remember()
+    def set_reference(self) -> None:
+        self._inner.set_reference()

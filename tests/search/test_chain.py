@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from tests.search.snapping import Snapping
 
 from bellcrank.errors import InvalidSettings, UnknownName
-from bellcrank.mechanics import Evaluator, Response, Status
+from bellcrank.mechanics import Response, SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem, unpack_mask
-from bellcrank.runs import Proposals
 from bellcrank.search import (
     BLOCK,
     ChainState,
@@ -26,6 +25,8 @@ from bellcrank.search import (
 )
 from bellcrank.search.blocks import random_numbers
 from bellcrank.search.metropolis import advance_in_python
+from bellcrank.storage import Proposals
+from tests.search.snapping import Snapping
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,9 @@ def same(first: Proposals, second: Proposals) -> bool:
 def whole(
     problem: Problem, settings: MetropolisSettings, chain: int = 0
 ) -> tuple[ChainState, Proposals]:
-    evaluator = Evaluator(problem, settings.objective, settings.dangling, settings.minimiser)
+    evaluator = SpringEvaluator(
+        problem, settings.objective, settings.unloaded_beams, settings.minimiser
+    )
     blocks = list(chain_blocks(evaluator, settings, chain))
     joined = (np.concatenate(column) for column in zip(*(b for _, b in blocks), strict=True))
     return blocks[-1][0], Proposals(*joined)
@@ -58,7 +61,7 @@ VARIANTS = [
     {},
     {"cost": "negative", "schedule": "geometric"},
     {"minimum_degree": 3},
-    {"dangling": "ignored"},
+    {"unloaded_beams": "prune_dead_ends"},
     {"patience": 7},
     {"objective": "directional:4"},
 ]
@@ -67,7 +70,7 @@ VARIANTS = [
 @pytest.mark.parametrize("variant", VARIANTS, ids=str)
 def test_the_compiled_block_equals_the_python_loop(small: Problem, variant: dict) -> None:
     settings = MetropolisSettings(steps=2 * BLOCK, **variant)
-    evaluator = Evaluator(small, settings.objective, settings.dangling)
+    evaluator = SpringEvaluator(small, settings.objective, settings.unloaded_beams)
     state = start_chain(evaluator, settings)
     for block in range(2):
         if is_done(state, settings):
@@ -83,9 +86,9 @@ def test_the_compiled_block_equals_the_python_loop(small: Problem, variant: dict
 def test_a_chain_resumed_from_plain_data_is_the_same_to_the_last_bit(small: Problem) -> None:
     settings = MetropolisSettings(steps=1000)
     end, proposals = whole(small, settings)
-    first = next(chain_blocks(Evaluator(small), settings, 0))
+    first = next(chain_blocks(SpringEvaluator(small), settings, 0))
     resumed = ChainState(**first[0].to_dict())
-    rest = list(chain_blocks(Evaluator(small), settings, 0, resumed))
+    rest = list(chain_blocks(SpringEvaluator(small), settings, 0, resumed))
     joined = Proposals(
         *(np.concatenate(c) for c in zip(first[1], *(p for _, p in rest), strict=True))
     )
@@ -107,11 +110,11 @@ def test_recorded_masks_differ_from_the_current_design_by_one_beam(small: Proble
 
 def test_the_recorded_efficiency_is_that_of_the_proposal(small: Problem) -> None:
     _, proposals = whole(small, MetropolisSettings(steps=500))
-    evaluator = Evaluator(small)
+    evaluator = SpringEvaluator(small)
     for step in range(0, 500, 50):
         mask = unpack_mask(proposals.mask[step].tobytes().hex(), small.lattice.beam_count)
         assert proposals.efficiency[step] == pytest.approx(
-            evaluator.respond(mask).efficiency, abs=1e-8
+            evaluator.evaluate(mask).efficiency, abs=1e-8
         )
 
 
@@ -154,8 +157,8 @@ def test_patience_ends_a_chain(small: Problem) -> None:
 
 def test_designs_that_snap_are_recorded_and_refused(small: Problem) -> None:
     settings = MetropolisSettings(steps=BLOCK, schedule="constant", cold=1e6)
-    responder = Snapping(small, 2)
-    _, proposals = advance_chain(responder, settings, 0, start_chain(responder, settings))
+    evaluator = Snapping(small, 2)
+    _, proposals = advance_chain(evaluator, settings, 0, start_chain(evaluator, settings))
     snapped = proposals.status == Status.SNAPPED
     assert snapped.sum() == BLOCK / 2
     assert not proposals.accepted[snapped].any()
@@ -164,8 +167,11 @@ def test_designs_that_snap_are_recorded_and_refused(small: Problem) -> None:
 
 def test_a_search_cannot_start_from_a_design_without_response(small: Problem) -> None:
     class Broken(Snapping):
-        def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
-            return replace(super().respond(mask, largest_increment), status=Status.MECHANISM)
+        def evaluate(
+            self, mask: np.ndarray, largest_increment: float = 1.0, **start: Any
+        ) -> Response:
+            response = super().evaluate(mask, largest_increment, **start)
+            return response if start else replace(response, status=Status.MECHANISM)
 
     with pytest.raises(InvalidSettings, match="cannot start"):
         start_chain(Broken(small, 2), MetropolisSettings())

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Core, Evaluator, Status
+from bellcrank.mechanics import Core, SpringEvaluator, Status
 from bellcrank.model import Input, Problem, find_problem, unpack_mask
 from bellcrank.search import (
     BLOCK,
@@ -18,12 +18,12 @@ from bellcrank.search import (
     MetropolisSettings,
     advance_chain,
     chain_blocks,
-    make_responder,
+    make_evaluator,
     read_settings,
     select,
     start_chain,
 )
-from bellcrank.search.goals import Case, GoalResponder, Moved, at_strokes, penalty_of, read_goal
+from bellcrank.search.goals import Case, GoalEvaluator, Moved, at_strokes, penalty_of, read_goal
 
 GOALS = {
     "mass <= 0.5": {},
@@ -49,8 +49,8 @@ def crane() -> Problem:
 
 def excess(problem: Problem, text: str, mask: np.ndarray) -> float:
     """Measured by a new evaluator, as the searches of the core see it."""
-    evaluator = Evaluator(problem, dangling="stripped")
-    response = evaluator.respond(mask)
+    evaluator = SpringEvaluator(problem, unloaded_beams="prune_all")
+    response = evaluator.evaluate(mask)
     core = Core(evaluator).of(mask)
     term = read_goal(text).term(problem)
     total = 0.0 if term.of_beams is None else term.of_beams(mask, core)
@@ -59,9 +59,9 @@ def excess(problem: Problem, text: str, mask: np.ndarray) -> float:
     return total
 
 
-def run(problem: Problem, responder: GoalResponder, settings: MetropolisSettings):
+def run(problem: Problem, evaluator: GoalEvaluator, settings: MetropolisSettings):
     """Masks, efficiencies, acceptance and status of all proposals of one chain."""
-    blocks = [rows for _, rows in chain_blocks(responder, settings, 0)]
+    blocks = [rows for _, rows in chain_blocks(evaluator, settings, 0)]
     mask = np.concatenate([np.unpackbits(rows.mask, axis=1) for rows in blocks])
     columns = ("efficiency", "accepted", "status", "cost")
     rest = [np.concatenate([getattr(rows, name) for rows in blocks]) for name in columns]
@@ -69,17 +69,17 @@ def run(problem: Problem, responder: GoalResponder, settings: MetropolisSettings
 
 
 def test_without_goals_the_plain_evaluator_answers(crane: Problem) -> None:
-    assert isinstance(make_responder(crane, HoppingSettings()), Evaluator)
-    assert isinstance(make_responder(crane, HoppingSettings(goals=("connected",))), GoalResponder)
-    assert isinstance(make_responder(crane, HoppingSettings(strokes=(0.5,))), GoalResponder)
+    assert isinstance(make_evaluator(crane, HoppingSettings()), SpringEvaluator)
+    assert isinstance(make_evaluator(crane, HoppingSettings(goals=("connected",))), GoalEvaluator)
+    assert isinstance(make_evaluator(crane, HoppingSettings(strokes=(0.5,))), GoalEvaluator)
 
 
 @pytest.mark.parametrize("search", ["basin-hopping", "paper", "informed", "tempering"])
 def test_a_goal_that_always_holds_changes_nothing_but_the_way(small: Problem, search: str) -> None:
     settings = read_settings({"search": search, "steps": BLOCK})
-    plain = [rows for _, rows in chain_blocks(make_responder(small, settings), settings, 0)]
+    plain = [rows for _, rows in chain_blocks(make_evaluator(small, settings), settings, 0)]
     harmless = replace(settings, goals=("strain <= 100",))
-    goals = [rows for _, rows in chain_blocks(make_responder(small, harmless), harmless, 0)]
+    goals = [rows for _, rows in chain_blocks(make_evaluator(small, harmless), harmless, 0)]
     for one, other in zip(plain, goals, strict=True):
         assert np.array_equal(one.mask, other.mask)
         assert np.array_equal(one.accepted, other.accepted)
@@ -89,16 +89,16 @@ def test_a_goal_that_always_holds_changes_nothing_but_the_way(small: Problem, se
 @pytest.mark.parametrize("goal", GOALS)
 def test_a_search_with_a_goal_ends_with_designs_that_keep_it(small: Problem, goal: str) -> None:
     settings = HoppingSettings(steps=2 * BLOCK, goals=(goal,))
-    responder = make_responder(small, settings)
-    assert isinstance(responder, GoalResponder)
-    mask, efficiency, accepted, status, _ = run(small, responder, settings)
+    evaluator = make_evaluator(small, settings)
+    assert isinstance(evaluator, GoalEvaluator)
+    mask, efficiency, accepted, status, _ = run(small, evaluator, settings)
     kept = accepted & (status == Status.CONVERGED)
     assert kept.any()
-    evaluator = Evaluator(small, dangling="stripped")
+    evaluator = SpringEvaluator(small, unloaded_beams="prune_all")
     for index in np.flatnonzero(kept)[-20:]:
         assert excess(small, goal, mask[index]) <= 1e-6
         assert efficiency[index] == pytest.approx(
-            evaluator.respond(mask[index]).efficiency, abs=1e-7
+            evaluator.evaluate(mask[index]).efficiency, abs=1e-7
         )
     for index in np.flatnonzero(accepted & (status == Status.UNMET))[:20]:
         assert excess(small, goal, mask[index]) > 0.0
@@ -106,11 +106,11 @@ def test_a_search_with_a_goal_ends_with_designs_that_keep_it(small: Problem, goa
     candidates = [
         Candidate(float(efficiency[i]), 0, int(i), np.packbits(mask[i]).tobytes()) for i in rows
     ]
-    judge = make_responder(small, replace(settings, dangling="counted"))
+    judge = make_evaluator(small, replace(settings, unloaded_beams="keep"))
     chosen = select(small, candidates, judge=judge)
     assert excess(small, goal, chosen.design.mask) <= 1e-6
     assert chosen.efficiency_after == pytest.approx(
-        Evaluator(small).respond(chosen.design.mask).efficiency, abs=1e-7
+        SpringEvaluator(small).evaluate(chosen.design.mask).efficiency, abs=1e-7
     )
 
 
@@ -119,10 +119,10 @@ def test_a_chain_comes_nearer_to_its_goals_step_by_step_and_never_leaves_them(
     crane: Problem, search: str
 ) -> None:
     settings = read_settings(
-        {"search": search, "steps": 600, "goals": ["mass <= 0.9"], "dangling": "stripped"}
+        {"search": search, "steps": 600, "goals": ["mass <= 0.9"], "unloaded_beams": "prune_all"}
     )
-    responder = make_responder(crane, settings)
-    mask, _, accepted, status, _ = run(crane, responder, settings)
+    evaluator = make_evaluator(crane, settings)
+    mask, _, accepted, status, _ = run(crane, evaluator, settings)
     excesses = np.array([excess(crane, "mass <= 0.9", one) for one in mask[accepted]])
     assert excesses[0] > 0.0
     assert (np.diff(excesses) <= 1e-6).all()
@@ -137,69 +137,71 @@ def test_a_chain_comes_nearer_to_its_goals_step_by_step_and_never_leaves_them(
 
 def test_records_keep_the_true_efficiency_and_the_cost_that_was_compared(small: Problem) -> None:
     settings = MetropolisSettings(steps=BLOCK, goals=("mass <= 0.9",), cost="negative")
-    responder = make_responder(small, settings)
-    mask, efficiency, _, status, cost = run(small, responder, settings)
+    evaluator = make_evaluator(small, settings)
+    mask, efficiency, _, status, cost = run(small, evaluator, settings)
     unmet = np.flatnonzero(status == Status.UNMET)[:15]
     assert len(unmet)
-    evaluator = Evaluator(small)
+    evaluator = SpringEvaluator(small)
     for index in unmet:
         penalty = 100.0 + 30.0 * (1.0 - 0.9 / _mass(small, mask[index]))
         assert cost[index] + efficiency[index] == pytest.approx(penalty)
         assert efficiency[index] == pytest.approx(
-            evaluator.respond(mask[index]).efficiency, abs=1e-7
+            evaluator.evaluate(mask[index]).efficiency, abs=1e-7
         )
 
 
 def _mass(problem: Problem, mask: np.ndarray) -> float:
-    core = Evaluator(problem).load_bearing(mask)[problem.designable]
+    core = SpringEvaluator(problem).load_bearing(mask)[problem.designable]
     length = problem.lattice.rest_length[problem.designable]
     return float(length[core].sum() / length.sum())
 
 
 def test_forbidden_by_the_beams_means_no_response_was_computed(crane: Problem) -> None:
-    responder = GoalResponder([Case(crane)], ["mass <= 0.99"])
+    evaluator = GoalEvaluator([Case(crane)], ["mass <= 0.99"])
     fewer = crane.initial.copy()
     fewer[crane.designable[::40]] = False
-    assert responder.respond(fewer).status is Status.CONVERGED
-    responder.remember()
-    displacement = responder.evaluators[0].displacement.copy()
-    answer = responder.respond_nearby(crane.initial)
+    assert evaluator.evaluate(fewer).status is Status.CONVERGED
+    evaluator.set_reference()
+    displacement = evaluator.evaluators[0].displacement.copy()
+    answer = evaluator.evaluate(crane.initial, warm_start=True)
     assert answer.status is Status.FORBIDDEN
-    assert not answer.counts
+    assert not answer.is_admissible
     assert np.isnan(answer.efficiency)
     assert answer.penalty == pytest.approx(penalty_of(0.01))
-    assert np.array_equal(displacement, responder.evaluators[0].displacement)
-    assert responder.respond(crane.initial).status is Status.UNMET
+    assert np.array_equal(displacement, evaluator.evaluators[0].displacement)
+    assert evaluator.evaluate(crane.initial).status is Status.UNMET
 
 
 def test_forbidden_by_the_response_tells_the_efficiency(crane: Problem) -> None:
-    stiff = GoalResponder([Case(crane)], ["stiffness >= 5.7"])
-    assert stiff.respond(crane.initial).status is Status.CONVERGED
-    stiff.remember()
+    stiff = GoalEvaluator([Case(crane)], ["stiffness >= 5.7"])
+    assert stiff.evaluate(crane.initial).status is Status.CONVERGED
+    stiff.set_reference()
     mask = crane.initial.copy()
     mask[crane.designable[::20]] = False
-    answer = stiff.respond_nearby(mask)
+    answer = stiff.evaluate(mask, warm_start=True)
     assert answer.status is Status.FORBIDDEN
-    assert answer.efficiency == pytest.approx(Evaluator(crane).respond(mask).efficiency, abs=1e-7)
+    assert answer.efficiency == pytest.approx(
+        SpringEvaluator(crane).evaluate(mask).efficiency, abs=1e-7
+    )
     assert stiff.broken(mask) == ["stiffness >= 5.7"]
 
 
 def test_what_is_no_improvement_is_not_asked_dear_questions(
     crane: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    responder = GoalResponder([Case(crane)], ["no-contact 0.1", "strain <= 10"])
-    responder.respond(crane.initial)
-    responder.remember()
+    evaluator = GoalEvaluator([Case(crane)], ["no-contact 0.1", "strain <= 10"])
+    evaluator.evaluate(crane.initial)
+    evaluator.set_reference()
     mask = crane.initial.copy()
     mask[crane.designable[50]] = False
-    assert responder.respond_nearby(mask).status is Status.CONVERGED
+    assert evaluator.evaluate(mask, warm_start=True).status is Status.CONVERGED
     monkeypatch.setattr("bellcrank.search.goals.contact.near_pairs", None)
-    assert responder.respond_nearby(mask, least=1.0).status is Status.UNVERIFIED
+    assert evaluator.evaluate(mask, warm_start=True, lower_bound=1.0).status is Status.UNVERIFIED
 
 
 def test_several_strokes_are_averaged(crane: Problem) -> None:
     strokes = (0.25, 0.5, 1.0)
-    responder = make_responder(crane, MetropolisSettings(strokes=strokes))
+    evaluator = make_evaluator(crane, MetropolisSettings(strokes=strokes))
     mask = crane.initial.copy()
     mask[crane.designable[::4]] = False
     each = []
@@ -207,67 +209,72 @@ def test_several_strokes_are_averaged(crane: Problem) -> None:
         push = Input(
             crane.input.nodes, crane.input.direction, "displacement", stroke * crane.input.amount
         )
-        each.append(Evaluator(replace(crane, input=push)).respond(mask))
-    response = responder.respond(mask)
+        each.append(SpringEvaluator(replace(crane, input=push)).evaluate(mask))
+    response = evaluator.evaluate(mask)
     assert np.ptp([one.efficiency for one in each]) > 1e-3
     assert response.efficiency == pytest.approx(np.mean([one.efficiency for one in each]), abs=1e-7)
     assert np.allclose(response.displacement, each[-1].displacement, atol=1e-7)
-    responder.remember()
-    assert responder.respond_nearby(mask).efficiency == pytest.approx(response.efficiency, abs=1e-7)
+    evaluator.set_reference()
+    assert evaluator.evaluate(mask, warm_start=True).efficiency == pytest.approx(
+        response.efficiency, abs=1e-7
+    )
 
 
 def test_cases_are_weighed_and_predictions_with_them(crane: Problem) -> None:
     other = find_problem("anti-parallel")
-    responder = GoalResponder([Case(crane, 3.0), Case(other, 1.0)])
-    one, two = (Evaluator(p).respond(crane.initial).efficiency for p in (crane, other))
-    before = responder.respond(crane.initial).efficiency
+    evaluator = GoalEvaluator([Case(crane, 3.0), Case(other, 1.0)])
+    one, two = (SpringEvaluator(p).evaluate(crane.initial).efficiency for p in (crane, other))
+    before = evaluator.evaluate(crane.initial).efficiency
     assert before == pytest.approx(0.75 * one + 0.25 * two, abs=1e-8)
-    screening = responder.screen(crane.initial)
+    screening = evaluator.predict_flips(crane.initial)
     assert screening is not None
-    responder.remember()
+    evaluator.set_reference()
     for index in np.argsort(-np.abs(screening.change))[:20]:
         mask = crane.initial.copy()
         mask[screening.beams[index]] = False
-        change = responder.respond_nearby(mask).efficiency - before
+        change = evaluator.evaluate(mask, warm_start=True).efficiency - before
         assert screening.change[index] == pytest.approx(change, rel=0.1)
 
 
 def test_a_search_follows_a_wanted_trajectory(small: Problem) -> None:
     strokes, wanted = [0.5, 1.0], np.array([0.02, 0.05])
-    responder = GoalResponder(at_strokes(small, strokes, wanted), dangling="ignored")
+    evaluator = GoalEvaluator(at_strokes(small, strokes, wanted), unloaded_beams="prune_dead_ends")
     settings = HoppingSettings(steps=3 * BLOCK)
-    start = responder.respond(small.initial)
-    mask, efficiency, accepted, _, _ = run(small, responder, settings)
+    start = evaluator.evaluate(small.initial)
+    mask, efficiency, accepted, _, _ = run(small, evaluator, settings)
     best = mask[accepted][np.argmax(efficiency[accepted])]
     assert efficiency[accepted].max() > 0.1 * start.efficiency
     for stroke, motion in zip(strokes, wanted, strict=True):
         amount = stroke * small.input.amount
         part = replace(small, input=replace(small.input, amount=amount))
-        reached = Evaluator(part, dangling="ignored").respond(best).efficiency * amount
+        reached = (
+            SpringEvaluator(part, unloaded_beams="prune_dead_ends").evaluate(best).efficiency
+            * amount
+        )
         assert reached == pytest.approx(motion, rel=0.1)
 
 
 def test_mirror_images_are_proposed_and_recorded_together(small: Problem) -> None:
     settings = MetropolisSettings(steps=BLOCK, goals=("mirror x",))
-    responder = make_responder(small, settings)
-    assert len(responder.problem.designable) == 88
-    mask, _, _, status, _ = run(small, responder, settings)
+    evaluator = make_evaluator(small, settings)
+    assert len(evaluator.problem.designable) == 88
+    mask, _, _, status, _ = run(small, evaluator, settings)
     assert not np.isin(status, [Status.FORBIDDEN, Status.UNMET]).any()
     assert max(excess(small, "mirror x", one) for one in mask[::10]) == 0.0
     assert (np.diff(mask.astype(int), axis=0) != 0).any()
 
 
 def test_predictions_for_mirror_images_are_of_both_flips(small: Problem) -> None:
-    responder = GoalResponder([Case(small)], ["mirror x"])
-    before = responder.respond(small.initial).efficiency
-    screening = responder.screen(small.initial)
+    evaluator = GoalEvaluator([Case(small)], ["mirror x"])
+    before = evaluator.evaluate(small.initial).efficiency
+    screening = evaluator.predict_flips(small.initial)
     assert screening is not None
-    responder.remember()
+    evaluator.set_reference()
     real = []
     for beam in screening.beams:
         mask = small.initial.copy()
         mask[beam] = False
-        real.append(responder.respond_nearby(mask).efficiency - before)
+        real.append(evaluator.evaluate(mask, warm_start=True).efficiency - before)
     assert np.corrcoef(screening.change, real)[0, 1] > 0.98
 
 
@@ -275,11 +282,11 @@ def test_a_chain_with_goals_goes_on_from_plain_data_to_the_same_bit(small: Probl
     settings = HoppingSettings(
         steps=3 * BLOCK, goals=("mass <= 0.6", "stiffness >= 0.5"), strokes=(0.5, 1.0)
     )
-    responder = make_responder(small, settings)
-    whole = [rows for _, rows in chain_blocks(responder, settings, 1)]
-    state = start_chain(make_responder(small, settings), settings, 1)
+    evaluator = make_evaluator(small, settings)
+    whole = [rows for _, rows in chain_blocks(evaluator, settings, 1)]
+    state = start_chain(make_evaluator(small, settings), settings, 1)
     for rows in whole:
-        state, again = advance_chain(make_responder(small, settings), settings, 1, state)
+        state, again = advance_chain(make_evaluator(small, settings), settings, 1, state)
         for one, other in zip(rows, again, strict=True):
             assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
         state = type(state).from_dict(state.to_dict())
@@ -289,7 +296,7 @@ def test_a_chain_with_goals_goes_on_from_plain_data_to_the_same_bit(small: Probl
 
 def test_a_design_that_breaks_a_goal_is_refused_and_the_goal_is_named(crane: Problem) -> None:
     full = Candidate(1.0, 0, 0, np.packbits(crane.initial).tobytes())
-    judge = GoalResponder([Case(crane)], ["mass <= 0.5", "connected", "stiffness >= 50"])
+    judge = GoalEvaluator([Case(crane)], ["mass <= 0.5", "connected", "stiffness >= 50"])
     with pytest.raises(InvalidSettings, match=r"keeps the goals \(1 breaks mass <= 0.5, stiff"):
         select(crane, [full], judge=judge)
     with pytest.raises(InvalidSettings, match=r"no design that keeps its goals \(mass <= 0.5, "):
@@ -310,11 +317,11 @@ def test_bad_settings_are_refused(crane: Problem) -> None:
 
 def test_cases_that_are_not_about_the_same_designs_are_refused(crane: Problem) -> None:
     with pytest.raises(InvalidSettings, match=r"cases\[1\]: problem 'scaling-8' has other posit"):
-        GoalResponder([Case(crane), Case(find_problem("scaling-8"))])
+        GoalEvaluator([Case(crane), Case(find_problem("scaling-8"))])
     with pytest.raises(InvalidSettings, match="other designable beams"):
-        GoalResponder([Case(crane), Case(replace(crane, designable=crane.designable[:5]))])
+        GoalEvaluator([Case(crane), Case(replace(crane, designable=crane.designable[:5]))])
     with pytest.raises(InvalidSettings, match="at least one"):
-        GoalResponder([])
+        GoalEvaluator([])
     with pytest.raises(InvalidSettings, match="weight of a case"):
         Case(crane, 0.0)
     with pytest.raises(InvalidSettings, match="one motion for each of 2 strokes"):

@@ -10,11 +10,11 @@ from scipy.stats import spearmanr
 
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.machines import mean_ports, two_port_at
-from bellcrank.mechanics import Core, Evaluator, Status, foresee_stiffness, output_stiffness
+from bellcrank.mechanics import Core, SpringEvaluator, Status, foresee_stiffness, output_stiffness
 from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem
 from bellcrank.search.goals import (
     Case,
-    GoalResponder,
+    GoalEvaluator,
     Moved,
     largest_strain,
     mass_of,
@@ -67,12 +67,12 @@ def without(problem: Problem, *pairs: tuple[int, int]) -> np.ndarray:
 def excess_of_beams(problem: Problem, text: str, mask: np.ndarray) -> float:
     measure = read_goal(text).term(problem).of_beams
     assert measure is not None
-    return measure(mask, Core(Evaluator(problem)).of(mask))
+    return measure(mask, Core(SpringEvaluator(problem)).of(mask))
 
 
 def moved(problem: Problem, mask: np.ndarray) -> Moved:
-    evaluator = Evaluator(problem)
-    response = evaluator.respond(mask)
+    evaluator = SpringEvaluator(problem)
+    response = evaluator.evaluate(mask)
     assert response.status is Status.CONVERGED
     return Moved(evaluator, mask, Core(evaluator).of(mask), response)
 
@@ -130,14 +130,16 @@ def test_an_unknown_goal_lists_the_known_ones() -> None:
 )
 def test_goals_that_make_no_sense_for_a_problem_say_why(text: str, message: str) -> None:
     with pytest.raises(InvalidSettings, match=f"goal '{text}': .*{message}"):
-        GoalResponder([Case(find_problem("crane"))], [text])
+        GoalEvaluator([Case(find_problem("crane"))], [text])
 
 
 def test_mass_is_the_length_that_carries_load() -> None:
     problem = ladder()
     full = 10.0 + 6.0 * np.sqrt(2.0)
     mask = without(problem, (0, 1), (1, 2))
-    assert mass_of(problem, Core(Evaluator(problem)).of(mask)) == pytest.approx((full - 2) / full)
+    assert mass_of(problem, Core(SpringEvaluator(problem)).of(mask)) == pytest.approx(
+        (full - 2) / full
+    )
     assert excess_of_beams(problem, "mass <= 0.5", problem.initial) == pytest.approx(0.5)
     assert excess_of_beams(problem, "mass <= 0.5", mask) == pytest.approx(
         1 - 0.5 / ((full - 2) / full)
@@ -150,14 +152,14 @@ def test_dead_ends_have_no_mass_for_they_are_not_built() -> None:
     # Node 5 keeps a single beam, down to node 1.
     cut = without(problem, (4, 5), (5, 6), (0, 5), (2, 5))
     gone = without(problem, (4, 5), (5, 6), (0, 5), (2, 5), (1, 5))
-    core = Core(Evaluator(problem))
+    core = Core(SpringEvaluator(problem))
     assert (core.of(cut) == core.of(gone)).all()
 
 
 def test_the_foreseen_change_of_mass_is_exact_for_beams_that_leave_no_dead_end() -> None:
     problem = ladder()
     term = read_goal("mass <= 0.5").term(problem)
-    core = Core(Evaluator(problem))
+    core = Core(SpringEvaluator(problem))
     assert term.by_flip is not None
     foreseen = term.by_flip(core.of(problem.initial))
     for beam in problem.designable:
@@ -232,8 +234,8 @@ def test_output_stiffness_is_what_a_small_force_meets(name: str) -> None:
     rng = np.random.default_rng(1)
     mask = problem.initial.copy()
     mask[rng.choice(problem.designable, 15, replace=False)] = False
-    evaluator = Evaluator(problem)
-    before = evaluator.respond(mask)
+    evaluator = SpringEvaluator(problem)
+    before = evaluator.evaluate(mask)
     assert before.status is Status.CONVERGED
     nodes, wanted = problem.output.nodes, problem.output.direction
     held = evaluator.structure.active[nodes] == 1
@@ -241,11 +243,11 @@ def test_output_stiffness_is_what_a_small_force_meets(name: str) -> None:
 
     def output(force: float) -> float:
         """Mean motion of the output under an additional force shared by its nodes."""
-        pushed = Evaluator(problem)
+        pushed = SpringEvaluator(problem)
         load = pushed.system.load.copy()
         load[nodes[held]] += force / held.sum() * wanted[held]
         pushed.system = pushed.system._replace(load=load)
-        motion = pushed.respond(mask, 0.25).displacement[nodes[held]]
+        motion = pushed.evaluate(mask, 0.25).displacement[nodes[held]]
         return float((motion * wanted[held]).sum(axis=1).mean())
 
     force = 1e-4 * stiffness
@@ -284,7 +286,7 @@ def test_input_stiffness_is_that_of_the_condensed_structure() -> None:
 
 def test_input_stiffness_is_none_of_a_force() -> None:
     with pytest.raises(InvalidSettings, match="'input-stiffness <= 1': the input is driven by"):
-        GoalResponder([Case(find_problem("pliers"))], ["input-stiffness <= 1"])
+        GoalEvaluator([Case(find_problem("pliers"))], ["input-stiffness <= 1"])
 
 
 def test_strain_is_that_of_the_most_stretched_beam() -> None:
@@ -344,10 +346,10 @@ def test_contact_counts_crossings_and_what_is_missing_of_the_width() -> None:
         input=Input([0, 1], [0.0, 1.0], "displacement", 0.8), output=Output([5], [1.0, 0.0]),
         designable=[2],
     )  # fmt: skip
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     displacement = np.zeros((6, 2))
     displacement[[0, 1], 1] = 0.8
-    response = replace(evaluator.respond(problem.initial), displacement=displacement)
+    response = replace(evaluator.evaluate(problem.initial), displacement=displacement)
     mask = np.array([True, True, False, False, False])
     state = Moved(evaluator, mask, np.zeros(5, bool), response)
     assert excess_of_response("no-contact", state) == 0.0
@@ -363,19 +365,19 @@ def test_contact_counts_crossings_and_what_is_missing_of_the_width() -> None:
 
 def test_snapping_is_what_a_careful_path_finds() -> None:
     problem = find_problem("crane")
-    careful = Evaluator(problem)
+    careful = SpringEvaluator(problem)
     for mask in random_designs(problem, 15, thinnest=0.4):
-        evaluator = Evaluator(problem)
-        response = evaluator.respond(mask)
+        evaluator = SpringEvaluator(problem)
+        response = evaluator.evaluate(mask)
         state = Moved(evaluator, mask, Core(evaluator).of(mask), response)
-        expected = careful.respond(mask, 1 / 32).status is not Status.CONVERGED
+        expected = careful.evaluate(mask, 1 / 32).status is not Status.CONVERGED
         assert excess_of_response("no-snapping", state) == expected
 
 
 def test_the_core_is_that_of_the_evaluator() -> None:
     for name in ("crane", "pliers", "discs"):
         problem = find_problem(name)
-        evaluator = Evaluator(problem)
+        evaluator = SpringEvaluator(problem)
         core = Core(evaluator)
         for mask in random_designs(problem, 20, thinnest=0.2):
             assert (core.of(mask) == evaluator.load_bearing(mask)).all()
@@ -387,17 +389,17 @@ def test_the_foreseen_stiffness_ranks_flips_as_the_true_one_does(name: str) -> N
     rng = np.random.default_rng(1)
     mask = problem.initial.copy()
     mask[problem.designable] &= rng.random(len(problem.designable)) < 0.85
-    evaluator = Evaluator(problem)
-    assert evaluator.respond(mask).status is Status.CONVERGED
+    evaluator = SpringEvaluator(problem)
+    assert evaluator.evaluate(mask).status is Status.CONVERGED
     before = output_stiffness(evaluator)
-    evaluator.screen(mask)
+    evaluator.predict_flips(mask)
     beams = problem.designable[:: max(1, len(problem.designable) // 120)]
     foreseen = foresee_stiffness(evaluator, beams, mask[beams])
     real = []
     for beam in beams:
         flipped = mask.copy()
         flipped[beam] ^= True
-        evaluator.respond(flipped)
+        evaluator.evaluate(flipped)
         real.append(output_stiffness(evaluator))
     changes = np.array(real) - before, foreseen - before
     assert spearmanr(*changes).statistic > 0.75

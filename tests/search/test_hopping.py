@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from tests.search.snapping import Snapping
 
-from bellcrank.mechanics import CAREFUL, Evaluator, Response, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem, unpack_mask
 from bellcrank.search import (
     BLOCK,
@@ -17,15 +16,16 @@ from bellcrank.search import (
     HoppingState,
     advance_chain,
     chain_blocks,
-    make_responder,
+    make_evaluator,
     start_chain,
 )
 from bellcrank.search.climbing import LEAST_GAIN, Climb, resume_climb
 from bellcrank.search.hopping import Hopper, kick
+from tests.search.snapping import Snapping
 
 if TYPE_CHECKING:
-    from bellcrank.runs import Proposals
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
+    from bellcrank.storage import Proposals
 
 EAGER: dict[str, Any] = {"walk": 300, "share": 0.5, "least_wait": 500, "wait": 0.2}
 """Settings with which short runs of a small problem have walks."""
@@ -45,7 +45,7 @@ def climb_to_the_end(climb: Climb) -> list[float]:
 
 
 def test_a_patient_climb_ends_where_no_flip_improves(small: Problem) -> None:
-    evaluator = Evaluator(small, dangling="ignored")
+    evaluator = SpringEvaluator(small, unloaded_beams="prune_dead_ends")
     climb = resume_climb(evaluator, small.initial.copy(), depth=10**6, largest_loss=1e6)
     assert climb is not None
     efficiencies = climb_to_the_end(climb)
@@ -54,14 +54,16 @@ def test_a_patient_climb_ends_where_no_flip_improves(small: Problem) -> None:
     for beam in small.designable:
         mask = climb.mask.copy()
         mask[beam] ^= True
-        response = evaluator.respond(mask)
+        response = evaluator.evaluate(mask)
         strained = not climb.mask[beam]  # gains of strained gaps are not believed
         if response.status is Status.CONVERGED and not strained:
             assert response.efficiency <= climb.efficiency + 2 * LEAST_GAIN
 
 
 def test_a_climb_takes_few_responses(small: Problem) -> None:
-    climb = resume_climb(Evaluator(small, dangling="ignored"), small.initial.copy(), 12, 0.01)
+    climb = resume_climb(
+        SpringEvaluator(small, unloaded_beams="prune_dead_ends"), small.initial.copy(), 12, 0.01
+    )
     assert climb is not None
     tries = len(climb_to_the_end(climb))
     # Every flip of every design on the way would be two orders of magnitude more.
@@ -69,7 +71,9 @@ def test_a_climb_takes_few_responses(small: Problem) -> None:
 
 
 def test_a_climb_ends_after_so_many_vain_tries(small: Problem) -> None:
-    climb = resume_climb(Evaluator(small, dangling="ignored"), small.initial.copy(), 3, 1e6)
+    climb = resume_climb(
+        SpringEvaluator(small, unloaded_beams="prune_dead_ends"), small.initial.copy(), 3, 1e6
+    )
     assert climb is not None
     climb_to_the_end(climb)
     assert len(climb.tried) == 3
@@ -78,7 +82,7 @@ def test_a_climb_ends_after_so_many_vain_tries(small: Problem) -> None:
 def test_a_climb_cannot_begin_where_nothing_holds() -> None:
     pliers = find_problem("pliers")
     nothing = np.zeros(pliers.lattice.beam_count, dtype=bool)
-    assert resume_climb(Evaluator(pliers), nothing, 12, 0.01) is None
+    assert resume_climb(SpringEvaluator(pliers), nothing, 12, 0.01) is None
 
 
 def test_a_kick_redraws_a_disc_and_nothing_else(small: Problem) -> None:
@@ -96,17 +100,17 @@ def test_a_kick_redraws_a_disc_and_nothing_else(small: Problem) -> None:
 
 
 def blocks(problem: Problem, settings: HoppingSettings) -> list[tuple[HoppingState, Proposals]]:
-    return list(chain_blocks(make_responder(problem, settings), settings, 0))
+    return list(chain_blocks(make_evaluator(problem, settings), settings, 0))
 
 
 def test_the_best_design_is_never_lost_and_stands_up_to_a_closer_look(small: Problem) -> None:
-    evaluator = Evaluator(small, dangling="stripped")
+    evaluator = SpringEvaluator(small, unloaded_beams="prune_all")
     best = -np.inf
     for state, _ in blocks(small, HoppingSettings(steps=2000, **EAGER)):
         assert state.best >= best
         best = state.best
         mask = unpack_mask(state.mask, small.lattice.beam_count)
-        response = evaluator.respond(mask, CAREFUL)
+        response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
         assert response.status is Status.CONVERGED
         assert response.efficiency == pytest.approx(best, abs=1e-8)
     assert best > 1.0
@@ -119,9 +123,9 @@ def walking(parts: list[tuple[HoppingState, Proposals]]) -> np.ndarray:
 
 def test_walks_begin_where_nothing_is_gained_and_take_their_share(small: Problem) -> None:
     settings = HoppingSettings(steps=8000, **EAGER)
-    responder = make_responder(small, settings)
-    unbeatable = replace(start_chain(responder, settings, 0), best=1e3)
-    steps = walking(list(chain_blocks(responder, settings, 0, unbeatable)))
+    evaluator = make_evaluator(small, settings)
+    unbeatable = replace(start_chain(evaluator, settings, 0), best=1e3)
+    steps = walking(list(chain_blocks(evaluator, settings, 0, unbeatable)))
     first = np.flatnonzero(steps)[0]
     assert 0 <= first - EAGER["least_wait"] < 300  # a climb is not broken off
     assert steps[first:].mean() == pytest.approx(EAGER["share"], abs=0.05)
@@ -135,10 +139,10 @@ def test_no_walks_without_steps_for_them(small: Problem) -> None:
 
 def test_a_walk_goes_on_where_the_last_ended_until_something_is_gained(small: Problem) -> None:
     settings = HoppingSettings(steps=4000, **EAGER)
-    responder = make_responder(small, settings)
-    state = replace(start_chain(responder, settings, 0), step=1000, hops=1)
+    evaluator = make_evaluator(small, settings)
+    state = replace(start_chain(evaluator, settings, 0), step=1000, hops=1)
     rng = np.random.default_rng(1)
-    hopper = Hopper(responder, settings, state, rng, 2000, None)
+    hopper = Hopper(evaluator, settings, state, rng, 2000, None)
     walker = state.mask
     for _ in range(2):
         hopper.leave()
@@ -153,10 +157,10 @@ def test_a_walk_goes_on_where_the_last_ended_until_something_is_gained(small: Pr
         walker = hopper.state.walker
         hopper.climb = None
         hopper.state = replace(hopper.state, walked=0)
-    hopper.end_climb(replace(resume(responder, small.initial), efficiency=1e3))
+    hopper.end_climb(replace(resume(evaluator, small.initial), efficiency=1e3))
     assert hopper.state.walker == walker
     hopper.state = replace(hopper.state, best=0.0)
-    hopper.end_climb(resume(responder, unpack_mask(walker, len(small.initial))))
+    hopper.end_climb(resume(evaluator, unpack_mask(walker, len(small.initial))))
     assert hopper.state.best > 0.0
     assert hopper.state.walker is None
 
@@ -166,19 +170,19 @@ def flips(row: np.ndarray, mask: str, problem: Problem) -> int:
     return int((bits != unpack_mask(mask, problem.lattice.beam_count)).sum())
 
 
-def resume(responder: Responder, mask: np.ndarray) -> Climb:
-    climb = resume_climb(responder, mask.copy(), 12, 0.01)
+def resume(evaluator: Evaluator, mask: np.ndarray) -> Climb:
+    climb = resume_climb(evaluator, mask.copy(), 12, 0.01)
     assert climb is not None
     return climb
 
 
 def test_a_walk_that_got_lost_begins_again_at_the_best_design(small: Problem) -> None:
     settings = HoppingSettings(steps=4000, **EAGER)
-    responder = make_responder(small, settings)
-    state = start_chain(responder, settings, 0)
+    evaluator = make_evaluator(small, settings)
+    state = start_chain(evaluator, settings, 0)
     nothing = "00" * len(bytes.fromhex(state.mask))
     lost = replace(state, walk=100, walker=nothing)
-    after, _ = advance_chain(responder, settings, 0, lost)
+    after, _ = advance_chain(evaluator, settings, 0, lost)
     assert after.step == BLOCK
     assert after.walker != nothing
     assert after.best > state.best
@@ -188,9 +192,11 @@ def test_a_first_climb_in_vain_is_not_repeated(small: Problem) -> None:
     class Strict(Snapping):
         """Where every design that is looked at closely snaps."""
 
-        def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
-            response = super().respond(mask, largest_increment)
-            snaps = largest_increment == CAREFUL
+        def evaluate(
+            self, mask: np.ndarray, largest_increment: float = 1.0, **start: Any
+        ) -> Response:
+            response = super().evaluate(mask, largest_increment, **start)
+            snaps = largest_increment == VERIFICATION_INCREMENT
             return replace(response, status=Status.SNAPPED) if snaps else response
 
     settings = HoppingSettings(steps=1000)
@@ -204,6 +210,6 @@ def test_a_first_climb_in_vain_is_not_repeated(small: Problem) -> None:
 
 def test_a_run_shorter_than_one_climb_still_offers_a_design(small: Problem) -> None:
     settings = HoppingSettings(steps=5)
-    *_, (state, proposals) = chain_blocks(make_responder(small, settings), settings, 0)
+    *_, (state, proposals) = chain_blocks(make_evaluator(small, settings), settings, 0)
     assert state.step == 5
     assert proposals.accepted.any()

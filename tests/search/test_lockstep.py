@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Evaluator, Response, Status
+from bellcrank.mechanics import Response, SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem
 from bellcrank.search import BLOCK
 from bellcrank.search.delayed_acceptance import ScreenedSettings
@@ -44,10 +45,10 @@ def together(
     settings: ScreenedSettings,
     scorer: Weights,
     keep: int = 0,
-    kind: type[Evaluator] = Evaluator,
+    kind: type[SpringEvaluator] = SpringEvaluator,
 ) -> list[Lockstep]:
-    responders = [kind(problem) for _ in range(CHAINS)]
-    return list(screened_steps(responders, scorer, settings, first=FIRST, keep=keep))
+    evaluators = [kind(problem) for _ in range(CHAINS)]
+    return list(screened_steps(evaluators, scorer, settings, first=FIRST, keep=keep))
 
 
 @pytest.mark.parametrize("lookahead", [1, 6])
@@ -56,7 +57,7 @@ def test_a_chain_goes_where_it_goes_alone_to_the_last_bit(problem: Problem, look
     scorer = Weights(problem)
     steps = together(problem, settings, scorer)
     assert [here.step for here in steps] == list(range(1, STEPS + 1))
-    evaluator = Evaluator(problem)  # one for all, as chains alone come one after the other
+    evaluator = SpringEvaluator(problem)  # one for all, as chains alone come one after the other
     for row in range(CHAINS):
         blocks = list(screened_blocks(evaluator, Weights(problem), settings, FIRST + row))
         assert [steps[state.step - 1].states[row] for state, _ in blocks] == [
@@ -80,19 +81,19 @@ def test_chains_are_scored_together(problem: Problem) -> None:
     assert len(ahead.sizes) < STEPS
 
 
-class Snapping(Evaluator):
+class Snapping(SpringEvaluator):
     """Mechanics in which many designs snap, to an efficiency that looks splendid."""
 
-    def respond_nearby(self, mask: np.ndarray, least: float = -np.inf) -> Response:
-        response = super().respond_nearby(mask, least)
-        if mask.sum() % 5:
+    def evaluate(self, mask: np.ndarray, largest_increment: float = 1.0, **start: Any) -> Response:
+        response = super().evaluate(mask, largest_increment, **start)
+        if not start or mask.sum() % 5:
             return response
         return replace(response, status=Status.SNAPPED, efficiency=9.0 + response.efficiency)
 
 
 def test_the_best_sound_designs_that_the_mechanics_computed_are_kept(problem: Problem) -> None:
     hot = replace(SETTINGS, schedule="constant", cold=1.0, steps=200)
-    first = Evaluator(problem).respond(problem.initial).efficiency
+    first = SpringEvaluator(problem).evaluate(problem.initial).efficiency
     last = together(problem, hot, Weights(problem), keep=4, kind=Snapping)[-1]
     for row in range(CHAINS):
         best = {np.packbits(problem.initial).tobytes(): first}
@@ -108,10 +109,12 @@ def test_the_best_sound_designs_that_the_mechanics_computed_are_kept(problem: Pr
 
 
 def test_an_initial_design_without_a_response_is_refused(problem: Problem) -> None:
-    class Loose(Evaluator):
-        def respond(self, mask: np.ndarray, largest_increment: float = 1.0) -> Response:
-            response = super().respond(mask, largest_increment)
-            return replace(response, status=Status.MECHANISM)
+    class Loose(SpringEvaluator):
+        def evaluate(
+            self, mask: np.ndarray, largest_increment: float = 1.0, **start: Any
+        ) -> Response:
+            response = super().evaluate(mask, largest_increment, **start)
+            return response if start else replace(response, status=Status.MECHANISM)
 
     with pytest.raises(InvalidSettings, match="cannot start from the initial design"):
         next(screened_steps([Loose(problem)], Weights(problem), SETTINGS))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings, UnknownName
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem
 from bellcrank.search import FORESEEN, MetropolisSettings, chain_blocks
 from bellcrank.search.delayed_acceptance import ScreenedSettings
@@ -42,10 +42,10 @@ def problem() -> Problem:
 
 def test_chains_of_a_population_go_where_those_of_the_compiled_search_go(problem: Problem) -> None:
     settings = MetropolisSettings(steps=STEPS, chains=2, seed=4)
-    scorer = MechanicsScorer(Evaluator(problem))
+    scorer = MechanicsScorer(SpringEvaluator(problem))
     steps = list(population_steps(problem, scorer, settings, first=5))
     for row in range(2):
-        blocks = list(chain_blocks(Evaluator(problem), settings, 5 + row))
+        blocks = list(chain_blocks(SpringEvaluator(problem), settings, 5 + row))
         accepted = np.concatenate([rows.accepted for _, rows in blocks])
         temperature = np.concatenate([rows.temperature for _, rows in blocks])
         efficiency = np.concatenate([rows.efficiency for _, rows in blocks])
@@ -129,7 +129,7 @@ def test_rules_that_need_the_mechanics_at_each_step_are_refused(
 
 def course_of(problem: Problem, settings: ScreenedSettings, scorer: object = None):
     scorer = scorer or Weights(problem)
-    blocks = list(screened_blocks(Evaluator(problem), scorer, settings, 2))
+    blocks = list(screened_blocks(SpringEvaluator(problem), scorer, settings, 2))
     columns = {
         name: np.concatenate([getattr(rows, name) for _, rows in blocks])
         for name in ("mask", "efficiency", "accepted", "status")
@@ -164,7 +164,7 @@ def test_a_screened_chain_counts_what_it_spares_the_mechanics(problem: Problem) 
 
 def test_a_scorer_that_is_right_leaves_nothing_to_correct(problem: Problem) -> None:
     settings = ScreenedSettings(steps=STEPS, least_chance=1e-12, hot=0.02, cold=0.02)
-    scorer = MechanicsScorer(Evaluator(problem))
+    scorer = MechanicsScorer(SpringEvaluator(problem))
     blocks, columns = course_of(problem, settings, scorer)
     assert blocks[-1][0].responses == blocks[-1][0].accepted
     assert blocks[-1][0].best >= columns["efficiency"][columns["accepted"]].max()
@@ -172,9 +172,9 @@ def test_a_scorer_that_is_right_leaves_nothing_to_correct(problem: Problem) -> N
 
 def test_a_screened_chain_goes_on_from_a_state_between_blocks(problem: Problem) -> None:
     settings = ScreenedSettings(steps=600)
-    whole = list(screened_blocks(Evaluator(problem), Weights(problem), settings, 0))
+    whole = list(screened_blocks(SpringEvaluator(problem), Weights(problem), settings, 0))
     middle = whole[0][0]
-    rest = list(screened_blocks(Evaluator(problem), Weights(problem), settings, 0, middle))
+    rest = list(screened_blocks(SpringEvaluator(problem), Weights(problem), settings, 0, middle))
     assert [state for state, _ in rest] == [state for state, _ in whole[1:]]
 
 

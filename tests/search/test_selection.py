@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem
 from bellcrank.search import (
     Candidate,
@@ -71,29 +71,29 @@ def test_a_chain_without_plateaus_offers_its_best() -> None:
 
 def test_the_selected_design_is_cleaned_and_reported_before_and_after(small: Problem) -> None:
     rng = np.random.default_rng(3)
-    evaluator = Evaluator(small)
+    evaluator = SpringEvaluator(small)
     while True:
         mask = small.initial.copy()
         mask[rng.choice(small.designable, 80, replace=False)] = False
         core = clean(small.full_design().with_mask(mask)).mask
-        response = evaluator.respond(core)
+        response = evaluator.evaluate(core)
         if (core != mask).any() and response.status is Status.CONVERGED and response.efficiency:
             break
     selection = select(small, [candidate(mask, 1.0)])
     assert np.array_equal(selection.design.mask, core)
-    assert selection.efficiency_before == pytest.approx(evaluator.respond(mask).efficiency)
+    assert selection.efficiency_before == pytest.approx(evaluator.evaluate(mask).efficiency)
     assert selection.efficiency_after == pytest.approx(response.efficiency, abs=1e-8)
     assert pieces(small, selection.design.mask) == 1
 
 
 def test_the_best_after_cleaning_wins_whatever_was_claimed(small: Problem) -> None:
-    evaluator = Evaluator(small)
+    evaluator = SpringEvaluator(small)
     masks = []
     for beam in small.designable[:6]:
         mask = small.initial.copy()
         mask[beam] = False
         masks.append(mask)
-    efficiencies = [evaluator.respond(mask).efficiency for mask in masks]
+    efficiencies = [evaluator.evaluate(mask).efficiency for mask in masks]
     claims = [candidate(mask, -value) for mask, value in zip(masks, efficiencies, strict=True)]
     assert select(small, claims).efficiency_after == pytest.approx(max(efficiencies), abs=1e-8)
 

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Input, Output, Problem, Supports, lattices
 from bellcrank.search import SearchSettings, chain_blocks
 
@@ -32,14 +32,14 @@ def ten_beams() -> Problem:
     return Problem(name="ten beams", lattice=lattice, designable=chosen, **regions)
 
 
-def all_efficiencies(problem: Problem, dangling: str) -> np.ndarray:
+def all_efficiencies(problem: Problem, unloaded_beams: str) -> np.ndarray:
     """Efficiency of every design, indexed by its designable bits."""
-    evaluator = Evaluator(problem, dangling=dangling)
+    evaluator = SpringEvaluator(problem, unloaded_beams=unloaded_beams)
     efficiency = []
     for bits in itertools.product([False, True], repeat=10):
         mask = problem.initial.copy()
         mask[problem.designable] = bits
-        efficiency.append(evaluator.respond(mask).efficiency)
+        efficiency.append(evaluator.evaluate(mask).efficiency)
     return np.array(efficiency)
 
 
@@ -58,7 +58,7 @@ def visited(problem: Problem, settings: SearchSettings, chain: int) -> np.ndarra
     """Index of the current design after each step of one chain."""
     mask = problem.initial.copy()
     indices = []
-    evaluator = Evaluator(problem, dangling=settings.dangling)
+    evaluator = SpringEvaluator(problem, unloaded_beams=settings.unloaded_beams)
     for _, proposals in chain_blocks(evaluator, settings, chain):
         proposed = np.unpackbits(proposals.mask, axis=1)[:, : len(mask)].astype(bool)
         for row, accepted in zip(proposed, proposals.accepted, strict=True):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Problem, unpack_mask
 from bellcrank.search import (
     MetropolisSettings,
@@ -58,7 +58,7 @@ class Exact:
 def exact() -> Exact:
     problem = ten_beams()
     return Exact(
-        problem, all_efficiencies(problem, "counted"), all_efficiencies(problem, "ignored")
+        problem, all_efficiencies(problem, "keep"), all_efficiencies(problem, "prune_dead_ends")
     )
 
 
@@ -72,7 +72,7 @@ def deviation_of_the_paper(exact: Exact, steps: int) -> float:
 def deviation_of_moves(exact: Exact, *names: str, steps: int = 1000) -> float:
     settings = MetropolisSettings(
         steps=steps, schedule="constant", cold=TEMPERATURE, cost="negative", moves=names,
-        dangling="ignored",
+        unloaded_beams="prune_dead_ends",
     )  # fmt: skip
     samples = [visited(exact.problem, settings, chain) for chain in range(CHAINS)]
     probability = boltzmann(-exact.ignored, TEMPERATURE)
@@ -111,10 +111,10 @@ def test_visits_by_a_mixture_of_moves_match_too(exact: Exact) -> None:
 def plain_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let chains of flips run in Python."""
 
-    def advance(responder, settings, chain, state):
+    def advance(evaluator, settings, chain, state):
         rng = metropolis.random_numbers(settings.seed, chain, state.step // metropolis.BLOCK)
         count = metropolis.steps_ahead(settings, state.step)
-        return metropolis.advance_in_python(responder, settings, state, rng, count)
+        return metropolis.advance_in_python(evaluator, settings, state, rng, count)
 
     monkeypatch.setattr(metropolis, "_advance_compiled", None)
     paper = metropolis.searches["paper"]
@@ -165,16 +165,18 @@ def deviation_of_tempering(exact: Exact, monkeypatch: pytest.MonkeyPatch, replic
     """Compare the designs of one replica, at the start of each of its turns."""
     take_turn, seen = tempering._take_turn, []
 
-    def watched(responder, settings, state, turn, *rest):
+    def watched(evaluator, settings, state, turn, *rest):
         if turn == replica:
             mask = unpack_mask(state.mask[replica], exact.problem.lattice.beam_count)
             seen[-1].append(index_of(exact.problem, mask))
-        return take_turn(responder, settings, state, turn, *rest)
+        return take_turn(evaluator, settings, state, turn, *rest)
 
     monkeypatch.setattr(tempering, "_take_turn", watched)
     for chain in range(CHAINS):
         seen.append([])
-        for _ in chain_blocks(Evaluator(exact.problem, dangling="ignored"), REPLICAS, chain):
+        for _ in chain_blocks(
+            SpringEvaluator(exact.problem, unloaded_beams="prune_dead_ends"), REPLICAS, chain
+        ):
             pass
     samples = [np.array(states[5:]) for states in seen]
     probability = boltzmann(-exact.ignored, REPLICAS.temperatures[replica])

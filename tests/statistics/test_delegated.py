@@ -7,12 +7,12 @@ bad the stand-in; as a population scored in batches, as often as that of its sco
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, Response, Status
+from bellcrank.mechanics import Response, SpringEvaluator, Status
 from bellcrank.search import MetropolisSettings, screened
 from bellcrank.search.delayed_acceptance import ScreenedSettings
 from bellcrank.search.populations import population_steps
@@ -43,7 +43,7 @@ class Known:
 
 
 class Table:
-    """All efficiencies, right or wrong, looked up: a scorer, and a responder that is as fast."""
+    """All efficiencies, right or wrong, looked up: a scorer, and a evaluator that is as fast."""
 
     def __init__(self, problem: Problem, efficiency: np.ndarray) -> None:
         self.problem = problem
@@ -52,20 +52,17 @@ class Table:
     def score(self, masks: np.ndarray) -> np.ndarray:
         return self.efficiency[masks[:, self.problem.designable] @ POWERS]
 
-    def respond(self, mask: np.ndarray, _largest_increment: float = 1.0) -> Response:
+    def evaluate(self, mask: np.ndarray, _largest_increment: float = 1.0, **_: Any) -> Response:
         return Response(Status.CONVERGED, float(self.score(mask[None])[0]), 0.0, np.empty((0, 2)))
 
-    def respond_nearby(self, mask: np.ndarray, _least: float = -np.inf) -> Response:
-        return self.respond(mask)
-
-    def remember(self) -> None:
+    def set_reference(self) -> None:
         pass
 
 
 @pytest.fixture(scope="module")
 def known() -> Known:
     problem = ten_beams()
-    return Known(problem, all_efficiencies(problem, "counted"))
+    return Known(problem, all_efficiencies(problem, "keep"))
 
 
 def noise(size: float) -> np.ndarray:
@@ -85,9 +82,9 @@ def deviation_of_screened(known: Known, scores: np.ndarray, steps: int = 1250) -
     samples = []
     for chain in range(CHAINS):
         mask, indices = known.problem.initial.copy(), []
-        responder = Table(known.problem, known.efficiency)
+        evaluator = Table(known.problem, known.efficiency)
         scorer = Table(known.problem, scores)
-        for _, rows in screened_blocks(responder, scorer, settings, chain):
+        for _, rows in screened_blocks(evaluator, scorer, settings, chain):
             proposed = np.unpackbits(rows.mask, axis=1)[:, : len(mask)].astype(bool)
             for row, accepted in zip(proposed, rows.accepted, strict=True):
                 mask = row if accepted else mask
@@ -143,7 +140,7 @@ def test_a_population_with_another_scorer_is_told_apart(known: Known) -> None:
 
 
 def test_the_table_says_what_the_mechanics_says(known: Known) -> None:
-    evaluator, table = Evaluator(known.problem), Table(known.problem, known.efficiency)
+    evaluator, table = SpringEvaluator(known.problem), Table(known.problem, known.efficiency)
     mask = known.problem.initial.copy()
     mask[known.problem.designable[::3]] = False
-    assert table.respond(mask).efficiency == evaluator.respond(mask).efficiency
+    assert table.evaluate(mask).efficiency == evaluator.evaluate(mask).efficiency

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bellcrank.mechanics import Evaluator, output_stiffness
-from bellcrank.search import MetropolisSettings, chain_blocks, make_responder
+from bellcrank.mechanics import SpringEvaluator, output_stiffness
+from bellcrank.search import MetropolisSettings, chain_blocks, make_evaluator
 
 from .lattice import (
     BURN_IN,
@@ -42,17 +42,17 @@ def all_designs(problem: Problem) -> np.ndarray:
 
 
 def is_light(problem: Problem) -> np.ndarray:
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     length = problem.lattice.rest_length[problem.designable]
     core = np.array([evaluator.load_bearing(m)[problem.designable] for m in all_designs(problem)])
     return core @ length <= MASS * length.sum()
 
 
 def is_stiff(problem: Problem) -> np.ndarray:
-    evaluator = Evaluator(problem, dangling="ignored")
+    evaluator = SpringEvaluator(problem, unloaded_beams="prune_dead_ends")
     stiffness = []
     for mask in all_designs(problem):
-        evaluator.respond(mask)
+        evaluator.evaluate(mask)
         stiffness.append(output_stiffness(evaluator))
     return np.array(stiffness) >= STIFFNESS
 
@@ -67,13 +67,13 @@ def problem() -> Problem:
 
 @pytest.fixture(scope="module")
 def efficiency(problem: Problem) -> np.ndarray:
-    return all_efficiencies(problem, "ignored")
+    return all_efficiencies(problem, "prune_dead_ends")
 
 
 def visits(problem: Problem, settings: MetropolisSettings, chain: int) -> np.ndarray:
     mask = problem.initial.copy()
     indices = []
-    for _, rows in chain_blocks(make_responder(problem, settings), settings, chain):
+    for _, rows in chain_blocks(make_evaluator(problem, settings), settings, chain):
         proposed = np.unpackbits(rows.mask, axis=1)[:, : len(mask)].astype(bool)
         for row, accepted in zip(proposed, rows.accepted, strict=True):
             mask = row if accepted else mask
@@ -84,7 +84,7 @@ def visits(problem: Problem, settings: MetropolisSettings, chain: int) -> np.nda
 def samples_of(problem: Problem, goal: str, *moves: str) -> list[np.ndarray]:
     settings = MetropolisSettings(
         steps=1250, schedule="constant", cold=TEMPERATURE, cost="negative", moves=moves,
-        dangling="ignored", goals=(goal,),
+        unloaded_beams="prune_dead_ends", goals=(goal,),
     )  # fmt: skip
     return [visits(problem, settings, chain) for chain in range(CHAINS)]
 

@@ -14,7 +14,7 @@ from bellcrank.campaign import Store
 from bellcrank.errors import InvalidSettings, OutputExists, StorageError
 from bellcrank.learning import building
 from bellcrank.learning.building import CAMPAIGN, DatasetSpec, build_dataset, gather
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import find_problem
 from bellcrank.surrogate.dataset import DATASET_FILE, read_dataset
 
@@ -33,10 +33,10 @@ def test_all_proposals_of_all_runs_are_there_with_the_efficiency_that_the_mechan
     assert data.run_count == 4
     assert len(data) + data.origin["left_out"] == 1200
     assert (~data.accepted).any()
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     masks = np.unpackbits(data.packed, axis=1, count=problem.lattice.beam_count).astype(bool)
     for row in range(0, len(data), 97):
-        response = evaluator.respond(masks[row])
+        response = evaluator.evaluate(masks[row])
         assert response.status is Status.CONVERGED
         assert data.efficiency[row] == pytest.approx(response.efficiency, abs=1e-8)
 
@@ -140,7 +140,10 @@ def test_another_dataset_in_the_folder_is_never_written_over(
         ({"runs": 0}, "runs: expected at least 1, got 0"),
         ({"steps": 0}, "steps: expected at least 1, got 0"),
         ({"seed": -1}, "seed: expected at least 0, got -1"),
-        ({"search": {"dangling": "ignored"}}, "dangling: with 'ignored' the search would see"),
+        (
+            {"search": {"unloaded_beams": "prune_dead_ends"}},
+            "unloaded_beams: with 'prune_dead_ends' the search would see",
+        ),
         ({"search": {"objective": "directional:4"}}, "objective: with 'directional:4' the"),
         ({"search": {"strokes": [0.5, 1.0]}}, "strokes: with"),
         ({"search": {"steps": 7}}, "steps: a dataset sets it for each run"),
@@ -157,9 +160,9 @@ def test_specs_that_make_no_sense_are_refused(
 
 def test_an_objective_that_is_not_odd_has_no_reversed_runs() -> None:
     crane = replace(find_problem("crane"), objective="directional:4")
-    evaluator = Evaluator(crane)
-    there = evaluator.respond(crane.initial).efficiency
-    back = Evaluator(building.reverse(crane)).respond(crane.initial).efficiency
+    evaluator = SpringEvaluator(crane)
+    there = evaluator.evaluate(crane.initial).efficiency
+    back = SpringEvaluator(building.reverse(crane)).evaluate(crane.initial).efficiency
     assert there != pytest.approx(-back, abs=1e-3)
     with pytest.raises(InvalidSettings, match="not opposite"):
         DatasetSpec(problem=crane, runs=2)

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import pearsonr, spearmanr
 
 from bellcrank.errors import InvalidDataset, InvalidModel, InvalidProblem, InvalidSettings
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Design, Lattice, find_problem, human_design
 from bellcrank.surrogate.agreement import agreement, rank_correlation
 from bellcrank.surrogate.dataset import Dataset
@@ -201,20 +201,20 @@ def test_a_block_larger_than_the_picture_is_refused(by_kind, human):
 
 
 def test_exact_effects_are_those_of_the_evaluator(explained, human):
-    evaluator = Evaluator(human.problem)
-    assert explained.efficiency == evaluator.respond(human.mask).efficiency
+    evaluator = SpringEvaluator(human.problem)
+    assert explained.efficiency == evaluator.evaluate(human.mask).efficiency
     for place in range(0, len(explained.beams), 9):
         flipped = human.mask.copy()
         flipped[explained.beams[place]] ^= True
-        response = evaluator.respond(flipped)
+        response = evaluator.evaluate(flipped)
         assert explained.status[place] == response.status
-        if response.counts:
+        if response.is_admissible:
             change = response.efficiency - explained.efficiency
             assert explained.exact[place] == pytest.approx(change, abs=1e-7)
         else:
             assert np.isnan(explained.exact[place])
-    evaluator.respond(human.mask)
-    assert np.array_equal(explained.screened, evaluator.screen(human.mask).change)
+    evaluator.evaluate(human.mask)
+    assert np.array_equal(explained.screened, evaluator.predict_flips(human.mask).change)
 
 
 def test_what_the_network_says_of_flips_is_what_it_predicts(explained, by_kind, human):
@@ -362,12 +362,12 @@ def test_masks_must_fit_the_problem(crane):
 
 
 def test_a_design_without_a_response_cannot_be_explained(by_kind, crane, monkeypatch):
-    real = Evaluator.respond
+    real = SpringEvaluator.respond
 
     def snapping(self, mask, largest_increment=1.0):
         return replace(real(self, mask, largest_increment), status=Status.SNAPPED)
 
-    monkeypatch.setattr(Evaluator, "respond", snapping)
+    monkeypatch.setattr(SpringEvaluator, "respond", snapping)
     with pytest.raises(InvalidSettings, match="design 0 of 'crane' has no efficiency"):
         explain(by_kind["mlp"], crane.full_design())
 

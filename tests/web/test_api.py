@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model import find_problem, human_design, problem_to_dict
-from bellcrank.parts import calibrated
+from bellcrank.part import calibrated
 from bellcrank.web.texts import read_task, write_task
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def test_a_motion_follows_the_true_path(client: TestClient, crane: dict[str, Any
     motion = client.post("/api/motion", json=body).json()
     design = human_design("crane")
     assert design is not None
-    exact = Evaluator(design.problem).respond(design.mask, CAREFUL)
+    exact = SpringEvaluator(design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
     there = np.array(motion["displacement"][-1]).reshape(-1, 2)
     assert np.abs(there - exact.displacement).max() < 1e-5
     assert motion["efficiency"][-1] == pytest.approx(exact.efficiency, abs=1e-9)
@@ -169,11 +169,11 @@ def test_the_worth_of_a_beam_is_what_flipping_it_changes(
     found = client.post("/api/sensitivity", json=body).json()
     design = human_design("crane")
     assert design is not None
-    evaluator = Evaluator(design.problem)
+    evaluator = SpringEvaluator(design.problem)
     for place in (3, 50, 150):
         mask = design.mask.copy()
         mask[found["beams"][place]] ^= True
-        flipped = evaluator.respond(mask)
+        flipped = evaluator.evaluate(mask)
         if found["change"][place] is None:
             assert flipped.status.label != "converged"
         else:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bellcrank.fem import FemSettings, levels
-from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model import Design, Problem, pack_mask, read_problem, unpack_mask
-from bellcrank.parts import PartSpec, calibrated
+from bellcrank.part import PartSpec, calibrated
 from bellcrank.search import Candidate, Finalist, HoppingSettings, read_settings
 from bellcrank.workflows import complete_design, start_design
 from bellcrank.workflows.choosing import (
@@ -27,7 +27,7 @@ from bellcrank.workflows.design import conclude
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bellcrank.runs import RunFolder
+    from bellcrank.storage import RunFolder
 
 LIFT = """
 schema = "bellcrank/problem/1"
@@ -65,7 +65,7 @@ def task(tmp_path: Path) -> Problem:
 def finalist(task: Problem, mask: str, chain: int = 0) -> Finalist:
     """A cleaned design, with its response."""
     design = Design(task, unpack_mask(mask, task.lattice.beam_count))
-    response = Evaluator(task).respond(design.mask, CAREFUL)
+    response = SpringEvaluator(task).evaluate(design.mask, VERIFICATION_INCREMENT)
     return Finalist(Candidate(response.efficiency, chain, 0, b""), design, response)
 
 

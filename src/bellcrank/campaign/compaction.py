@@ -37,8 +37,8 @@ from bellcrank.campaign.segments import (
     table_schema,
 )
 from bellcrank.errors import CorruptRun, StorageError
-from bellcrank.runs.files import remove_temporaries
-from bellcrank.runs.shards import parquet_file
+from bellcrank.storage.files import remove_temporaries
+from bellcrank.storage.shards import parquet_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

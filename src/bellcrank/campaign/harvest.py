@@ -19,8 +19,8 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.model import problem_from_dict, write_design
 from bellcrank.model.storage import already_exists
 from bellcrank.provenance import provenance
-from bellcrank.runs.files import make_folder
-from bellcrank.runs.shards import arrays_of, parquet_file
+from bellcrank.storage.files import make_folder
+from bellcrank.storage.shards import arrays_of, parquet_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 from bellcrank.errors import CorruptRun, OutputExists
 from bellcrank.model.storage import sync_folder
-from bellcrank.runs.files import make_folder, storage_error, target_of
+from bellcrank.storage.files import make_folder, storage_error, target_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

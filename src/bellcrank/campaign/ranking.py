@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.campaign.segments import CONVERGED, WHAT_TO_DO
 from bellcrank.errors import InvalidSettings
-from bellcrank.runs.shards import parquet_file
+from bellcrank.storage.shards import parquet_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

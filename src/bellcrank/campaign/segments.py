@@ -16,15 +16,15 @@ import numpy as np
 from bellcrank.campaign.layout import segment_path
 from bellcrank.campaign.seal import BLANK, SEAL_KEY, check_seal, sealed
 from bellcrank.errors import CorruptRun, OutputExists
-from bellcrank.runs.files import make_folder, storage_error, whole_file
-from bellcrank.runs.shards import parquet_file, parquet_writer
+from bellcrank.storage.files import make_folder, storage_error, whole_file
+from bellcrank.storage.shards import parquet_file, parquet_writer
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     from bellcrank.campaign.spec import Run, Spec
-    from bellcrank.runs import Proposals
+    from bellcrank.storage import Proposals
 
 SEGMENT_SCHEMA = "bellcrank/segment/1"
 ROW_GROUP = 65_536

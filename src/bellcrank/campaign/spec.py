@@ -35,7 +35,7 @@ from bellcrank.errors import (
 from bellcrank.model import find_problem, problem_to_dict
 from bellcrank.model.builtin import builtin
 from bellcrank.model.parsing import Table, parse, read_toml
-from bellcrank.runs.description import plain, spec_hash
+from bellcrank.storage.description import plain, spec_hash
 
 if TYPE_CHECKING:
     import os

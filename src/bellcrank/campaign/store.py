@@ -27,15 +27,15 @@ from bellcrank.errors import CorruptRun, InvalidFile, InvalidSettings, OutputExi
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
-from bellcrank.runs.description import first_difference, plain
-from bellcrank.runs.records import checked_proposals
+from bellcrank.storage.description import first_difference, plain
+from bellcrank.storage.records import checked_proposals
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
     from bellcrank.campaign.spec import Run, Task
-    from bellcrank.runs import ProposalColumns
+    from bellcrank.storage import ProposalColumns
 
 CAMPAIGN_SCHEMA = "bellcrank/campaign/1"
 

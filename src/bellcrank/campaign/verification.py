@@ -9,7 +9,7 @@ from bellcrank.campaign.compaction import Part, expand, read_part, read_parts
 from bellcrank.campaign.layout import foreign, part_files, run_folders, segment_files, segment_path
 from bellcrank.campaign.segments import read_segment
 from bellcrank.errors import BellcrankError, CorruptRun
-from bellcrank.runs.files import storage_error
+from bellcrank.storage.files import storage_error
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,7 +15,7 @@ from bellcrank.campaign.layout import DESCRIPTION
 from bellcrank.campaign.store import Store
 from bellcrank.errors import BellcrankError, InvalidSettings
 from bellcrank.model import problem_from_dict
-from bellcrank.runs import Proposals
+from bellcrank.storage import Proposals
 
 if TYPE_CHECKING:
     from bellcrank.campaign.spec import Run, Spec
@@ -70,7 +70,7 @@ def advance(store: Store, run: Run) -> None:
     from bellcrank.search import (
         advance_chain,
         is_done,
-        make_responder,
+        make_evaluator,
         read_settings,
         read_state,
         start_chain,
@@ -80,16 +80,16 @@ def advance(store: Store, run: Run) -> None:
     if segments and segments[-1].done:
         return
     settings = read_settings(run.settings)
-    responder = make_responder(problem_from_dict(run.task.problem, f"run {run.id}"), settings)
+    evaluator = make_evaluator(problem_from_dict(run.task.problem, f"run {run.id}"), settings)
     if segments:
         state = read_state(settings, segments[-1].state)
     else:
-        state = start_chain(responder, settings, 0)
+        state = start_chain(evaluator, settings, 0)
     done = False
     while not done and str(store.path) not in _stopping:
         first_step, parts = state.step, []
         while not done and state.step < first_step + store.spec.segment:
-            state, proposals = advance_chain(responder, settings, 0, state)
+            state, proposals = advance_chain(evaluator, settings, 0, state)
             parts.append(proposals)
             done = is_done(state, settings)
         rows = Proposals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
@@ -118,7 +118,7 @@ def check_tasks(spec: Spec) -> None:
     InvalidSettings
         Naming the task.
     """
-    from bellcrank.search import advance_chain, make_responder, read_settings, start_chain
+    from bellcrank.search import advance_chain, make_evaluator, read_settings, start_chain
 
     number = 0
     for task in spec.tasks:
@@ -126,8 +126,8 @@ def check_tasks(spec: Spec) -> None:
         number += task.run_count
         few = read_settings({**run.settings, "steps": 2})
         try:
-            responder = make_responder(problem_from_dict(task.problem, f"task {task.name!r}"), few)
-            advance_chain(responder, few, 0, start_chain(responder, few, 0))
+            evaluator = make_evaluator(problem_from_dict(task.problem, f"task {task.name!r}"), few)
+            advance_chain(evaluator, few, 0, start_chain(evaluator, few, 0))
         except BellcrankError as error:
             raise InvalidSettings(f"task {task.name!r}: {error}") from None
 

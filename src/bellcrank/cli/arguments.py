@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from bellcrank.model import Design
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
 
 DesignName = Annotated[
     str,
@@ -72,7 +72,7 @@ def part_of(
     ------
     InvalidFile, InvalidSettings, UnknownName
     """
-    from bellcrank.parts import Material, materials, read_part
+    from bellcrank.part import Material, materials, read_part
 
     spec = base if path is None else read_part(path, base)
     changes: dict[str, Any] = {key: value for key, value in lengths.items() if value is not None}

@@ -33,10 +33,10 @@ def characterise(
             "units; may be given several times. \\[free, blocked, the best spring]"
         ),
     ] = None,
-    dangling: Annotated[
+    unloaded_beams: Annotated[
         str,
         typer.Option(help="counted (literal model), ignored (dead ends) or stripped (idle parts)."),
-    ] = "counted",
+    ] = "keep",
     potential: Annotated[
         bool, typer.Option("--potential", help="Fit potentials for chains of actuators too.")
     ] = False,
@@ -66,7 +66,7 @@ def characterise(
     targets = _targets(out, overwrite=overwrite)
     announce_compilation()
     found = characterise(
-        chosen, loads, points, dangling=dangling, potentials=potential  # type: ignore[arg-type]
+        chosen, loads, points, unloaded_beams=unloaded_beams, potentials=potential  # type: ignore[arg-type]
     )  # fmt: skip
     if as_json:
         print_json(json.dumps(characterisation_to_dict(found), indent=1))

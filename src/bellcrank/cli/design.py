@@ -29,7 +29,7 @@ from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
     from bellcrank.model import Design, Problem
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
     from bellcrank.workflows import DesignReport
 
 
@@ -53,7 +53,7 @@ def design(
             help="basin-hopping, informed, tempering, or paper (Bonfanti et al. 2020).",
         ),
     ] = "basin-hopping",
-    dangling: Annotated[
+    unloaded_beams: Annotated[
         str | None,
         typer.Option(
             help="stripped (what bears no load), ignored (dead ends) or counted (as in 'paper')."
@@ -124,7 +124,8 @@ def design(
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
     given = {
         "steps": steps, "chains": chains, "seed": seed, "objective": objective,
-        "dangling": dangling, "minimiser": minimiser, "cost": cost, "schedule": schedule,
+        "unloaded_beams": unloaded_beams, "minimiser": minimiser,
+        "cost": cost, "schedule": schedule,
         "minimum_degree": minimum_degree, "patience": patience,
         "goals": goal and tuple(goal), "strokes": strokes and _numbers("--strokes", strokes),
         **settings_of("--set", more),
@@ -169,7 +170,7 @@ def _task_from(design: Design) -> Problem:
 
 def _part(width: str | None, scale: str | None, material: str | None) -> PartSpec | None:
     """Return what the design will be made as, if anything was said about that."""
-    from bellcrank.parts import PartSpec, materials
+    from bellcrank.part import PartSpec, materials
 
     if width is None:
         if scale is not None or material is not None:

@@ -29,24 +29,24 @@ def evaluate(
     objective: Annotated[
         str | None, typer.Option(help="displacement, directional:N or force.")
     ] = None,
-    dangling: Annotated[
+    unloaded_beams: Annotated[
         str,
         typer.Option(help="counted (literal model), ignored (dead ends) or stripped (idle parts)."),
-    ] = "counted",
+    ] = "keep",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Compute the response of designs, each from rest to the full stroke."""
-    from bellcrank.mechanics import CAREFUL, Evaluator
+    from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
     from bellcrank.model import pack_mask, read_masks
     from bellcrank.workflows import find_design
 
     design = find_design(problem)
     masks = read_masks(designs, design.problem) if designs else [design.mask]
-    evaluator = Evaluator(design.problem, objective, dangling, minimiser)  # type: ignore[arg-type]
+    evaluator = SpringEvaluator(design.problem, objective, unloaded_beams, minimiser)  # type: ignore[arg-type]
     announce_compilation()
     rows = []
     for mask in masks:
-        row = {"mask": pack_mask(mask), **_row(evaluator.respond(mask, CAREFUL))}
+        row = {"mask": pack_mask(mask), **_row(evaluator.evaluate(mask, VERIFICATION_INCREMENT))}
         rows.append({**row, "beams": int(mask.sum())})
     if as_json:
         print_json(json.dumps({"results": rows}, indent=1))

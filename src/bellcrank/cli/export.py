@@ -38,7 +38,7 @@ Pointer = Annotated[str, typer.Option(help="Length of a strut that points out of
 
 def grips_of(plate: bool, screws: int, screw_diameter: str, pad: bool, pointer: str) -> Grips:
     """Return what is added to a part, from what stands on the command line."""
-    from bellcrank.parts import read_length
+    from bellcrank.part import read_length
     from bellcrank.workflows.fabricate import Grips
 
     return Grips(
@@ -77,10 +77,10 @@ def export(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Write the part that a design becomes, for printers, cutters and other programs."""
-    from bellcrank.fabricate import check_print, exporter_for
-    from bellcrank.fabricate import export as write
+    from bellcrank.export import check_print, exporter_for
+    from bellcrank.export import export as write
     from bellcrank.model.storage import check_folder
-    from bellcrank.parts import read_length
+    from bellcrank.part import read_length
     from bellcrank.workflows import spec_for
     from bellcrank.workflows.fabricate import bundle_of
 

@@ -140,7 +140,7 @@ def add(
     from bellcrank.machines.library.entry import name_of
     from bellcrank.machines.library.files import entry_to_dict
     from bellcrank.model.storage import already_exists
-    from bellcrank.runs.files import make_folder
+    from bellcrank.storage.files import make_folder
 
     chosen = design_named(design)
     if points < 1:

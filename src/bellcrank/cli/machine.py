@@ -70,7 +70,7 @@ def build(
 
     from bellcrank.machines.assembly import assemble
     from bellcrank.machines.showcases import find_plan
-    from bellcrank.mechanics import CAREFUL, Evaluator
+    from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
     from bellcrank.model import write_design
     from bellcrank.model.storage import already_exists, check_folder
 
@@ -84,7 +84,9 @@ def build(
     start = time.perf_counter()
     built = assemble(found, partial(find_part, Path(found.source).parent))
     announce_compilation()
-    response = Evaluator(built.design.problem).respond(built.design.mask, CAREFUL)
+    response = SpringEvaluator(built.design.problem).evaluate(
+        built.design.mask, VERIFICATION_INCREMENT
+    )
     seconds = time.perf_counter() - start
     efficiency = response.efficiency if math.isfinite(response.efficiency) else None
     write_design(replace(built.design, efficiency=efficiency), target, overwrite=overwrite)
@@ -125,6 +127,6 @@ def _table(built: Machine, response: Response) -> Table:
         table.add_row(name, plain(told[name]))
     table.add_row("parts", plain(", ".join(told["parts"])))
     value = "-" if told["efficiency"] is None else f"{told['efficiency']:.4f}"
-    status = "" if response.counts else f" ({response.status.message})"
+    status = "" if response.is_admissible else f" ({response.status.message})"
     table.add_row("efficiency", f"{value}{status}")
     return table

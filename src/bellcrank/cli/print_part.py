@@ -55,7 +55,7 @@ def print_(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Slice a design for a printer, and say what it takes."""
-    from bellcrank.parts import read_length
+    from bellcrank.part import read_length
     from bellcrank.workflows import spec_for
     from bellcrank.workflows.fabricate import (
         bundle_of,

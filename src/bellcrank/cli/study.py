@@ -1,4 +1,4 @@
-"""`bellcrank study`: the paper's figures and tables, remade."""
+"""`bellcrank study`: the figures and tables of the paper, computed again."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from bellcrank.cli.app import app
+from bellcrank.cli.checkout import require_reproduction
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.errors import InvalidSettings
 
@@ -42,7 +43,8 @@ def study(
     as_json: Annotated[bool, typer.Option("--json", help="Print the records.")] = False,
 ) -> None:
     """Remake figures and tables of the paper; what was computed once is not computed again."""
-    from bellcrank.studies import run_study, studies
+    require_reproduction()
+    from reproduction import run_study, studies
 
     if workers is not None and workers < 1:
         raise InvalidSettings(f"--workers: expected at least one, got {workers}")
@@ -87,7 +89,7 @@ def _progress(name: str) -> Iterator[Callable[[str, int, int], None]]:
 
 
 def _print_list(*, as_json: bool) -> None:
-    from bellcrank.studies import studies
+    from reproduction import studies
 
     if as_json:
         told = [
@@ -114,8 +116,8 @@ def _print(record: Mapping[str, Any]) -> None:
 def _write_page(out: Path) -> None:
     """Write the page that compares the records in a folder with the paper; draw them anew."""
     from bellcrank.model.storage import write_text
-    from bellcrank.studies.page import page_of
-    from bellcrank.studies.records import read_records, refresh
+    from reproduction.page import page_of
+    from reproduction.records import read_records, refresh
 
     names = read_records(out)
     if not names:

@@ -64,7 +64,7 @@ def surrogate_search(
     from bellcrank.learning.driving_settings import Driving
     from bellcrank.learning.fitting import model_files
     from bellcrank.model import find_problem
-    from bellcrank.runs import check_free
+    from bellcrank.storage import check_free
     from bellcrank.surrogate.dataset import read_dataset
     from bellcrank.surrogate.predictor import load_predictor
 

@@ -148,7 +148,7 @@ def _plan(
     from bellcrank.fem import FemSettings, levels
     from bellcrank.fem.continuum.laws import laws
     from bellcrank.fem.frame import theories
-    from bellcrank.parts import read_length
+    from bellcrank.part import read_length
 
     longest = None if size is None else read_length("size", size)
     common = FemSettings(linear=linear, elements=elements, size=longest)

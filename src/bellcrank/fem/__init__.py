@@ -2,7 +2,7 @@
 
 >>> from bellcrank.fem import FemSettings, levels
 >>> from bellcrank.model import human_design
->>> from bellcrank.parts import PartSpec
+>>> from bellcrank.part import PartSpec
 >>> part = PartSpec(width=2.0).of(human_design("crane"))
 >>> analysis = levels["frame"](part, FemSettings())
 >>> analysis.status.value, round(analysis.efficiency, 3)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bellcrank.fem.results import Analysis
-    from bellcrank.parts import Part
+    from bellcrank.part import Part
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

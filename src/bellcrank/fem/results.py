@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from bellcrank.fem.contact import Contacts
     from bellcrank.fem.path import Loss
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

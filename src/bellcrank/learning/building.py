@@ -13,10 +13,10 @@ from bellcrank.errors import CorruptRun, InvalidDataset, InvalidSettings, Output
 from bellcrank.mechanics import Status, objective_of
 from bellcrank.model import problem_to_dict
 from bellcrank.model.storage import check_folder
-from bellcrank.runs.description import plain
-from bellcrank.runs.files import make_folder
-from bellcrank.runs.shards import arrays_of, parquet_file
 from bellcrank.search import read_settings
+from bellcrank.storage.description import plain
+from bellcrank.storage.files import make_folder
+from bellcrank.storage.shards import arrays_of, parquet_file
 from bellcrank.surrogate.dataset import DATASET_FILE, Dataset
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ ODD_EXPONENT = 2.0
 """n of the only f_n(gamma) = 2 cos(gamma/2)^n - 1 that changes its sign with the motion."""
 OWN = ("steps", "seed", "chains")
 """Settings of a search that a dataset decides about; the last two a campaign does."""
-LABELS: dict[str, Any] = {"objective": None, "dangling": "counted", "strokes": [1.0]}
+LABELS: dict[str, Any] = {"objective": None, "unloaded_beams": "keep", "strokes": [1.0]}
 """Settings of a search that decide what an efficiency is: those of `bellcrank evaluate`."""
 COLUMNS = ("seed", "step", "mask", "efficiency", "accepted", "status")
 
@@ -117,11 +117,11 @@ def reverse(problem: Problem) -> Problem:
 
     Examples
     --------
-    >>> from bellcrank.mechanics import Evaluator
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
-    >>> there = Evaluator(crane).respond(crane.initial).efficiency
-    >>> back = Evaluator(reverse(crane)).respond(crane.initial).efficiency
+    >>> there = SpringEvaluator(crane).evaluate(crane.initial).efficiency
+    >>> back = SpringEvaluator(reverse(crane)).evaluate(crane.initial).efficiency
     >>> there == -back
     True
     """

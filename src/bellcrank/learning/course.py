@@ -13,8 +13,8 @@ from bellcrank.learning.proposing import ActiveSettings
 from bellcrank.learning.round_files import ROUNDS, check_unused, read_record
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
-from bellcrank.runs.files import make_folder
 from bellcrank.search.settings import check_whole
+from bellcrank.storage.files import make_folder
 from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.folder import INITIAL, data_hash
 from bellcrank.surrogate.recipes import Recipe

@@ -9,8 +9,8 @@ import numpy as np
 
 from bellcrank.model import Design, unpack_mask, write_design
 from bellcrank.model.storage import write_text
-from bellcrank.runs import check_free
-from bellcrank.runs.files import make_folder
+from bellcrank.storage import check_free
+from bellcrank.storage.files import make_folder
 
 if TYPE_CHECKING:
     from pathlib import Path

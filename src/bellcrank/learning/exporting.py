@@ -18,7 +18,7 @@ import numpy as np
 from bellcrank.errors import InvalidSettings, OutputExists
 from bellcrank.model.storage import open_temporary, write_text
 from bellcrank.registry import Registry
-from bellcrank.runs.files import make_folder, remove_temporaries, storage_error, target_of
+from bellcrank.storage.files import make_folder, remove_temporaries, storage_error, target_of
 from bellcrank.surrogate.pictures import Canvas, Renderer, draw_lines
 
 if TYPE_CHECKING:

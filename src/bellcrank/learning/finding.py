@@ -16,7 +16,7 @@ import numpy as np
 
 from bellcrank.learning.driven import Effort
 from bellcrank.learning.stretches import Confirmer
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.search import chain_blocks
 from bellcrank.search.lockstep import screened_steps
 from bellcrank.search.populations import Population, population_steps, start_population
@@ -96,7 +96,7 @@ def by_networks(
     """
     chains.tell(0, None)
     population = start_population(chains.problem, scorer, rule, chains.keep)
-    confirmer = Confirmer.at(Evaluator(chains.problem), rule, chains.first, population)
+    confirmer = Confirmer.at(SpringEvaluator(chains.problem), rule, chains.first, population)
 
     def review(here: Population) -> Population:
         due = confirm and here.step % confirm == 0
@@ -133,8 +133,8 @@ def by_screening(chains: Chains, scorer: Scorer, rule: ScreenedSettings) -> Foun
         If the initial design has no unique, stable response.
     """
     chains.tell(0, None)
-    responders = [Evaluator(chains.problem) for _ in range(rule.chains)]
-    steps = screened_steps(responders, scorer, rule, first=chains.first, keep=chains.keep)
+    evaluators = [SpringEvaluator(chains.problem) for _ in range(rule.chains)]
+    steps = screened_steps(evaluators, scorer, rule, first=chains.first, keep=chains.keep)
     for here in steps:
         chains.tell(here.step, float(np.median([state.efficiency for state in here.states])))
         if chains.stop.is_set():
@@ -155,7 +155,7 @@ def by_screening(chains: Chains, scorer: Scorer, rule: ScreenedSettings) -> Foun
 def by_mechanics(chains: Chains, rule: MetropolisSettings) -> Found:
     """Let the mechanics search, one chain after the other."""
     problem = chains.problem
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     final, best, steps, accepted = [], [], [], []
     for number in range(rule.chains):
         seen: dict[bytes, float] = {np.packbits(problem.initial).tobytes(): -math.inf}

@@ -10,7 +10,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.learning.round_files import check_unused, last_finished
-from bellcrank.runs.files import make_folder
+from bellcrank.storage.files import make_folder
 from bellcrank.surrogate.beginning import begin, resume
 from bellcrank.surrogate.folder import (
     DESCRIPTION,

@@ -12,7 +12,7 @@ from bellcrank.errors import InvalidDataset, InvalidSettings
 from bellcrank.learning.driving_settings import FIRST_CHAIN, Driving
 from bellcrank.learning.heard import Heard
 from bellcrank.learning.scoring import NetworkScorer
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.provenance import provenance
 from bellcrank.search.populations import population_steps
 from bellcrank.search.settings import check_whole, is_number
@@ -232,13 +232,13 @@ def label_designs(
         If none is left.
     """
     problem = predictor.problem
-    evaluator, beams = Evaluator(problem), problem.lattice.beam_count
+    evaluator, beams = SpringEvaluator(problem), problem.lattice.beam_count
     total = sum(map(len, chosen))
     packed, efficiency, run = [], [], []
     done = 0
     for chain, designs in enumerate(chosen):
         for design in designs:
-            response = evaluator.respond(np.unpackbits(design, count=beams).astype(bool))
+            response = evaluator.evaluate(np.unpackbits(design, count=beams).astype(bool))
             done += 1
             if response.status is Status.CONVERGED:
                 packed.append(design)

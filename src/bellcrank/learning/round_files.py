@@ -19,7 +19,7 @@ from bellcrank.learning.active import Labelled, Round
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
-from bellcrank.runs.files import make_folder, remove_temporaries
+from bellcrank.storage.files import make_folder, remove_temporaries
 from bellcrank.surrogate.dataset import read_dataset
 from bellcrank.surrogate.folder import check_new
 from bellcrank.surrogate.metrics import Accuracy

@@ -41,7 +41,7 @@ from bellcrank.learning.round_files import (
     write_labelled,
     write_round,
 )
-from bellcrank.runs.files import make_folder
+from bellcrank.storage.files import make_folder
 from bellcrank.surrogate.beginning import begin, resume
 from bellcrank.surrogate.folder import DESCRIPTION, INITIAL, data_hash
 from bellcrank.surrogate.trained import read_model

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -91,7 +91,7 @@ class Judge:
     """
 
     def __init__(self, problem: Problem, tell: Callable[[int], None] = lambda _done: None) -> None:
-        self._evaluator = Evaluator(problem)
+        self._evaluator = SpringEvaluator(problem)
         self._beams = problem.lattice.beam_count
         self._known: dict[bytes, Truth] = {}
         self._tell = tell
@@ -107,7 +107,7 @@ class Judge:
         key = packed.tobytes()
         if key not in self._known:
             mask = np.unpackbits(packed, count=self._beams).astype(bool)
-            response = self._evaluator.respond(mask, largest_increment=CAREFUL)
+            response = self._evaluator.evaluate(mask, largest_increment=VERIFICATION_INCREMENT)
             sound = response.status is Status.CONVERGED
             efficiency = response.efficiency if sound else None
             self._known[key] = Truth(response.status.label, efficiency)

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.search import MetropolisSettings
+    from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.populations import Population
-    from bellcrank.search.responder import Responder
 
 CONFIRMING = 0x5C4EC
 """Names the streams of random numbers by which stretches are judged."""
@@ -57,10 +57,10 @@ class Confirmer:
 
     @classmethod
     def at(
-        cls, responder: Responder, settings: MetropolisSettings, first: int, start: Population
+        cls, evaluator: Evaluator, settings: MetropolisSettings, first: int, start: Population
     ) -> Confirmer:
         """Begin at the initial design."""
-        scorer = MechanicsScorer(responder)
+        scorer = MechanicsScorer(evaluator)
         true = np.repeat(scorer.score(start.masks[:1]), len(start.masks))
         return cls(scorer, settings, first, start, costs_of(settings.cost, true))
 

@@ -13,7 +13,7 @@ from bellcrank.machines.loads import Load
 from bellcrank.machines.ports import Port, block_ports, mean_ports, ports_of
 from bellcrank.machines.sampling import Fit, fit
 from bellcrank.machines.two_port import TwoPort, two_port_at
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.provenance import provenance
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Dangling, Superelement
+    from bellcrank.mechanics import Superelement, UnloadedBeams
     from bellcrank.model import Design
 
 DEGREES = {"mean": (2, 3, 4, 5, 6, 7, 8), "block": (2, 3, 4)}
@@ -45,7 +45,7 @@ class Characterisation:
         What tells the design from others.
     beams
         How many it has.
-    dangling
+    unloaded_beams
         What counts of it.
     drive
         Of the problem: ``"displacement"`` or ``"force"``.
@@ -69,7 +69,7 @@ class Characterisation:
     problem_hash: str
     mask: str
     beams: int
-    dangling: Dangling
+    unloaded_beams: UnloadedBeams
     drive: str
     input: Port
     output: Port
@@ -97,7 +97,7 @@ def characterise(
     loads: Sequence[Load] | None = None,
     points: int = 20,
     *,
-    dangling: Dangling = "counted",
+    unloaded_beams: UnloadedBeams = "keep",
     potentials: bool = False,
 ) -> Characterisation:
     """Condense an actuator to its ports, at rest and along its stroke.
@@ -112,8 +112,8 @@ def characterise(
         share of the work (`usual_loads`).
     points
         Along the stroke.
-    dangling
-        As for an `Evaluator`.
+    unloaded_beams
+        As for an `SpringEvaluator`.
     potentials
         Whether to fit potentials, for chains of actuators; takes some seconds.
 
@@ -131,7 +131,7 @@ def characterise(
     >>> print(f"{lever.rest.efficiency:.3f} {lever.curves[0].efficiency[-1]:.3f}")
     0.818 1.010
     """
-    element = mean_ports(design, dangling)
+    element = mean_ports(design, unloaded_beams)
     rest = two_port_at(element, element.rest())
     chosen = usual_loads(rest) if loads is None else tuple(loads)
     for load in chosen:
@@ -141,7 +141,7 @@ def characterise(
                 "input"
             )
     curves = tuple(trace(element, load, points) for load in chosen)
-    blocks = block_ports(design, dangling)
+    blocks = block_ports(design, unloaded_beams)
     found = {}
     if potentials and rest.connected:
         views = {"mean": element, "block": blocks}
@@ -152,7 +152,7 @@ def characterise(
         problem_hash=design.problem.hash,
         mask=design.mask_hex,
         beams=design.beam_count,
-        dangling=dangling,
+        unloaded_beams=unloaded_beams,
         drive=design.problem.input.drive,
         input=given,
         output=wanted,
@@ -200,7 +200,9 @@ def _doubts_of_branch(design: Design, element: Superelement, free: PortCurve) ->
     """Compare the free curve with the response, which looks out for second equilibria."""
     problem = design.problem
     bare = replace(problem, output=replace(problem.output, spring=None, spring_kind=None))
-    response = Evaluator(bare, "displacement", element.dangling).respond(design.mask, CAREFUL)
+    response = SpringEvaluator(bare, "displacement", element.unloaded_beams).evaluate(
+        design.mask, VERIFICATION_INCREMENT
+    )
     if response.status is Status.SNAPPED and free.status is Status.CONVERGED:
         return [f"free: {response.status.message}"]
     if free.status is Status.CONVERGED and response.status is Status.CONVERGED:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Dangling, Grip
+    from bellcrank.mechanics import Grip, UnloadedBeams
     from bellcrank.model import Design, Input, Output
 
 INPUT, OUTPUT = 0, 1
@@ -71,15 +71,15 @@ def ports_of(design: Design) -> tuple[Port, Port]:
 
 
 def mean_ports(
-    design: Design, dangling: Dangling = "counted", *, springs: bool = False
+    design: Design, unloaded_beams: UnloadedBeams = "keep", *, springs: bool = False
 ) -> Superelement:
     """Return a design as felt through the mean motion of its ports: u_in and u_out.
 
     Parameters
     ----------
     design
-    dangling
-        As for an `Evaluator`.
+    unloaded_beams
+        As for an `SpringEvaluator`.
     springs
         Whether the problem's springs on the output belong to the actuator; by default they are
         a load like any other, and left out.
@@ -106,11 +106,11 @@ def mean_ports(
     measures = np.zeros((2, entry.count + exit_.count))
     measures[INPUT, : entry.count] = share
     measures[OUTPUT, entry.count :] = _mean(wanted)
-    return _gripped(design, [entry, exit_], measures, dangling, springs=springs)
+    return _gripped(design, [entry, exit_], measures, unloaded_beams, springs=springs)
 
 
 def block_ports(
-    design: Design, dangling: Dangling = "counted", *, springs: bool = False
+    design: Design, unloaded_beams: UnloadedBeams = "keep", *, springs: bool = False
 ) -> Superelement:
     """Return a design as felt through two rigid blocks: (x, y, rotation) of input, then output.
 
@@ -123,7 +123,7 @@ def block_ports(
     """
     positions = design.problem.lattice.positions
     blocks = [Rigid(port.nodes, positions[port.nodes], port.centre) for port in ports_of(design)]
-    return _gripped(design, blocks, None, dangling, springs=springs)
+    return _gripped(design, blocks, None, unloaded_beams, springs=springs)
 
 
 def _mean(region: Input | Output) -> NDArray[np.float64]:
@@ -136,11 +136,11 @@ def _gripped(
     design: Design,
     grips: Sequence[Grip],
     measures: NDArray[np.float64] | None,
-    dangling: Dangling,
+    unloaded_beams: UnloadedBeams,
     *,
     springs: bool,
 ) -> Superelement:
-    element = Superelement(design, grips, measures, dangling, springs=springs)
+    element = Superelement(design, grips, measures, unloaded_beams, springs=springs)
     if not element.reached[0]:
         raise InvalidSettings(
             f"{design.problem.name}: nothing resists the input: what it holds hangs loose"

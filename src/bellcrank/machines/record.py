@@ -3,7 +3,7 @@
 Keys are those of `Characterisation`, arrays are lists, and what is infinite or no number is null::
 
     {"schema": "bellcrank/two-port/1", "name": "crane", "problem_hash": "...", "mask": "...",
-     "beams": 352, "dangling": "counted", "drive": "displacement",
+     "beams": 352, "unloaded_beams": "keep", "drive": "displacement",
      "input": {"nodes": [...], "centre": [9.0, 8.66], "direction": [0.0, -1.0]}, "output": {...},
      "rest": {"input_stiffness": 9.686, "efficiency": -0.0439, "output_compliance": 0.1675},
      "blocks": [[...], ...],
@@ -68,7 +68,7 @@ def characterisation_to_dict(found: Characterisation) -> dict[str, Any]:
         "problem_hash": found.problem_hash,
         "mask": found.mask,
         "beams": found.beams,
-        "dangling": found.dangling,
+        "unloaded_beams": found.unloaded_beams,
         "drive": found.drive,
         "input": _port(found.input),
         "output": _port(found.output),
@@ -136,7 +136,7 @@ def characterisation_from_dict(data: Mapping[str, Any], source: str) -> Characte
         problem_hash=table.problem_hash,
         mask=table.mask,
         beams=table.beams,
-        dangling=table.dangling,
+        unloaded_beams=table.unloaded_beams,
         drive=table.drive,
         input=_read_port(table.input, f"{source}: input"),
         output=_read_port(table.output, f"{source}: output"),

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from bellcrank.mechanics import Dangling  # noqa: TC001 - pydantic reads it
+from bellcrank.mechanics import UnloadedBeams  # noqa: TC001 - pydantic reads it
 from bellcrank.model.parsing import Table
 
 SCHEMA = "bellcrank/two-port/1"
@@ -67,7 +67,7 @@ class CharacterisationTable(Table):
     problem_hash: str
     mask: str
     beams: int
-    dangling: Dangling
+    unloaded_beams: UnloadedBeams
     drive: Literal["displacement", "force"]
     input: PortTable
     output: PortTable

@@ -2,22 +2,22 @@
 
 The work flow, in four lines:
 
->>> from bellcrank.mechanics import Evaluator
+>>> from bellcrank.mechanics import SpringEvaluator
 >>> from bellcrank.model import find_problem
->>> evaluator = Evaluator(find_problem("anti-parallel"))
->>> round(evaluator.respond(evaluator.problem.initial).efficiency, 7)
+>>> evaluator = SpringEvaluator(find_problem("anti-parallel"))
+>>> round(evaluator.evaluate(evaluator.problem.initial).efficiency, 7)
 0.0420422
 """
 
 from bellcrank.mechanics.carrying import Core, foresee_stiffness, output_stiffness
 from bellcrank.mechanics.conditions import Conditions, Linear
 from bellcrank.mechanics.evaluator import (
-    CAREFUL,
-    Dangling,
-    Evaluator,
+    VERIFICATION_INCREMENT,
+    FlipPrediction,
     Response,
-    Screening,
+    SpringEvaluator,
     Status,
+    UnloadedBeams,
     load_bearing_core,
 )
 from bellcrank.mechanics.following import Arrival, follow
@@ -28,13 +28,12 @@ from bellcrank.mechanics.substructure import Condensed, Substructure
 from bellcrank.mechanics.superelement import State, Superelement
 
 __all__ = [
-    "CAREFUL",
+    "VERIFICATION_INCREMENT",
     "Arrival",
     "Condensed",
     "Conditions",
     "Core",
-    "Dangling",
-    "Evaluator",
+    "FlipPrediction",
     "Grip",
     "Linear",
     "Loose",
@@ -42,12 +41,13 @@ __all__ = [
     "Objective",
     "Response",
     "Rigid",
-    "Screening",
     "Sliding",
+    "SpringEvaluator",
     "State",
     "Status",
     "Substructure",
     "Superelement",
+    "UnloadedBeams",
     "efficiency_of",
     "follow",
     "foresee_stiffness",

@@ -12,26 +12,26 @@ from bellcrank.mechanics.system import allocate_structure
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics.evaluator import Evaluator
+    from bellcrank.mechanics.evaluator import SpringEvaluator
 
 
 class Core:
     """Finds the load-bearing part of designs, without their response.
 
-    As `Evaluator.load_bearing`, ten times faster, and what the evaluator keeps of the
+    As `SpringEvaluator.load_bearing`, ten times faster, and what the evaluator keeps of the
     response it computed last stays as it is. For an evaluator of stripped designs, all that
     no load can reach is left out.
 
     Examples
     --------
-    >>> from bellcrank.mechanics import Evaluator
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
-    >>> int(Core(Evaluator(crane)).of(crane.initial).sum())
+    >>> int(Core(SpringEvaluator(crane)).of(crane.initial).sum())
     352
     """
 
-    def __init__(self, evaluator: Evaluator) -> None:
+    def __init__(self, evaluator: SpringEvaluator) -> None:
         self._system = evaluator.system
         self._kind = STRIPPED if evaluator.core == STRIPPED else IGNORED
         self._structure = allocate_structure(evaluator.system)
@@ -45,7 +45,7 @@ class Core:
         return core.astype(bool)
 
 
-def output_stiffness(evaluator: Evaluator) -> float:
+def output_stiffness(evaluator: SpringEvaluator) -> float:
     """Return how the output of the design evaluated last resists a small force.
 
     ``1 / (t' K^-1 t)``, with K the tangent stiffness at full load and t the mean of the wanted
@@ -61,11 +61,11 @@ def output_stiffness(evaluator: Evaluator) -> float:
 
     Examples
     --------
-    >>> from bellcrank.mechanics import Evaluator
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
-    >>> evaluator = Evaluator(crane)
-    >>> response = evaluator.respond(crane.initial)
+    >>> evaluator = SpringEvaluator(crane)
+    >>> response = evaluator.evaluate(crane.initial)
     >>> round(output_stiffness(evaluator), 3)
     5.745
     """
@@ -78,7 +78,7 @@ def output_stiffness(evaluator: Evaluator) -> float:
 
 
 def foresee_stiffness(
-    evaluator: Evaluator, beams: NDArray[np.int64], present: NDArray[np.bool_]
+    evaluator: SpringEvaluator, beams: NDArray[np.int64], present: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Predict the stiffness of the output after each flip, from the design screened last.
 

@@ -24,9 +24,9 @@ from bellcrank.mechanics.kernels.arrays import (
 from bellcrank.mechanics.minimisers import minimisers
 from bellcrank.mechanics.objectives import objective_of
 from bellcrank.mechanics.system import (
+    allocate_flip_workspace,
     allocate_known,
     allocate_scratch,
-    allocate_screen,
     allocate_structure,
     build_system,
 )
@@ -34,13 +34,13 @@ from bellcrank.mechanics.system import (
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from bellcrank.mechanics.kernels.screening import Screen
+    from bellcrank.mechanics.kernels.flip_prediction import FlipWorkspace
     from bellcrank.model import Design, Problem
 
-Dangling = Literal["counted", "ignored", "stripped"]
+UnloadedBeams = Literal["keep", "prune_dead_ends", "prune_all"]
 
 
-CAREFUL = 1 / 32
+VERIFICATION_INCREMENT = 1 / 32
 """Largest increment of the load for a design that somebody will build: a search may take longer
 strides, and miss that one in a hundred of the designs near a loss of stability snaps."""
 
@@ -119,13 +119,13 @@ class Response:
         return self.efficiency - self.penalty
 
     @property
-    def counts(self) -> bool:
+    def is_admissible(self) -> bool:
         """Whether a search may go there: the equilibrium is stable and reached from rest."""
         return self.status in {Status.CONVERGED, Status.UNMET}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Screening:
+class FlipPrediction:
     """What one Newton step tells of each flip of some beams.
 
     Parameters
@@ -144,7 +144,7 @@ class Screening:
     strain: NDArray[np.float64]
 
 
-class Evaluator:
+class SpringEvaluator:
     """Computes responses of designs of one problem; one instance for each thread.
 
     Parameters
@@ -154,10 +154,10 @@ class Evaluator:
     objective
         Name of an efficiency (see `bellcrank.mechanics.objectives`); the problem's own
         by default.
-    dangling
-        ``"counted"``: the literal model. ``"ignored"``: the load-bearing core, without
+    unloaded_beams
+        ``"keep"``: the literal model. ``"prune_dead_ends"``: the load-bearing core, without
         dead-end beams, whose splitting of angular springs no real part has.
-        ``"stripped"``: also without what hangs by a single node or stands on supports
+        ``"prune_all"``: also without what hangs by a single node or stands on supports
         alone, which splits them as well.
     minimiser
         ``"newton"``, ``"cg"`` or ``"fire"``.
@@ -166,7 +166,7 @@ class Evaluator:
     --------
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
-    >>> response = Evaluator(crane).respond(crane.initial)
+    >>> response = SpringEvaluator(crane).evaluate(crane.initial)
     >>> response.status.label, round(response.efficiency, 6)
     ('converged', -0.064086)
     """
@@ -175,22 +175,23 @@ class Evaluator:
         self,
         problem: Problem,
         objective: str | None = None,
-        dangling: Dangling = "counted",
+        unloaded_beams: UnloadedBeams = "keep",
         minimiser: str = "newton",
     ) -> None:
-        if dangling not in get_args(Dangling):
+        if unloaded_beams not in get_args(UnloadedBeams):
             raise InvalidSettings(
-                f"dangling must be one of {', '.join(get_args(Dangling))}; got {dangling!r}"
+                f"unloaded_beams must be one of {', '.join(get_args(UnloadedBeams))}; "
+                f"got {unloaded_beams!r}"
             )
         self.problem = problem
-        self.core = get_args(Dangling).index(dangling)
+        self.core = get_args(UnloadedBeams).index(unloaded_beams)
         self.minimiser = minimisers[minimiser]()
         self.system: System = build_system(problem, objective_of(problem, objective))
         self.structure: Structure = allocate_structure(self.system)
         self.scratch = allocate_scratch(self.system, self.structure)
         self.known: Known = allocate_known(self.system)
         self.displacement = np.zeros_like(self.system.positions)
-        self._screen: Screen | None = None
+        self._screen: FlipWorkspace | None = None
 
     def _checked(self, mask: ArrayLike) -> NDArray[np.uint8]:
         given = np.asarray(mask)
@@ -201,7 +202,14 @@ class Evaluator:
             )
         return given.astype(bool).astype(np.uint8)
 
-    def respond(self, mask: ArrayLike, largest_increment: float = 1.0) -> Response:
+    def evaluate(
+        self,
+        mask: ArrayLike,
+        largest_increment: float = 1.0,
+        *,
+        warm_start: bool = False,
+        lower_bound: float = -math.inf,
+    ) -> Response:
         """Load the design `mask` from rest to the full stroke.
 
         Parameters
@@ -211,15 +219,21 @@ class Evaluator:
         largest_increment
             Upper bound on the load increments, as a fraction of the full load; smaller
             values follow the path more finely than the step control asks for.
+        warm_start
+            Start from the reference equilibrium of a similar design (`set_reference`). The
+            response is the same to within the tolerance, and computed faster.
+        lower_bound
+            With a warm start: for an equilibrium no more efficient than this, it is not
+            verified that it is the one reached from rest; its status is UNVERIFIED.
 
         Raises
         ------
         InvalidProblem
             If the mask has the wrong length.
         """
-        return self._respond(mask, self.core, False, -math.inf, largest_increment)
+        return self._load(mask, self.core, warm_start, lower_bound, largest_increment)
 
-    def _respond(
+    def _load(
         self, mask: ArrayLike, core: int, nearby: bool, least: float, largest_increment: float
     ) -> Response:
         status, efficiency, energy = self.minimiser(
@@ -228,25 +242,11 @@ class Evaluator:
         )  # fmt: skip
         return Response(Status(status), efficiency, energy, self.displacement.copy())
 
-    def remember(self) -> None:
-        """Keep the equilibrium computed last, which must have converged, for `respond_nearby`."""
+    def set_reference(self) -> None:
+        """Keep the equilibrium computed last, which must have converged, for warm starts."""
         self.known.present[:] = self.structure.present
         self.known.active[:] = self.structure.active
         self.known.u[:] = self.displacement
-
-    def respond_nearby(self, mask: ArrayLike, least: float = -math.inf) -> Response:
-        """As `respond`, started from the remembered equilibrium of a similar design.
-
-        Only faster: the response is the same to within the tolerance.
-
-        Parameters
-        ----------
-        mask : (M,) bool
-        least
-            An equilibrium no more efficient than this is of no interest: whether it is the one
-            reached from rest is not looked up, and its status is UNVERIFIED.
-        """
-        return self._respond(mask, self.core, True, least, 1.0)
 
     def load_bearing(self, mask: ArrayLike) -> NDArray[np.bool_]:
         """Return which beams of a design can carry load: no loose pieces, no dead ends.
@@ -259,7 +259,7 @@ class Evaluator:
         -------
         (M,) bool
         """
-        self._respond(mask, IGNORED, False, -math.inf, 1.0)
+        self._load(mask, IGNORED, False, -math.inf, 1.0)
         ends_move = self.structure.active[self.system.beams].astype(bool).any(axis=1)
         core: NDArray[np.bool_] = (self.structure.present != 0) & ends_move
         return core
@@ -280,7 +280,7 @@ class Evaluator:
         """
         from bellcrank.mechanics.kernels.sensitivity import find_sensitivity
 
-        response = self.respond(mask)
+        response = self.evaluate(mask)
         sensitivity = np.zeros(len(self.system.beams))
         found = response.status in (Status.CONVERGED, Status.SNAPPED) and find_sensitivity(
             self.system, self._checked(mask), self.core,
@@ -291,11 +291,13 @@ class Evaluator:
             raise InvalidSettings(f"no sensitivity: {response.status.message}")
         return sensitivity
 
-    def screen(self, mask: ArrayLike, beams: ArrayLike | None = None) -> Screening | None:
+    def predict_flips(
+        self, mask: ArrayLike, beams: ArrayLike | None = None
+    ) -> FlipPrediction | None:
         """Predict the change of the efficiency by each flip, from the response computed last.
 
         One Newton step from the equilibrium of `mask`, which must be the design that
-        `respond` or `respond_nearby` was last called with, to that of each flipped design,
+        `evaluate` was last called with, to that of each flipped design,
         by a low-rank change of its stiffness. Much nearer to the truth than `sensitivity`,
         and for the price of one or two responses.
 
@@ -307,34 +309,34 @@ class Evaluator:
 
         Returns
         -------
-        Screening or None
+        FlipPrediction or None
             None if the equilibrium is unstable, so that there is nothing to start from.
 
         Examples
         --------
         >>> from bellcrank.model import find_problem
         >>> crane = find_problem("crane")
-        >>> evaluator = Evaluator(crane)
-        >>> efficiency = evaluator.respond(crane.initial).efficiency
-        >>> screening = evaluator.screen(crane.initial)
+        >>> evaluator = SpringEvaluator(crane)
+        >>> efficiency = evaluator.evaluate(crane.initial).efficiency
+        >>> screening = evaluator.predict_flips(crane.initial)
         >>> best = screening.change.argmax()
         >>> flipped = crane.initial.copy()
         >>> flipped[screening.beams[best]] = False
-        >>> gained = evaluator.respond(flipped).efficiency - efficiency
+        >>> gained = evaluator.evaluate(flipped).efficiency - efficiency
         >>> print(f"{screening.change[best]:.3f} predicted, {gained:.3f} gained")
         0.026 predicted, 0.026 gained
         """
-        from bellcrank.mechanics.kernels.screening import screen_flips
+        from bellcrank.mechanics.kernels.flip_prediction import predict_flips
 
         chosen = self.problem.designable if beams is None else np.asarray(beams, dtype=np.int64)
         if self._screen is None:
-            self._screen = allocate_screen(self.system, self.structure)
+            self._screen = allocate_flip_workspace(self.system, self.structure)
         change, strain = np.zeros(len(chosen)), np.zeros(len(chosen))
-        found = screen_flips(
+        found = predict_flips(
             self.system, self._checked(mask), self.core, chosen, self.structure,
             self.displacement, self.scratch, self._screen, change, strain,
         )  # fmt: skip
-        return Screening(chosen, change, strain) if found else None
+        return FlipPrediction(chosen, change, strain) if found else None
 
     def flexibility(self) -> NDArray[np.float64]:
         """Return (n, 2, n, 2) the inverse of the stiffness that `screen` looked at last.
@@ -356,7 +358,7 @@ class Evaluator:
 
 
 def load_bearing_core(design: Design) -> NDArray[np.bool_]:
-    """Return the mask of the beams that can carry load: see `Evaluator.load_bearing`.
+    """Return the mask of the beams that can carry load: see `SpringEvaluator.load_bearing`.
 
     Examples
     --------
@@ -365,4 +367,4 @@ def load_bearing_core(design: Design) -> NDArray[np.bool_]:
     >>> bool(load_bearing_core(crane).all())
     True
     """
-    return Evaluator(design.problem, "displacement").load_bearing(design.mask)
+    return SpringEvaluator(design.problem, "displacement").load_bearing(design.mask)

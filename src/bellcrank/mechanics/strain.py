@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics.evaluator import Evaluator
+    from bellcrank.mechanics.evaluator import SpringEvaluator
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,15 +29,15 @@ class Strain:
     input_force: float
 
 
-def strain_of(evaluator: Evaluator) -> Strain:
+def strain_of(evaluator: SpringEvaluator) -> Strain:
     """Measure what the beams bear in the response computed last.
 
     Examples
     --------
-    >>> from bellcrank.mechanics import Evaluator
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
-    >>> evaluator = Evaluator(find_problem("crane"))
-    >>> response = evaluator.respond(evaluator.problem.initial)
+    >>> evaluator = SpringEvaluator(find_problem("crane"))
+    >>> response = evaluator.evaluate(evaluator.problem.initial)
     >>> bool(np.isclose(strain_of(evaluator).energy.sum(), response.energy))
     True
     """

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics.evaluator import Dangling, Status
+from bellcrank.mechanics.evaluator import Status, UnloadedBeams
 from bellcrank.mechanics.kernels.arrays import HELD
 from bellcrank.mechanics.objectives import objective_of
 from bellcrank.mechanics.system import allocate_scratch, allocate_structure, build_system
@@ -62,8 +62,8 @@ class Substructure:
     design
     gripped : (p,) int64
         Nodes that are moved; no supports among them.
-    dangling
-        As for an `Evaluator`.
+    unloaded_beams
+        As for an `SpringEvaluator`.
     springs
         Whether the springs on the output nodes belong to it.
 
@@ -93,13 +93,14 @@ class Substructure:
         self,
         design: Design,
         gripped: ArrayLike,
-        dangling: Dangling = "counted",
+        unloaded_beams: UnloadedBeams = "keep",
         *,
         springs: bool = False,
     ) -> None:
-        if dangling not in get_args(Dangling):
+        if unloaded_beams not in get_args(UnloadedBeams):
             raise InvalidSettings(
-                f"dangling must be one of {', '.join(get_args(Dangling))}; got {dangling!r}"
+                f"unloaded_beams must be one of {', '.join(get_args(UnloadedBeams))}; "
+                f"got {unloaded_beams!r}"
             )
         problem = design.problem
         self.design = design
@@ -116,7 +117,7 @@ class Substructure:
         self._order = self.system.block[self._free]
         blocks = np.arange(len(self.scratch.step))
         self._mode = np.cos(1.0 + np.stack([3.0 * blocks, 3.0 * blocks + 1.0], axis=1))
-        self._find_structure(get_args(Dangling).index(dangling))
+        self._find_structure(get_args(UnloadedBeams).index(unloaded_beams))
 
     def _find_structure(self, core: int) -> None:
         from bellcrank.mechanics.kernels.condensation import find_structure

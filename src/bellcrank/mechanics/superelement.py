@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.mechanics.conditions import Conditions
-    from bellcrank.mechanics.evaluator import Dangling
+    from bellcrank.mechanics.evaluator import UnloadedBeams
     from bellcrank.mechanics.grips import Grip
     from bellcrank.model import Design
 
@@ -67,7 +67,7 @@ class Superelement:
         How nodes are gripped. Their coordinates, one grip after the other, are z (m,).
     measures : (k, m)
         The coordinates that conditions and forces are about: q = measures z; by default z.
-    dangling, springs
+    unloaded_beams, springs
         As for a `Substructure`.
 
     Raises
@@ -93,16 +93,16 @@ class Superelement:
         design: Design,
         grips: Sequence[Grip],
         measures: ArrayLike | None = None,
-        dangling: Dangling = "counted",
+        unloaded_beams: UnloadedBeams = "keep",
         *,
         springs: bool = False,
     ) -> None:
         gripped = np.concatenate([grip.nodes for grip in grips])
         self.design = design
-        self.dangling: Dangling = dangling
+        self.unloaded_beams: UnloadedBeams = unloaded_beams
         self.grips = tuple(grips)
         self.count = sum(grip.count for grip in grips)
-        self.cut = Substructure(design, gripped, dangling, springs=springs)
+        self.cut = Substructure(design, gripped, unloaded_beams, springs=springs)
         ends = np.cumsum([0, *(grip.count for grip in grips)]).tolist()
         self._parts = [slice(a, b) for a, b in pairwise(ends)]
         # What the input does not reach stays at rest, whatever is asked of it.

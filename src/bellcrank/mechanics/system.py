@@ -20,7 +20,7 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
-from bellcrank.mechanics.kernels.screening import PANEL, RANK, Screen
+from bellcrank.mechanics.kernels.flip_prediction import PANEL, RANK, FlipWorkspace
 from bellcrank.mechanics.kernels.tangents import MOST_KNOTS, ROWS
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
 
@@ -192,10 +192,10 @@ def allocate_scratch(system: System, structure: Structure) -> Scratch:
     )
 
 
-def allocate_screen(system: System, structure: Structure) -> Screen:
+def allocate_flip_workspace(system: System, structure: Structure) -> FlipWorkspace:
     """Working memory for the prediction of all flips; grows with the square of the nodes."""
     blocks = len(structure.column_bits)
-    return Screen(
+    return FlipWorkspace(
         inverse=np.zeros((blocks, blocks, 4)),
         panel=np.zeros((blocks, 2, 2 * PANEL)),
         counts=np.zeros(len(system.positions), np.uint8),

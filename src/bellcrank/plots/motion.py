@@ -101,10 +101,10 @@ def draw_motion(
     --------
     >>> import os
     >>> from tempfile import TemporaryDirectory
-    >>> from bellcrank.mechanics import Evaluator
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
-    >>> response = Evaluator(crane).respond(crane.initial)
+    >>> response = SpringEvaluator(crane).evaluate(crane.initial)
     >>> with TemporaryDirectory() as folder:
     ...     draw_motion(
     ...         Motion(crane.full_design(), response.displacement, response.efficiency),

@@ -8,8 +8,8 @@ Examples
 --------
 >>> from bellcrank.model import find_problem
 >>> settings = HoppingSettings(steps=500)
->>> responder = make_responder(find_problem("scaling-8"), settings)
->>> *_, (state, proposals) = chain_blocks(responder, settings, chain=0)
+>>> evaluator = make_evaluator(find_problem("scaling-8"), settings)
+>>> *_, (state, proposals) = chain_blocks(evaluator, settings, chain=0)
 >>> state.step, len(proposals.efficiency)
 (500, 250)
 """
@@ -17,11 +17,11 @@ Examples
 from bellcrank.search.blocks import BLOCK, FORBIDDEN, FORESEEN
 from bellcrank.search.cleaning import clean, loaded_beams, pieces
 from bellcrank.search.costs import Cost, costs
+from bellcrank.search.evaluator import Evaluator, make_evaluator
 from bellcrank.search.hopping import HoppingSettings, HoppingState
 from bellcrank.search.metropolis import ChainState, InformedSettings, MetropolisSettings
 from bellcrank.search.moves import Move, moves
 from bellcrank.search.parallel import Progress, default_workers, run_chain, run_chains
-from bellcrank.search.responder import Responder, make_responder
 from bellcrank.search.schedules import schedules
 from bellcrank.search.searches import (
     DEFAULT_SEARCH,
@@ -61,6 +61,7 @@ __all__ = [
     "ChainState",
     "Choice",
     "Cost",
+    "Evaluator",
     "Finalist",
     "HoppingSettings",
     "HoppingState",
@@ -69,7 +70,6 @@ __all__ = [
     "Move",
     "Progress",
     "Refusals",
-    "Responder",
     "Search",
     "SearchSettings",
     "Selection",
@@ -85,7 +85,7 @@ __all__ = [
     "default_workers",
     "is_done",
     "loaded_beams",
-    "make_responder",
+    "make_evaluator",
     "most_efficient",
     "moves",
     "peaks",

@@ -9,14 +9,14 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import Status
-from bellcrank.runs import Proposals
+from bellcrank.storage import Proposals
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics import Response
     from bellcrank.model import Problem
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.settings import SearchSettings
 
 BLOCK = 250
@@ -39,7 +39,7 @@ def steps_ahead(settings: SearchSettings, step: int) -> int:
     return min(BLOCK, settings.steps - step)
 
 
-def initial_response(responder: Responder) -> Response:
+def initial_response(evaluator: Evaluator) -> Response:
     """Return the response of a problem's initial design, which a search starts from.
 
     Raises
@@ -47,9 +47,9 @@ def initial_response(responder: Responder) -> Response:
     InvalidSettings
         If it has none, so that there is nothing to compare with.
     """
-    problem = responder.problem
-    response = responder.respond(problem.initial)
-    if not response.counts:
+    problem = evaluator.problem
+    response = evaluator.evaluate(problem.initial)
+    if not response.is_admissible:
         raise InvalidSettings(
             f"problem {problem.name!r}: the search cannot start from the initial design: "
             f"{response.status.message}"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -102,7 +102,7 @@ def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:
     return int(connected_components(graph, directed=False)[0])
 
 
-def clean(design: Design, evaluator: Evaluator | None = None) -> Design:
+def clean(design: Design, evaluator: SpringEvaluator | None = None) -> Design:
     """Leave out of a design what no load can reach.
 
     First the load-bearing core (no loose pieces, no dead ends), then what hangs by a
@@ -121,6 +121,6 @@ def clean(design: Design, evaluator: Evaluator | None = None) -> Design:
     >>> clean(crane).beam_count
     352
     """
-    evaluator = evaluator or Evaluator(design.problem, "displacement")
+    evaluator = evaluator or SpringEvaluator(design.problem, "displacement")
     core = evaluator.load_bearing(design.mask)
     return design.with_mask(loaded_beams(design.problem, core))

@@ -1,6 +1,6 @@
 """Climbing: from a design to one that no flip of a beam improves, in few responses.
 
-One Newton step predicts what each flip would do (`Evaluator.screen`). They are tried from
+One Newton step predicts what each flip would do (`SpringEvaluator.screen`). They are tried from
 the most promising on; the first that really improves is taken, and all are predicted anew.
 """
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics import Response
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
 
 LEAST_GAIN = 1e-6
 """Gain of efficiency that counts as one; responses are settled to 1e-9."""
@@ -32,7 +32,7 @@ class Climb:
 
     Parameters
     ----------
-    responder
+    evaluator
         Must have the design remembered.
     mask : (M,) bool
         The design reached.
@@ -46,7 +46,7 @@ class Climb:
         Beams tried in vain since the last gain.
     """
 
-    responder: Responder
+    evaluator: Evaluator
     mask: NDArray[np.bool_]
     efficiency: float
     depth: int
@@ -64,7 +64,7 @@ class Climb:
         return self._waiting.pop()
 
     def _candidates(self) -> list[int]:
-        screening = self.responder.screen(self.mask)
+        screening = self.evaluator.predict_flips(self.mask)
         if screening is None:
             return []
         believed = self.mask[screening.beams] | (np.abs(screening.strain) <= LARGEST_STRAIN)
@@ -86,10 +86,12 @@ class Climb:
         """
         mask = self.mask.copy()
         mask[beam] ^= True
-        response = self.responder.respond_nearby(mask, self.efficiency + LEAST_GAIN)
-        taken = response.counts and response.score > self.efficiency + LEAST_GAIN
+        response = self.evaluator.evaluate(
+            mask, warm_start=True, lower_bound=self.efficiency + LEAST_GAIN
+        )
+        taken = response.is_admissible and response.score > self.efficiency + LEAST_GAIN
         if taken:
-            self.responder.remember()
+            self.evaluator.set_reference()
             self.mask, self.efficiency = mask, response.score
             self.tried, self._waiting = [], None
         else:
@@ -98,15 +100,15 @@ class Climb:
 
 
 def resume_climb(
-    responder: Responder,
+    evaluator: Evaluator,
     mask: NDArray[np.bool_],
     depth: int,
     largest_loss: float,
     tried: Iterable[int] = (),
 ) -> Climb | None:
     """Start a climb, or go on with it; None from a design without a stable response."""
-    response = responder.respond(mask)
-    if not response.counts:
+    response = evaluator.evaluate(mask)
+    if not response.is_admissible:
         return None
-    responder.remember()
-    return Climb(responder, mask, response.score, depth, largest_loss, list(tried))
+    evaluator.set_reference()
+    return Climb(evaluator, mask, response.score, depth, largest_loss, list(tried))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from bellcrank.mechanics import CAREFUL
+from bellcrank.mechanics import VERIFICATION_INCREMENT
 from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
 from bellcrank.search.climbing import Climb, resume_climb
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import Status
     from bellcrank.model import Problem
-    from bellcrank.runs import Proposals
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
+    from bellcrank.storage import Proposals
 
 PROGRESS = 1e-3
 """Relative gain of efficiency by which a search shows that it is not at its end."""
@@ -150,10 +150,10 @@ class HoppingState:
         return cls(**{**data, "tried": tuple(data["tried"])})
 
 
-def start(responder: Responder, _settings: HoppingSettings, _chain: int) -> HoppingState:
+def start(evaluator: Evaluator, _settings: HoppingSettings, _chain: int) -> HoppingState:
     """Return the state before the first climb, from the problem's initial design."""
-    efficiency = initial_response(responder).score
-    return HoppingState(0, pack_mask(responder.problem.initial), efficiency)
+    efficiency = initial_response(evaluator).score
+    return HoppingState(0, pack_mask(evaluator.problem.initial), efficiency)
 
 
 def is_done(state: HoppingState, settings: HoppingSettings) -> bool:
@@ -188,18 +188,18 @@ def walks_now(state: HoppingState, settings: HoppingSettings) -> bool:
 
 
 def climb_from(
-    responder: Responder, settings: HoppingSettings, mask: str, tried: Iterable[int] = ()
+    evaluator: Evaluator, settings: HoppingSettings, mask: str, tried: Iterable[int] = ()
 ) -> Climb | None:
     """Climb on, or from somewhere else; None from a design without a stable response."""
-    bits = unpack_mask(mask, responder.problem.lattice.beam_count).copy()
-    return resume_climb(responder, bits, settings.depth, settings.largest_loss, tried)
+    bits = unpack_mask(mask, evaluator.problem.lattice.beam_count).copy()
+    return resume_climb(evaluator, bits, settings.depth, settings.largest_loss, tried)
 
 
 @dataclass(slots=True, eq=False)
 class Hopper:
     """Basin hopping within a block."""
 
-    responder: Responder
+    evaluator: Evaluator
     settings: HoppingSettings
     state: HoppingState
     rng: np.random.Generator
@@ -245,27 +245,27 @@ class Hopper:
             return
         mask = self._bits(state.mask)
         if state.hops > 0:
-            mask = kick(self.responder.problem, mask, self.settings, self.rng)
-        response = self.responder.respond(mask)
-        counts = response.counts
+            mask = kick(self.evaluator.problem, mask, self.settings, self.rng)
+        response = self.evaluator.evaluate(mask)
+        counts = response.is_admissible
         self.note(mask, response.efficiency, counts, response.status, response.penalty)
         if counts:
-            self.responder.remember()
+            self.evaluator.set_reference()
             self.climb = Climb(
-                self.responder, mask, response.score,
+                self.evaluator, mask, response.score,
                 self.settings.depth, self.settings.largest_loss, [],
             )  # fmt: skip
 
     def end_climb(self, climb: Climb) -> None:
         """Keep where the climb has led, if that is no worse and stands up to a closer look."""
         if climb.efficiency >= self.state.best:
-            response = self.responder.respond(climb.mask, CAREFUL)
-            counts = response.counts and response.score >= self.state.best
+            response = self.evaluator.evaluate(climb.mask, VERIFICATION_INCREMENT)
+            counts = response.is_admissible and response.score >= self.state.best
             self.note(climb.mask, response.efficiency, counts, response.status, response.penalty)
             if counts:
                 self._keep(climb.mask, response.score)
         elif self.state.step == self.settings.steps - 1:
-            response = self.responder.respond(climb.mask)
+            response = self.evaluator.evaluate(climb.mask)
             self.note(climb.mask, response.efficiency, False, response.status, response.penalty)
         self.climb = None
         self.state = replace(self.state, hops=self.state.hops + 1)
@@ -278,15 +278,15 @@ class Hopper:
         """
         state = self.state
         assert state.walker is not None
-        response = self.responder.respond(self._bits(state.walker))
-        if not response.counts:
+        response = self.evaluator.evaluate(self._bits(state.walker))
+        if not response.is_admissible:
             self.state = replace(state, walk=0, walked=state.step, walker=None)
             return
         settings = MetropolisSettings(
             cost="negative",
             schedule="constant",
             cold=self.settings.warmth * (abs(state.best) or 1.0),
-            dangling=self.settings.dangling,
+            unloaded_beams=self.settings.unloaded_beams,
             minimiser=self.settings.minimiser,
         )
         score = response.score
@@ -294,7 +294,7 @@ class Hopper:
         count = min(state.walk, self.last - state.step)
         # As many numbers as it wants, whether compiled or not, change nothing for what follows.
         rng = np.random.default_rng(self.rng.integers(2**63))
-        chain, proposals = make_steps(self.responder, settings, chain, rng, count)
+        chain, proposals = make_steps(self.evaluator, settings, chain, rng, count)
         self.rows.extend(proposals)
         self.state = replace(
             state,
@@ -305,7 +305,7 @@ class Hopper:
             walker=chain.mask,
         )
         if not self.state.walk:
-            self.climb = climb_from(self.responder, self.settings, chain.mask)
+            self.climb = climb_from(self.evaluator, self.settings, chain.mask)
 
     def _keep(self, mask: NDArray[np.bool_], efficiency: float) -> None:
         state = self.state
@@ -314,19 +314,19 @@ class Hopper:
             self.state = replace(self.state, gained=state.step, walker=None)
 
     def _bits(self, mask: str) -> NDArray[np.bool_]:
-        return unpack_mask(mask, self.responder.problem.lattice.beam_count).copy()
+        return unpack_mask(mask, self.evaluator.problem.lattice.beam_count).copy()
 
 
 def advance(
-    responder: Responder, settings: HoppingSettings, chain: int, state: HoppingState
+    evaluator: Evaluator, settings: HoppingSettings, chain: int, state: HoppingState
 ) -> tuple[HoppingState, Proposals]:
     """Make the steps of a block."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
     last = state.step + steps_ahead(settings, state.step)
     climb = None
     if state.climbing is not None:
-        climb = climb_from(responder, settings, state.climbing, state.tried)
-    hopper = Hopper(responder, settings, state, rng, last, climb)
+        climb = climb_from(evaluator, settings, state.climbing, state.tried)
+    hopper = Hopper(evaluator, settings, state, rng, last, climb)
     while hopper.state.step < last:
         hopper.go_on()
     climb = hopper.climb
@@ -335,7 +335,7 @@ def advance(
         climbing=None if climb is None else pack_mask(climb.mask),
         tried=() if climb is None else tuple(climb.tried),
     )
-    return state, hopper.rows.proposals(responder.problem)
+    return state, hopper.rows.proposals(evaluator.problem)
 
 
 searches.register("basin-hopping")(

@@ -7,14 +7,15 @@ the last bit, if what the scorer says of a design does not depend on what stands
 
 Examples
 --------
->>> from bellcrank.mechanics import Evaluator
+>>> from bellcrank.mechanics import SpringEvaluator
 >>> from bellcrank.model import find_problem
 >>> from bellcrank.search.delayed_acceptance import ScreenedSettings
 >>> from bellcrank.search.scorers import MechanicsScorer
 >>> problem = find_problem("scaling-8")
->>> scorer = MechanicsScorer(Evaluator(problem))
+>>> scorer = MechanicsScorer(SpringEvaluator(problem))
 >>> settings = ScreenedSettings(steps=20, lookahead=1)
->>> *_, last = screened_steps([Evaluator(problem) for _ in range(3)], scorer, settings, keep=2)
+>>> chains = [SpringEvaluator(problem) for _ in range(3)]
+>>> *_, last = screened_steps(chains, scorer, settings, keep=2)
 >>> last.step, [state.responses + state.saved for state in last.states]
 (20, [20, 20, 20])
 """
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from bellcrank.search.delayed_acceptance import ScreenedSettings
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.scorers import Scorer
     from bellcrank.search.screened import ScreenedState
 
@@ -62,7 +63,7 @@ class Lockstep:
 
 
 def screened_steps(
-    responders: Sequence[Responder],
+    evaluators: Sequence[Evaluator],
     scorer: Scorer,
     settings: ScreenedSettings,
     *,
@@ -73,7 +74,7 @@ def screened_steps(
 
     Parameters
     ----------
-    responders
+    evaluators
         One for each chain, at least one: it remembers where its chain is.
     first
         Number of the first chain; together with the seed it names a chain's random numbers.
@@ -85,27 +86,27 @@ def screened_steps(
     InvalidSettings
         If the initial design has no unique, stable response.
     """
-    states = (start_screened(responders[0]),) * len(responders)
-    kept = _start_keeping(responders, states, keep)
+    states = (start_screened(evaluators[0]),) * len(evaluators)
+    kept = _start_keeping(evaluators, states, keep)
     while states[0].step < settings.steps:
         blocks = [
-            ScreenedBlock(responder, settings, chain, state)
-            for chain, (responder, state) in enumerate(zip(responders, states, strict=True), first)
+            ScreenedBlock(evaluator, settings, chain, state)
+            for chain, (evaluator, state) in enumerate(zip(evaluators, states, strict=True), first)
         ]
         for _ in blocks[0].beams:
             score_ahead(scorer, blocks)
             for block in blocks:
                 block.step()
             states = tuple(block.state for block in blocks)
-            kept = _keep_proposed(kept, responders[0].problem.lattice.beam_count, blocks)
+            kept = _keep_proposed(kept, evaluators[0].problem.lattice.beam_count, blocks)
             yield Lockstep(states, kept)
 
 
 def _start_keeping(
-    responders: Sequence[Responder], states: Sequence[ScreenedState], keep: int
+    evaluators: Sequence[Evaluator], states: Sequence[ScreenedState], keep: int
 ) -> Kept:
     """Return what the chains keep before their first proposals: the initial design."""
-    masks = np.array([responder.problem.initial for responder in responders])
+    masks = np.array([evaluator.problem.initial for evaluator in evaluators])
     nothing = Kept.nothing(len(masks), keep, (masks.shape[1] + 7) // 8)
     return nothing.joined_by(np.array([state.efficiency for state in states]), masks)
 

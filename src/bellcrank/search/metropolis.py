@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Dangling, Evaluator
+from bellcrank.mechanics import SpringEvaluator, UnloadedBeams
 from bellcrank.model import pack_mask, unpack_mask
-from bellcrank.runs import Proposals
 from bellcrank.search.blocks import (
     BLOCK,
     Rows,
@@ -30,11 +29,12 @@ from bellcrank.search.schedules import schedules
 from bellcrank.search.searches import Search, searches
 from bellcrank.search.settings import NO_LIMIT, SearchSettings, check_positive, check_whole
 from bellcrank.search.walking import place_of, step
+from bellcrank.storage import Proposals
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +69,7 @@ class MetropolisSettings(SearchSettings):
 
     name: ClassVar[str] = "paper"
 
-    dangling: Dangling = "counted"
+    unloaded_beams: UnloadedBeams = "keep"
     moves: tuple[str, ...] = ("flip",)
     cost: str = "exponential"
     schedule: str = "linear"
@@ -114,7 +114,7 @@ class InformedSettings(MetropolisSettings):
 
     name: ClassVar[str] = "informed"
 
-    dangling: Dangling = "stripped"
+    unloaded_beams: UnloadedBeams = "prune_all"
     moves: tuple[str, ...] = ("balanced", "balanced", "delayed", "node")
     cost: str = "negative"
     schedule: str = "geometric"
@@ -161,12 +161,12 @@ class ChainState:
         return cls(**data)
 
 
-def start(responder: Responder, settings: MetropolisSettings, _chain: int) -> ChainState:
+def start(evaluator: Evaluator, settings: MetropolisSettings, _chain: int) -> ChainState:
     """Return the state of a chain at the problem's initial design."""
-    efficiency = initial_response(responder).score
+    efficiency = initial_response(evaluator).score
     return ChainState(
         step=0,
-        mask=pack_mask(responder.problem.initial),
+        mask=pack_mask(evaluator.problem.initial),
         efficiency=efficiency,
         cost=costs[settings.cost].of(efficiency),
         best=efficiency,
@@ -179,15 +179,15 @@ def is_done(state: ChainState, settings: MetropolisSettings) -> bool:
 
 
 def advance(
-    responder: Responder, settings: MetropolisSettings, chain: int, state: ChainState
+    evaluator: Evaluator, settings: MetropolisSettings, chain: int, state: ChainState
 ) -> tuple[ChainState, Proposals]:
     """Advance a chain by one block, or less if its steps or its patience end first."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
-    return make_steps(responder, settings, state, rng, steps_ahead(settings, state.step))
+    return make_steps(evaluator, settings, state, rng, steps_ahead(settings, state.step))
 
 
 def make_steps(
-    responder: Responder,
+    evaluator: Evaluator,
     settings: MetropolisSettings,
     state: ChainState,
     rng: np.random.Generator,
@@ -195,13 +195,13 @@ def make_steps(
 ) -> tuple[ChainState, Proposals]:
     """Make so many steps, at most a block of them, or less if the patience ends first."""
     flips_only = set(settings.moves) == {"flip"}
-    if isinstance(responder, Evaluator) and settings.minimiser == "newton" and flips_only:
-        return _advance_compiled(responder, settings, state, rng.random((BLOCK, 2))[:count])
-    return advance_in_python(responder, settings, state, rng, count)
+    if isinstance(evaluator, SpringEvaluator) and settings.minimiser == "newton" and flips_only:
+        return _advance_compiled(evaluator, settings, state, rng.random((BLOCK, 2))[:count])
+    return advance_in_python(evaluator, settings, state, rng, count)
 
 
 def _advance_compiled(
-    evaluator: Evaluator,
+    evaluator: SpringEvaluator,
     settings: MetropolisSettings,
     state: ChainState,
     uniforms: NDArray[np.float64],
@@ -209,8 +209,8 @@ def _advance_compiled(
     from bellcrank.search.kernels.metropolis import Chain, Records, Rules, advance
 
     mask = unpack_mask(state.mask, evaluator.problem.lattice.beam_count)
-    evaluator.respond(mask)
-    evaluator.remember()
+    evaluator.evaluate(mask)
+    evaluator.set_reference()
     chain = Chain(
         mask=mask.astype(np.uint8),
         packed=np.packbits(mask),
@@ -254,20 +254,20 @@ def _advance_compiled(
 
 
 def advance_in_python(
-    responder: Responder,
+    evaluator: Evaluator,
     settings: MetropolisSettings,
     state: ChainState,
     rng: np.random.Generator,
     count: int,
 ) -> tuple[ChainState, Proposals]:
-    """Make steps with any responder and any moves.
+    """Make steps with any evaluator and any moves.
 
     The compiled loop in `bellcrank.search.kernels.metropolis` does the same, faster, where
     single beams are flipped.
     """
     chosen = [moves[name] for name in settings.moves]
     temperatures = settings.temperatures
-    here = place_of(responder, settings.cost, temperatures[0], state.mask)
+    here = place_of(evaluator, settings.cost, temperatures[0], state.mask)
     rows = Rows()
     last = state.step + count
     while state.step < last and not is_done(state, settings):
@@ -282,7 +282,7 @@ def advance_in_python(
                 accepted=state.accepted + 1, rejections=0,
             )  # fmt: skip
         here = after
-    return replace(state, mask=pack_mask(here.mask)), rows.proposals(responder.problem)
+    return replace(state, mask=pack_mask(here.mask)), rows.proposals(evaluator.problem)
 
 
 searches.register("paper")(Search(MetropolisSettings, ChainState, start, advance, is_done))

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.runs import Proposals, RunFolder
-from bellcrank.search.responder import make_responder
+from bellcrank.search.evaluator import make_evaluator
 from bellcrank.search.searches import (
     State,
     advance_chain,
@@ -23,6 +22,7 @@ from bellcrank.search.searches import (
     read_state,
     start_chain,
 )
+from bellcrank.storage import Proposals, RunFolder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,11 +76,11 @@ def run_chain(
     together with the state to go on from.
     """
     next_step, stored = folder.progress(chain)
-    responder = make_responder(folder.problem, settings)
-    state = read_state(settings, stored) if stored else start_chain(responder, settings, chain)
+    evaluator = make_evaluator(folder.problem, settings)
+    state = read_state(settings, stored) if stored else start_chain(evaluator, settings, chain)
     pending: list[Proposals] = []
     while not is_done(state, settings) and not stop.is_set():
-        state, proposals = advance_chain(responder, settings, chain, state)
+        state, proposals = advance_chain(evaluator, settings, chain, state)
         pending.append(proposals)
         tell(
             Progress(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import Screening
+from bellcrank.mechanics import FlipPrediction
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bellcrank.mechanics import Response
     from bellcrank.model import Problem
     from bellcrank.search.costs import Cost
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
 
 
 @dataclass(slots=True, eq=False)
@@ -25,7 +25,7 @@ class Place:
 
     Parameters
     ----------
-    responder
+    evaluator
         Who evaluated it.
     cost_function
         What the search lowers.
@@ -36,19 +36,19 @@ class Place:
         Of the design.
     """
 
-    responder: Responder
+    evaluator: Evaluator
     cost_function: Cost
     temperature: float
     mask: NDArray[np.bool_]
     response: Response
     is_last: bool = True
-    """Whether it is the design that the responder evaluated last; else it must be remembered."""
-    _screening: Screening | None = field(default=None, repr=False)
+    """Whether it is the design that the evaluator evaluated last; else it must be remembered."""
+    _screening: FlipPrediction | None = field(default=None, repr=False)
 
     @property
     def problem(self) -> Problem:
         """What the design is for."""
-        return self.responder.problem
+        return self.evaluator.problem
 
     @property
     def cost(self) -> float:
@@ -56,18 +56,18 @@ class Place:
         return self.cost_function.of(self.response.score)
 
     @property
-    def counts(self) -> bool:
+    def is_admissible(self) -> bool:
         """Whether the design has a unique, stable response, so that a chain may go there."""
-        return self.response.counts
+        return self.response.is_admissible
 
-    def screening(self) -> Screening:
+    def screening(self) -> FlipPrediction:
         """Predict what each flip would do, once; nothing where no prediction can be made."""
         if self._screening is None:
             if not self.is_last:
-                self.responder.respond_nearby(self.mask)
+                self.evaluator.evaluate(self.mask, warm_start=True)
             beams = self.problem.designable
-            nothing = Screening(beams, np.zeros(len(beams)), np.zeros(len(beams)))
-            self._screening = self.responder.screen(self.mask) or nothing
+            nothing = FlipPrediction(beams, np.zeros(len(beams)), np.zeros(len(beams)))
+            self._screening = self.evaluator.predict_flips(self.mask) or nothing
         return self._screening
 
     def log_gain(self, index: int | slice) -> NDArray[np.float64]:

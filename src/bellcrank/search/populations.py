@@ -7,13 +7,13 @@ mechanics as scorer, chain k of a population goes where chain k of that search g
 
 Examples
 --------
->>> from bellcrank.mechanics import Evaluator
+>>> from bellcrank.mechanics import SpringEvaluator
 >>> from bellcrank.model import find_problem
 >>> from bellcrank.search import MetropolisSettings
 >>> from bellcrank.search.scorers import MechanicsScorer
 >>> problem = find_problem("scaling-8")
 >>> settings = MetropolisSettings(steps=20, chains=3)
->>> scorer = MechanicsScorer(Evaluator(problem))
+>>> scorer = MechanicsScorer(SpringEvaluator(problem))
 >>> *_, (population, _) = population_steps(problem, scorer, settings)
 >>> population.step, population.masks.shape == (3, problem.lattice.beam_count)
 (20, True)

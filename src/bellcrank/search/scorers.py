@@ -13,8 +13,8 @@ from bellcrank.search.costs import LARGEST_EXPONENT, costs
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.metropolis import MetropolisSettings
-    from bellcrank.search.responder import Responder
 
 PLAIN = {
     "moves": ("flip",),
@@ -38,17 +38,17 @@ class MechanicsScorer:
 
     Parameters
     ----------
-    responder
+    evaluator
         Who computes; designs without a unique, stable response are to keep away from.
     """
 
-    def __init__(self, responder: Responder) -> None:
-        self.responder = responder
+    def __init__(self, evaluator: Evaluator) -> None:
+        self.evaluator = evaluator
 
     def score(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return the efficiencies (n,) of designs (n, M), each loaded from rest."""
-        found = [self.responder.respond(mask) for mask in masks]
-        return np.array([each.score if each.counts else math.nan for each in found])
+        found = [self.evaluator.evaluate(mask) for mask in masks]
+        return np.array([each.score if each.is_admissible else math.nan for each in found])
 
 
 def costs_of(name: str, score: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,14 +6,14 @@ That changes nothing in where the chain goes.
 
 Examples
 --------
->>> from bellcrank.mechanics import Evaluator
+>>> from bellcrank.mechanics import SpringEvaluator
 >>> from bellcrank.model import find_problem
 >>> from bellcrank.search.scorers import MechanicsScorer
 >>> problem = find_problem("scaling-8")
->>> evaluator = Evaluator(problem)
+>>> evaluator = SpringEvaluator(problem)
 >>> settings = ScreenedSettings(steps=300)
 >>> *_, (state, proposals) = screened_blocks(
-...     evaluator, MechanicsScorer(Evaluator(problem)), settings, chain=0
+...     evaluator, MechanicsScorer(SpringEvaluator(problem)), settings, chain=0
 ... )
 >>> state.step, state.responses + state.saved
 (300, 300)
@@ -48,9 +48,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.runs import Proposals
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.scorers import Scorer
+    from bellcrank.storage import Proposals
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class ScreenedState:
         return self.step - self.responses
 
 
-def start_screened(responder: Responder) -> ScreenedState:
+def start_screened(evaluator: Evaluator) -> ScreenedState:
     """Return the state of a chain at the problem's initial design.
 
     Raises
@@ -97,12 +97,12 @@ def start_screened(responder: Responder) -> ScreenedState:
     InvalidSettings
         If that has no unique, stable response.
     """
-    efficiency = initial_response(responder).score
-    return ScreenedState(0, pack_mask(responder.problem.initial), efficiency, efficiency)
+    efficiency = initial_response(evaluator).score
+    return ScreenedState(0, pack_mask(evaluator.problem.initial), efficiency, efficiency)
 
 
 def screened_blocks(
-    responder: Responder,
+    evaluator: Evaluator,
     scorer: Scorer,
     settings: ScreenedSettings,
     chain: int,
@@ -117,25 +117,25 @@ def screened_blocks(
     InvalidSettings
         If the initial design has no unique, stable response.
     """
-    state = state or start_screened(responder)
+    state = state or start_screened(evaluator)
     while state.step < settings.steps:
-        state, proposals = advance_screened(responder, scorer, settings, chain, state)
+        state, proposals = advance_screened(evaluator, scorer, settings, chain, state)
         yield state, proposals
 
 
 def advance_screened(
-    responder: Responder,
+    evaluator: Evaluator,
     scorer: Scorer,
     settings: ScreenedSettings,
     chain: int,
     state: ScreenedState,
 ) -> tuple[ScreenedState, Proposals]:
     """Advance a chain by one block, or less if its steps end first."""
-    block = ScreenedBlock(responder, settings, chain, state)
+    block = ScreenedBlock(evaluator, settings, chain, state)
     for _ in block.beams:
         score_ahead(scorer, [block])
         block.step()
-    return block.state, block.rows.proposals(responder.problem)
+    return block.state, block.rows.proposals(evaluator.problem)
 
 
 class ScreenedBlock:
@@ -143,7 +143,7 @@ class ScreenedBlock:
 
     Parameters
     ----------
-    responder
+    evaluator
         Of this chain alone as long as the block lasts: it remembers where the chain is.
     state
         Of the chain before the block; of that name, the attribute is of now.
@@ -157,17 +157,17 @@ class ScreenedBlock:
     """
 
     def __init__(
-        self, responder: Responder, settings: ScreenedSettings, chain: int, state: ScreenedState
+        self, evaluator: Evaluator, settings: ScreenedSettings, chain: int, state: ScreenedState
     ) -> None:
         rng = random_numbers(settings.seed, chain, state.step // BLOCK)
         self._uniforms = rng.random((BLOCK, 3))[: steps_ahead(settings, state.step)]
-        designable = responder.problem.designable
+        designable = evaluator.problem.designable
         self.beams = designable[(self._uniforms[:, 0] * len(designable)).astype(np.int64)]
         self.settings = settings
         self.state = state
         self.rows = Rows()
         self._temperatures = settings.temperatures
-        self._here = place_of(responder, settings.cost, self._temperatures[0], state.mask)
+        self._here = place_of(evaluator, settings.cost, self._temperatures[0], state.mask)
         self._cost = math.nan
         self._is_new = True
         self._ahead: dict[int, float] = {}

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from bellcrank.errors import InvalidSettings
 from bellcrank.registry import Registry
 from bellcrank.search.blocks import BLOCK
-from bellcrank.search.goals import GoalResponder
+from bellcrank.search.goals import GoalEvaluator
 from bellcrank.search.selection import Offers, plateau_ends
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from bellcrank.runs import Proposals
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.settings import SearchSettings
+    from bellcrank.storage import Proposals
 
 DEFAULT_SEARCH = "basin-hopping"
 
@@ -63,9 +63,9 @@ class Search:
     settings, state
         Classes of what it is told and of where it stands.
     start
-        ``(responder, settings, chain)`` to the state before the first proposal.
+        ``(evaluator, settings, chain)`` to the state before the first proposal.
     advance
-        ``(responder, settings, chain, state)`` to the state after a block, which ends at a
+        ``(evaluator, settings, chain, state)`` to the state after a block, which ends at a
         multiple of `BLOCK` steps or with the chain, and one row for each proposal in it.
     is_done
         ``(state, settings)``: whether the chain has ended.
@@ -77,8 +77,8 @@ class Search:
 
     settings: type[SearchSettings]
     state: type[State]
-    start: Callable[[Responder, Any, int], State]
-    advance: Callable[[Responder, Any, int, Any], tuple[State, Proposals]]
+    start: Callable[[Evaluator, Any, int], State]
+    advance: Callable[[Evaluator, Any, int, Any], tuple[State, Proposals]]
     is_done: Callable[[Any, Any], bool]
     offers: Offers = plateau_ends
     leaps: bool = False
@@ -93,8 +93,8 @@ def read_settings(data: dict[str, Any]) -> SearchSettings:
     Examples
     --------
     >>> settings = read_settings({"search": "paper", "steps": 500})
-    >>> settings.name, settings.steps, settings.dangling
-    ('paper', 500, 'counted')
+    >>> settings.name, settings.steps, settings.unloaded_beams
+    ('paper', 500, 'keep')
 
     Raises
     ------
@@ -108,7 +108,7 @@ def read_state(settings: SearchSettings, data: dict[str, Any]) -> State:
     return searches[settings.name].state.from_dict(data)
 
 
-def start_chain(responder: Responder, settings: SearchSettings, chain: int = 0) -> State:
+def start_chain(evaluator: Evaluator, settings: SearchSettings, chain: int = 0) -> State:
     """Return the state of a chain before its first proposal.
 
     Raises
@@ -116,11 +116,11 @@ def start_chain(responder: Responder, settings: SearchSettings, chain: int = 0) 
     InvalidSettings
         If the initial design has no response, so that there is nothing to compare with.
     """
-    return searches[settings.name].start(responder, settings, chain)
+    return searches[settings.name].start(evaluator, settings, chain)
 
 
 def advance_chain(
-    responder: Responder, settings: SearchSettings, chain: int, state: State
+    evaluator: Evaluator, settings: SearchSettings, chain: int, state: State
 ) -> tuple[State, Proposals]:
     """Advance a chain by one block, or less if it ends first.
 
@@ -133,9 +133,9 @@ def advance_chain(
     """
     if state.step % BLOCK:
         raise InvalidSettings(f"chain {chain}: a state at step {state.step} is not between blocks")
-    after, proposals = searches[settings.name].advance(responder, settings, chain, state)
-    if isinstance(responder, GoalResponder):
-        proposals = responder.as_meant(proposals)
+    after, proposals = searches[settings.name].advance(evaluator, settings, chain, state)
+    if isinstance(evaluator, GoalEvaluator):
+        proposals = evaluator.as_meant(proposals)
     return after, proposals
 
 
@@ -145,20 +145,20 @@ def is_done(state: State, settings: SearchSettings) -> bool:
 
 
 def chain_blocks(
-    responder: Responder, settings: SearchSettings, chain: int, state: State | None = None
+    evaluator: Evaluator, settings: SearchSettings, chain: int, state: State | None = None
 ) -> Iterator[tuple[State, Proposals]]:
     """Yield state and proposals block by block until the chain is done.
 
     Examples
     --------
-    >>> from bellcrank.mechanics import Evaluator
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> settings = read_settings({"search": "paper", "steps": 300})
-    >>> evaluator = Evaluator(find_problem("scaling-8"))
+    >>> evaluator = SpringEvaluator(find_problem("scaling-8"))
     >>> [state.step for state, _ in chain_blocks(evaluator, settings, 0)]
     [250, 300]
     """
-    state = state or start_chain(responder, settings, chain)
+    state = state or start_chain(evaluator, settings, chain)
     while not is_done(state, settings):
-        state, proposals = advance_chain(responder, settings, chain, state)
+        state, proposals = advance_chain(evaluator, settings, chain, state)
         yield state, proposals

@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import CAREFUL, Evaluator, Response, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
 from bellcrank.model import Design, Problem
 from bellcrank.search.cleaning import clean, pieces
-from bellcrank.search.goals import GoalResponder
+from bellcrank.search.goals import GoalEvaluator
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
 
 Offers: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.uint8]], list[int]]"
 """From efficiencies (n,) and packed masks (n, bytes) of the accepted designs, in order, to the
@@ -218,13 +218,13 @@ def candidates_of(
 
 
 def _cleaned(
-    problem: Problem, candidates: Iterable[Candidate], evaluator: Evaluator, judge: Responder
+    problem: Problem, candidates: Iterable[Candidate], evaluator: SpringEvaluator, judge: Evaluator
 ) -> Iterator[tuple[Candidate, Design]]:
     """Yield each candidate cleaned, each cleaned design once."""
     seen: set[bytes] = set()
     for candidate in candidates:
         cleaned = clean(Design(problem, _bits(problem, candidate)), evaluator)
-        if isinstance(judge, GoalResponder):
+        if isinstance(judge, GoalEvaluator):
             cleaned = cleaned.with_mask(judge.closed(cleaned.mask))
         key = np.packbits(cleaned.mask).tobytes()
         if key not in seen:
@@ -237,9 +237,9 @@ def _bits(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
     return bits[: problem.lattice.beam_count].astype(bool)
 
 
-def _why_not(judge: Responder, design: Design, response: Response) -> str | None:
+def _why_not(judge: Evaluator, design: Design, response: Response) -> str | None:
     """Return the reason to refuse a cleaned design, if there is one."""
-    if response.status is Status.UNMET and isinstance(judge, GoalResponder):
+    if response.status is Status.UNMET and isinstance(judge, GoalEvaluator):
         return f"breaks {', '.join(judge.broken(design.mask))}"
     if response.status is not Status.CONVERGED:
         return response.status.label
@@ -255,7 +255,7 @@ def select(
     problem: Problem,
     candidates: Iterable[Candidate],
     objective: str | None = None,
-    judge: Responder | None = None,
+    judge: Evaluator | None = None,
     choose: Choice = most_efficient,
 ) -> Selection:
     """Clean the candidates and choose the one that is most efficient afterwards.
@@ -277,12 +277,12 @@ def select(
         If no candidate qualifies.
     """
     candidates = list(candidates)
-    evaluator = Evaluator(problem, objective)
+    evaluator = SpringEvaluator(problem, objective)
     judge = judge or evaluator
     finalists: list[Finalist] = []
     refused: Refusals = []
     for candidate, design in _cleaned(problem, candidates, evaluator, judge):
-        response = judge.respond(design.mask, largest_increment=CAREFUL)
+        response = judge.evaluate(design.mask, largest_increment=VERIFICATION_INCREMENT)
         if (reason := _why_not(judge, design, response)) is not None:
             refused.append((response.efficiency, reason))
         else:
@@ -297,15 +297,15 @@ def select(
         design=chosen.design,
         response=chosen.response,
         found=chosen.found,
-        efficiency_before=judge.respond(_bits(problem, chosen.found)).efficiency,
+        efficiency_before=judge.evaluate(_bits(problem, chosen.found)).efficiency,
         efficiency_after=best,
         refused={reason: reasons.count(reason) for reason in sorted(set(reasons))},
     )
 
 
-def _none_left(problem: Problem, count: int, refused: Refusals, judge: Responder) -> str:
+def _none_left(problem: Problem, count: int, refused: Refusals, judge: Evaluator) -> str:
     """Say why no candidate qualifies."""
-    goals = judge.goals if isinstance(judge, GoalResponder) else ()
+    goals = judge.goals if isinstance(judge, GoalEvaluator) else ()
     if goals and not count:
         return (
             f"problem {problem.name!r}: the search accepted no design that keeps its goals "

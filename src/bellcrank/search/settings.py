@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar, Self, TypeGuard
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Dangling, minimisers
+from bellcrank.mechanics import UnloadedBeams, minimisers
 from bellcrank.search.goals.terms import read_goal
 
 NO_LIMIT = 2**62
@@ -29,7 +29,7 @@ class SearchSettings:
         Together with the chain's number it determines everything.
     objective
         Name of an efficiency, or None for the problem's own.
-    dangling
+    unloaded_beams
         Whether dead-end beams count (the literal model), are ignored, or stripped together
         with all else that no load can reach.
     minimiser
@@ -51,7 +51,7 @@ class SearchSettings:
     chains: int = 4
     seed: int = 0
     objective: str | None = None
-    dangling: Dangling = "stripped"
+    unloaded_beams: UnloadedBeams = "prune_all"
     minimiser: str = "newton"
     goals: tuple[str, ...] = ()
     strokes: tuple[float, ...] = (1.0,)

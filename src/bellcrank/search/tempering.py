@@ -27,8 +27,8 @@ from bellcrank.search.walking import place_of, step
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.runs import Proposals
-    from bellcrank.search.responder import Responder
+    from bellcrank.search.evaluator import Evaluator
+    from bellcrank.storage import Proposals
 
 T = TypeVar("T")
 
@@ -123,10 +123,10 @@ class TemperingState:
         return cls(**{**data, **lists})
 
 
-def start(responder: Responder, settings: TemperingSettings, _chain: int) -> TemperingState:
+def start(evaluator: Evaluator, settings: TemperingSettings, _chain: int) -> TemperingState:
     """Return the state with all replicas at the problem's initial design."""
-    efficiency = initial_response(responder).score
-    mask = pack_mask(responder.problem.initial)
+    efficiency = initial_response(evaluator).score
+    mask = pack_mask(evaluator.problem.initial)
     count = settings.replicas
     return TemperingState(0, (mask,) * count, (efficiency,) * count, efficiency)
 
@@ -137,7 +137,7 @@ def is_done(state: TemperingState, settings: TemperingSettings) -> bool:
 
 
 def advance(
-    responder: Responder, settings: TemperingSettings, chain: int, state: TemperingState
+    evaluator: Evaluator, settings: TemperingSettings, chain: int, state: TemperingState
 ) -> tuple[TemperingState, Proposals]:
     """Let the replicas take turns for a block, with exchanges after each round."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
@@ -146,14 +146,14 @@ def advance(
     while state.step < last:
         count = min(TURN, last - state.step)
         replica = state.step // TURN % settings.replicas
-        state = _take_turn(responder, settings, state, replica, count, rng, rows)
+        state = _take_turn(evaluator, settings, state, replica, count, rng, rows)
         if replica == settings.replicas - 1 and state.step % TURN == 0:
             state = _exchange(settings, state, rng)
-    return state, rows.proposals(responder.problem)
+    return state, rows.proposals(evaluator.problem)
 
 
 def _take_turn(
-    responder: Responder,
+    evaluator: Evaluator,
     settings: TemperingSettings,
     state: TemperingState,
     replica: int,
@@ -162,7 +162,7 @@ def _take_turn(
     rows: Rows,
 ) -> TemperingState:
     temperature = float(settings.temperatures[replica])
-    here = place_of(responder, settings.cost, temperature, state.mask[replica])
+    here = place_of(evaluator, settings.cost, temperature, state.mask[replica])
     accepted, best = state.accepted, state.best
     for _ in range(count):
         name = settings.moves[int(rng.random() * len(settings.moves))]

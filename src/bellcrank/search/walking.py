@@ -1,4 +1,4 @@
-"""One step of a Markov chain over designs, by any move and with any responder."""
+"""One step of a Markov chain over designs, by any move and with any evaluator."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Problem
     from bellcrank.search.blocks import Rows
+    from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.moves import Move
-    from bellcrank.search.responder import Responder
 
 
-def place_of(responder: Responder, cost: str, temperature: float, mask: str) -> Place:
+def place_of(evaluator: Evaluator, cost: str, temperature: float, mask: str) -> Place:
     """Return where a chain stands, evaluated from rest and remembered."""
-    bits = unpack_mask(mask, responder.problem.lattice.beam_count).copy()
-    response = responder.respond(bits)
-    responder.remember()
-    return Place(responder, costs[cost], temperature, bits, response)
+    bits = unpack_mask(mask, evaluator.problem.lattice.beam_count).copy()
+    response = evaluator.evaluate(bits)
+    evaluator.set_reference()
+    return Place(evaluator, costs[cost], temperature, bits, response)
 
 
 def step(
@@ -73,18 +73,18 @@ def consider(
     uniform
         Random number in [0, 1).
     """
-    response = here.responder.respond_nearby(mask)
+    response = here.evaluator.evaluate(mask, warm_start=True)
     here.is_last = False
-    there = Place(here.responder, here.cost_function, here.temperature, mask, response)
+    there = Place(here.evaluator, here.cost_function, here.temperature, mask, response)
     accepted = False
-    if there.counts:
+    if there.is_admissible:
         gain = (here.cost - there.cost) / here.temperature
         accepted = accepts(log_ratio(there, gain), uniform)
     rows.add(
         mask, response.efficiency, there.cost, here.temperature, accepted, int(response.status)
     )
     if accepted:
-        here.responder.remember()
+        here.evaluator.set_reference()
         return there
     return here
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidModel, InvalidSettings
-from bellcrank.runs.files import make_folder
+from bellcrank.storage.files import make_folder
 from bellcrank.surrogate.backend import find_device, find_precision
 from bellcrank.surrogate.checkpoints import restore
 from bellcrank.surrogate.folder import (

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidDataset, InvalidProblem, InvalidSettings
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.surrogate.agreement import agreement
 from bellcrank.surrogate.predictor import Predictor
 from bellcrank.surrogate.trained import TrainedModel
@@ -89,30 +89,30 @@ def flip_effects(problem: Problem, masks: ArrayLike) -> FlipEffects:
             f"masks: expected shape (designs, {problem.lattice.beam_count}), one entry for each "
             f"beam of {problem.name!r}, got {given.shape}"
         )
-    evaluator = Evaluator(problem)
+    evaluator = SpringEvaluator(problem)
     beams = np.asarray(problem.designable, np.int64)
     shape = (len(given), len(beams))
     efficiency = np.empty(len(given))
     exact, screened = np.full(shape, np.nan), np.full(shape, np.nan)
     status = np.empty(shape, np.int64)
     for number, mask in enumerate(given):
-        response = evaluator.respond(mask)
-        if not response.counts:
+        response = evaluator.evaluate(mask)
+        if not response.is_admissible:
             raise InvalidSettings(
                 f"design {number} of {problem.name!r} has no efficiency that flips could change: "
                 f"{response.status.message}"
             )
         efficiency[number] = response.efficiency
-        foreseen = evaluator.screen(mask, beams)
+        foreseen = evaluator.predict_flips(mask, beams)
         if foreseen is not None:
             screened[number] = foreseen.change
-        evaluator.remember()
+        evaluator.set_reference()
         for place, beam in enumerate(beams):
             flipped = mask.copy()
             flipped[beam] = not flipped[beam]
-            found = evaluator.respond_nearby(flipped)
+            found = evaluator.evaluate(flipped, warm_start=True)
             status[number, place] = found.status
-            if found.counts:
+            if found.is_admissible:
                 exact[number, place] = found.efficiency - response.efficiency
     return FlipEffects(problem, given, beams, efficiency, exact, status, screened)
 

@@ -15,7 +15,7 @@ from bellcrank.errors import InvalidFile, InvalidSettings, OutputExists
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
-from bellcrank.runs.files import make_folder, remove_temporaries
+from bellcrank.storage.files import make_folder, remove_temporaries
 from bellcrank.surrogate.recipes import PRECISIONS, Recipe
 
 if TYPE_CHECKING:

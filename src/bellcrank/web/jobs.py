@@ -139,7 +139,7 @@ class Job:
         """Read its task; with the stiffness of struts where it is for a part."""
         begun = self.path / "run" / "run.json"
         if begun.exists():
-            from bellcrank.runs import RunFolder
+            from bellcrank.storage import RunFolder
 
             return RunFolder.open(begun.parent).problem
         return read_problem(self.path / "problem.json")

@@ -15,7 +15,7 @@ from bellcrank.web.solving import design_of
 
 if TYPE_CHECKING:
     from bellcrank.model import Design
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
 
 MOVIE_SECONDS = 4.0
 MOVIE_SIZE = (1280, 720)
@@ -39,7 +39,7 @@ def design_file(
     about
         Efficiency and provenance, as far as they are known.
     """
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
 
     design = replace(
         design_of(text, mask),
@@ -80,8 +80,8 @@ def _card(design: Design, spec: PartSpec, path: Path) -> None:
 
 
 def _export(design: Design, spec: PartSpec, path: Path) -> None:
-    from bellcrank.fabricate import export
-    from bellcrank.fabricate.formats.base import LAYER
+    from bellcrank.export import export
+    from bellcrank.export.formats.base import LAYER
     from bellcrank.workflows.fabricate import Grips, bundle_of
 
     export(bundle_of(design, spec, Grips(), layer=LAYER), path)
@@ -89,7 +89,7 @@ def _export(design: Design, spec: PartSpec, path: Path) -> None:
 
 def remarks(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     """Say what a part will be like: size, mass, and what is to be said about printing it."""
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
     from bellcrank.workflows.fabricate import Grips, bundle_of, findings_about, profile_for
 
     spec = PartSpec.from_dict(part)
@@ -116,7 +116,7 @@ def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[s
         with their stress.
     """
     from bellcrank.fem import FemSettings
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
     from bellcrank.workflows import validate
 
     spec = PartSpec.from_dict(part)
@@ -152,7 +152,7 @@ def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:
     """
     from bellcrank.machines.assembly import assemble
     from bellcrank.machines.plan import MachineTable, plan_of
-    from bellcrank.mechanics import CAREFUL, Evaluator
+    from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
     from bellcrank.model import problem_to_dict
     from bellcrank.model.parsing import parse
     from bellcrank.web.limits import check_size
@@ -167,7 +167,7 @@ def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:
     built = assemble(plan_of(parse(MachineTable, plan, source), source), find)
     problem = built.design.problem
     check_size(problem.lattice.node_count, problem.lattice.beam_count)
-    response = Evaluator(problem).respond(built.design.mask, CAREFUL)
+    response = SpringEvaluator(problem).evaluate(built.design.mask, VERIFICATION_INCREMENT)
     return {
         "problem": problem_to_dict(problem),
         "mask": built.design.mask_hex,

@@ -55,7 +55,7 @@ async def begin_run(body: RunBody, shop: Shop) -> dict[str, str]:
 def _prepared(body: RunBody) -> tuple[Problem, Record]:
     """Refuse what could not be searched, before it is queued."""
     from bellcrank.model import unpack_mask
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
     from bellcrank.search import read_settings
     from bellcrank.search.goals import read_goal
 

@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from bellcrank.errors import BellcrankError, InvalidSettings, first_line
-from bellcrank.runs.locking import locked
+from bellcrank.storage.locking import locked
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from bellcrank.runs import RunFolder
     from bellcrank.search import Progress, SearchSettings
+    from bellcrank.storage import RunFolder
     from bellcrank.web.tracing import Point
 
 TOO_EARLY = "nothing has been found yet that could be built; search a little longer"
@@ -66,11 +66,11 @@ class Reporter:
     """Collects what the chains tell from their threads, and passes it on ten times a second."""
 
     def __init__(self, pipe: Connection, folder: RunFolder, settings: SearchSettings) -> None:
-        from bellcrank.mechanics import Evaluator
+        from bellcrank.mechanics import SpringEvaluator
 
         self._pipe = pipe
         self._problem = folder.problem
-        self._evaluator = Evaluator(folder.problem)
+        self._evaluator = SpringEvaluator(folder.problem)
         self._total = settings.chains * settings.steps
         self._lock = threading.Lock()
         self._chains: dict[int, dict[str, Any]] = {}
@@ -88,7 +88,7 @@ class Reporter:
         """Return where chains that have done nothing yet stand: annealing is soon over."""
         from bellcrank.web.tracing import tidy
 
-        efficiency = tidy(self._evaluator.respond(self._problem.initial).efficiency)
+        efficiency = tidy(self._evaluator.evaluate(self._problem.initial).efficiency)
         temperature = float(getattr(settings, "temperatures", [0.0])[0])
         point = (0, efficiency, efficiency, temperature)
         return {chain: [point] for chain, done in self._done.items() if not done}
@@ -163,9 +163,9 @@ class Reporter:
         from bellcrank.web.solving import finite, flat
 
         bits = unpack_mask(mask, self._problem.lattice.beam_count)
-        response = self._evaluator.respond(bits)
+        response = self._evaluator.evaluate(bits)
         self._moved_at, self._moved_mask = time.monotonic(), mask
-        shown = response.counts
+        shown = response.is_admissible
         return {
             "mask": mask,
             "efficiency": finite(response.efficiency),
@@ -240,7 +240,7 @@ def _search(where: Path, workers: int, pipe: Connection, ears: Ears) -> dict[str
 
 def _begin_or_reopen(where: Path) -> RunFolder:
     from bellcrank.model import read_problem
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
     from bellcrank.search import read_settings
     from bellcrank.workflows import reopen_design, start_design
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.runs.files import make_folder
-from bellcrank.runs.locking import locked
+from bellcrank.storage.files import make_folder
+from bellcrank.storage.locking import locked
 from bellcrank.web.security import is_loopback
 
 if TYPE_CHECKING:

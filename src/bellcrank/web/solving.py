@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import Design, human_design, unpack_mask
 from bellcrank.web.texts import problem_of
 
@@ -35,7 +35,7 @@ class Known:
     """A problem that was asked about, with what answers for it."""
 
     problem: Problem
-    evaluator: Evaluator
+    evaluator: SpringEvaluator
 
 
 _known: OrderedDict[str, Known] = OrderedDict()
@@ -47,7 +47,7 @@ def known(text: str) -> Known:
         _known.move_to_end(text)
         return _known[text]
     problem = problem_of(json.loads(text))
-    _known[text] = Known(problem, Evaluator(problem))
+    _known[text] = Known(problem, SpringEvaluator(problem))
     while len(_known) > KEPT:
         _known.popitem(last=False)
     return _known[text]
@@ -63,17 +63,17 @@ def warm() -> bool:
     """Compile what the page needs, or load it from the cache."""
     design = human_design("crane")
     assert design is not None
-    evaluator = Evaluator(design.problem)
-    evaluator.respond(design.mask, CAREFUL)
-    evaluator.screen(design.mask)
+    evaluator = SpringEvaluator(design.problem)
+    evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
+    evaluator.predict_flips(design.mask)
     return True
 
 
 def respond(text: str, mask: str) -> dict[str, Any]:
     """Follow a design from rest to the full stroke in small steps, as a careful builder would."""
     at_hand = known(text)
-    response = at_hand.evaluator.respond(
-        unpack_mask(mask, at_hand.problem.lattice.beam_count), CAREFUL
+    response = at_hand.evaluator.evaluate(
+        unpack_mask(mask, at_hand.problem.lattice.beam_count), VERIFICATION_INCREMENT
     )
     answer: dict[str, Any] = {
         "status": response.status.label,
@@ -127,13 +127,13 @@ def sensitivity(text: str, mask: str) -> dict[str, Any]:
     """
     at_hand = known(text)
     bits = unpack_mask(mask, at_hand.problem.lattice.beam_count).copy()
-    base = at_hand.evaluator.respond(bits)
+    base = at_hand.evaluator.evaluate(bits)
     if base.status is not Status.CONVERGED:
         raise InvalidSettings(f"no sensitivity: {base.status.message}")
     change: list[float | None] = []
     for beam in at_hand.problem.designable.tolist():
         bits[beam] ^= True
-        flipped = at_hand.evaluator.respond(bits)
+        flipped = at_hand.evaluator.evaluate(bits)
         bits[beam] ^= True
         # What snaps or falls to a mechanism has no efficiency to compare with.
         known_change = flipped.efficiency - base.efficiency

@@ -12,7 +12,7 @@ from bellcrank.errors import UnknownName
 from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.model import builtin, lattices, problem_to_dict
 from bellcrank.model.calls import call_with_keys
-from bellcrank.parts import PartSpec, calibrated
+from bellcrank.part import PartSpec, calibrated
 from bellcrank.web import solving
 from bellcrank.web.limits import check_lattice, check_size
 from bellcrank.web.state import Shop

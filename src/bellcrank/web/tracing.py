@@ -12,7 +12,7 @@ from bellcrank.search import BLOCK, read_settings, searches
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bellcrank.runs import RunFolder
+    from bellcrank.storage import RunFolder
 
 Point = tuple[int, float | None, float | None, float]
 """Step; efficiency of the current and of the best design; temperature."""
@@ -83,13 +83,13 @@ def read_curves(folder: RunFolder) -> dict[int, list[Point]]:
 
 def read_run_curves(path: Path) -> dict[str, Any]:
     """Read the curves of the run in a folder; none if it has not begun."""
-    from bellcrank.runs import RunFolder
+    from bellcrank.storage import RunFolder
 
     return {"curves": read_curves(RunFolder.open(path)) if (path / "run.json").exists() else {}}
 
 
 def copy_history(path: Path, target: Path) -> None:
     """Write what the run in a folder has proposed so far into another folder."""
-    from bellcrank.runs import RunFolder
+    from bellcrank.storage import RunFolder
 
     RunFolder.open(path).copy_history(target)

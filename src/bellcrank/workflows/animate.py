@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import CAREFUL, Evaluator, Status, load_bearing_core
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status, load_bearing_core
 from bellcrank.mechanics.strain import strain_of
 from bellcrank.plots.movies import (
     Course,
@@ -111,10 +111,12 @@ def load_design(
     efficiency, force = np.zeros(states), np.zeros(states)
     snapped = np.zeros(states, dtype=bool)
     for k, share in enumerate(part.tolist()):
-        evaluator = Evaluator(_at(problem, max(share, SMALL)), objective)
+        evaluator = SpringEvaluator(_at(problem, max(share, SMALL)), objective)
         # A power of two, so that the increments add up to the whole without a remainder.
-        increment = min(1.0, 2.0 ** math.floor(math.log2(CAREFUL / max(share, SMALL))))
-        response = evaluator.respond(design.mask, increment)
+        increment = min(
+            1.0, 2.0 ** math.floor(math.log2(VERIFICATION_INCREMENT / max(share, SMALL)))
+        )
+        response = evaluator.evaluate(design.mask, increment)
         if response.status not in {Status.CONVERGED, Status.SNAPPED}:
             raise InvalidSettings(f"{problem.name}: no motion to show: {response.status.message}")
         efficiency[k] = response.efficiency

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Core, Evaluator, Status
+from bellcrank.mechanics import Core, SpringEvaluator, Status
 from bellcrank.model import read_design
 from bellcrank.plots.movies import (
     Course,
@@ -22,8 +22,8 @@ from bellcrank.plots.movies import (
     pick_states,
     search_schedule,
 )
-from bellcrank.runs import RunFolder
 from bellcrank.search import SearchSettings, read_settings, searches
+from bellcrank.storage import RunFolder
 from bellcrank.workflows.animate import efficiency_note, silent
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def read_story(folder: RunFolder, settings: SearchSettings) -> Story:
     if len(taken) == 0:
         raise _nothing(folder)
     problem = folder.problem
-    first = _evaluator(problem, settings).respond(problem.initial).efficiency
+    first = _evaluator(problem, settings).evaluate(problem.initial).efficiency
     efficiency = records["efficiency"][taken]
     if searches[settings.name].leaps:
         # What seemed better than the chosen design was looked at closely, and not kept.
@@ -198,9 +198,9 @@ def _accepted(records: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
     return taken
 
 
-def _evaluator(problem: Problem, settings: SearchSettings) -> Evaluator:
+def _evaluator(problem: Problem, settings: SearchSettings) -> SpringEvaluator:
     """Return what answers as the search did."""
-    return Evaluator(problem, settings.objective, settings.dangling)
+    return SpringEvaluator(problem, settings.objective, settings.unloaded_beams)
 
 
 def _changing(
@@ -217,10 +217,10 @@ def _changing(
     masks = story.mask[picked]
     bearing = np.array([core.of(mask) for mask in masks])
     held = np.isin(problem.lattice.beams, problem.supports.fixed).all(axis=1)
-    present = masks if settings.dangling == "counted" else bearing | (masks & held)
+    present = masks if settings.unloaded_beams == "keep" else bearing | (masks & held)
     displacement = []
     for done, mask in enumerate(masks):
-        displacement.append(evaluator.respond(mask).displacement)
+        displacement.append(evaluator.evaluate(mask).displacement)
         tell("loading", done + 1, len(picked))
     drawn = "" if magnify == 1.0 else f" · motion drawn × {magnify:g}"
     notes = tuple(

@@ -6,7 +6,7 @@ import hashlib
 import math
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.fabricate import Export, check_print
+from bellcrank.export import Export, check_print
 from bellcrank.fem import FemSettings
 from bellcrank.model.parsing import read_json
 from bellcrank.plots.card import Card, draw_card
@@ -21,9 +21,9 @@ from bellcrank.workflows.validate import identity, validate
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bellcrank.fabricate.profiles import PrintProfile
+    from bellcrank.export.profiles import PrintProfile
     from bellcrank.model import Design
-    from bellcrank.parts import Part, PartSpec
+    from bellcrank.part import Part, PartSpec
     from bellcrank.plots.card import Table
     from bellcrank.workflows.validate import Validation
 

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings, levels
 from bellcrank.fem.path import PathStatus
-from bellcrank.parts.pieces import require_held
+from bellcrank.part.pieces import require_held
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from bellcrank.fem import Analysis
     from bellcrank.model import Design
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
     from bellcrank.search import Finalist, Refusals, SearchSettings
 
 LEVEL = "frame"
@@ -72,7 +72,7 @@ def fault_of(analysis: Analysis) -> str | None:
     Examples
     --------
     >>> from bellcrank.model import human_design
-    >>> from bellcrank.parts import PartSpec
+    >>> from bellcrank.part import PartSpec
     >>> part = PartSpec().of(human_design("crane"))
     >>> fault_of(levels["frame"](part, COARSE))
     """

@@ -8,21 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import BellcrankError
-from bellcrank.mechanics import CAREFUL, Response, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, Status
 from bellcrank.model import Design, Problem, human_design, write_design
-from bellcrank.parts import PartSpec, calibrated
+from bellcrank.part import PartSpec, calibrated
 from bellcrank.provenance import provenance
-from bellcrank.runs import RunFolder, check_free, remove_temporaries
-from bellcrank.runs.layout import LOCK
-from bellcrank.runs.locking import locked
 from bellcrank.search import (
     Candidate,
+    Evaluator,
     Progress,
-    Responder,
     SearchSettings,
     advance_chain,
     candidates_of,
-    make_responder,
+    make_evaluator,
     most_efficient,
     read_settings,
     run_chains,
@@ -30,6 +27,9 @@ from bellcrank.search import (
     select,
     start_chain,
 )
+from bellcrank.storage import RunFolder, check_free, remove_temporaries
+from bellcrank.storage.layout import LOCK
+from bellcrank.storage.locking import locked
 from bellcrank.workflows.choosing import FINE, LEVEL, PartChoice, stands
 from bellcrank.workflows.outcome import DesignReport
 from bellcrank.workflows.pareto import write_front
@@ -51,9 +51,9 @@ def prepare(problem: Problem, settings: SearchSettings) -> None:
     InvalidSettings
         If the initial design has no unique, stable response.
     """
-    responder = make_responder(problem, settings)
+    evaluator = make_evaluator(problem, settings)
     few = replace(settings, steps=2)  # of which one may only ask, the other predict
-    advance_chain(responder, few, 0, start_chain(responder, few))
+    advance_chain(evaluator, few, 0, start_chain(evaluator, few))
 
 
 def start_design(
@@ -185,15 +185,15 @@ def accepted_candidates(
     return candidates, proposals, best
 
 
-def judge_for(problem: Problem, settings: SearchSettings, **changes: Any) -> Responder:
+def judge_for(problem: Problem, settings: SearchSettings, **changes: Any) -> Evaluator:
     """Return who judges finished designs: in the literal model, with the goals of the search."""
-    told = {"dangling": "counted", "minimiser": "newton", **changes}
-    return make_responder(problem, replace(settings, **told))
+    told = {"unloaded_beams": "keep", "minimiser": "newton", **changes}
+    return make_evaluator(problem, replace(settings, **told))
 
 
 def verify(design: Design, settings: SearchSettings, response: Response) -> dict[str, float]:
     """Compute the efficiency of a design from rest by a second minimiser."""
-    second = judge_for(design.problem, settings, minimiser="cg", goals=()).respond(design.mask)
+    second = judge_for(design.problem, settings, minimiser="cg", goals=()).evaluate(design.mask)
     return {"newton": response.efficiency, "cg": second.efficiency}
 
 
@@ -224,13 +224,13 @@ def conclude(
     human = human_design(problem.name)
     human_response = None
     if human is not None:
-        human_response = literal.respond(human.mask, CAREFUL)
+        human_response = literal.evaluate(human.mask, VERIFICATION_INCREMENT)
     report = DesignReport(
         folder=folder.path,
         settings=settings,
         selection=selection,
         checks=verify(selection.design, settings, selection.response),
-        initial_efficiency=literal.respond(problem.initial, CAREFUL).efficiency,
+        initial_efficiency=literal.evaluate(problem.initial, VERIFICATION_INCREMENT).efficiency,
         human=human,
         human_response=human_response,
         proposals=proposals,

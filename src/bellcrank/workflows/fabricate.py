@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.fabricate import Export, check_print, exporter_for
-from bellcrank.fabricate.profiles import profiles
-from bellcrank.fabricate.slicer import find_slicer, slice_solid
+from bellcrank.export import Export, check_print, exporter_for
+from bellcrank.export.profiles import profiles
+from bellcrank.export.slicer import find_slicer, slice_solid
 from bellcrank.fem.contact import centre_lines, find_contacts
-from bellcrank.geometry import strut_outline
-from bellcrank.geometry.grips import filled, with_pointer
-from bellcrank.geometry.screws import drilled, screw_places
-from bellcrank.mechanics import CAREFUL, Evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
-from bellcrank.parts.pieces import doubts_about, require_held
+from bellcrank.part.outline import strut_outline
+from bellcrank.part.outline.grips import filled, with_pointer
+from bellcrank.part.outline.screws import drilled, screw_places
+from bellcrank.part.pieces import doubts_about, require_held
 from bellcrank.workflows.animate import load_design
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bellcrank.fabricate.profiles import PrintProfile
-    from bellcrank.fabricate.slicer import Sliced
-    from bellcrank.geometry import Outline
+    from bellcrank.export.profiles import PrintProfile
+    from bellcrank.export.slicer import Sliced
     from bellcrank.model import Design
-    from bellcrank.parts import Part, PartSpec
+    from bellcrank.part import Part, PartSpec
+    from bellcrank.part.outline import Outline
 
 FRAMES = 25
 """Along a motion that is written to a file."""
@@ -155,7 +155,9 @@ def findings_about(bundle: Export, profile: PrintProfile) -> list[str]:
     part = bundle.part
     sentences = [finding.sentence for finding in check_print(bundle, profile.rules)]
     sentences += doubts_about(part.design)
-    response = Evaluator(part.design.problem).respond(part.design.mask, CAREFUL)
+    response = SpringEvaluator(part.design.problem).evaluate(
+        part.design.mask, VERIFICATION_INCREMENT
+    )
     moved = part.positions + part.scale * response.displacement
     beams = np.flatnonzero(part.design.mask)
     rest, there = (centre_lines(places[part.struts]) for places in (part.positions, moved))

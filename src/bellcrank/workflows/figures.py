@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.fabricate.formats.vtu import mesh_to_bytes
+from bellcrank.export.formats.vtu import mesh_to_bytes
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.plots import Motion, Stressed, StrokeAxes, StrokeCurve, draw_stress
 from bellcrank.plots.saving import check_target

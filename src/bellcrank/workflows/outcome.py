@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import Response
     from bellcrank.model import Design
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
     from bellcrank.search import SearchSettings, Selection
     from bellcrank.workflows.validate import Validation
 

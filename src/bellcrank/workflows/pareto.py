@@ -8,19 +8,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.mechanics import CAREFUL, Core, Evaluator, Status, output_stiffness
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    Core,
+    SpringEvaluator,
+    Status,
+    output_stiffness,
+)
 from bellcrank.model import Design, pack_mask
 from bellcrank.model.storage import write_text
 from bellcrank.plots import draw_front
-from bellcrank.search import clean, make_responder, pieces
-from bellcrank.search.goals import GoalResponder, ParetoArchive, mass_of
+from bellcrank.search import clean, make_evaluator, pieces
+from bellcrank.search.goals import GoalEvaluator, ParetoArchive, mass_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
-    from bellcrank.runs import RunFolder
-    from bellcrank.search import Responder, SearchSettings
+    from bellcrank.search import Evaluator, SearchSettings
+    from bellcrank.storage import RunFolder
 
 MOST_DESIGNS = 20_000
 """That are looked at again, the most efficient first."""
@@ -46,19 +52,19 @@ class Scale:
 
     def __init__(self, problem: Problem, settings: SearchSettings) -> None:
         self.problem = problem
-        literal = replace(settings, dangling="counted", minimiser="newton")
-        self.judge: Responder = make_responder(problem, literal)
-        one = self.judge.evaluators[0] if isinstance(self.judge, GoalResponder) else self.judge
-        assert isinstance(one, Evaluator)
+        literal = replace(settings, unloaded_beams="keep", minimiser="newton")
+        self.judge: Evaluator = make_evaluator(problem, literal)
+        one = self.judge.evaluators[0] if isinstance(self.judge, GoalEvaluator) else self.judge
+        assert isinstance(one, SpringEvaluator)
         self.evaluator = one
         # What no load can reach is not built; left in, it would count in the literal model.
-        self.core = Core(Evaluator(problem, "displacement", "stripped"))
+        self.core = Core(SpringEvaluator(problem, "displacement", "prune_all"))
 
     def measure(
         self, mask: NDArray[np.bool_], largest_increment: float = 1.0
     ) -> dict[str, float] | None:
         """Return the measures of a design; None if it is unstable or breaks a goal."""
-        response = self.judge.respond(mask, largest_increment)
+        response = self.judge.evaluate(mask, largest_increment)
         if response.status is not Status.CONVERGED:
             return None
         return {
@@ -70,7 +76,7 @@ class Scale:
     def clean(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return what of a design would be built."""
         cleaned = clean(Design(self.problem, mask)).mask
-        return self.judge.closed(cleaned) if isinstance(self.judge, GoalResponder) else cleaned
+        return self.judge.closed(cleaned) if isinstance(self.judge, GoalEvaluator) else cleaned
 
 
 def find_front(
@@ -89,7 +95,7 @@ def find_front(
         if values is None or not archive.would_keep(values):
             continue
         cleaned = scale.clean(core)
-        values = scale.measure(cleaned, CAREFUL)
+        values = scale.measure(cleaned, VERIFICATION_INCREMENT)
         if values is not None and pieces(folder.problem, cleaned) == 1:
             archive.add(pack_mask(cleaned), values)
     return archive

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.plots import ChainPath, Motion, PathsStyle, draw_comparison, draw_motion, draw_paths
-from bellcrank.runs import RunFolder
 from bellcrank.search import MetropolisSettings, SearchSettings, read_settings, searches
+from bellcrank.storage import RunFolder
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -64,7 +64,7 @@ def move(
     design: Design, objective: str | None = None, *, name: str = "", magnify: float = 1.0
 ) -> Motion:
     """Compute the response of a design, ready to be drawn."""
-    response = Evaluator(design.problem, objective).respond(design.mask)
+    response = SpringEvaluator(design.problem, objective).evaluate(design.mask)
     note = "" if response.status is Status.CONVERGED else response.status.label
     return Motion(
         design, response.displacement, response.efficiency, name=name, note=note, magnify=magnify

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.errors import InvalidFile
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
-from bellcrank.runs.locking import locked
+from bellcrank.storage.locking import locked
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.model.storage import write_text
 
 if TYPE_CHECKING:
-    from bellcrank.runs import RunFolder
+    from bellcrank.storage import RunFolder
     from bellcrank.workflows.outcome import DesignReport
 
 

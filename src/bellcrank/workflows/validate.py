@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings, levels
 from bellcrank.fem.results import finite
-from bellcrank.mechanics import CAREFUL, Evaluator, Response
-from bellcrank.parts import PartSpec, read_length
-from bellcrank.parts.pieces import doubts_about, require_held
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator
+from bellcrank.part import PartSpec, read_length
+from bellcrank.part.pieces import doubts_about, require_held
 from bellcrank.provenance import provenance
 from bellcrank.workflows.record import SCHEMA
 
@@ -171,7 +171,7 @@ def validate(
     """
     check_plan(design, spec, plan)
     part = spec.of(design)
-    response = Evaluator(design.problem).respond(design.mask, CAREFUL)
+    response = SpringEvaluator(design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
     found = Validation(design, spec, response, plan, [])
     for index, (level, settings) in enumerate(plan):
         analysis = levels[level].analyse(

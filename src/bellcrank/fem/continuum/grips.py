@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 
 @dataclass(frozen=True, slots=True)

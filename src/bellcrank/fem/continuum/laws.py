@@ -15,7 +15,7 @@ from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
-    from bellcrank.parts.materials import Material
+    from bellcrank.part.materials import Material
 
 Quantity = Callable[[Any, "Lame"], Any]
 """Of F, a coefficient function of NGSolve, and a material."""
@@ -45,7 +45,7 @@ def lame_of(material: Material) -> Lame:
 
     Examples
     --------
-    >>> from bellcrank.parts.materials import Material
+    >>> from bellcrank.part.materials import Material
     >>> constants = lame_of(Material(name="rubber", young=12.0, poisson=0.25))
     >>> constants, round(constants.thin, 9)
     (Lame(first=4.8, shear=4.8), 3.2)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bellcrank.fem.continuum.response import ContinuumState, Response
     from bellcrank.fem.levels import FemSettings
     from bellcrank.fem.results import Field
-    from bellcrank.parts import Part
+    from bellcrank.part import Part
 
 
 def check_outline(part: Part, settings: FemSettings) -> None:

@@ -11,13 +11,13 @@ from scipy.spatial import cKDTree
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.continuum.backend import ngsolve
-from bellcrank.geometry import Loop
+from bellcrank.part.outline import Loop
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.geometry import Outline
-    from bellcrank.parts.part import Part
+    from bellcrank.part.outline import Outline
+    from bellcrank.part.part import Part
 
 HUB = 0.35
 """Radius of a hub, as a part of the width of struts: always within the material."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from bellcrank.fem.continuum.mesh import ContinuumMesh
     from bellcrank.fem.results import Field
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 STEPPING = Stepping(first=0.125, largest=0.25)
 

@@ -14,7 +14,7 @@ from bellcrank.fem.continuum.mesh import ContinuumMesh, Turns, plane_mesh
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 SIZE = 1.0
 """Of the largest triangles, as a part of the width."""

@@ -12,7 +12,7 @@ from bellcrank.fem.continuum.laws import lame_of, laws
 if TYPE_CHECKING:
     from bellcrank.fem.continuum.laws import Lame, Law
     from bellcrank.fem.continuum.mesh import ContinuumMesh
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 ORDER = {2: 4, 3: 2}
 """Degree up to which energies are integrated exactly: six points in a triangle, and the four of

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from bellcrank.fem.frame.mesh import FrameMesh
     from bellcrank.fem.levels import FemSettings
     from bellcrank.fem.path import Path
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 SNAPS = 5
 """Jumps after which nobody wants to know where the part ends."""

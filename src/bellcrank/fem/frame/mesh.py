@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.parts.section import SHEAR_COEFFICIENT
+from bellcrank.part.section import SHEAR_COEFFICIENT
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.fem.frame.mesh import FrameMesh
-    from bellcrank.parts.part import Part
+    from bellcrank.part.part import Part
 
 
 SOFTEST = 1e-12

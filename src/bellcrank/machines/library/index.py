@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from bellcrank.machines.elementary import DIRECTIONS
 from bellcrank.machines.library.thumbnails import Thumbnail, thumbnail
-from bellcrank.mechanics import Evaluator
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model.storage import already_exists, write_text
-from bellcrank.runs.files import make_folder
+from bellcrank.storage.files import make_folder
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -72,7 +72,7 @@ def write_pages(known: Library, out: Path, *, overwrite: bool = False) -> list[P
 
 def draw(entry: Entry) -> Thumbnail:
     """Draw an entry at rest and at its full stroke, under the load that it was made for."""
-    response = Evaluator(entry.design.problem).respond(entry.design.mask)
+    response = SpringEvaluator(entry.design.problem).evaluate(entry.design.mask)
     return thumbnail(entry.design, response.displacement)
 
 

@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import CAREFUL, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Status
 from bellcrank.model import Design
-from bellcrank.search.goals import Case, GoalResponder
+from bellcrank.search.goals import Case, GoalEvaluator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -111,11 +111,11 @@ def plain_lever(problem: Problem, goals: Sequence[str] = ()) -> Design:
     >>> lever.provenance["pivot"] in range(7), lever.efficiency > 1.0
     (True, True)
     """
-    judge = GoalResponder([Case(problem)], goals)
+    judge = GoalEvaluator([Case(problem)], goals)
     best: Design | None = None
     for shape in shapes(problem):
         lever = lever_of(problem, shape)
-        response = judge.respond(lever.mask, CAREFUL)
+        response = judge.evaluate(lever.mask, VERIFICATION_INCREMENT)
         if response.status is not Status.CONVERGED:
             continue
         if best is None or best.efficiency is None or response.efficiency > best.efficiency:

@@ -19,10 +19,10 @@ from bellcrank.machines.library.kinds import kinds
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, measure
 from bellcrank.machines.library.summary import entry_files, read_index, read_summary, write_index
 from bellcrank.mechanics import Response, Status
-from bellcrank.runs.files import make_folder
-from bellcrank.runs.layout import LOCK
-from bellcrank.runs.locking import locked
 from bellcrank.search import read_settings, run_chains, select
+from bellcrank.storage.files import make_folder
+from bellcrank.storage.layout import LOCK
+from bellcrank.storage.locking import locked
 from bellcrank.workflows import reopen_design, start_design
 from bellcrank.workflows.design import accepted_candidates, judge_for
 
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from bellcrank.machines.library.orders import Order, Task
     from bellcrank.machines.library.summary import Summary
     from bellcrank.model import Problem
-    from bellcrank.runs import RunFolder
-    from bellcrank.search import Candidate, Progress, Responder, SearchSettings, Selection
+    from bellcrank.search import Candidate, Evaluator, Progress, SearchSettings, Selection
+    from bellcrank.storage import RunFolder
 
 WORK = "searches"
 """Folder of the searches, in that of the entries."""
@@ -250,13 +250,17 @@ class Resisting:
         Who knows the goals.
     """
 
-    def __init__(self, judge: Responder) -> None:
+    def __init__(self, judge: Evaluator) -> None:
         self.judge = judge
         self.problem = judge.problem
 
-    def respond(self, mask: NDArray[np.bool_], largest_increment: float = 1.0) -> Response:
-        """Response of a design; forbidden if nothing resists its input."""
-        response = self.judge.respond(mask, largest_increment)
+    def evaluate(
+        self, mask: NDArray[np.bool_], largest_increment: float = 1.0, **start: Any
+    ) -> Response:
+        """Return the response of a design; its status is FORBIDDEN if nothing resists its input."""
+        response = self.judge.evaluate(mask, largest_increment, **start)
+        if start.get("warm_start"):
+            return response
         stiffness = 2.0 * response.energy / self.problem.input.amount**2
         if response.status is Status.CONVERGED and not stiffness > LEAST_STIFFNESS:
             return replace(response, status=Status.FORBIDDEN)

@@ -12,7 +12,7 @@ from bellcrank.machines.characterise import characterise
 from bellcrank.machines.library.entry import Entry, FrameCheck, LeverCheck, direction_of
 from bellcrank.machines.library.kinds import OWN, kinds
 from bellcrank.machines.library.lever import plain_lever
-from bellcrank.mechanics import CAREFUL, Evaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.provenance import provenance
 from bellcrank.workflows import spec_for, validate
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bellcrank.model import Design, Problem
-    from bellcrank.parts import PartSpec
+    from bellcrank.part import PartSpec
 
 LEAST_STIFFNESS = 1e-6
 """Of an input: below it an actuator is a mechanism that follows its input and resists nothing."""
@@ -59,7 +59,7 @@ def measure(
     ('left', 1.01, 1.21)
     """
     problem = design.problem
-    response = Evaluator(problem).respond(design.mask, CAREFUL)
+    response = SpringEvaluator(problem).evaluate(design.mask, VERIFICATION_INCREMENT)
     if response.status is not Status.CONVERGED:
         raise InvalidSettings(f"{problem.name}: no actuator to rely on: {response.status.message}")
     found = characterise(design, points=points)

@@ -13,7 +13,7 @@ from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.machines.library.entry import stem
 from bellcrank.machines.library.kinds import Kind, kinds
 from bellcrank.machines.library.lever import plain_lever
-from bellcrank.mechanics import Evaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.search import HoppingSettings
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Task:
             "full": (problem, chains - chains // 2),
             "lever": (replace(problem, initial=initial), chains // 2),
         }
-        if Evaluator(problem).respond(initial).status is not Status.CONVERGED:
+        if SpringEvaluator(problem).evaluate(initial).status is not Status.CONVERGED:
             # The whole port makes it snap, or so nearly that no search would begin there.
             return {"full": (problem, chains)}
         return {name: start for name, start in begun.items() if start[1]}

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from bellcrank.mechanics import (
-    CAREFUL,
-    Dangling,
-    Evaluator,
+    VERIFICATION_INCREMENT,
+    SpringEvaluator,
     Status,
+    UnloadedBeams,
     foresee_stiffness,
     output_stiffness,
 )
@@ -88,14 +88,18 @@ def no_snapping(_problem: Problem, _nothing: None) -> Term:
     design in a hundred among those near a loss of stability.
     """
     # One of its own: the evaluator that holds the response must not forget it.
-    careful: dict[tuple[float, int], Evaluator] = {}
+    careful: dict[tuple[float, int], SpringEvaluator] = {}
 
     def of_response(moved: Moved) -> float:
         given = moved.evaluator
         key = (given.problem.input.amount, given.core)
         if key not in careful:
-            careful[key] = Evaluator(given.problem, "displacement", get_args(Dangling)[given.core])
-        return float(careful[key].respond(moved.mask, CAREFUL).status is not Status.CONVERGED)
+            careful[key] = SpringEvaluator(
+                given.problem, "displacement", get_args(UnloadedBeams)[given.core]
+            )
+        return float(
+            careful[key].evaluate(moved.mask, VERIFICATION_INCREMENT).status is not Status.CONVERGED
+        )
 
     return Term(of_response=of_response, price=4)
 

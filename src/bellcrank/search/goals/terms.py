@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Evaluator, Response
+    from bellcrank.mechanics import Response, SpringEvaluator
     from bellcrank.model import Problem
 
 SMALLEST_EXCESS = 1e-6
@@ -52,7 +52,7 @@ class Moved:
         At full load.
     """
 
-    evaluator: Evaluator
+    evaluator: SpringEvaluator
     mask: NDArray[np.bool_]
     core: NDArray[np.bool_]
     response: Response

@@ -1,0 +1,182 @@
+"""How the efficiency of the crane grows along the paper's chains, from several seeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.model import find_problem, human_design
+from bellcrank.plots import style
+from bellcrank.plots.charts import Chart, Level, Series
+from bellcrank.plots.sheets import Sheet, draw_sheet
+from reproduction import published
+from reproduction.registry import Claim, Figures, Study, register
+from reproduction.searching import respond, run_chains
+from reproduction.words import count, number, span
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from reproduction.bench import Bench
+
+MARKS = ("0.5", "1.0", "2.0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """How many chains, and how long."""
+
+    problem: str = "crane"
+    steps: int = 20_000
+    chains: int = 30
+    seed: int = 0
+
+
+def run(settings: Settings, bench: Bench) -> Figures:
+    """Run the chains."""
+    problem = find_problem(settings.problem)
+    search = {"search": "paper", "steps": settings.steps, "seed": settings.seed}
+    chains = run_chains(bench, "chain", problem, search, settings.chains)
+    human = human_design(settings.problem)
+    by_hand = respond(human).efficiency if human else None
+    ends = [chain["last"] for chain in chains]
+    best = [chain["best"] for chain in chains]
+    return {
+        "problem": settings.problem,
+        "chains": settings.chains,
+        "steps": settings.steps,
+        "human": by_hand,
+        "end": quantiles(ends),
+        "best": quantiles(best),
+        "above_human": sum(value > by_hand for value in best) if by_hand else None,
+        "accepted": quantiles([chain["accepted"] / chain["steps"] for chain in chains]),
+        "reached": {mark: reached([chain["reached"][mark] for chain in chains]) for mark in MARKS},
+        "seconds_per_proposal": float(np.median([c["seconds"] / c["steps"] for c in chains])),
+        "ends": sorted(ends),
+        "paths": [chain["path"] for chain in chains],
+    }
+
+
+def quantiles(values: Sequence[float]) -> dict[str, float]:
+    """Return least, tenth percentile, median, ninetieth percentile and largest."""
+    found = np.quantile(values, [0.0, 0.1, 0.5, 0.9, 1.0])
+    return dict(zip(("least", "low", "median", "high", "largest"), found.tolist(), strict=True))
+
+
+def reached(steps: Sequence[int | None]) -> dict[str, float | int | None]:
+    """Return how many chains come so far, and after how many proposals in the median of these."""
+    there = [step for step in steps if step is not None]
+    return {"chains": len(there), "proposals": float(np.median(there)) if there else None}
+
+
+def draw(figures: Mapping[str, Any], path: Path) -> None:
+    """Draw the paths, and how their ends are spread."""
+    order = np.argsort([each["efficiency"][-1] for each in figures["paths"]])
+    count_of = len(order)
+    series = []
+    for place, k in enumerate(order):
+        best = place == count_of - 1
+        series.append(
+            Series(
+                np.array(figures["paths"][k]["accepted"], dtype=float),
+                np.array(figures["paths"][k]["efficiency"], dtype=float),
+                colour=style.BEST if best else _shade(place / max(count_of - 1, 1)),
+                width=1.7 if best else 0.8,
+                level=3.0 if best else 2.0,
+                name="highest end" if best else "other seeds" * (place == 0),
+            )
+        )
+    levels = [Level(figures["human"], "human design")] if figures["human"] else []
+    levels.append(Level(published.ANNEALING, "annealed", style.IDLE, upright=True))
+    ends = np.array(figures["ends"])
+    top = float(np.ceil(2.0 * max(ends.max(), figures["best"]["largest"])) / 2.0)
+    spread = Series(np.linspace(0.0, top, 15), ends, kind="histogram", name="ends of chains")
+    charts = [
+        Chart(
+            "Along each chain", "accepted changes", "efficiency", series, levels,
+            log_x=True, legend="upper left",
+        ),
+        Chart(
+            "Where they end", "efficiency at the end", "chains, %", [spread],
+            [Level(figures["end"]["median"], f"median {figures['end']['median']:.2f}",
+                   style.BUILT, upright=True)],
+            legend="upper left",
+        ),
+    ]  # fmt: skip
+    sheet = Sheet(
+        title=f"{figures['problem']}: efficiency along {figures['chains']} chains",
+        note=f"{count(figures['steps'], 'proposal')} each by the paper's rule; discrete model",
+        charts=charts,
+        height=3.3,
+    )
+    draw_sheet(sheet, path, overwrite=True)
+
+
+def _shade(place: float) -> str:
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return to_hex(colormaps["bone"](0.42 + 0.4 * (1.0 - place)))
+
+
+def claims(figures: Mapping[str, Any]) -> list[Claim]:
+    """Compare with the paper."""
+    one = figures["reached"]["1.0"]
+    told = [
+        Claim(
+            "cooling: linear over accepted steps",
+            f"T from {published.HOT:g} to {published.COLD:g} over {published.ANNEALING}",
+            "the same",
+            "settings of `--search paper`",
+        ),
+        Claim(
+            "efficiency at the end of paths from several seeds",
+            "",
+            f"ends at {span(figures['end']['least'], figures['end']['largest'])}, median "
+            f"{number(figures['end']['median'])}, of {count(figures['chains'], 'chain')} after "
+            f"{count(figures['steps'], 'proposal')}",
+            "discrete model, before cleaning",
+        ),
+        Claim(
+            "proposals until the output moves as far as the input",
+            "",
+            f"{one['proposals']:.0f} in the median of {one['chains']} of "
+            f"{count(figures['chains'], 'chain')}" if one["proposals"] else "not reached",
+        ),
+    ]  # fmt: skip
+    if figures["above_human"] is not None:
+        told.append(
+            Claim(
+                "machine designs pass the one by hand",
+                "",
+                f"{figures['above_human']} of {figures['chains']} pass its "
+                f"{number(figures['human'])}",
+                "our design by hand, not the paper's",
+            )
+        )
+    return told
+
+
+STUDY = register(
+    Study(
+        name="paths",
+        title="Efficiency along the paper's chains",
+        after="figure 2",
+        full=Settings(),
+        quick=Settings(steps=2000, chains=8),
+        run=run,
+        draw=draw,
+        claims=claims,
+        runs=lambda told: f"{count(told['chains'], 'chain')} of {count(told['steps'], 'proposal')}",
+        deviations=(
+            (
+                "Equilibria are found by Newton's method instead of conjugate gradients; the "
+                "response is the same, and always that from rest."
+            ),
+            "Designs that snap along the stroke are refused: they have no unique efficiency.",
+        ),
+    )
+)

@@ -1,0 +1,246 @@
+"""What larger lattices cost, and what they bring."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.mechanics import SpringEvaluator
+from bellcrank.model import find_problem
+from bellcrank.plots import style
+from bellcrank.plots.charts import Chart, Series
+from bellcrank.plots.sheets import Sheet, draw_sheet
+from bellcrank.search import read_settings
+from reproduction import published
+from reproduction.registry import Claim, Figures, Study, register
+from reproduction.searching import design_of, run_chain
+from reproduction.words import count, number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from reproduction.bench import Bench
+
+MARK = "1.0"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Sizes, runs of each, and how long they are.
+
+    Parameters
+    ----------
+    sizes
+        Of the built-in problems ``scaling-N``.
+    runs
+        Of each size: the larger the lattice, the fewer, as their time grows faster than anything.
+    proposals_per_beam
+        Length of a run, by the number of designable beams.
+    relaxed
+        Responses of each size that are timed with a first-order minimiser too.
+    """
+
+    sizes: tuple[int, ...] = (8, 10, 12, 14, 16, 18, 20)
+    runs: tuple[int, ...] = (100, 100, 100, 100, 50, 30, 20)
+    proposals_per_beam: int = 15
+    relaxed: int = 4
+    minimiser: str = "fire"
+    seed: int = 0
+
+
+def run(settings: Settings, bench: Bench) -> Figures:
+    """Run and time the chains of each size."""
+    rows = []
+    for size, runs in zip(settings.sizes, settings.runs, strict=True):
+        problem = find_problem(f"scaling-{size}")
+        beams = len(problem.designable)
+        told = {
+            "search": "paper",
+            "steps": settings.proposals_per_beam * beams,
+            "chains": runs,
+            "seed": settings.seed,
+        }
+        search = read_settings(told)
+        work = {str(k): partial(run_chain, problem, search, k) for k in range(runs)}
+        chains = list(bench.all(f"size-{size}", work).values())
+        masks = [chain["offered"][0]["mask"] for chain in chains if chain["offered"]]
+        relaxed = bench.one(
+            f"relaxed-{size}",
+            partial(relaxed_seconds, size, settings.minimiser, masks[: settings.relaxed]),
+        )
+        rows.append(
+            {"size": size, "beams": beams, "runs": runs, **_summary(chains), "relaxed": relaxed}
+        )
+    return {
+        "runs": list(settings.runs),
+        "proposals_per_beam": settings.proposals_per_beam,
+        "minimiser": settings.minimiser,
+        "sizes": rows,
+        "exponents": exponents(rows),
+    }
+
+
+def relaxed_seconds(size: int, minimiser: str, masks: Sequence[str]) -> float | None:
+    """Return the processor time of a response by a first-order minimiser, median over designs."""
+    problem = find_problem(f"scaling-{size}")
+    evaluator = SpringEvaluator(problem, minimiser=minimiser)
+    evaluator.evaluate(problem.initial)
+    found = []
+    for mask in masks:
+        design = design_of(problem, mask)
+        began = time.thread_time()
+        evaluator.evaluate(design.mask)
+        found.append(time.thread_time() - began)
+    return float(np.median(found)) if found else None
+
+
+def _summary(chains: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    seconds = np.array([chain["seconds"] for chain in chains])
+    steps = np.array([chain["steps"] for chain in chains])
+    best = np.array([chain["best"] for chain in chains])
+    there = [
+        chain["seconds"] * chain["reached"][MARK] / chain["steps"]
+        for chain in chains
+        if chain["reached"][MARK] is not None
+    ]
+    return {
+        "steps": int(steps[0]),
+        "seconds": np.quantile(seconds, [0.1, 0.5, 0.9]).tolist(),
+        "best": np.quantile(best, [0.1, 0.5, 0.9]).tolist(),
+        "per_proposal": float(np.median(seconds / steps)),
+        "reached": len(there),
+        "seconds_to_one": float(np.median(there)) if there else None,
+    }
+
+
+MEASURES: dict[str, tuple[str, Callable[[Mapping[str, Any]], float | None]]] = {
+    "run": ("run", lambda row: row["seconds"][1]),
+    "proposal": ("proposal", lambda row: row["per_proposal"]),
+    "to_one": ("until efficiency 1", lambda row: row["seconds_to_one"]),
+    "relaxed": ("response, first-order", lambda row: row["relaxed"]),
+}
+
+
+def exponents(rows: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
+    """Return the slopes of times against the number of designable beams, both logarithmic."""
+    return {name: slope(rows, of) for name, (_, of) in MEASURES.items()}
+
+
+def slope(
+    rows: Sequence[Mapping[str, Any]], of: Callable[[Mapping[str, Any]], float | None]
+) -> float | None:
+    """Return the slope of the line of least squares through logarithms."""
+    points = [(row["beams"], value) for row in rows if (value := of(row)) is not None and value > 0]
+    if len(points) < 2:
+        return None
+    across, up = np.log(np.array(points)).T
+    return float(np.polyfit(across, up, 1)[0])
+
+
+def draw(figures: Mapping[str, Any], path: Path) -> None:
+    """Draw times and efficiencies against the number of beams."""
+    rows = figures["sizes"]
+    beams = np.array([row["beams"] for row in rows], dtype=float)
+    series = []
+    shades = (style.BEST, style.BUILT, style.WANTED, style.INPUT)
+    for (name, (words, of)), colour in zip(MEASURES.items(), shades, strict=True):
+        values = np.array([np.nan if of(row) is None else of(row) for row in rows], dtype=float)
+        power = figures["exponents"][name]
+        if power is not None:
+            told = f"{words}: exponent {power:.2f}"
+            series.append(Series(beams, values, name=told, kind="both", colour=colour))
+    runs = np.array([row["seconds"][1] for row in rows])
+    steep = runs[0] * (beams / beams[0]) ** published.EXPONENT
+    series.append(
+        Series(
+            beams, steep, name=f"the paper: exponent {published.EXPONENT:g}",
+            colour=style.IDLE, dashed=True, level=1.5,
+        )
+    )  # fmt: skip
+    low, middle, high = np.array([row["best"] for row in rows]).T
+    best = Series(
+        beams, middle, name="median, 10 % to 90 %", kind="both", low=low, high=high,
+        colour=style.BEST,
+    )  # fmt: skip
+    charts = [
+        Chart(
+            "Processor time, one core", "designable beams N", "seconds", series,
+            log_x=True, log_y=True, legend="upper left",
+            limits_y=(None, 100.0 * float(np.nanmax(runs))),
+        ),
+        Chart(
+            "What a run finds", "designable beams N", "best efficiency", [best],
+            log_x=True, legend="lower right", limits_y=(0.0, None),
+        ),
+    ]  # fmt: skip
+    sheet = Sheet(
+        title="Cost and gain of larger lattices",
+        note=f"{_how_many(figures['runs'])} by the paper's rule, "
+        f"{figures['proposals_per_beam']} proposals for each designable beam; discrete model",
+        charts=charts,
+        height=3.6,
+    )
+    draw_sheet(sheet, path, overwrite=True)
+
+
+def _how_many(runs: Sequence[int]) -> str:
+    """Say how many runs of each size there are.
+
+    Examples
+    --------
+    >>> _how_many([2, 2]), _how_many([100, 100, 30])
+    ('2 runs of each size', '100 to 30 runs of each size')
+    """
+    most, fewest = max(runs), min(runs)
+    return f"{count(most, 'run') if most == fewest else f'{most} to {fewest} runs'} of each size"
+
+
+def claims(figures: Mapping[str, Any]) -> list[Claim]:
+    """Compare with the paper."""
+    powers, rows = figures["exponents"], figures["sizes"]
+    first, last = rows[0], rows[-1]
+    return [
+        Claim(
+            "exponent of the time of a run with the number of beams",
+            number(published.EXPONENT),
+            f"{number(powers['run'])}; of a proposal {number(powers['proposal'])}, until "
+            f"efficiency 1 {number(powers['to_one'])}, of a response by "
+            f"`{figures['minimiser']}` {number(powers['relaxed'])}",
+            f"{first['beams']} to {last['beams']} designable beams; what the paper's time is "
+            "that of is not known to us",
+        ),
+        Claim(
+            "efficiency that runs reach, against size",
+            "",
+            f"median best {number(first['best'][1])} with {first['beams']} designable beams, "
+            f"{number(last['best'][1])} with {last['beams']}",
+            f"{figures['proposals_per_beam']} proposals for each beam",
+        ),
+    ]
+
+
+STUDY = register(
+    Study(
+        name="scaling",
+        title="Time and efficiency against the number of beams",
+        after="scaling with size",
+        full=Settings(),
+        quick=Settings(sizes=(8, 10, 12), runs=(2, 2, 2), proposals_per_beam=6, relaxed=2),
+        run=run,
+        draw=draw,
+        claims=claims,
+        runs=lambda told: f"{_how_many(told['runs'])} (of {count(len(told['sizes']), 'size')})",
+        deviations=(
+            (
+                "The paper averages over 100 runs of each size; ours are fewer of the largest "
+                "lattices."
+            ),
+            "A run ends after a number of proposals that grows with the lattice.",
+        ),
+    )
+)

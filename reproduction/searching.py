@@ -1,0 +1,160 @@
+"""Chains of searches as plain records: what every study asks them for."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
+from bellcrank.model import Design, unpack_mask
+from bellcrank.plots.downsampling import thin
+from bellcrank.search import (
+    Candidate,
+    advance_chain,
+    candidates_of,
+    is_done,
+    make_evaluator,
+    most_efficient,
+    read_settings,
+    searches,
+    select,
+    start_chain,
+)
+from bellcrank.workflows.design import prepare
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+    from bellcrank.search import Choice, Evaluator, SearchSettings, Selection
+    from reproduction.bench import Bench
+
+POINTS = 160
+"""Of a path that is kept, about."""
+OFFERED = 12
+"""Designs of a chain that are kept, to be cleaned and compared."""
+DIGITS = 7
+
+
+def run_chain(problem: Problem, settings: SearchSettings, chain: int = 0) -> dict[str, Any]:
+    """Run one chain and return what studies need of it, as plain data.
+
+    Returns
+    -------
+    dict
+        steps, accepted, seconds (of this thread's processor time), best (efficiency of an
+        accepted design), path (accepted steps and efficiencies, thinned without losing a peak),
+        reached (proposals after which the best so far first exceeds 0.5, 1, 2), offered (masks,
+        efficiencies and steps of the designs worth building).
+    """
+    prepare(problem, settings)  # compiles before the clock runs
+    began = time.thread_time()
+    evaluator = make_evaluator(problem, settings)
+    state = start_chain(evaluator, settings, chain)
+    steps: list[NDArray[np.int64]] = []
+    masks: list[NDArray[np.uint8]] = []
+    values: list[NDArray[np.float64]] = []
+    while not is_done(state, settings):
+        before = state.step
+        state, rows = advance_chain(evaluator, settings, chain, state)
+        taken = np.flatnonzero(rows.accepted & (rows.status == Status.CONVERGED))
+        steps.append(before + taken)
+        masks.append(rows.mask[taken])
+        values.append(rows.efficiency[taken])
+    seconds = time.thread_time() - began
+    step, mask, value = np.concatenate(steps), np.concatenate(masks), np.concatenate(values)
+    offers = candidates_of(chain, step, mask, value, searches[settings.name].offers, OFFERED)
+    return {
+        "steps": state.step,
+        "accepted": len(value),
+        "seconds": round(seconds, 4),
+        "best": round(float(value.max(initial=-np.inf)), DIGITS),
+        "last": round(float(value[-1]), DIGITS) if len(value) else None,
+        "path": thinned_path(value),
+        "reached": {str(mark): _reached(step, value, mark) for mark in (0.5, 1.0, 2.0)},
+        "offered": [
+            {"mask": each.mask.hex(), "efficiency": each.efficiency, "step": each.step}
+            for each in offers
+        ],
+    }
+
+
+def _reached(step: NDArray[np.int64], value: NDArray[np.float64], mark: float) -> int | None:
+    """Return the proposals after which an efficiency is first reached; None if never."""
+    there = np.flatnonzero(value >= mark)
+    return int(step[there[0]]) + 1 if len(there) else None
+
+
+def thinned_path(value: NDArray[np.float64]) -> dict[str, list[float]]:
+    """Return accepted steps and efficiencies along a chain, by the logarithm of the step."""
+    if not len(value):
+        return {"accepted": [], "efficiency": []}
+    accepted = np.arange(1.0, len(value) + 1.0)
+    kept = thin(np.log(accepted), value, POINTS // 4)
+    return {
+        "accepted": accepted[kept].astype(int).tolist(),
+        "efficiency": np.round(value[kept], 4).tolist(),
+    }
+
+
+def run_chains(
+    bench: Bench, what: str, problem: Problem, search: Mapping[str, Any], chains: int
+) -> list[dict[str, Any]]:
+    """Run so many chains of a search, each kept in a file of its own.
+
+    Parameters
+    ----------
+    search
+        Settings as plain data, with the name of the search.
+    """
+    settings = read_settings({**search, "chains": chains})
+    work = {str(chain): partial(run_chain, problem, settings, chain) for chain in range(chains)}
+    return list(bench.all(what, work).values())
+
+
+def best_design(
+    problem: Problem,
+    chains: Sequence[Mapping[str, Any]],
+    judge: Evaluator | None = None,
+    choose: Choice = most_efficient,
+) -> Selection:
+    """Clean and compare what chains offer, and return the most efficient design.
+
+    Parameters
+    ----------
+    judge
+        Who knows the goals of the search; none by default.
+    choose
+        Who has the last word among those that qualify.
+
+    Raises
+    ------
+    InvalidSettings
+        If none of them is one stable piece.
+    """
+    offers = [
+        Candidate(each["efficiency"], number, each["step"], bytes.fromhex(each["mask"]))
+        for number, chain in enumerate(chains)
+        for each in chain["offered"]
+    ]
+    return select(problem, offers, None, judge, choose)
+
+
+def design_of(problem: Problem, mask: str) -> Design:
+    """Return the design with a mask in hexadecimal."""
+    return Design(problem, unpack_mask(mask, problem.lattice.beam_count))
+
+
+def respond(design: Design, part_of_stroke: float = 1.0) -> Response:
+    """Return the response of a finished design, followed carefully from rest."""
+    problem = design.problem
+    if part_of_stroke != 1.0:
+        given = replace(problem.input, amount=part_of_stroke * problem.input.amount)
+        problem = replace(problem, input=given)
+    return SpringEvaluator(problem).evaluate(design.mask, VERIFICATION_INCREMENT)

@@ -1,0 +1,175 @@
+"""The rival: topology optimisation of a box by pyMOTO, as its own examples do it.
+
+Densities on square elements, a linear density filter, stiffness by the power 3 (SIMP), springs at
+input and output, the largest output under a given input force and volume, by MMA: the textbook's
+formulation (Sigmund, Mech. Struct. Mach. 25, 493, 1997), with the settings of pyMOTO's examples.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import time
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from reproduction.boxes import Box
+
+INSTALL = "pip install 'bellcrank[rivals]'"
+LEAST = 1e-6
+"""Stiffness of emptiness."""
+POISSON = 0.3
+PAD = 1.7
+"""Radius round ports and supports that is solid, mm: a little more than bellcrank keeps there."""
+
+
+def pymoto() -> Any:
+    """Return the module pyMOTO.
+
+    Raises
+    ------
+    InvalidSettings
+        If it is not installed.
+    """
+    import matplotlib as mpl
+
+    # On import pyMOTO chooses a window system for all pictures of the process, or fails.
+    chosen = mpl.use
+    mpl.use = lambda *_names, **_more: None
+    try:
+        import pymoto as module
+    except ImportError as missing:
+        raise InvalidSettings(
+            f"the study of rivals needs pyMOTO and NGSolve; install them with: {INSTALL}"
+        ) from missing
+    finally:
+        mpl.use = chosen
+    return module
+
+
+def optimise(
+    box: Box,
+    element: float,
+    volume: float,
+    springs: tuple[float, float],
+    radius: float,
+    iterations: int,
+) -> dict[str, Any]:
+    """Return densities that move the output of a box far.
+
+    Parameters
+    ----------
+    element
+        Size of the elements, mm.
+    volume
+        Part of the box that may be filled.
+    springs
+        At input and output, in units of Young's modulus times the thickness.
+    radius
+        Of the filter, elements.
+    iterations
+        Of MMA.
+
+    Returns
+    -------
+    dict
+        density (rows from below), seconds (processor time), iterations, objective.
+    """
+    module = pymoto()
+    size = box.high - box.low
+    across, up = (max(round(float(side) / element), 2) for side in size)
+    domain = module.VoxelDomain(across, up)
+    step = size / np.array([across, up])
+    solid, empty = _passive(box, domain, step, (across, up))
+    load, output, held = _ports(box, domain, step)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # its solvers convert matrices, and say so each time
+        began = time.thread_time()
+        density = module.Signal("x", state=np.full(domain.nel, volume))
+        constant = _springs(load, output, springs)
+        with module.Network() as network:
+            chosen = module.SetValue(indices=solid, value=1.0)(density)
+            chosen = module.SetValue(indices=empty, value=0.0)(chosen)
+            smooth = module.DensityFilter(domain, radius=radius)(chosen)
+            stiff = module.MathExpression(f"{LEAST} + {1.0 - LEAST}*inp0^3")(smooth)
+            matrix = module.AssembleStiffness(
+                domain, e_modulus=1.0, poisson_ratio=POISSON, plane="stress", bc=held,
+                add_constant=constant,
+            )(stiff)  # fmt: skip
+            moved = module.LinSolve(symmetric=True, positive_definite=True)(
+                matrix, module.Signal("f", state=load)
+            )
+            reached = module.EinSum("i,i->")(moved, module.Signal("l", state=-output))
+            objective = module.Scaling(scaling=10.0)(reached)
+            used = module.EinSum("i->")(smooth)
+            limit = module.Scaling(scaling=10.0, maxval=volume * domain.nel)(used)
+        with contextlib.redirect_stdout(io.StringIO()):
+            module.minimize_mma(density, [objective, limit], network, maxit=iterations, verbosity=0)
+    return {
+        "density": np.asarray(smooth.state).reshape(up, across).round(4).tolist(),
+        "elements": [across, up],
+        "seconds": round(time.thread_time() - began, 2),
+        "springs": list(springs),
+        "output_over_input": -float(reached.state) / float(load @ np.asarray(moved.state)),
+    }
+
+
+def _passive(
+    box: Box, domain: Any, step: NDArray[np.float64], shape: tuple[int, int]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the elements that are solid, and those that are empty, whatever is designed."""
+    columns, rows = np.meshgrid(np.arange(shape[0]), np.arange(shape[1]))
+    number = domain.get_elemnumber(columns.ravel(), rows.ravel())
+    centres = box.low + step * (np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
+    problem = box.problem
+    ports = np.concatenate([problem.input.nodes, problem.output.nodes, problem.supports.fixed])
+    away = np.hypot(*(centres[:, None] - box.positions[ports][None]).transpose(2, 0, 1)).min(axis=1)
+    solid = away < PAD
+    empty = np.zeros(len(number), dtype=bool)
+    if box.void is not None:
+        empty = ((centres > box.void[0]) & (centres < box.void[1])).all(axis=1) & ~solid
+    return number[solid], number[empty]
+
+
+def _ports(
+    box: Box, domain: Any, step: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return the unit load at the input, the mean output, and the degrees of freedom held."""
+    problem = box.problem
+    corners = np.arange(domain.nnodes)
+    places = box.low + step * np.column_stack(
+        [corners % (domain.nelx + 1), corners // (domain.nelx + 1)]
+    )
+
+    def nearest(node: int) -> int:
+        return int(np.argmin(np.hypot(*(places - box.positions[node]).T)))
+
+    load, output = np.zeros(2 * domain.nnodes), np.zeros(2 * domain.nnodes)
+    for vector, region in ((load, problem.input), (output, problem.output)):
+        for node, direction in zip(region.nodes.tolist(), region.direction, strict=True):
+            at = 2 * nearest(node)
+            vector[at : at + 2] += direction / len(region.nodes)
+    held = [
+        2 * corner + axis
+        for node in problem.supports.fixed
+        for corner in np.flatnonzero(np.hypot(*(places - box.positions[node]).T) < 0.8 * PAD)
+        for axis in (0, 1)
+    ]
+    return load, output, np.array(sorted(set(held)), dtype=np.int64)
+
+
+def _springs(
+    load: NDArray[np.float64], output: NDArray[np.float64], springs: tuple[float, float]
+) -> Any:
+    """Return the stiffness of springs along the mean motions of input and output."""
+    from scipy.sparse import csr_matrix
+
+    vectors = [csr_matrix(vector) for vector in (load, output)]
+    return sum(k * (v.T @ v) for k, v in zip(springs, vectors, strict=True))

@@ -1,0 +1,165 @@
+"""Exact changes of an outline where a part is held, pushed and read.
+
+Lines and arcs stay what they are: holes between the nodes of a block are filled, so that it
+becomes a plate to clamp or a pad to push, and a strut can be added that points out how an output
+moves. `bellcrank.part.outline.screws` drills holes into plates.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.part.outline.curves import Loop, Outline
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Reals = NDArray[np.float64]
+    Ids = NDArray[np.int64]
+
+_CLOSE = 1e-6
+"""Struts whose distances differ by this part of them are equally far."""
+
+
+def filled(outline: Outline, positions: ArrayLike, beams: ArrayLike, nodes: ArrayLike) -> Outline:
+    """Return an outline without the holes that lie between given nodes.
+
+    A hole goes if every strut around it joins two of the nodes, and with it whatever lies in it.
+
+    Parameters
+    ----------
+    outline
+        Of the struts.
+    positions : (N, 2) array_like, mm
+        Nodes.
+    beams : (M, 2) array_like of int
+        The two nodes of each strut.
+    nodes : (k,) array_like of int
+        The nodes of the block, such as all supports.
+
+    Raises
+    ------
+    InvalidSettings
+        If there is no such node.
+
+    Examples
+    --------
+    >>> from bellcrank.part.outline import strut_outline
+    >>> square = [[0, 0], [10, 0], [10, 10], [0, 10]]
+    >>> beams = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]]
+    >>> outline = strut_outline(square, beams, width=1.0, fillet=0.2)
+    >>> filled(outline, square, beams, [0, 1, 2]).hole_count
+    1
+    >>> filled(outline, square, beams, [0, 1, 2, 3]).hole_count
+    0
+    """
+    import shapely
+
+    places, pairs = np.asarray(positions, dtype=np.float64), np.asarray(beams)
+    block = read_nodes(nodes, len(places))
+    if not outline.holes:
+        return outline
+    inner = np.all(np.isin(pairs, block), axis=1)
+    probes = [_probes(hole) for hole in outline.holes]
+    hole = np.repeat(np.arange(len(probes)), [len(probe) for probe in probes])
+    points = shapely.points(np.concatenate(probes))
+    tree = shapely.STRtree(shapely.linestrings(places[pairs]))
+    found, distance = tree.query_nearest(points, all_matches=False, return_distance=True)
+    reach = np.empty(len(points))
+    reach[found[0]] = distance * (1.0 + _CLOSE)
+    probe, strut = tree.query(points, "dwithin", reach)
+    gone = np.ones(len(probes), dtype=np.bool_)
+    gone[hole[probe[~inner[strut]]]] = False
+    return _without_holes(outline, gone)
+
+
+def with_pointer(
+    positions: ArrayLike, beams: ArrayLike, node: int, direction: ArrayLike, length: float
+) -> tuple[Reals, Ids]:
+    """Return nodes and beams with one strut more, that points from a node into a direction.
+
+    Parameters
+    ----------
+    positions : (N, 2) array_like, mm
+        Nodes.
+    beams : (M, 2) array_like of int
+        The two nodes of each strut.
+    node
+        Where the pointer begins, such as an output node.
+    direction : (2,) array_like
+        Where it points, such as the wanted motion; its length does not matter.
+    length : float, mm
+        Of the pointer.
+
+    Returns
+    -------
+    (N + 1, 2) float64, mm, and (M + 1, 2) int64
+        For `strut_outline`.
+
+    Raises
+    ------
+    InvalidSettings
+        If there is no such node, or the direction or the length is none.
+
+    Examples
+    --------
+    >>> positions, beams = with_pointer([[0, 0], [10, 0]], [[0, 1]], 1, [0, -3], 5.0)
+    >>> positions[2].tolist(), beams.tolist()
+    ([10.0, -5.0], [[0, 1], [1, 2]])
+    """
+    places, pairs = np.asarray(positions, dtype=np.float64), np.asarray(beams, dtype=np.int64)
+    start = int(read_nodes([node], len(places))[0])
+    along = np.asarray(direction, dtype=np.float64)
+    size = float(np.linalg.norm(along))
+    if along.shape != (2,) or not 0.0 < size < np.inf:
+        raise InvalidSettings(f"direction: expected two numbers, not both 0, got {direction!r}")
+    if not 0.0 < length < np.inf:
+        raise InvalidSettings(f"length: expected a length above 0 mm, got {length!r}")
+    tip = places[start] + length / size * along
+    return np.vstack([places, tip]), np.vstack([pairs, [start, len(places)]])
+
+
+def _probes(hole: Loop) -> Reals:
+    """Return a point for each edge of a hole, to which those struts are nearest that bound it.
+
+    These are both struts whose corner a fillet fills, if one looks from its centre.
+    """
+    chords = hole.chords
+    left = np.column_stack([-chords[:, 1], chords[:, 0]])
+    middle: Reals = hole.points + 0.5 * chords - 0.5 * hole.bulge[:, None] * left
+    middle[hole.bulge < 0.0] = hole.centres[hole.bulge < 0.0]
+    return middle
+
+
+def _without_holes(outline: Outline, gone: NDArray[np.bool_]) -> Outline:
+    """Return an outline without some of its holes and without what lies in them."""
+    import shapely
+
+    holes = [hole for hole, away in zip(outline.holes, gone, strict=True) if not away]
+    outer = list(outline.outer)
+    if len(outer) > 1 and gone.any():
+        plates = [
+            shapely.Polygon(hole.flattened(1e-4 * hole.length))
+            for hole, away in zip(outline.holes, gone, strict=True)
+            if away
+        ]
+        plate = shapely.union_all(plates)
+        outer = [loop for loop in outer if not shapely.contains_xy(plate, *loop.points[0])]
+        holes = [hole for hole in holes if not shapely.contains_xy(plate, *hole.points[0])]
+    return Outline(tuple(outer), tuple(holes))
+
+
+def read_nodes(nodes: ArrayLike, count: int) -> Ids:
+    """Return (k,) numbers of nodes; InvalidSettings if there is no such node."""
+    ids = np.asarray(nodes)
+    if ids.ndim != 1 or not len(ids) or not np.issubdtype(ids.dtype, np.integer):
+        raise InvalidSettings(f"nodes: expected one or more numbers of nodes, got {nodes!r}")
+    bad = np.flatnonzero((ids < 0) | (ids >= count))
+    if len(bad):
+        raise InvalidSettings(
+            f"nodes[{bad[0]}]: got node {ids[bad[0]]}, but nodes are 0 to {count - 1}"
+        )
+    return ids.astype(np.int64)

@@ -1,0 +1,237 @@
+"""How wide struts may be, and how large their fillets, before holes close or struts join.
+
+As all struts swell at the same rate, what they enclose changes its connections only where
+the distance to the nearest centre line has a critical point. Its maxima are the centres of
+holes, which close there. At its saddles two surfaces meet, halfway between a node and the
+node or strut opposite it, with no other strut between them; a hole splits there or a new one
+arises. Up to there, fillets that fill different corners stay apart, too: two that met would
+enclose something new.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.part.outline.fillets import filled
+from bellcrank.part.outline.struts import read_struts
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from bellcrank.part.outline.struts import Struts
+
+# Struts this narrow, as a part of the whole, enclose all holes there are. What is closer to
+# each other touches.
+_HAIR = 1e-5
+
+# A radius closer to the greatest would leave holes that are too small to draw.
+_MARGIN = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limits:
+    """Half-widths of struts at which holes close and surfaces meet.
+
+    Parameters
+    ----------
+    depths : (H,) float64, mm
+        Of each hole, the radius of the largest circle in it.
+    bottlenecks : (B,) float64, mm
+        Half-widths at which surfaces meet that no node joins, ascending.
+    places : (B, 2) float64, mm
+        Where they meet.
+    """
+
+    depths: NDArray[np.float64]
+    bottlenecks: NDArray[np.float64]
+    places: NDArray[np.float64]
+
+    @property
+    def least(self) -> float:
+        """The first change of all, mm; inf if there is none."""
+        return float(min(self.depths.min(initial=np.inf), self.bottlenecks.min(initial=np.inf)))
+
+
+def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> float:
+    """Return the largest radius of fillets with which no hole closes, splits or is added.
+
+    Parameters
+    ----------
+    positions : (N, 2) array_like, mm
+        Nodes.
+    beams : (M, 2) array_like of int
+        The two nodes of each strut.
+    width : float, mm
+        Width of the struts.
+
+    Returns
+    -------
+    float, mm
+        To within a thousandth, and never too large; inf where nothing limits it.
+
+    Raises
+    ------
+    InvalidSettings
+        As for `strut_outline`.
+
+    Examples
+    --------
+    The circle inscribed in an equilateral triangle with sides of 12 mm has a radius of
+    3.46 mm, of which half a strut takes 1 mm.
+
+    >>> triangle = [[0.0, 0.0], [12.0, 0.0], [6.0, 108.0**0.5]], [[0, 1], [1, 2], [2, 0]]
+    >>> round(room_for_fillet(*triangle, width=2.0), 2)
+    2.46
+    """
+    struts = read_struts(positions, beams)
+    check_sizes(width, 0.0)
+    limits = find_limits(struts)
+    check_room(limits, width, 0.0)
+    return _allowed(limits.least) - 0.5 * width
+
+
+def check_sizes(width: float, fillet: float) -> None:
+    """Raise unless both are lengths that struts and fillets may have."""
+    if not 0.0 < width < math.inf:
+        raise InvalidSettings(f"width: expected a length above 0 mm, got {width!r}")
+    if not 0.0 <= fillet < math.inf:
+        raise InvalidSettings(f"fillet: expected a radius of 0 mm or more, got {fillet!r}")
+
+
+def check_room(limits: Limits, width: float, fillet: float) -> None:
+    """Raise if what is between struts changes its connections.
+
+    Parameters
+    ----------
+    limits
+        Half-widths at which it does.
+    width, fillet : float, mm
+        Width of the struts and radius of the fillets.
+
+    Raises
+    ------
+    InvalidSettings
+        If holes close, split or are added; says how wide or large at most.
+    """
+    half, most = 0.5 * width, _allowed(limits.least)
+    if half >= most:
+        raise InvalidSettings(
+            f"width: struts {width:g} mm wide would {_change(limits, half)}; "
+            f"choose at most {_floored(2.0 * most)} mm"
+        )
+    # What `room_for_fillet` returned must pass, whichever way the sum was rounded.
+    if fillet > 0.0 and half + fillet > (1.0 + 1e-12) * most:
+        raise InvalidSettings(
+            f"fillet: a radius of {fillet:g} mm would {_change(limits, half + fillet)}; "
+            f"at most {_floored(most - half)} mm leaves room"
+        )
+
+
+def find_limits(struts: Struts, reach: float = math.inf) -> Limits:
+    """Find at which half-widths holes close and surfaces meet.
+
+    Of the surfaces that meet, the first are found, unless all holes or `reach` come before.
+
+    Parameters
+    ----------
+    struts
+        Struts.
+    reach : float, mm
+        Half-width beyond which it does not matter.
+    """
+    import shapely
+
+    depths = _depths(struts)
+    most = min(1.001 * reach, float(depths.min(initial=struts.extent)))
+    # The search goes ever further: pairs of distant nodes are many, and seldom the first.
+    limit = min(most, float(shapely.length(struts.tree.geometries).mean()))
+    values, places = _bottlenecks(struts, limit)
+    while not len(values) and limit < most:
+        limit = min(2.0 * limit, most)
+        values, places = _bottlenecks(struts, limit)
+    return Limits(depths, values, places)
+
+
+def find_joins(struts: Struts, half: float, reach: float) -> Limits:
+    """Find where surfaces meet between two half-widths, whatever becomes of holes."""
+    values, places = _bottlenecks(struts, 1.001 * reach)
+    later = values > half
+    return Limits(np.empty(0), values[later], places[later])
+
+
+def _depths(struts: Struts) -> NDArray[np.float64]:
+    """Return the radius of the largest circle in each hole between very narrow struts."""
+    import shapely
+
+    hair = _HAIR * struts.extent
+    outline = filled(struts, 2.0 * hair, 0.0)
+    rings = np.array(
+        [shapely.Polygon(loop.flattened(0.1 * hair)) for loop in outline.holes], object
+    )
+    if outline.piece_count > 1 and len(rings):
+        # A piece that lies in a hole of another takes part of it.
+        pieces = np.array([shapely.Polygon(loop.flattened(0.1 * hair)) for loop in outline.outer])
+        around, within = shapely.STRtree(pieces).query(rings, "contains")
+        for ring in np.unique(around):
+            inside = shapely.union_all(pieces[within[around == ring]])
+            rings[ring] = shapely.difference(rings[ring], inside)
+    # No circle in a convex hole is smaller than its area divided by its length.
+    fine = 2e-4 * shapely.area(rings) / shapely.length(rings)
+    circles = shapely.maximum_inscribed_circle(rings, fine)
+    centres = shapely.points(shapely.get_coordinates(shapely.get_point(circles, 0)) - struts.origin)
+    depths: NDArray[np.float64] = struts.tree.query_nearest(
+        centres, all_matches=False, return_distance=True
+    )[1]
+    return depths
+
+
+def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return at which half-widths up to `limit` surfaces meet, and where, ascending."""
+    import shapely
+
+    nodes = struts.positions
+    points = shapely.points(nodes)
+    node, strut = struts.tree.query(points, "dwithin", 2.0 * limit)
+    tail, head = nodes[struts.beams[strut, 0]], nodes[struts.beams[strut, 1]]
+    axis = head - tail
+    share = np.sum((nodes[node] - tail) * axis, axis=1) / np.sum(axis * axis, axis=1)
+    facing = (share > 0.0) & (share < 1.0) & ~np.any(struts.beams[strut] == node[:, None], axis=1)
+    across = (tail + share[:, None] * axis)[facing]
+    pairs = cKDTree(nodes).query_pairs(2.0 * limit, output_type="ndarray")
+    one = np.concatenate([nodes[node[facing]], nodes[pairs[:, 0]]])
+    two = np.concatenate([across, nodes[pairs[:, 1]]])
+    half, middle = 0.5 * np.linalg.norm(two - one, axis=1), 0.5 * (one + two)
+    _, distance = struts.tree.query_nearest(
+        shapely.points(middle), all_matches=False, return_distance=True
+    )
+    # What is closer than a hair is one, be it only by rounding.
+    apart = (half > _HAIR * struts.extent) & (half <= limit)
+    found = np.flatnonzero(apart & (distance > (1.0 - 1e-9) * half))
+    found = found[np.argsort(half[found], kind="stable")]
+    return half[found], middle[found] + struts.origin
+
+
+def _allowed(critical: float) -> float:
+    """Return the greatest half-width that is safely below a critical one."""
+    return (1.0 - _MARGIN) * critical
+
+
+def _change(limits: Limits, reach: float) -> str:
+    """Say what becomes of the space between struts within `reach`."""
+    closed = int(np.count_nonzero(reach > _allowed(1.0) * limits.depths))
+    if closed:
+        return f"close {closed} of {len(limits.depths)} holes"
+    x, y = limits.places[0]
+    return f"join struts that share no node, first at ({x:.4g}, {y:.4g}) mm"
+
+
+def _floored(length: float) -> str:
+    """Return a length with three digits, never rounded up."""
+    step = 10.0 ** (math.floor(math.log10(length)) - 2)
+    return f"{math.floor(length / step) * step:.3g}"

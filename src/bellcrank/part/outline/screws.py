@@ -1,0 +1,233 @@
+"""Screw holes in a plate, as exact as the outline: where there is room for them, and where best."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.part.outline.curves import Loop, Outline
+from bellcrank.part.outline.grips import read_nodes
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Reals = NDArray[np.float64]
+    Ids = NDArray[np.int64]
+
+_ACROSS = 120
+"""How many candidates for a screw are tried along the longer side of a plate."""
+_INSIDE = 0.75
+"""How far inside a plate screws should be, as a part of what its middle permits."""
+
+
+def drilled(outline: Outline, centres: ArrayLike, diameter: float, wall: float) -> Outline:
+    """Return an outline with circular holes.
+
+    Parameters
+    ----------
+    outline
+        Of the part.
+    centres : (k, 2) array_like, mm
+        Where to drill.
+    diameter, wall : float, mm
+        Of the holes, and what must be left around them everywhere.
+
+    Raises
+    ------
+    InvalidSettings
+        If some hole would leave too thin a wall, or a length makes no sense.
+
+    Examples
+    --------
+    >>> square = Outline((Loop([[0, 0], [20, 0], [20, 20], [0, 20]], [0, 0, 0, 0]),))
+    >>> round(square.area - drilled(square, [[6, 10], [14, 10]], 4.0, 2.0).area, 6)
+    25.132741
+    >>> drilled(square, [[3, 10]], 4.0, 2.0)
+    Traceback (most recent call last):
+        ...
+    bellcrank.errors.InvalidSettings: centres[0]: a hole of 4 mm at (3, 10) mm would leave a wall \
+of 1 mm, less than 2 mm; move it, fill a larger plate, or choose a smaller screw
+    """
+    radius = _read_screw(diameter, wall)
+    places = np.asarray(centres, dtype=np.float64).reshape(-1, 2)
+    left = clearance(outline, places) - radius
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    np.fill_diagonal(apart, np.inf)
+    left = np.minimum(left, apart.min(axis=1, initial=np.inf) - 2.0 * radius)
+    thin = np.flatnonzero(left < wall * (1.0 - 1e-9))
+    if len(thin):
+        x, y = places[thin[0]]
+        raise InvalidSettings(
+            f"centres[{thin[0]}]: a hole of {diameter:g} mm at ({x:.4g}, {y:.4g}) mm would leave "
+            f"{_left_over(left[thin[0]])}, less than {wall:g} mm; move it, fill a larger plate, "
+            "or choose a smaller screw"
+        )
+    side = np.array([radius, 0.0])
+    turn = np.array([-1.0, -1.0])
+    holes = [Loop(np.stack([place - side, place + side]), turn) for place in places]
+    return Outline(outline.outer, (*outline.holes, *holes))
+
+
+def screw_places(
+    outline: Outline,
+    positions: ArrayLike,
+    nodes: ArrayLike,
+    count: int,
+    diameter: float,
+    wall: float,
+) -> Reals:
+    """Return where screws hold a plate best: far from each other and well inside.
+
+    Parameters
+    ----------
+    outline
+        Of the part, with its plate (`filled`).
+    positions : (N, 2) array_like, mm
+        All nodes of the lattice.
+    nodes : (k,) array_like of int
+        Those of the plate: screws are nearer to one of them than to any other node.
+    count
+        How many screws.
+    diameter, wall : float, mm
+        Of their holes, and what must be left around them everywhere.
+
+    Returns
+    -------
+    (count, 2) float64, mm
+
+    Raises
+    ------
+    InvalidSettings
+        If the plate has no room for them.
+
+    Examples
+    --------
+    >>> plate = Outline((Loop([[0, 0], [40, 0], [40, 12], [0, 12]], [0, 0, 0, 0]),))
+    >>> corners = [[0, 0], [40, 0], [40, 12], [0, 12]]
+    >>> places = screw_places(plate, corners, [0, 1, 2, 3], 2, 3.0, 1.5)
+    >>> drilled(plate, places, 3.0, 1.5).hole_count
+    2
+    """
+    from scipy.spatial import cKDTree
+
+    radius = _read_screw(diameter, wall)
+    every = np.asarray(positions, dtype=np.float64)
+    block = read_nodes(nodes, len(every))
+    if count < 1:
+        raise InvalidSettings(f"count: expected at least 1 screw, got {count}")
+    low, high = every[block].min(axis=0), every[block].max(axis=0)
+    step = max(float((high - low).max()), diameter) / _ACROSS
+    axes = [
+        np.linspace(a, b, max(1, round((b - a) / step)) + 1)
+        for a, b in zip(low.tolist(), high.tolist(), strict=True)
+    ]
+    grid = np.vstack([np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2), every[block]])
+    grid = grid[np.isin(cKDTree(every).query(grid)[1], block)]
+    depth = clearance(outline, grid)
+    least = radius + wall
+    deepest = float(depth.max(initial=-np.inf))
+    for limit in (max(least, _INSIDE * deepest), least):
+        places = _far_apart(grid[depth >= limit], count)
+        if _are_apart(places, count, diameter + wall):
+            return places
+    raise InvalidSettings(
+        f"count: no room for {count} screw holes of {diameter:g} mm with {wall:g} mm of wall; the "
+        f"largest circle in the plate is {2.0 * max(deepest, 0.0):.3g} mm wide; fill a larger "
+        "plate, or choose fewer or smaller screws"
+    )
+
+
+def clearance(outline: Outline, points: ArrayLike) -> Reals:
+    """Return the distance of points from the boundary of a part, exact.
+
+    Parameters
+    ----------
+    outline
+        Of the part.
+    points : (k, 2) array_like, mm
+
+    Returns
+    -------
+    (k,) float64, mm
+        Above 0 within the part, below 0 outside.
+
+    Examples
+    --------
+    >>> disc = Outline((Loop([[-2.0, 0.0], [2.0, 0.0]], [1.0, 1.0]),))
+    >>> clearance(disc, [[0.5, 0.0], [0.0, -3.0]]).round(9).tolist()
+    [1.5, -1.0]
+    """
+    import shapely
+
+    places = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    fine = 1e-4 * min(loop.length for loop in outline.loops)
+    solid = outline.polygon(fine)
+    shapely.prepare(solid)
+    inside = shapely.contains_xy(solid, *places.T)
+    distance = np.full(len(places), np.inf)
+    for loop in outline.loops:
+        distance = np.minimum(distance, _distance(loop, places))
+    # So near to an arc that its chord decides, the sign means nothing.
+    signed: Reals = np.where(inside, distance, -distance)
+    return signed
+
+
+def _distance(loop: Loop, places: Reals) -> Reals:
+    """Return how far points are from a loop."""
+    nearest = np.full(len(places), np.inf)
+    for start, chord, centre, radius, turn in zip(
+        loop.points, loop.chords, loop.centres, loop.radii, loop.turns, strict=True
+    ):
+        offset = places - start
+        if turn == 0.0:
+            share = np.clip(offset @ chord / (chord @ chord), 0.0, 1.0)
+            away = np.linalg.norm(offset - share[:, None] * chord, axis=1)
+        else:
+            spoke, arm = start - centre, places - centre
+            angle = np.arctan2(spoke[0] * arm[:, 1] - spoke[1] * arm[:, 0], arm @ spoke)
+            ahead = np.mod(np.sign(turn) * angle, 2.0 * np.pi)
+            ends = np.minimum(
+                np.linalg.norm(offset, axis=1), np.linalg.norm(offset - chord, axis=1)
+            )
+            beside = np.abs(np.linalg.norm(arm, axis=1) - radius)
+            away = np.where(ahead <= np.abs(turn), beside, ends)
+        nearest = np.minimum(nearest, away)
+    return nearest
+
+
+def _far_apart(places: Reals, count: int) -> Reals:
+    """Choose places, each as far as can be from those before, beginning with two extremes."""
+    if not len(places):
+        return places
+    middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    if count == 1:
+        return places[[int(np.argmin(np.linalg.norm(places - middle, axis=1)))]]
+    chosen = [int(np.argmax(np.linalg.norm(places - middle, axis=1)))]
+    away = np.linalg.norm(places - places[chosen[0]], axis=1)
+    while len(chosen) < count:
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(places - places[chosen[-1]], axis=1))
+    return places[chosen]
+
+
+def _are_apart(places: Reals, count: int, least: float) -> bool:
+    """Whether there are enough places, and none nearer to another than permitted."""
+    if len(places) < count:
+        return False
+    away = np.linalg.norm(places[:, None] - places[None], axis=2)
+    np.fill_diagonal(away, np.inf)
+    return bool(away.min() >= least)
+
+
+def _read_screw(diameter: float, wall: float) -> float:
+    if not 0.0 < diameter < np.inf:
+        raise InvalidSettings(f"diameter: expected a length above 0 mm, got {diameter!r}")
+    if not 0.0 <= wall < np.inf:
+        raise InvalidSettings(f"wall: expected a length of 0 mm or more, got {wall!r}")
+    return 0.5 * diameter
+
+
+def _left_over(wall: float) -> str:
+    return f"a wall of {wall:.3g} mm" if wall > 0.0 else "no wall"

@@ -1,0 +1,127 @@
+"""The part that a design becomes: how large, of what, with struts how wide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.part.outline import room_for_fillet, strut_outline
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Design
+    from bellcrank.part.materials import Material
+    from bellcrank.part.outline import Outline
+    from bellcrank.part.section import Section
+
+
+FILLET = 0.25
+"""Default fillet radius, as a part of the strut width."""
+ROOM = 0.5
+"""And at most so much of what leaves the holes open."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A design with a size and a material.
+
+    Parameters
+    ----------
+    design
+        Whose beams become struts.
+    material
+        What they are made of.
+    section
+        Their cross-section.
+    scale
+        Length of a lattice unit, mm.
+    fillet
+        Radius in the corners between struts, mm; None for a quarter of the strut width, or less
+        where that leaves no room.
+
+    Raises
+    ------
+    InvalidSettings
+        If nothing is there to be built, or struts are as wide as they are long.
+
+    Examples
+    --------
+    >>> from bellcrank.part.materials import Material
+    >>> from bellcrank.part.section import Section
+    >>> from bellcrank.model import find_problem
+    >>> crane = find_problem("crane").full_design()
+    >>> rubber = Material(name="rubber", young=12.0, poisson=0.48)
+    >>> part = Part(crane, rubber, Section(2.0, 5.0))
+    >>> round(part.stroke, 6)
+    4.330127
+    """
+
+    design: Design
+    material: Material
+    section: Section
+    scale: float = 10.0
+    fillet: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.fillet is not None and not 0.0 <= self.fillet < float("inf"):
+            raise InvalidSettings(f"fillet: expected a radius of 0 mm or more, got {self.fillet!r}")
+        if not 0.0 < self.scale < float("inf"):
+            raise InvalidSettings(f"scale: expected a length above 0 mm, got {self.scale!r}")
+        if not self.design.mask.any():
+            raise InvalidSettings("the design has no beams; there is no part to validate")
+        shortest = float(self.design.problem.lattice.rest_length[self.design.mask].min())
+        if self.section.width >= shortest * self.scale:
+            raise InvalidSettings(
+                f"width: struts {self.section.width:g} mm wide are not slender where the shortest "
+                f"is {shortest * self.scale:g} mm long; choose narrower struts or a larger scale"
+            )
+
+    @property
+    def fillet_radius(self) -> float:
+        """Radius in the corners between struts, mm."""
+        if self.fillet is not None:
+            return self.fillet
+        room = room_for_fillet(self.positions, self.struts, self.section.width)
+        return min(FILLET * self.section.width, ROOM * room)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(N, 2) nodes of the lattice at rest, mm."""
+        return self.design.problem.lattice.positions * self.scale
+
+    @property
+    def struts(self) -> NDArray[np.int64]:
+        """(s, 2) nodes of the beams that are present."""
+        return self.design.problem.lattice.beams[self.design.mask]
+
+    def outline(self) -> Outline:
+        """Return the planar outline: what is meshed, printed and cut.
+
+        Raises
+        ------
+        InvalidSettings
+            If struts or fillets are so wide that holes between them close.
+        """
+        return strut_outline(self.positions, self.struts, self.section.width, self.fillet_radius)
+
+    @property
+    def stroke(self) -> float:
+        """The full motion of the input, mm; nan where a force drives it."""
+        given = self.design.problem.input
+        return given.amount * self.scale if given.drive == "displacement" else float("nan")
+
+    @property
+    def stiffness_unit(self) -> float:
+        """Stiffness in N / mm of what counts 1 in the problem.
+
+        A beam of the discrete model has the stiffness 2 k, its strut that of an elastic bar.
+        Forces and springs of a problem are made real by this factor, so that they strain the
+        struts as they strain the beams.
+        """
+        stiffness = self.design.problem.stiffness
+        length = float(np.mean(self.design.problem.lattice.rest_length)) * self.scale
+        return self.material.young * self.section.area / length / (2.0 * stiffness.bond)

@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidSettings
+from reproduction.boxes import TASKS, box_of
+from reproduction.neutral import contour_of, drawing, judge, polygon_of
+from reproduction.topology import optimise, pymoto
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_ports_of_a_box_face_each_other_and_the_gap_is_empty(name: str) -> None:
+    box = box_of(name, 6, 7, 0.2, 0.01)
+    problem = box.problem
+    places = problem.lattice.positions
+    assert places[problem.input.nodes, 0].max() == 0.0
+    assert places[problem.output.nodes, 0].min() >= places[:, 0].max() - 0.5
+    absent = np.flatnonzero(~problem.initial)
+    assert (name == "gripper") == bool(len(absent))
+    assert not np.isin(absent, problem.designable).any()
+
+
+def test_a_contour_has_the_area_asked_for_and_holds_all_ports() -> None:
+    box = box_of("inverter", 6, 7, 0.2, 0.01)
+    rows, columns = 54, 62
+    up, across = np.linspace(-1.0, 1.0, rows)[:, None], np.linspace(-1.0, 1.0, columns)
+    density = 0.95 - 0.9 * np.exp(-4.0 * (up**2 + across**2))
+    size = float(np.prod(box.high - box.low))
+    shape = contour_of(box, density, 0.9 * size)
+    assert shape is not None
+    assert shape.area == pytest.approx(0.9 * size, rel=0.01)
+    assert len(shape.interiors) == 1
+
+
+def test_boundary_curves_run_round_the_mesh() -> None:
+    rest = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    curves = drawing(rest, np.ones((4, 2)), np.array([[0, 1, 2], [0, 2, 3]]))
+    assert len(curves) == 1
+    corners = np.array(curves[0])
+    assert {tuple(each) for each in corners[:, :2].tolist()} == {
+        (0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)
+    }  # fmt: skip
+    assert (corners[:, 2:] - corners[:, :2] == 1.0).all()
+
+
+def test_without_the_rival_there_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pymoto", None)
+    with pytest.raises(InvalidSettings, match=r"pip install 'bellcrank\[rivals\]'"):
+        pymoto()
+
+
+def test_the_rival_inverts_a_push() -> None:
+    pytest.importorskip("numpy")
+    try:
+        pymoto()
+    except InvalidSettings:
+        pytest.skip("pyMOTO is not installed")
+    box = box_of("inverter", 4, 7, 0.2, 0.01)
+    told = optimise(box, 2.0, 0.4, (0.1, 0.01), 1.5, 25)
+    assert told["output_over_input"] > 0.3
+
+
+def test_the_judge_moves_a_lattice_as_its_own_level_does() -> None:
+    pytest.importorskip("ngsolve")
+    from bellcrank.fem import FemSettings
+    from bellcrank.fem.levels import levels
+
+    box = box_of("inverter", 4, 3, 0.05, 0.01)
+    part = box.spec.of(box.problem.full_design())
+    told = judge(box, part, polygon_of(part), 2.0, "neo-hookean")
+    known = levels["plane"](part, FemSettings(size=2.0))
+    assert told["status"] == "converged"
+    assert told["efficiency"] == pytest.approx(known.efficiency, abs=0.02)
+    assert told["input_force_N"] == pytest.approx(known.last.push, rel=0.02)

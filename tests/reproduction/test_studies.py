@@ -1,0 +1,166 @@
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import CorruptRun, InvalidFile
+from reproduction import Bench, draw_record, read_record, read_records, run_study, studies
+from reproduction.angular_springs import resistance
+from reproduction.page import page_of
+from reproduction.records import LARGEST, as_text, rounded, shrunk
+from reproduction.scaling import slope
+
+RECORDS = Path(__file__).parents[2] / "docs" / "studies"
+PAGE = RECORDS.parent / "paper.md"
+
+TINY: dict[str, dict[str, Any]] = {
+    "structure": {"problem": "crane", "steps": 600, "chains": 1},
+    "paths": {"steps": 600, "chains": 2},
+    "crane": {"paper_steps": 600, "paper_chains": 1, "steps": 500, "chains": 1, "levels": ()},
+    "scaling": {"sizes": (8, 9), "runs": (1, 1), "proposals_per_beam": 4, "relaxed": 1},
+    "disorder": {"lattices": 2, "steps": 600},
+    "amplitude": {
+        "problems": ("crane",), "points": 3, "steps": 600, "chains": 1, "frames": False,
+    },
+    "angular-springs": {},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, dict[str, Any]]]:
+    """Records of tiny studies, and the folder they lie in. Not to be changed."""
+    out = tmp_path_factory.mktemp("studies")
+    with pytest.MonkeyPatch.context() as patch:
+        for name, less in TINY.items():
+            study = studies[name]
+            tiny = replace(study, quick=replace(study.quick, **less))
+            patch.setitem(studies._entries, name, tiny)
+        return out, {name: run_study(name, out, quick=True, workers=2) for name in TINY}
+
+
+def test_every_study_leaves_a_record_and_a_small_picture(made) -> None:
+    out, records = made
+    assert set(read_records(out)) == set(TINY)
+    for name, record in records.items():
+        assert json.loads(json.dumps(record)) == read_record(out / f"{name}.json")
+        assert record["mode"] == "quick"
+        assert record["provenance"]["version"]
+        assert 2_000 < (out / f"{name}.png").stat().st_size <= LARGEST
+        assert [claim.to_dict() for claim in studies[name].claims(record["figures"])] == (
+            record["comparison"]
+        )
+
+
+def test_a_picture_is_drawn_again_from_its_record(made, tmp_path: Path) -> None:
+    out, _ = made
+    draw_record(read_record(out / "paths.json"), tmp_path / "again.png")
+    assert (tmp_path / "again.png").read_bytes() == (out / "paths.png").read_bytes()
+
+
+def test_the_page_has_every_claim_of_every_record(made) -> None:
+    _, records = made
+    page = page_of(records)
+    for record in records.values():
+        for row in record["comparison"]:
+            assert row["ours"] in page
+
+
+def test_work_that_is_kept_is_not_done_again(tmp_path: Path) -> None:
+    bench = Bench.in_folder(tmp_path, "some", {"n": 1})
+    assert bench.all("piece", {"a": lambda: 1, "b": lambda: 2}) == {"a": 1, "b": 2}
+
+    def never() -> int:
+        raise AssertionError
+
+    again = Bench.in_folder(tmp_path, "some", {"n": 1})
+    assert again.all("piece", {"a": never, "b": never, "c": lambda: 3})["c"] == 3
+    other = Bench.in_folder(tmp_path, "some", {"n": 2})
+    assert other.one("piece-a", lambda: 7) == 7
+
+
+def test_what_was_done_before_an_error_is_kept(tmp_path: Path) -> None:
+    bench = Bench.in_folder(tmp_path, "some", {})
+
+    def fail() -> int:
+        raise RuntimeError("killed")
+
+    with pytest.raises(RuntimeError, match="killed"):
+        bench.all("piece", {"a": lambda: 1, "b": fail}, workers=1)
+    assert [path.name for path in bench.folder.iterdir()] == ["piece-a.json"]
+
+
+def test_a_damaged_raw_record_is_named(tmp_path: Path) -> None:
+    bench = Bench.in_folder(tmp_path, "some", {})
+    (bench.folder / "a.json").write_text("{")
+    with pytest.raises(CorruptRun, match=r"a\.json: expected JSON; delete it"):
+        bench.one("a", lambda: 1)
+
+
+def test_other_files_are_no_records(tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    path.write_text('{"schema": "other"}')
+    with pytest.raises(InvalidFile, match="bellcrank/study/1"):
+        read_record(path)
+    path.write_text('{"schema": "bellcrank/study/1", "study": "none"}')
+    with pytest.raises(InvalidFile, match="unknown study"):
+        read_record(path)
+
+
+def test_settings_of_all_studies_are_plain_data_and_quick_ones_do_less() -> None:
+    for study in studies.values():
+        assert json.dumps([asdict(study.full), asdict(study.quick)])
+        assert study.title
+        assert study.after
+
+
+def test_lists_of_numbers_take_one_line() -> None:
+    text = as_text({"a": [1.5, None, -2e-05], "b": [[1, 2], [3, 4]]})
+    assert '"a": [1.5, null, -2e-05]' in text
+    assert json.loads(text) == {"a": [1.5, None, -2e-05], "b": [[1, 2], [3, 4]]}
+    assert rounded([float("inf"), np.pi]) == [None, 3.14159]
+
+
+def test_a_large_picture_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
+    from io import BytesIO
+
+    from PIL import Image
+
+    monkeypatch.setattr("reproduction.records.LARGEST", 1000)
+    noise = np.random.default_rng(0).integers(0, 255, (70, 90, 3), dtype=np.uint8)
+    content = BytesIO()
+    Image.fromarray(noise).save(content, format="PNG")
+    with Image.open(BytesIO(shrunk(content.getvalue()))) as small:
+        assert small.size == (38, 29)
+
+
+def test_a_slope_is_that_of_a_power_law() -> None:
+    rows = [{"beams": n, "t": 0.3 * n**2.5} for n in (100, 200, 400)]
+    assert slope(rows, lambda row: row["t"]) == pytest.approx(2.5)
+    assert slope(rows[:1], lambda row: row["t"]) is None
+
+
+def test_dead_ends_put_springs_in_series_unless_they_are_ignored() -> None:
+    assert resistance([0, 120], [], 0.01, "keep") == pytest.approx(2.0, abs=1e-4)
+    assert resistance([0, 60, 120], [1], 0.01, "keep") == pytest.approx(1.5, abs=1e-4)
+    assert resistance([0, 60, 120], [1], 0.01, "prune_dead_ends") == pytest.approx(2.0, abs=1e-4)
+
+
+def test_the_paper_page_is_what_the_committed_records_say() -> None:
+    records = read_records(RECORDS)
+    assert set(records) == set(studies)
+    assert page_of(records, pictures="studies/") == PAGE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", studies.names())
+def test_committed_records_say_what_they_claim(name: str) -> None:
+    record = read_record(RECORDS / f"{name}.json")
+    assert record["mode"] == "full"
+    assert record["provenance"]["commit"]
+    claims = [claim.to_dict() for claim in studies[name].claims(record["figures"])]
+    assert claims == record["comparison"]
+    assert (RECORDS / f"{name}.png").stat().st_size < 150_000
