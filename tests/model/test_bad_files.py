@@ -96,7 +96,7 @@ def test_files_of_impossible_problems_are_refused(write, small, key, value, mess
         (
             "[5, 6, 5, 6, 5, 6]",
             '"many"',
-            "lattice.is_admissible: expected a valid list, got 'many'",
+            "lattice.counts: expected a valid list, got 'many'",
         ),
         ("first_x = [0.5,", "first_x = [nan,", "lattice.first_x[0]: expected a finite number"),
         ("amount = 0.433", "amount = inf", "input.amount: expected a finite number, got inf"),

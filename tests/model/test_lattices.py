@@ -104,7 +104,7 @@ def test_contacts_have_only_the_three_lengths_that_two_sizes_allow():
         (
             "triangular-rows",
             {"counts": [3, 0, 3]},
-            r"lattice.is_admissible\[1\]: expected at least 1",
+            r"lattice.counts\[1\]: expected at least 1",
         ),
         ("triangular-rows", {"counts": [3]}, "expected as many counts as first_x"),
         ("triangular-rows", {"counts": [], "first_x": []}, "at least one of each"),
