@@ -28,9 +28,8 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status,
 from bellcrank.model import builtin, find_problem
 from bellcrank.search import (
     DEFAULT_SEARCH,
-    FORBIDDEN,
-    FORESEEN,
     SearchSettings,
+    Verdict,
     advance_chain,
     make_evaluator,
     read_settings,
@@ -131,7 +130,7 @@ def play(game: Play) -> Game:
         state, rows = advance_chain(evaluator, settings, 0, state)
         spent = time.process_time() - start
         for index in range(len(rows.status)):
-            evaluated = rows.status[index] not in (FORBIDDEN, FORESEEN)
+            evaluated = rows.status[index] not in (Verdict.FORBIDDEN, Verdict.REJECTED_EARLY)
             responses += bool(evaluated and rows.efficiency[index] != current)
             if rows.accepted[index]:
                 current = rows.efficiency[index]

@@ -20,6 +20,7 @@ from bellcrank.machines.library.files import entry_to_dict
 from bellcrank.machines.library.making import WORK, Resisting
 from bellcrank.machines.library.summary import INDEX, entry_files
 from bellcrank.mechanics import SpringEvaluator, Status
+from bellcrank.search import Verdict
 from bellcrank.storage.layout import LOCK
 from bellcrank.storage.locking import locked
 
@@ -209,6 +210,6 @@ def test_what_merely_follows_its_input_is_forbidden() -> None:
     judge = Resisting(SpringEvaluator(problem))
     bar = lever_of(problem, Shape("bar")).mask
     assert SpringEvaluator(problem).evaluate(bar).status is Status.CONVERGED
-    assert judge.evaluate(bar).status is Status.FORBIDDEN
+    assert judge.evaluate(bar).status is Verdict.FORBIDDEN
     assert judge.evaluate(problem.initial).status is Status.CONVERGED
     assert judge.load_bearing(bar).any(), "all else is the judge's"

@@ -12,10 +12,10 @@ from bellcrank.mechanics import Core, SpringEvaluator, Status
 from bellcrank.model import Input, Problem, find_problem, unpack_mask
 from bellcrank.search import (
     BLOCK,
-    FORBIDDEN,
     Candidate,
     HoppingSettings,
     MetropolisSettings,
+    Verdict,
     advance_chain,
     chain_blocks,
     make_evaluator,
@@ -100,7 +100,7 @@ def test_a_search_with_a_goal_ends_with_designs_that_keep_it(small: Problem, goa
         assert efficiency[index] == pytest.approx(
             evaluator.evaluate(mask[index]).efficiency, abs=1e-7
         )
-    for index in np.flatnonzero(accepted & (status == Status.UNMET))[:20]:
+    for index in np.flatnonzero(accepted & (status == Verdict.UNMET))[:20]:
         assert excess(small, goal, mask[index]) > 0.0
     rows = np.flatnonzero(kept)
     candidates = [
@@ -128,9 +128,9 @@ def test_a_chain_comes_nearer_to_its_goals_step_by_step_and_never_leaves_them(
     assert (np.diff(excesses) <= 1e-6).all()
     first = int(np.argmax(excesses == 0.0))
     assert first > 10
-    assert (status[accepted][:first] == Status.UNMET).all()
+    assert (status[accepted][:first] == Verdict.UNMET).all()
     assert (status[accepted][first:] == Status.CONVERGED).all()
-    refused = status == FORBIDDEN
+    refused = status == Verdict.FORBIDDEN
     assert refused.any() or search == "informed"  # which foresees most of them
     assert not accepted[refused].any()
 
@@ -139,7 +139,7 @@ def test_records_keep_the_true_efficiency_and_the_cost_that_was_compared(small: 
     settings = MetropolisSettings(steps=BLOCK, goals=("mass <= 0.9",), cost="negative")
     evaluator = make_evaluator(small, settings)
     mask, efficiency, _, status, cost = run(small, evaluator, settings)
-    unmet = np.flatnonzero(status == Status.UNMET)[:15]
+    unmet = np.flatnonzero(status == Verdict.UNMET)[:15]
     assert len(unmet)
     evaluator = SpringEvaluator(small)
     for index in unmet:
@@ -164,12 +164,12 @@ def test_forbidden_by_the_beams_means_no_response_was_computed(crane: Problem) -
     evaluator.set_reference()
     displacement = evaluator.evaluators[0].displacement.copy()
     answer = evaluator.evaluate(crane.initial, warm_start=True)
-    assert answer.status is Status.FORBIDDEN
+    assert answer.status is Verdict.FORBIDDEN
     assert not answer.is_admissible
     assert np.isnan(answer.efficiency)
     assert answer.penalty == pytest.approx(penalty_of(0.01))
     assert np.array_equal(displacement, evaluator.evaluators[0].displacement)
-    assert evaluator.evaluate(crane.initial).status is Status.UNMET
+    assert evaluator.evaluate(crane.initial).status is Verdict.UNMET
 
 
 def test_forbidden_by_the_response_tells_the_efficiency(crane: Problem) -> None:
@@ -179,7 +179,7 @@ def test_forbidden_by_the_response_tells_the_efficiency(crane: Problem) -> None:
     mask = crane.initial.copy()
     mask[crane.designable[::20]] = False
     answer = stiff.evaluate(mask, warm_start=True)
-    assert answer.status is Status.FORBIDDEN
+    assert answer.status is Verdict.FORBIDDEN
     assert answer.efficiency == pytest.approx(
         SpringEvaluator(crane).evaluate(mask).efficiency, abs=1e-7
     )
@@ -259,7 +259,7 @@ def test_mirror_images_are_proposed_and_recorded_together(small: Problem) -> Non
     evaluator = make_evaluator(small, settings)
     assert len(evaluator.problem.designable) == 88
     mask, _, _, status, _ = run(small, evaluator, settings)
-    assert not np.isin(status, [Status.FORBIDDEN, Status.UNMET]).any()
+    assert not np.isin(status, [Verdict.FORBIDDEN, Verdict.UNMET]).any()
     assert max(excess(small, "mirror x", one) for one in mask[::10]) == 0.0
     assert (np.diff(mask.astype(int), axis=0) != 0).any()
 

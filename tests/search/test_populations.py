@@ -11,7 +11,7 @@ import pytest
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem
-from bellcrank.search import FORESEEN, MetropolisSettings, chain_blocks
+from bellcrank.search import MetropolisSettings, Verdict, chain_blocks
 from bellcrank.search.delayed_acceptance import ScreenedSettings
 from bellcrank.search.populations import population_steps
 from bellcrank.search.scorers import MechanicsScorer
@@ -155,7 +155,7 @@ def test_looking_ahead_changes_nothing_but_the_batches(problem: Problem) -> None
 def test_a_screened_chain_counts_what_it_spares_the_mechanics(problem: Problem) -> None:
     blocks, columns = course_of(problem, ScreenedSettings(steps=STEPS))
     state = blocks[-1][0]
-    foreseen = columns["status"] == FORESEEN
+    foreseen = columns["status"] == Verdict.REJECTED_EARLY
     assert 0 < state.saved == foreseen.sum() < STEPS
     assert np.isnan(columns["efficiency"][foreseen]).all()
     assert not columns["accepted"][foreseen].any()

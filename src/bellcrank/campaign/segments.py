@@ -16,6 +16,7 @@ import numpy as np
 from bellcrank.campaign.layout import segment_path
 from bellcrank.campaign.seal import BLANK, SEAL_KEY, check_seal, sealed
 from bellcrank.errors import CorruptRun, OutputExists
+from bellcrank.search import Verdict
 from bellcrank.storage.files import make_folder, storage_error, whole_file
 from bellcrank.storage.shards import parquet_file, parquet_writer
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 SEGMENT_SCHEMA = "bellcrank/segment/1"
 ROW_GROUP = 65_536
-CONVERGED = 0
+CONVERGED = int(Verdict.CONVERGED)
 """Status of a proposal whose efficiency is that of a stable equilibrium."""
 WHAT_TO_DO = "bellcrank campaign verify --repair deletes it, and resume computes it again"
 

@@ -16,7 +16,6 @@ from bellcrank.mechanics.evaluator import (
     FlipPrediction,
     Response,
     SpringEvaluator,
-    Status,
     UnloadedBeams,
     load_bearing_core,
 )
@@ -24,6 +23,7 @@ from bellcrank.mechanics.following import Arrival, follow
 from bellcrank.mechanics.grips import Grip, Loose, Rigid, Sliding
 from bellcrank.mechanics.minimisers import Minimiser, minimisers
 from bellcrank.mechanics.objectives import Objective, efficiency_of, objective_of, objectives
+from bellcrank.mechanics.status import Outcome, Status
 from bellcrank.mechanics.substructure import Condensed, Substructure
 from bellcrank.mechanics.superelement import State, Superelement
 
@@ -39,6 +39,7 @@ __all__ = [
     "Loose",
     "Minimiser",
     "Objective",
+    "Outcome",
     "Response",
     "Rigid",
     "Sliding",

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.mechanics.kernels.arrays import (
-    CONVERGED,
     IGNORED,
-    MECHANISM,
-    SNAPPED,
-    UNCONVERGED,
-    UNVERIFIED,
     Known,
     Structure,
     System,
 )
 from bellcrank.mechanics.minimisers import minimisers
 from bellcrank.mechanics.objectives import objective_of
+from bellcrank.mechanics.status import Status
 from bellcrank.mechanics.system import (
     allocate_flip_workspace,
     allocate_known,
@@ -35,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.mechanics.kernels.flip_prediction import FlipWorkspace
+    from bellcrank.mechanics.status import Outcome
     from bellcrank.model import Design, Problem
 
 UnloadedBeams = Literal["keep", "prune_dead_ends", "prune_all"]
@@ -45,50 +41,6 @@ VERIFICATION_INCREMENT = 1 / 32
 strides, and miss that one in a hundred of the designs near a loss of stability snaps."""
 
 
-class Status(IntEnum):
-    """How the search for an equilibrium ended, or what a search's goals say to the design."""
-
-    CONVERGED = CONVERGED
-    SNAPPED = SNAPPED
-    MECHANISM = MECHANISM
-    UNCONVERGED = UNCONVERGED
-    FORBIDDEN = 4
-    UNVERIFIED = UNVERIFIED
-    UNMET = 7
-
-    @property
-    def label(self) -> str:
-        """The status as it is written in files."""
-        return self.name.lower()
-
-    @property
-    def message(self) -> str:
-        """What it means, as a sentence."""
-        return _MESSAGES[self]
-
-
-_MESSAGES = {
-    Status.CONVERGED: "a stable equilibrium was reached from rest along a stable path",
-    Status.SNAPPED: (
-        "the structure loses its stability along the stroke, or comes so near to it that a "
-        "small disturbance decides which way it goes; the response is that of one branch"
-    ),
-    Status.MECHANISM: "a driven piece is not held against moving as a rigid body",
-    Status.UNCONVERGED: "no stable equilibrium was found at full load",
-    Status.FORBIDDEN: (
-        "the design breaks the rules or goals of the search more than the one at hand; where the "
-        "beams alone tell, it has no response"
-    ),
-    Status.UNMET: (
-        "a stable equilibrium was reached from rest, but the design does not keep the goals yet"
-    ),
-    Status.UNVERIFIED: (
-        "a stable equilibrium less efficient than was asked for; whether it is the one reached "
-        "from rest was not looked at"
-    ),
-}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
     """What a design does at full load.
@@ -96,7 +48,8 @@ class Response:
     Parameters
     ----------
     status
-        Whether it can be relied on; only CONVERGED and UNMET responses are unique.
+        How the computation ended; the efficiency is unique where the status is admissible. A
+        `Status`, or a code that a search assigns (`bellcrank.search.Verdict`).
     efficiency
         As the objective defines it; nan for a mechanism.
     energy
@@ -107,7 +60,7 @@ class Response:
         For breaking the goals of a search, in units of the efficiency; 0 if they are kept.
     """
 
-    status: Status
+    status: Outcome
     efficiency: float
     energy: float
     displacement: NDArray[np.float64]
@@ -121,7 +74,7 @@ class Response:
     @property
     def is_admissible(self) -> bool:
         """Whether a search may go there: the equilibrium is stable and reached from rest."""
-        return self.status in {Status.CONVERGED, Status.UNMET}
+        return self.status.is_admissible
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics.conditions import Conditions, Linear
-from bellcrank.mechanics.evaluator import Status
+from bellcrank.mechanics.status import Status
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics.evaluator import Status, UnloadedBeams
+from bellcrank.mechanics.evaluator import UnloadedBeams
 from bellcrank.mechanics.kernels.arrays import HELD
 from bellcrank.mechanics.objectives import objective_of
+from bellcrank.mechanics.status import Status
 from bellcrank.mechanics.system import allocate_scratch, allocate_structure, build_system
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics.conditions import Linear
-from bellcrank.mechanics.evaluator import Status
+from bellcrank.mechanics.status import Status
 from bellcrank.mechanics.substructure import Condensed, Substructure
 
 if TYPE_CHECKING:

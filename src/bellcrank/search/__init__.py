@@ -14,7 +14,7 @@ Examples
 (500, 250)
 """
 
-from bellcrank.search.blocks import BLOCK, FORBIDDEN, FORESEEN
+from bellcrank.search.blocks import BLOCK
 from bellcrank.search.cleaning import clean, loaded_beams, pieces
 from bellcrank.search.costs import Cost, costs
 from bellcrank.search.evaluator import Evaluator, make_evaluator
@@ -51,12 +51,11 @@ from bellcrank.search.selection import (
 )
 from bellcrank.search.settings import SearchSettings
 from bellcrank.search.tempering import TemperingSettings, TemperingState
+from bellcrank.search.verdict import Verdict
 
 __all__ = [
     "BLOCK",
     "DEFAULT_SEARCH",
-    "FORBIDDEN",
-    "FORESEEN",
     "Candidate",
     "ChainState",
     "Choice",
@@ -76,6 +75,7 @@ __all__ = [
     "State",
     "TemperingSettings",
     "TemperingState",
+    "Verdict",
     "advance_chain",
     "candidates_of",
     "chain_blocks",

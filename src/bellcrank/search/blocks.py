@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Status
 from bellcrank.storage import Proposals
 
 if TYPE_CHECKING:
@@ -21,11 +20,6 @@ if TYPE_CHECKING:
 
 BLOCK = 250
 """Steps between two states at which a chain can be stopped and resumed."""
-FORBIDDEN = int(Status.FORBIDDEN)
-"""Status of a proposal that breaks rules or goals more than the design at hand, and is refused;
-unevaluated where the beams alone tell."""
-FORESEEN = 5
-"""Status of a proposal that is refused unevaluated because a prediction spoke against it."""
 
 
 def random_numbers(seed: int, chain: int, block: int) -> np.random.Generator:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Status
+    from bellcrank.mechanics import Outcome
     from bellcrank.model import Problem
     from bellcrank.search.evaluator import Evaluator
     from bellcrank.storage import Proposals
@@ -213,7 +213,7 @@ class Hopper:
         mask: NDArray[np.bool_],
         efficiency: float,
         accepted: bool,
-        status: Status,
+        status: Outcome,
         penalty: float = 0.0,
     ) -> None:
         """Record a response and count it."""

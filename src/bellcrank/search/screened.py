@@ -32,7 +32,6 @@ import numpy as np
 from bellcrank.model import pack_mask
 from bellcrank.search.blocks import (
     BLOCK,
-    FORESEEN,
     Rows,
     initial_response,
     random_numbers,
@@ -41,6 +40,7 @@ from bellcrank.search.blocks import (
 from bellcrank.search.delayed_acceptance import ScreenedSettings, corrected, log_passes
 from bellcrank.search.place import Place, flipped
 from bellcrank.search.scorers import costs_of
+from bellcrank.search.verdict import Verdict
 from bellcrank.search.walking import consider, place_of
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def screened_blocks(
 ) -> Iterator[tuple[ScreenedState, Proposals]]:
     """Yield state and proposals block by block until the chain is done.
 
-    Proposals that the scorer held back have the status `FORESEEN` and no efficiency.
+    Proposals that the scorer held back have the status `REJECTED_EARLY` and no efficiency.
 
     Raises
     ------
@@ -237,7 +237,7 @@ def _step(
     mask = flipped(here.mask, np.array([beam]))
     there_passes = log_passes(rise, here.temperature, settings)
     if uniforms[0] >= math.exp(there_passes):
-        rows.add(mask, math.nan, math.nan, here.temperature, False, FORESEEN)
+        rows.add(mask, math.nan, math.nan, here.temperature, False, Verdict.REJECTED_EARLY)
         return here, False
     back_passes = log_passes(-rise, here.temperature, settings)
 

@@ -19,6 +19,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluato
 from bellcrank.model import Design, Problem
 from bellcrank.search.cleaning import clean, pieces
 from bellcrank.search.goals import GoalEvaluator
+from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -239,7 +240,7 @@ def _bits(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
 
 def _why_not(judge: Evaluator, design: Design, response: Response) -> str | None:
     """Return the reason to refuse a cleaned design, if there is one."""
-    if response.status is Status.UNMET and isinstance(judge, GoalEvaluator):
+    if response.status is Verdict.UNMET and isinstance(judge, GoalEvaluator):
         return f"breaks {', '.join(judge.broken(design.mask))}"
     if response.status is not Status.CONVERGED:
         return response.status.label

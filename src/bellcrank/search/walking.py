@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.model import unpack_mask
-from bellcrank.search.blocks import FORBIDDEN, FORESEEN
 from bellcrank.search.costs import costs
 from bellcrank.search.place import Place, accepts, flipped
+from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,11 +41,11 @@ def step(
     beams = move.propose(here, rng)
     uniform = rng.random()
     if beams is None:
-        rows.add(here.mask, math.nan, math.nan, here.temperature, False, FORESEEN)
+        rows.add(here.mask, math.nan, math.nan, here.temperature, False, Verdict.REJECTED_EARLY)
         return here
     mask = flipped(here.mask, beams)
     if minimum_degree and _is_forbidden(here.problem, minimum_degree, mask, beams):
-        rows.add(mask, math.nan, math.nan, here.temperature, False, FORBIDDEN)
+        rows.add(mask, math.nan, math.nan, here.temperature, False, Verdict.FORBIDDEN)
         return here
 
     def log_ratio(there: Place, gain: float) -> float:

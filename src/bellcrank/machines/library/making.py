@@ -19,7 +19,7 @@ from bellcrank.machines.library.kinds import kinds
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, measure
 from bellcrank.machines.library.summary import entry_files, read_index, read_summary, write_index
 from bellcrank.mechanics import Response, Status
-from bellcrank.search import read_settings, run_chains, select
+from bellcrank.search import Verdict, read_settings, run_chains, select
 from bellcrank.storage.files import make_folder
 from bellcrank.storage.layout import LOCK
 from bellcrank.storage.locking import locked
@@ -263,7 +263,7 @@ class Resisting:
             return response
         stiffness = 2.0 * response.energy / self.problem.input.amount**2
         if response.status is Status.CONVERGED and not stiffness > LEAST_STIFFNESS:
-            return replace(response, status=Status.FORBIDDEN)
+            return replace(response, status=Verdict.FORBIDDEN)
         return response
 
     def __getattr__(self, name: str) -> Any:

@@ -19,6 +19,7 @@ from bellcrank.mechanics import (
 from bellcrank.search.goals.cases import Case, check_alike
 from bellcrank.search.goals.mirror import orbits_of
 from bellcrank.search.goals.terms import SMALLEST_EXCESS, Moved, read_goal
+from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -174,7 +175,7 @@ class GoalEvaluator:
         excess = self._excess_of_beams(design, core)
         if excess > self._remembered + SMALLEST_EXCESS:
             nowhere = np.zeros_like(self.problem.lattice.positions)
-            return Response(Status.FORBIDDEN, math.nan, math.nan, nowhere, penalty_of(excess))
+            return Response(Verdict.FORBIDDEN, math.nan, math.nan, nowhere, penalty_of(excess))
         alone = len(self.cases) == 1 and self.cases[0].wanted is None
         floor = lower_bound + penalty_of(excess) if alone else -math.inf
         return self._judged(
@@ -271,9 +272,9 @@ class GoalEvaluator:
                 return replace(response, status=Status.UNVERIFIED, penalty=penalty_of(excess))
             excess += _of_response(made, moved)
             if excess > most + SMALLEST_EXCESS:
-                return replace(response, status=Status.FORBIDDEN, penalty=penalty_of(excess))
+                return replace(response, status=Verdict.FORBIDDEN, penalty=penalty_of(excess))
         self._excess = excess
-        status = Status.UNMET if penalty_of(excess) else Status.CONVERGED
+        status = Verdict.UNMET if penalty_of(excess) else Status.CONVERGED
         return replace(response, status=status, penalty=penalty_of(excess))
 
     def _foreseen(

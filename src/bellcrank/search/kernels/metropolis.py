@@ -21,7 +21,9 @@ from bellcrank.mechanics.kernels.response import (
     find_response,
     remember,
 )
-from bellcrank.search.blocks import FORBIDDEN
+from bellcrank.search.verdict import Verdict
+
+FORBIDDEN = int(Verdict.FORBIDDEN)
 
 EXPONENTIAL = 0
 """Of the codes of `bellcrank.search.costs`; the other is the efficiency with its sign changed."""
