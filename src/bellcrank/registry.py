@@ -23,7 +23,7 @@ bellcrank.errors.UnknownName: unknown shape 'circle'; known: square
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from bellcrank.errors import UnknownName
 
@@ -77,8 +77,3 @@ class Registry(Mapping[str, T]):
 
     def __len__(self) -> int:
         return len(self._entries)
-
-
-design_sources: Registry[Callable[[str], Any]] = Registry("source of designs")
-"""Who else knows designs by name. Each returns the `Design` of a name, None if it does not know
-it; `bellcrank.workflows.find_design` asks them in turn, whatever layer they are of."""

@@ -37,19 +37,17 @@ def test_every_format_is_written_by_its_suffix(here: Path, name: str) -> None:
     assert (here / file).stat().st_size > 3000
 
 
-def test_a_folder_with_the_name_of_a_problem_is_told_from_the_problem(here: Path) -> None:
+def test_a_result_folder_is_exported_in_place_of_the_problem_of_its_name(here: Path) -> None:
     human = human_design("crane")
     assert human is not None
     (here / "crane").mkdir()
     write_design(human, here / "crane" / "design.json")
-    whole = call("export", "crane", "whole.svg")
-    assert (
-        "crane is the built-in problem with all its beams; for the design in the folder, write"
-        in (" ".join(whole.err.split()))
-    )
-    part = call("export", "crane/", "part.svg")
-    assert "note:" not in part.err
-    assert (here / "part.svg").read_bytes() != (here / "whole.svg").read_bytes()
+    noted = call("export", "crane", "part.svg")
+    assert "note:" in noted.err
+    assert "note:" not in call("export", "crane/", "same.svg").err
+    call("export", "human:crane", "human.svg")
+    written = [(here / name).read_bytes() for name in ("part.svg", "same.svg", "human.svg")]
+    assert written[0] == written[1] == written[2]
 
 
 def test_the_part_is_as_wide_and_thick_as_said(here: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import threading
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from unittest import mock
 
 import pytest
 
+from bellcrank.model import find_problem
 from bellcrank.search import parallel
 
 from .helpers import PROBLEM, SMALL, call, refusal, write
@@ -54,13 +56,37 @@ def test_a_command_that_cannot_be_followed_is_refused_in_one_line(
     assert not list(here.iterdir())
 
 
-def test_a_result_folder_does_not_hide_the_problem_of_its_name(here: Path, whole: Path) -> None:
+def test_a_result_folder_takes_precedence_over_the_bundled_problem(here: Path, whole: Path) -> None:
     shutil.copytree(whole, here / PROBLEM)
-    problem, design = (
-        call("evaluate", name, "--json").data["results"][0] for name in (PROBLEM, f"{PROBLEM}/")
+    mask = json.loads((whole / "design.json").read_text())["mask"]
+    for name in (PROBLEM, f"{PROBLEM}/"):
+        outcome = call("evaluate", name, "--json")
+        assert outcome.data["results"][0]["mask"] == mask
+        assert ("note:" in outcome.err) == (name == PROBLEM)
+    small = ("--seconds", "0.2", "--size", "320x240")
+    assert "note:" in call("animate", PROBLEM, "motion.gif", *small).err
+    assert (here / "motion.gif").stat().st_size > 1000
+    record = here / "record.json"
+    assert "note:" in call("validate", PROBLEM, "--elements", "1", "--record", record).err
+    assert json.loads(record.read_text())["mask"] == mask
+
+
+def test_the_name_of_a_problem_is_designed_for_whatever_folder_exists(
+    here: Path, whole: Path
+) -> None:
+    shutil.copytree(whole, here / PROBLEM)
+    outcome = call(
+        "design", PROBLEM, "--search", "paper", "--steps", "2", "--chains", "1", "--out", "again"
     )
-    assert problem["beams"] == 219
-    assert design["beams"] < 219
+    assert outcome.code == 0, outcome.err
+    run = json.loads((here / "again" / "run.json").read_text())
+    assert run["problem"]["initial"] == find_problem(PROBLEM).full_design().mask_hex
+
+
+def test_an_unfinished_run_points_to_the_option_that_resumes_it(half: Path) -> None:
+    message = refusal("export", half, "part.svg", folder=half)
+    assert str(half) in message
+    assert "--resume" in message
 
 
 def test_an_error_in_one_chain_is_told_though_another_was_stopped_by_it(half: Path) -> None:
@@ -84,7 +110,7 @@ def test_an_error_in_one_chain_is_told_though_another_was_stopped_by_it(half: Pa
 
 
 def test_ctrl_c_outside_a_search_says_so(here: Path) -> None:
-    with mock.patch("bellcrank.workflows.find_design", side_effect=KeyboardInterrupt):
+    with mock.patch("bellcrank.workflows.find.find_design", side_effect=KeyboardInterrupt):
         outcome = call("evaluate", PROBLEM)
     assert (outcome.code, outcome.err.strip()) == (130, "Interrupted.")
     assert not list(here.iterdir())

@@ -31,7 +31,8 @@ from bellcrank.plots.movies import (
     stroke_schedule,
 )
 from bellcrank.workflows import find_design
-from bellcrank.workflows.animate import Looks, animate_motion, load_design, motion_movie
+from bellcrank.workflows.animate import Looks, animate_motion, motion_movie
+from bellcrank.workflows.loading import loading_path
 
 SMALL = (320, 180)
 SETTINGS = MovieSettings(seconds=0.8, fps=25, size=SMALL)
@@ -202,7 +203,7 @@ def test_the_first_frame_is_rest_and_the_middle_one_the_full_stroke(movie):
 
 def test_each_frame_shows_the_response_to_a_part_of_the_stroke():
     design = find_design("machine:discs")
-    way = load_design(design, np.array([0.0, 0.3, 1.0]))
+    way = loading_path(design, np.array([0.0, 0.3, 1.0]))
     given = replace(design.problem.input, amount=0.3 * design.problem.input.amount)
     response = SpringEvaluator(replace(design.problem, input=given)).evaluate(design.mask)
     assert np.allclose(way.displacement[1], response.displacement, atol=1e-9)

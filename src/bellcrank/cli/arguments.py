@@ -38,22 +38,21 @@ MaterialName = Annotated[
 
 
 def design_named(text: str) -> Design:
-    """Return the design that a word on the command line means.
+    """Return the design that an argument names.
 
-    Says what is meant where a result folder has the name of a built-in problem.
+    Prints a note if a result folder takes precedence over the bundled problem of that name.
 
     Raises
     ------
-    UnknownName, InvalidFile, InvalidProblem
+    UnknownName, InvalidFile, InvalidProblem, InvalidSettings
     """
     from bellcrank.cli.console import notes, plain
-    from bellcrank.model import builtin
-    from bellcrank.workflows import find_design
+    from bellcrank.workflows.find import find_design, hides_problem
 
-    if text in builtin and (Path(text) / "design.json").exists():
+    if hides_problem(text):
         notes.print(
-            f"[yellow]note:[/] {plain(text)} is the built-in problem with all its beams; for the "
-            f"design in the folder, write {plain(text)}/"
+            f"[yellow]note:[/] {plain(text)} is the design in the result folder {plain(text)}/, "
+            "not the bundled problem of that name"
         )
     return find_design(text)
 

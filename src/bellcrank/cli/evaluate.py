@@ -12,6 +12,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
+from bellcrank.cli.arguments import design_named
 from bellcrank.cli.console import announce_compilation, print_json, results
 
 if TYPE_CHECKING:
@@ -38,9 +39,8 @@ def evaluate(
     """Compute the response of designs, each from rest to the full stroke."""
     from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
     from bellcrank.model import pack_mask, read_masks
-    from bellcrank.workflows import find_design
 
-    design = find_design(problem)
+    design = design_named(problem)
     masks = read_masks(designs, design.problem) if designs else [design.mask]
     evaluator = SpringEvaluator(design.problem, objective, unloaded_beams, minimiser)  # type: ignore[arg-type]
     announce_compilation()

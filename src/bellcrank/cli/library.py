@@ -7,7 +7,7 @@ import shlex
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -16,10 +16,6 @@ from bellcrank.cli.arguments import DesignName, design_named
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json
 from bellcrank.cli.library_view import MakingProgress, print_entries, print_entry, warn
 from bellcrank.errors import InvalidSettings
-from bellcrank.registry import design_sources
-
-if TYPE_CHECKING:
-    from bellcrank.model import Design
 
 library = typer.Typer(
     name="library",
@@ -32,14 +28,6 @@ NAME = typer.Argument(help="Of an entry: its name, the beginning of it, or its h
 Name = Annotated[str, NAME]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")]
-
-
-@design_sources.register("library")
-def design_of_entry(name: str) -> Design | None:
-    """Return the design of an entry; None for what cannot be the name of one."""
-    from bellcrank.machines.library import library
-
-    return library().design(name)
 
 
 @library.command("list")

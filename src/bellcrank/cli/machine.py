@@ -15,7 +15,6 @@ from rich.table import Table
 from bellcrank.cli.app import app
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.errors import InvalidSettings
-from bellcrank.registry import design_sources
 
 if TYPE_CHECKING:
     from bellcrank.machines.assembly import Machine
@@ -32,14 +31,6 @@ app.add_typer(machine)
 PlanName = Annotated[
     str, typer.Argument(help="A machine's plan, TOML, or a name of `bellcrank machine list`.")
 ]
-
-
-@design_sources.register("struts")
-def design_of_strut(name: str) -> Design | None:
-    """Return the strut of a length, like strut-6; None for other names."""
-    from bellcrank.machines.elementary import strut_named
-
-    return strut_named(name)
 
 
 @machine.command(name="list")

@@ -26,7 +26,6 @@ read by `read_problem`; designs travel in JSON.
 
 from bellcrank.model.builtin import builtin
 from bellcrank.model.conditions import Input, Output, Stiffness, Supports
-from bellcrank.model.explicit import problem_to_dict
 from bellcrank.model.files import (
     design_from_dict,
     design_to_dict,
@@ -42,7 +41,7 @@ from bellcrank.model.gallery import gallery_design, human_design
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
 from bellcrank.model.masks import pack_mask, unpack_mask
-from bellcrank.model.problem import Design, Problem
+from bellcrank.model.problem import Design, Problem, problem_to_dict
 from bellcrank.model.regions import regions
 from bellcrank.model.schema import problem_from_dict
 

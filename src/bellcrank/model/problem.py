@@ -20,7 +20,6 @@ from bellcrank.model.arrays import (
     rebuild,
 )
 from bellcrank.model.conditions import Input, Output, Stiffness, Supports
-from bellcrank.model.explicit import problem_to_dict
 from bellcrank.model.masks import pack_mask
 
 if TYPE_CHECKING:
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.model.lattice import Lattice
+
+PROBLEM_SCHEMA = "bellcrank/problem/1"
 
 Aggregate = Literal["mean", "sum"]
 
@@ -193,6 +194,58 @@ class Design:
     def with_mask(self, mask: ArrayLike) -> Design:
         """Return a design with other beams; its efficiency is not known yet."""
         return replace(self, mask=np.asarray(mask), efficiency=None)
+
+
+def problem_to_dict(problem: Problem) -> dict[str, Any]:
+    """Return a problem in full as plain data (schema ``bellcrank/problem/1``).
+
+    Two problems are equal if and only if their data are equal: `Problem.hash` is computed from
+    them.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> data = problem_to_dict(find_problem("crane"))
+    >>> data["schema"], data["input"]["direction"], len(data["designable"])
+    ('bellcrank/problem/1', [0.0, -1.0], 203)
+    """
+    data: dict[str, Any] = {
+        "schema": PROBLEM_SCHEMA,
+        "name": problem.name,
+        "positions": problem.lattice.positions.tolist(),
+        "beams": problem.lattice.beams.tolist(),
+        "initial": pack_mask(problem.initial),
+        "designable": problem.designable.tolist(),
+        "stiffness": {"bond": problem.stiffness.bond, "angle": problem.stiffness.angle},
+        "supports": {
+            "fixed": problem.supports.fixed.tolist(),
+            "fixed_x": problem.supports.fixed_x.tolist(),
+            "fixed_y": problem.supports.fixed_y.tolist(),
+        },
+        "input": {
+            "nodes": problem.input.nodes.tolist(),
+            "direction": _one_or_each(problem.input.direction),
+            "drive": problem.input.drive,
+            "amount": problem.input.amount,
+        },
+        "output": {
+            "nodes": problem.output.nodes.tolist(),
+            "direction": _one_or_each(problem.output.direction),
+            "spring": problem.output.spring,
+            "spring_kind": problem.output.spring_kind,
+        },
+        "aggregate": problem.aggregate,
+    }
+    if problem.objective is not None:
+        data["objective"] = problem.objective
+    return data
+
+
+def _one_or_each(vectors: NDArray[np.float64]) -> list[Any]:
+    """Return one vector if all are equal, otherwise all of them."""
+    same = bool((vectors == vectors[0]).all())
+    written: list[Any] = vectors[0].tolist() if same else vectors.tolist()
+    return written
 
 
 def _check_words(problem: Problem) -> None:

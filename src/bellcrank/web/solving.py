@@ -106,12 +106,12 @@ def check(text: str, goals: tuple[str, ...]) -> dict[str, Any]:
 
 def motion(text: str, mask: str) -> dict[str, Any]:
     """Compute the states of a design along its true path, each from rest."""
-    from bellcrank.workflows.animate import load_design
+    from bellcrank.workflows.loading import loading_path
 
-    way = load_design(design_of(text, mask), np.linspace(0.0, 1.0, STATES))
+    way = loading_path(design_of(text, mask), np.linspace(0.0, 1.0, STATES))
     peak = float(way.energy.max(initial=0.0)) or 1.0
     return {
-        "part": way.part.round(DIGITS).tolist(),
+        "part": way.fraction.round(DIGITS).tolist(),
         "displacement": [flat(each) for each in way.displacement],
         "energy": [(each / peak).round(4).tolist() for each in way.energy],
         "efficiency": [finite(each) for each in way.efficiency],

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status, load_bearing_core
-from bellcrank.mechanics.strain import strain_of
+from bellcrank.mechanics import load_bearing_core
 from bellcrank.plots.movies import (
     Course,
     Graph,
@@ -21,6 +18,7 @@ from bellcrank.plots.movies import (
     film,
     stroke_schedule,
 )
+from bellcrank.workflows.loading import LoadingPath, loading_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -28,12 +26,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.model import Design, Problem
+    from bellcrank.model import Design
 
     Tell = Callable[[str, int, int], None]
-
-SMALL = 1e-3
-"""Part of the stroke that stands for none, where an efficiency is asked for."""
 
 
 FIGURE_SPACE = "\u2007"
@@ -58,77 +53,6 @@ class Looks:
 
     objective: str | None = None
     magnify: float = 1.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Loading:
-    """The way of a design from rest to the full stroke.
-
-    Parameters
-    ----------
-    part : (K,) float64
-        Parts of the stroke, from 0 to 1.
-    displacement : (K, N, 2) float64
-    energy : (K, M) float64
-        Of each beam, as in `Strain`.
-    efficiency, input_force : (K,) float64
-        The efficiency at rest is that of a small stroke.
-    snapped : (K,) bool
-        Whether the structure has lost its stability on the way to there.
-    """
-
-    part: NDArray[np.float64]
-    displacement: NDArray[np.float64]
-    energy: NDArray[np.float64]
-    efficiency: NDArray[np.float64]
-    input_force: NDArray[np.float64]
-    snapped: NDArray[np.bool_]
-
-
-def load_design(
-    design: Design,
-    part: NDArray[np.float64],
-    objective: str | None = None,
-    tell: Callable[[int], None] = lambda _done: None,
-) -> Loading:
-    """Compute the responses of a design at parts of its stroke, each from rest.
-
-    Parameters
-    ----------
-    part : (K,) float64
-        Increasing, from 0 to 1.
-    tell
-        Called with the number of responses computed.
-
-    Raises
-    ------
-    InvalidSettings
-        If the design is not held, or has no stable equilibrium at its full stroke.
-    """
-    problem, states = design.problem, len(part)
-    displacement = np.zeros((states, *problem.lattice.positions.shape))
-    energy = np.zeros((states, problem.lattice.beam_count))
-    efficiency, force = np.zeros(states), np.zeros(states)
-    snapped = np.zeros(states, dtype=bool)
-    for k, share in enumerate(part.tolist()):
-        evaluator = SpringEvaluator(_at(problem, max(share, SMALL)), objective)
-        # A power of two, so that the increments add up to the whole without a remainder.
-        increment = min(
-            1.0, 2.0 ** math.floor(math.log2(VERIFICATION_INCREMENT / max(share, SMALL)))
-        )
-        response = evaluator.evaluate(design.mask, increment)
-        if response.status not in {Status.CONVERGED, Status.SNAPPED}:
-            raise InvalidSettings(f"{problem.name}: no motion to show: {response.status.message}")
-        efficiency[k] = response.efficiency
-        snapped[k] = response.status is Status.SNAPPED
-        if share > 0.0:
-            strain = strain_of(evaluator)
-            displacement[k] = response.displacement
-            energy[k], force[k] = strain.energy, strain.input_force
-        tell(k + 1)
-    # What has snapped stays snapped: a single state before may only seem to have.
-    snapped = np.logical_and.accumulate(snapped[::-1])[::-1]
-    return Loading(part, displacement, energy, efficiency, force, snapped)
 
 
 def animate_motion(
@@ -187,19 +111,19 @@ def motion_movie(
     looks = looks or Looks()
     part, order = stroke_schedule(settings.frames)
     states = len(part)
-    ways: list[Loading] = []
+    ways: list[LoadingPath] = []
 
     def loaded(done: int) -> None:
         tell("loading", len(ways) * states + done, len(designs) * states)
 
     for _, design in designs:
-        ways.append(load_design(design, part, looks.objective, loaded))
+        ways.append(loading_path(design, part, looks.objective, loaded))
     shown = [(name, design, way) for (name, design), way in zip(designs, ways, strict=True)]
     courses = tuple(_moving(*one, looks.magnify) for one in shown)
     return Movie(courses, _graphs(shown), order)
 
 
-def _moving(name: str, design: Design, way: Loading, magnify: float) -> Course:
+def _moving(name: str, design: Design, way: LoadingPath, magnify: float) -> Course:
     """Return the course of a design along its stroke."""
     states, beams = way.energy.shape
     bearing = load_bearing_core(design)
@@ -207,9 +131,9 @@ def _moving(name: str, design: Design, way: Loading, magnify: float) -> Course:
     size = f"{design.beam_count} beams" if magnify == 1.0 else f"motion drawn × {magnify:g}"
     notes = tuple(
         f"{size} · {word} {_percent(share)} · {efficiency_note(efficiency)}"
-        for efficiency, share in zip(way.efficiency, way.part, strict=True)
+        for efficiency, share in zip(way.efficiency, way.fraction, strict=True)
     )
-    snap = f"has snapped at {100.0 * way.part[way.snapped.argmax()]:.0f} % of the {word}"
+    snap = f"has snapped at {100.0 * way.fraction[way.snapped.argmax()]:.0f} % of the {word}"
     return Course(
         problem=design.problem,
         present=np.broadcast_to(design.mask, (states, beams)),
@@ -233,11 +157,11 @@ def efficiency_note(efficiency: float) -> str:
     return f"efficiency {efficiency:.3f}" if np.isfinite(efficiency) else "no efficiency"
 
 
-def _graphs(shown: list[tuple[str, Design, Loading]]) -> tuple[Graph, ...]:
+def _graphs(shown: list[tuple[str, Design, LoadingPath]]) -> tuple[Graph, ...]:
     """Return efficiency, and what answers the input, against the input."""
     drives = {design.problem.input.drive for _, design, _ in shown}
     if len(drives) > 1:
-        along = [_line(name, 100.0 * way.part, way.efficiency, way) for name, _, way in shown]
+        along = [_line(name, 100.0 * way.fraction, way.efficiency, way) for name, _, way in shown]
         return (Graph("part of the stroke, %", "efficiency", tuple(along)),)
     by_motion = drives == {"displacement"}
     across = "input motion, lattice units" if by_motion else "force on an input node"
@@ -246,15 +170,15 @@ def _graphs(shown: list[tuple[str, Design, Loading]]) -> tuple[Graph, ...]:
         given, output = design.problem.input, design.problem.output
         along_output = (way.displacement[:, output.nodes] * output.direction).sum(axis=2)
         against = way.input_force if by_motion else along_output.mean(axis=1)
-        efficiency.append(_line(name, given.amount * way.part, way.efficiency, way))
-        answer.append(_line(name, given.amount * way.part, against, way))
+        efficiency.append(_line(name, given.amount * way.fraction, way.efficiency, way))
+        answer.append(_line(name, given.amount * way.fraction, against, way))
     return (
         Graph(across, "efficiency", tuple(efficiency)),
         Graph(across, "input force" if by_motion else "output motion", tuple(answer)),
     )
 
 
-def _line(name: str, x: NDArray[np.float64], y: NDArray[np.float64], way: Loading) -> Line:
+def _line(name: str, x: NDArray[np.float64], y: NDArray[np.float64], way: LoadingPath) -> Line:
     """Return a curve along the stroke, broken where the design snaps."""
     at = np.arange(len(x))
     if way.snapped.any():
@@ -262,8 +186,3 @@ def _line(name: str, x: NDArray[np.float64], y: NDArray[np.float64], way: Loadin
         x, y = np.insert(x, snap, x[snap]), np.insert(y, snap, np.nan)
         at[snap:] += 1
     return Line(x, y, at, name)
-
-
-def _at(problem: Problem, share: float) -> Problem:
-    """Return a problem with a part of its stroke."""
-    return replace(problem, input=replace(problem.input, amount=share * problem.input.amount))

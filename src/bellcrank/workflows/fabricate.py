@@ -18,7 +18,7 @@ from bellcrank.part.outline import strut_outline
 from bellcrank.part.outline.grips import filled, with_pointer
 from bellcrank.part.outline.screws import drilled, screw_places
 from bellcrank.part.pieces import doubts_about, require_held
-from bellcrank.workflows.animate import load_design
+from bellcrank.workflows.loading import loading_path
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -139,7 +139,7 @@ def bundle_of(
         require_held(design)
     frames = None
     if moved:
-        way = load_design(design, np.linspace(0.0, 1.0, FRAMES))
+        way = loading_path(design, np.linspace(0.0, 1.0, FRAMES))
         frames = design.problem.lattice.positions + way.displacement
     return Export(
         part=part,

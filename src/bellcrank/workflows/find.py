@@ -1,60 +1,100 @@
-"""From what a person types to a design."""
+"""Find a design by the name that a user gives it."""
 
 from __future__ import annotations
 
 import json
+from importlib import import_module
 from pathlib import Path
 from typing import cast, get_args
 
-from bellcrank.errors import UnknownName
+from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.model import Design, builtin, find_problem, gallery_design, read_design
 from bellcrank.model.gallery import Kind
-from bellcrank.registry import design_sources
+from bellcrank.storage.layout import DESCRIPTION
+
+DESIGN_FILE = "design.json"
+"""Name of the design in a result folder."""
 
 
 def find_design(name_or_path: str) -> Design:
-    """Return a design named on the command line.
+    """Return the design of a given name.
+
+    Names are tried in this order:
+
+    1. ``human:NAME`` and ``machine:NAME``, the bundled designs of a bundled problem,
+    2. a result folder, which holds a ``design.json``,
+    3. a bundled problem: its initial design,
+    4. a design file,
+    5. an entry of the library or a strut (``strut-6``), unless a file of that name exists,
+    6. a problem file: its initial design.
 
     Parameters
     ----------
     name_or_path
-        A problem, built in or in a file, whose initial design is meant; a design file; a
-        result folder with a ``design.json``; or ``human:NAME`` or ``machine:NAME`` for a
-        design of a built-in problem that comes with the package. The name of a built-in
-        problem means the problem even where there is a folder of that name: ``crane/`` is
-        the folder. What is none of these is asked of `bellcrank.registry.design_sources`: on
-        the command line, the library of actuators.
+        Name or path, as above. A result folder takes precedence over a bundled problem of the
+        same name (`hides_problem` tells the two cases apart).
 
     Raises
     ------
-    UnknownName, InvalidFile, InvalidProblem
+    UnknownName
+        If there is no such design, file or problem.
+    InvalidSettings
+        If the folder is that of an unfinished run.
+    InvalidFile, InvalidProblem
+        If the file does not describe a valid design or problem.
 
     Examples
     --------
     >>> find_design("crane").beam_count
     352
+    >>> find_design("strut-6").problem.name
+    'strut-6'
     """
     kind, colon, name = name_or_path.partition(":")
     if colon and kind in get_args(Kind):
-        of_kind = cast("Kind", kind)
-        found = gallery_design(of_kind, name)
-        if found is None:
-            there = ", ".join(known for known in builtin if gallery_design(of_kind, known))
-            raise UnknownName(f"no {kind} design for {name!r}; there are some for: {there}")
-        return found
+        return _bundled_design(cast("Kind", kind), name)
     path = Path(name_or_path)
+    if (path / DESIGN_FILE).exists():
+        return read_design(path / DESIGN_FILE)
     if name_or_path in builtin:
         return find_problem(name_or_path).full_design()
-    if path.is_dir() and (path / "design.json").exists():
-        return read_design(path / "design.json")
+    if (path / DESCRIPTION).exists():
+        raise InvalidSettings(
+            f"{path}: this run is not finished and has no {DESIGN_FILE} yet; finish it with "
+            f"bellcrank design --resume {path}"
+        )
     if path.suffix == ".json" and path.is_file() and _is_design(path):
         return read_design(path)
     if not path.exists():
-        for ask in design_sources.values():
-            known: Design | None = ask(name_or_path)
-            if known is not None:
-                return known
+        design = _machine_part(name_or_path)
+        if design is not None:
+            return design
     return find_problem(name_or_path).full_design()
+
+
+def hides_problem(name: str) -> bool:
+    """Return whether a result folder takes precedence over the bundled problem of that name."""
+    return name in builtin and (Path(name) / DESIGN_FILE).exists()
+
+
+def _bundled_design(kind: Kind, name: str) -> Design:
+    design = gallery_design(kind, name)
+    if design is None:
+        known = ", ".join(problem for problem in builtin if gallery_design(kind, problem))
+        raise UnknownName(f"no {kind} design for {name!r}; known: {known}")
+    return design
+
+
+def _machine_part(name: str) -> Design | None:
+    """Return the strut or library entry of that name, or None.
+
+    The library is built with the workflows of this package. Loading it by name when it is needed
+    keeps the import direction, and keeps it out of commands that do not use it.
+    """
+    elementary = import_module("bellcrank.machines.elementary")
+    library = import_module("bellcrank.machines.library")
+    design: Design | None = elementary.strut_named(name) or library.library().design(name)
+    return design
 
 
 def _is_design(path: Path) -> bool:

@@ -1,0 +1,107 @@
+"""The loading path of a design in the spring model, from rest to the full stroke."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
+from bellcrank.mechanics.strain import strain_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Design
+
+SMALL = 1e-3
+"""Fraction of the stroke at which the efficiency at rest is evaluated."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadingPath:
+    """Equilibria of a design at K fractions of its stroke.
+
+    Parameters
+    ----------
+    fraction : (K,) float64
+        Fractions of the stroke, from 0 to 1.
+    displacement : (K, N, 2) float64
+        Displacement of the nodes, lattice units.
+    energy : (K, M) float64
+        Strain energy of each beam (see `bellcrank.mechanics.strain.Strain`).
+    efficiency, input_force : (K,) float64
+        Efficiency and total input force. The efficiency at rest is that of a small stroke.
+    snapped : (K,) bool
+        Whether the structure has lost stability on the way to the state.
+    """
+
+    fraction: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    energy: NDArray[np.float64]
+    efficiency: NDArray[np.float64]
+    input_force: NDArray[np.float64]
+    snapped: NDArray[np.bool_]
+
+
+def loading_path(
+    design: Design,
+    fractions: NDArray[np.float64],
+    objective: str | None = None,
+    report: Callable[[int], None] = lambda _done: None,
+) -> LoadingPath:
+    """Compute the responses of a design at fractions of its stroke, each from rest.
+
+    Parameters
+    ----------
+    design
+        The design.
+    fractions : (K,) float64
+        Increasing, from 0 to 1.
+    objective
+        Name of the objective; the problem's own by default.
+    report
+        Called with the number of responses computed so far.
+
+    Raises
+    ------
+    InvalidSettings
+        If the design is not supported or has no stable equilibrium at its full stroke.
+
+    Examples
+    --------
+    >>> from bellcrank.model import human_design
+    >>> path = loading_path(human_design("crane"), np.array([0.0, 0.5, 1.0]))
+    >>> path.displacement.shape, path.snapped.any()
+    ((3, 133, 2), np.False_)
+    """
+    problem, states = design.problem, len(fractions)
+    displacement = np.zeros((states, *problem.lattice.positions.shape))
+    energy = np.zeros((states, problem.lattice.beam_count))
+    efficiency, force = np.zeros(states), np.zeros(states)
+    snapped = np.zeros(states, dtype=bool)
+    for k, fraction in enumerate(fractions.tolist()):
+        share = max(fraction, SMALL)
+        amount = share * problem.input.amount
+        driven = replace(problem, input=replace(problem.input, amount=amount))
+        evaluator = SpringEvaluator(driven, objective)
+        # A power of two, so that the increments add up to the whole without a remainder.
+        increment = min(1.0, 2.0 ** math.floor(math.log2(VERIFICATION_INCREMENT / share)))
+        response = evaluator.evaluate(design.mask, increment)
+        if response.status not in {Status.CONVERGED, Status.SNAPPED}:
+            raise InvalidSettings(f"{problem.name}: no motion to show: {response.status.message}")
+        efficiency[k] = response.efficiency
+        snapped[k] = response.status is Status.SNAPPED
+        if fraction > 0.0:
+            strain = strain_of(evaluator)
+            displacement[k] = response.displacement
+            energy[k], force[k] = strain.energy, strain.input_force
+        report(k + 1)
+    # A single state before a snapped one may be marked by chance: only what stays is kept.
+    snapped = np.logical_and.accumulate(snapped[::-1])[::-1]
+    return LoadingPath(fractions, displacement, energy, efficiency, force, snapped)
