@@ -162,16 +162,30 @@ LINES = np.array([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]], [[0.0, 4.0], [5.0, 4.0]
 def test_struts_that_come_near_touch() -> None:
     moved = LINES.copy()
     moved[1, 1] = [5.0, 1.5]
-    contacts = find_contacts(np.array([3, 8]), LINES, moved, 2.0)
+    contacts = find_contacts(np.array([3, 8]), LINES, [(1.0, moved)], 2.0)
     assert contacts.pairs.tolist() == [[3, 8]]
     assert contacts.overlap == pytest.approx([0.5])
-    assert "beams 3 and 8, by 0.5 mm" in contacts.message
+    assert "beams 3 and 8" in contacts.message
+    assert "0.5 mm" in contacts.message
+
+
+def test_contacts_have_the_largest_overlap_and_the_first_load_of_the_stroke() -> None:
+    states = []
+    for load, height in ((0.2, 3.0), (0.4, 1.8), (0.6, 1.2), (0.8, 3.0)):
+        moved = LINES.copy()
+        moved[1, 1] = [5.0, height]
+        states.append((load, moved))
+    contacts = find_contacts(np.array([3, 8]), LINES, states, 2.0)
+    assert contacts.pairs.tolist() == [[3, 8]]
+    assert contacts.overlap == pytest.approx([0.8])
+    assert contacts.onset.tolist() == [0.4]
+    assert contacts.first == 0.4
 
 
 def test_struts_that_cross_touch_all_the_more() -> None:
     moved = LINES.copy()
     moved[1] = [[3.0, 6.0], [3.1, 0.4], [3.2, -6.0]]
-    contacts = find_contacts(np.array([3, 8]), LINES, moved, 2.0)
+    contacts = find_contacts(np.array([3, 8]), LINES, [(1.0, moved)], 2.0)
     assert contacts.overlap == pytest.approx([2.0])
 
 
@@ -179,10 +193,10 @@ def test_struts_of_one_joint_do_not_touch_at_it_but_where_they_close() -> None:
     angle = np.radians(60.0)
     along = np.linspace(0.0, 10.0, 9)
     rest = np.array([np.outer(along, [1.0, 0.0]), np.outer(along, [np.cos(angle), np.sin(angle)])])
-    assert len(find_contacts(np.array([0, 1]), rest, rest, 2.0).pairs) == 0
+    assert len(find_contacts(np.array([0, 1]), rest, [(1.0, rest)], 2.0).pairs) == 0
     closed = rest.copy()
     closed[1] = np.outer(along, [np.cos(0.1), np.sin(0.1)])
-    assert find_contacts(np.array([0, 1]), rest, closed, 2.0).overlap[0] > 0.5
+    assert find_contacts(np.array([0, 1]), rest, [(1.0, closed)], 2.0).overlap[0] > 0.5
 
 
 @pytest.mark.parametrize(

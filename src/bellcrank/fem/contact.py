@@ -1,4 +1,7 @@
-"""Struts that touch or cross each other in the moved state, which no level resists."""
+"""Contact between struts in the deformed states of a part.
+
+No level of analysis resists contact; it is only detected and reported.
+"""
 
 from __future__ import annotations
 
@@ -8,51 +11,76 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
-
-PLACES = 9
-"""Along the centre line of each strut where contact is looked for."""
-CLEAR = 1.5
-"""Distance of centre lines in widths beyond which a place is clear of a joint and its fillets."""
+SAMPLES = 9
+"""Points on the centre line of each strut at which contact is checked."""
+CLEARANCE = 1.5
+"""Distance of centre lines at rest, in strut widths, beyond which a point is clear of a joint and
+its fillets."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contacts:
-    """Pairs of struts that touch.
+    """Pairs of struts that touch or cross somewhere along the stroke.
 
     Parameters
     ----------
     pairs : (p, 2) int64
         Beams of the lattice.
-    overlap : (p,)
-        How deep they go into each other, mm: strut width less distance of the centre lines.
+    overlap : (p,) float64
+        Largest penetration along the stroke, mm: strut width minus distance of the centre lines.
+    onset : (p,) float64
+        Fraction of the stroke at the first checked state in which the pair touches.
+
+    Examples
+    --------
+    >>> contacts = Contacts(np.array([[7, 9]]), np.array([0.5]), np.array([0.25]))
+    >>> contacts.first, contacts.message
+    (0.25, 'a pair of struts touches or crosses, beams 7 and 9 from 25% of the stroke on, \
+by up to 0.5 mm')
     """
 
     pairs: NDArray[np.int64]
     overlap: NDArray[np.float64]
+    onset: NDArray[np.float64]
+
+    @property
+    def first(self) -> float | None:
+        """Fraction of the stroke at which contact first occurs; None without contact."""
+        return float(self.onset.min()) if len(self.onset) else None
 
     @property
     def message(self) -> str:
-        """What touches, as a sentence."""
-        first, second = self.pairs[np.argmax(self.overlap)]
-        count = "a pair" if len(self.pairs) == 1 else f"{len(self.pairs)} pairs"
+        """Description of the contacts in one sentence."""
+        count = len(self.pairs)
+        earliest = np.argmin(self.onset)
+        one, other = self.pairs[earliest]
+        which = f"beams {one} and {other} from {self.onset[earliest]:.0%} of the stroke on"
+        if count == 1:
+            return (
+                f"a pair of struts touches or crosses, {which}, by up to {self.overlap[0]:.2g} mm"
+            )
+        deepest = np.argmax(self.overlap)
+        one, other = self.pairs[deepest]
         return (
-            f"{count} of struts touch or cross in the moved state, deepest those "
-            f"of beams {first} and {second}, by {self.overlap.max():.2g} mm"
+            f"{count} pairs of struts touch or cross, first {which}; largest overlap "
+            f"{self.overlap[deepest]:.2g} mm between beams {one} and {other}"
         )
 
     def to_list(self) -> list[dict[str, Any]]:
         """Return the pairs as plain data."""
         return [
-            {"beams": [int(one), int(other)], "overlap_mm": float(depth)}
-            for (one, other), depth in zip(self.pairs, self.overlap, strict=True)
+            {"beams": [int(one), int(other)], "overlap_mm": float(depth), "first_at": float(onset)}
+            for (one, other), depth, onset in zip(self.pairs, self.overlap, self.onset, strict=True)
         ]
 
 
 def centre_lines(ends: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (s, k, 2) points along straight struts from (s, 2, 2) their ends."""
-    along = np.linspace(0.0, 1.0, PLACES)[None, :, None]
+    along = np.linspace(0.0, 1.0, SAMPLES)[None, :, None]
     lines: NDArray[np.float64] = ends[:, :1] * (1.0 - along) + ends[:, 1:] * along
     return lines
 
@@ -60,50 +88,71 @@ def centre_lines(ends: NDArray[np.float64]) -> NDArray[np.float64]:
 def find_contacts(
     struts: NDArray[np.int64],
     rest: NDArray[np.float64],
-    moved: NDArray[np.float64],
+    stroke: Iterable[tuple[float, NDArray[np.float64]]],
     width: float,
 ) -> Contacts:
-    """Find the struts whose bodies meet when they move.
+    """Find the struts that touch or cross in any of the states along a stroke.
 
-    Struts that share a joint overlap there by design: what counts are places on the centre line
-    of one that were well over a width away from the centre line of the other at rest, and now are
-    less than a width away.
+    Struts overlap near a joint that they share, so a point on the centre line of one strut counts
+    only if it was more than `CLEARANCE` widths away from the centre line of the other at rest. It
+    is in contact if it is now less than one width away. Centre lines that cross, and did not cross
+    at rest, are in contact too.
 
     Parameters
     ----------
     struts : (s,) int64
-        Their beams in the lattice.
-    rest, moved : (s, k, 2)
-        Points along their centre lines, mm, at rest and moved.
+        Beams of the lattice.
+    rest : (s, k, 2) float64
+        Points along the centre lines at rest, mm.
+    stroke : iterable of (float, (s, k, 2) float64)
+        Fraction of the full input and the same points in that state, in order of the load.
     width
-        Of the struts, mm.
+        Width of the struts, mm.
+
+    Returns
+    -------
+    Contacts
+        Each pair once, in ascending order.
 
     Examples
     --------
     >>> lines = np.array([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]]] * 2)
     >>> lines[1] += [0.0, 4.0]
-    >>> closer = lines.copy()
-    >>> closer[1] -= [0.0, 2.5]
-    >>> find_contacts(np.array([7, 9]), lines, closer, 2.0).to_list()
-    [{'beams': [7, 9], 'overlap_mm': 0.5}]
+    >>> states = [(load, lines - [[[0.0, 0.0]], [[0.0, 5.0 * load]]]) for load in (0.25, 0.5)]
+    >>> find_contacts(np.array([7, 9]), lines, states, 2.0).to_list()
+    [{'beams': [7, 9], 'overlap_mm': 0.5, 'first_at': 0.5}]
     """
+    found: dict[tuple[int, int], tuple[float, float]] = {}
+    for load, moved in stroke:
+        for one, other, depth in _overlaps(rest, moved, width):
+            largest, onset = found.get((one, other), (0.0, load))
+            found[one, other] = (max(largest, depth), onset)
+    ordered = sorted(found.items())
+    pairs = np.array([pair for pair, _ in ordered], dtype=np.int64).reshape(-1, 2)
+    values = np.array([value for _, value in ordered], dtype=np.float64).reshape(-1, 2)
+    return Contacts(struts[pairs].reshape(-1, 2), values[:, 0], values[:, 1])
+
+
+def _overlaps(
+    rest: NDArray[np.float64], moved: NDArray[np.float64], width: float
+) -> list[tuple[int, int, float]]:
+    """Return the pairs of struts in contact in one state, with their overlap in mm."""
     import shapely
 
     lines, before = shapely.linestrings(moved), shapely.linestrings(rest)
     one, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=width)
     one, other = one[one != other], other[one != other]
-    points = shapely.points(moved[one])
-    near = shapely.distance(points, lines[other][:, None])
-    apart = shapely.distance(shapely.points(rest[one]), before[other][:, None])
-    counts = (near < width) & (apart >= CLEAR * width)
-    depth = np.where(counts, width - near, -np.inf).max(axis=1, initial=-np.inf)
+    distance = shapely.distance(shapely.points(moved[one]), lines[other][:, None])
+    at_rest = shapely.distance(shapely.points(rest[one]), before[other][:, None])
+    checked = (distance < width) & (at_rest >= CLEARANCE * width)
+    overlap = np.where(checked, width - distance, -np.inf).max(axis=1, initial=-np.inf)
     crossing = shapely.crosses(lines[one], lines[other]) & ~shapely.intersects(
         before[one], before[other]
     )
-    depth[crossing] = width
-    touching = depth > 0.0
-    pairs = np.sort(np.stack([one[touching], other[touching]], axis=1), axis=1)
-    pairs, which = np.unique(pairs, axis=0, return_inverse=True)
-    overlap = np.zeros(len(pairs))
-    np.maximum.at(overlap, which.ravel(), depth[touching])
-    return Contacts(struts[pairs].reshape(-1, 2), overlap)
+    overlap[crossing] = width
+    found: dict[tuple[int, int], float] = {}
+    for first, second, depth in zip(one.tolist(), other.tolist(), overlap.tolist(), strict=True):
+        if depth > 0.0:
+            pair = (min(first, second), max(first, second))
+            found[pair] = max(depth, found.get(pair, 0.0))
+    return [(*pair, depth) for pair, depth in found.items()]

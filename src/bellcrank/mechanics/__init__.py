@@ -24,6 +24,7 @@ from bellcrank.mechanics.grips import Grip, Loose, Rigid, Sliding
 from bellcrank.mechanics.minimisers import Minimiser, minimisers
 from bellcrank.mechanics.objectives import Objective, efficiency_of, objective_of, objectives
 from bellcrank.mechanics.status import Outcome, Status
+from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction
 from bellcrank.mechanics.substructure import Condensed, Substructure
 from bellcrank.mechanics.superelement import State, Superelement
 
@@ -46,9 +47,11 @@ __all__ = [
     "SpringEvaluator",
     "State",
     "Status",
+    "StrokeEvaluator",
     "Substructure",
     "Superelement",
     "UnloadedBeams",
+    "at_fraction",
     "efficiency_of",
     "follow",
     "foresee_stiffness",

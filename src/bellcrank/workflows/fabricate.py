@@ -12,7 +12,7 @@ from bellcrank.export import Export, check_print, exporter_for
 from bellcrank.export.profiles import profiles
 from bellcrank.export.slicer import find_slicer, slice_solid
 from bellcrank.fem.contact import centre_lines, find_contacts
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
+from bellcrank.mechanics import StrokeEvaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.part.outline import strut_outline
 from bellcrank.part.outline.grips import filled, with_pointer
@@ -155,13 +155,12 @@ def findings_about(bundle: Export, profile: PrintProfile) -> list[str]:
     part = bundle.part
     sentences = [finding.sentence for finding in check_print(bundle, profile.rules)]
     sentences += doubts_about(part.design)
-    response = SpringEvaluator(part.design.problem).evaluate(
-        part.design.mask, VERIFICATION_INCREMENT
+    stroke = (
+        (load, centre_lines((part.positions + part.scale * response.displacement)[part.struts]))
+        for load, response in StrokeEvaluator(part.design.problem).evaluate(part.design.mask)
     )
-    moved = part.positions + part.scale * response.displacement
-    beams = np.flatnonzero(part.design.mask)
-    rest, there = (centre_lines(places[part.struts]) for places in (part.positions, moved))
-    contacts = find_contacts(beams, rest, there, part.section.width)
+    beams, rest = np.flatnonzero(part.design.mask), centre_lines(part.positions[part.struts])
+    contacts = find_contacts(beams, rest, stroke, part.section.width)
     if len(contacts.pairs):
         sentences.append(contacts.message)
     return sentences

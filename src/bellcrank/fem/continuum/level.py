@@ -86,7 +86,7 @@ def _analyse(
         loss=path.loss,
         points=[point_of(part, state) for state in states],
         after=None,
-        contacts=contacts_of(part, found.field),
+        contacts=contacts_of(part, found),
         field=found.field,
         cost={
             "seconds": time.perf_counter() - began,
@@ -110,21 +110,34 @@ def point_of(part: Part, state: ContinuumState) -> StrokePoint:
     )
 
 
-def contacts_of(part: Part, field: Field) -> Contacts:
-    """Find the struts that touch, by where their centre lines go."""
+def contacts_of(part: Part, response: Response) -> Contacts:
+    """Find the struts whose centre lines come too close in any equilibrium of the path."""
     lines = centre_lines(part.positions[part.struts])
-    moved = lines + displacement_at(field, lines.reshape(-1, 2)).reshape(lines.shape)
+    interpolate = interpolator(response.field, lines.reshape(-1, 2))
+    stroke = (
+        (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
+        for state, field in zip(response.states, response.fields, strict=True)
+    )
     beams = np.flatnonzero(part.design.mask)
-    return find_contacts(beams, lines, moved, part.section.width)
+    return find_contacts(beams, lines, stroke, part.section.width)
 
 
-def displacement_at(field: Field, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (p, 2) the displacement of points of a sheet, or of the lower face of a body, mm.
+def interpolator(
+    field: Field, points: NDArray[np.float64]
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Return a function that interpolates vertex displacements to points of a part.
 
     Parameters
     ----------
+    field
+        Any state of the part; in space the points are on its lower face.
     points : (p, 2)
         Within the part at rest, mm.
+
+    Returns
+    -------
+    callable
+        From (n, 2) or (n, 3) displacements of the vertices to (p, 2) those of the points, mm.
     """
     import shapely
 
@@ -140,6 +153,10 @@ def displacement_at(field: Field, points: NDArray[np.float64]) -> NDArray[np.flo
     sides = np.stack([second - first, third - first], axis=2)
     part = np.linalg.solve(sides, (points[which] - first)[:, :, None])[:, :, 0]
     weight = np.column_stack([1.0 - part.sum(axis=1), part])
-    moved = np.zeros_like(points)
-    moved[which] = np.einsum("pk,pkd->pd", weight, field.displacement[cells[cell], :2])
-    return moved
+
+    def interpolate(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        moved = np.zeros_like(points)
+        moved[which] = np.einsum("pk,pkd->pd", weight, displacement[cells[cell], :2])
+        return moved
+
+    return interpolate

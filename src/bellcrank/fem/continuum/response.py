@@ -72,8 +72,8 @@ class Response:
         Its equilibria.
     states
         The same in full.
-    field
-        Of the last one.
+    fields
+        The same for pictures and files.
     unknowns
         How many there are.
     elements
@@ -82,9 +82,14 @@ class Response:
 
     path: Path
     states: list[ContinuumState]
-    field: Field
+    fields: list[Field]
     unknowns: int
     elements: int
+
+    @property
+    def field(self) -> Field:
+        """The last equilibrium."""
+        return self.fields[-1]
 
 
 def solve_plane(
@@ -150,7 +155,8 @@ def respond(
         complete(part, equations, state, shape)
         for state, shape in zip(path.states, shapes, strict=True)
     ]
-    return Response(path, states, shapes[-1].field, equations.count, len(mesh.elements))
+    fields = [shape.field for shape in shapes]
+    return Response(path, states, fields, equations.count, len(mesh.elements))
 
 
 def solve_linear(equations: ContinuumEquations) -> Path:

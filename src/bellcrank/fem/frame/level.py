@@ -19,7 +19,7 @@ from bellcrank.fem.path import Follower, PathStatus, Stepping
 from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -81,7 +81,7 @@ def analyse_frame(part: Part, settings: FemSettings, tell: Callable[[float], Non
         loss=loss,
         points=points,
         after=point_of(part, mesh, after) if after else None,
-        contacts=contacts_of(part, mesh, last),
+        contacts=contacts_of(part, mesh, states),
         field=field_of(part, mesh, last, linear=settings.linear),
         cost={
             "seconds": time.perf_counter() - began,
@@ -152,11 +152,11 @@ def fibres(
     return young * (np.abs(stretched) + bent), np.maximum(stretched + bent, widened)
 
 
-def contacts_of(part: Part, mesh: FrameMesh, state: FrameState) -> Contacts:
-    """Find the struts that touch."""
+def contacts_of(part: Part, mesh: FrameMesh, states: Sequence[FrameState]) -> Contacts:
+    """Find the struts that touch in any equilibrium of the path."""
     struts, lines = mesh.lines()
-    moved = mesh.positions + state.displacement[:, :2]
-    return find_contacts(struts, mesh.positions[lines], moved[lines], part.section.width)
+    stroke = ((state.load, (mesh.positions + state.displacement[:, :2])[lines]) for state in states)
+    return find_contacts(struts, mesh.positions[lines], stroke, part.section.width)
 
 
 def field_of(part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool) -> Field:

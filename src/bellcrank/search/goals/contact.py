@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
+from bellcrank.mechanics import StrokeEvaluator, UnloadedBeams
 from bellcrank.search.goals.terms import Kind, Moved, Term, counted, positive
 from bellcrank.search.goals.terms import terms as registry
 
@@ -114,14 +115,32 @@ def struts_of(moved: Moved) -> NDArray[np.int64]:
 
 
 def no_contact(_problem: Problem, width: float) -> Term:
-    """No crossing in the moved state and, with a width, no two struts nearer than that.
+    """No struts that cross and, with a width, none nearer to each other than that width.
 
-    Each crossing is a fault; two struts that are too near count by the missing part of the width.
+    Each crossing counts as one fault, and two struts that are too near as the missing fraction of
+    the width. Designs that are verified are checked along the whole stroke, where the state with
+    most faults counts; others at full load only.
     """
+    # Separate evaluators, because the one that holds the response must keep it.
+    strokes: dict[tuple[float, int], StrokeEvaluator] = {}
+
+    def faults(positions: NDArray[np.float64], struts: NDArray[np.int64]) -> float:
+        _, distance = near_pairs(positions, struts, width)
+        return float(np.sum(1.0 - distance / width)) if width else float(len(distance))
 
     def of_response(moved: Moved) -> float:
-        _, distance = near_pairs(moved.positions, struts_of(moved), width)
-        return counted(float(np.sum(1.0 - distance / width)) if width else float(len(distance)))
+        struts = struts_of(moved)
+        worst = faults(moved.positions, struts)
+        if moved.verified:
+            evaluator = moved.evaluator
+            key = (evaluator.problem.input.amount, evaluator.core)
+            if key not in strokes:
+                unloaded_beams = get_args(UnloadedBeams)[evaluator.core]
+                strokes[key] = StrokeEvaluator(evaluator.problem, unloaded_beams)
+            rest = evaluator.problem.lattice.positions
+            for _, response in strokes[key].evaluate(moved.mask):
+                worst = max(worst, faults(rest + response.displacement, struts))
+        return counted(worst)
 
     return Term(of_response=of_response, price=3)
 

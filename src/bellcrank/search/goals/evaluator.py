@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
     Core,
     FlipPrediction,
     Response,
@@ -167,6 +168,7 @@ class GoalEvaluator:
             core,
             self._excess_of_beams(design, core),
             lambda evaluator: evaluator.evaluate(design, largest_increment),
+            verified=largest_increment <= VERIFICATION_INCREMENT,
         )
 
     def _evaluate_warm(
@@ -220,7 +222,10 @@ class GoalEvaluator:
         """Return the goals that a design with a stable response breaks."""
         design = self.expanded(mask)
         core = self._core(design)
-        moved = self._moved(design, core, [e.evaluate(design) for e in self.evaluators])
+        responses = [
+            evaluator.evaluate(design, VERIFICATION_INCREMENT) for evaluator in self.evaluators
+        ]
+        moved = self._moved(design, core, responses, verified=True)
         return [
             text
             for text, made in self._terms
@@ -237,10 +242,15 @@ class GoalEvaluator:
         return sum(_of_beams(made, design, core) for _, made in self._terms)
 
     def _moved(
-        self, design: NDArray[np.bool_], core: NDArray[np.bool_], responses: list[Response]
+        self,
+        design: NDArray[np.bool_],
+        core: NDArray[np.bool_],
+        responses: list[Response],
+        *,
+        verified: bool,
     ) -> list[Moved]:
         return [
-            Moved(evaluator, design, core, response)
+            Moved(evaluator, design, core, response, verified)
             for evaluator, response in zip(self.evaluators, responses, strict=True)
         ]
 
@@ -252,6 +262,8 @@ class GoalEvaluator:
         answer: Callable[[SpringEvaluator], Response],
         most: float = math.inf,
         least: float = -math.inf,
+        *,
+        verified: bool = False,
     ) -> Response:
         """Ask every case for its response, and the terms what they think of it."""
         self._excess = math.inf
@@ -266,7 +278,7 @@ class GoalEvaluator:
             for weight, case, value in zip(self.weights, self.cases, self._value, strict=True)
         )
         response = replace(responses[0], efficiency=efficiency)
-        moved = self._moved_last = self._moved(design, core, responses)
+        moved = self._moved_last = self._moved(design, core, responses, verified=verified)
         for _, made in self._terms:
             if efficiency - penalty_of(excess) <= least:
                 return replace(response, status=Status.UNVERIFIED, penalty=penalty_of(excess))

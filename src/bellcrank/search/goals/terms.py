@@ -50,12 +50,16 @@ class Moved:
         The beams that are present, and those of them that carry load.
     response
         At full load.
+    verified
+        Whether the design is verified, so that constraints on the whole stroke are evaluated along
+        it. Otherwise they are evaluated at full load only.
     """
 
     evaluator: SpringEvaluator
     mask: NDArray[np.bool_]
     core: NDArray[np.bool_]
     response: Response
+    verified: bool = False
 
     @property
     def positions(self) -> NDArray[np.float64]:

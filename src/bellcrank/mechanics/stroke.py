@@ -1,0 +1,68 @@
+"""Equilibria of the spring model along the stroke."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from bellcrank.mechanics.evaluator import VERIFICATION_INCREMENT, SpringEvaluator
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import ArrayLike
+
+    from bellcrank.mechanics.evaluator import Response, UnloadedBeams
+    from bellcrank.model import Problem
+
+STATES = 8
+"""Number of states along the stroke, the full input included, at which contact is checked."""
+
+
+def at_fraction(problem: Problem, fraction: float) -> Problem:
+    """Return a problem with a fraction of its input.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> round(at_fraction(find_problem("crane"), 0.5).input.amount, 3)
+    0.217
+    """
+    return replace(problem, input=replace(problem.input, amount=fraction * problem.input.amount))
+
+
+class StrokeEvaluator:
+    """Responses of designs at equal fractions of the full input, each computed from rest.
+
+    Parameters
+    ----------
+    problem
+        Lattice, supports, full input and output.
+    unloaded_beams
+        As in `SpringEvaluator`.
+    states
+        Number of states, the full input included.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> crane = find_problem("crane")
+    >>> [load for load, _ in StrokeEvaluator(crane, states=4).evaluate(crane.initial)]
+    [0.25, 0.5, 0.75, 1.0]
+    """
+
+    def __init__(
+        self, problem: Problem, unloaded_beams: UnloadedBeams = "keep", states: int = STATES
+    ) -> None:
+        self._evaluators = [
+            (load, SpringEvaluator(at_fraction(problem, load), "displacement", unloaded_beams))
+            for load in (state / states for state in range(1, states + 1))
+        ]
+
+    def evaluate(self, mask: ArrayLike) -> Iterator[tuple[float, Response]]:
+        """Yield the fraction of the full input and the response there, in ascending order."""
+        for load, evaluator in self._evaluators:
+            # A power of two, so that the increments add up to the load without a remainder.
+            increment = 2.0 ** math.floor(math.log2(VERIFICATION_INCREMENT / load))
+            yield load, evaluator.evaluate(mask, min(1.0, increment))
