@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 
-from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.provenance import provenance
@@ -29,7 +28,6 @@ from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.identity import architecture_of
 from bellcrank.surrogate.models import models
-from bellcrank.surrogate.onnx import in_onnx
 from bellcrank.surrogate.recipes import Recipe
 from bellcrank.surrogate.trained import TrainedModel
 from bellcrank.surrogate.views import PictureView, views
@@ -201,7 +199,7 @@ def network(name: str) -> TrainedModel:
 
 
 def measure_network(masks: NDArray[np.bool_], name: str, effort: Effort) -> list[Cost]:
-    """Time predictions in each precision there is, in ONNX Runtime, and on a GPU."""
+    """Time predictions in each precision, on the processor and on a GPU."""
     model = network(name)
     packed = np.packbits(masks, axis=1)
     costs = []
@@ -217,13 +215,6 @@ def measure_network(masks: NDArray[np.bool_], name: str, effort: Effort) -> list
         for kind in sorted(kinds, reverse=True):
             add(f"{name}, torch {kind}", "one core", batch,
                 lambda p, k=kind: model.predict(p, device="cpu", precision=k))  # fmt: skip
-    try:
-        fast = in_onnx(model, threads=1)
-    except InvalidSettings as missing:
-        print(f"{name} in ONNX Runtime left out: {missing}")
-    else:
-        for batch in effort.batches:
-            add(f"{name}, ONNX Runtime float32", "one core", batch, fast.predict)
     if torch.cuda.is_available():
         for batch in GPU_BATCHES:
             for kind in ("float32", "bfloat16"):

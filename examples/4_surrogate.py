@@ -14,11 +14,8 @@ it does not, is told honestly on :doc:`/surrogate`; here is how it goes.
 
 from pathlib import Path
 
-import numpy as np
-
-from bellcrank.learning.building import DatasetSpec, build_dataset
+from bellcrank.campaign.dataset import DatasetSpec, build_dataset
 from bellcrank.model import find_problem
-from bellcrank.plots.learning import Learnt, draw_learnt
 from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.recipes import recipe_of
 
@@ -47,26 +44,6 @@ for epoch in training.log:
 held_out = training.split.held_out[:5]
 for told, true in zip(model.predict(data.packed[held_out]), data.efficiency[held_out], strict=True):
     print(f"predicted {told:+.3f}, in truth {true:+.3f}")
-
-# %%
-# A point on the line is a prediction that is right. From so few designs a network learns little;
-# :doc:`/surrogate` shows how much it takes.
-
-tested = model.record["held_out"]
-rows = training.split.held_out
-draw_learnt(
-    Learnt(
-        name="scaling-8 by mlp",
-        note=f"{len(data) - len(rows)} designs to learn from, {len(rows)} of other runs to test",
-        predicted=model.predict(data.packed[rows]),
-        actual=data.efficiency[rows],
-        r_squared=tested["r_squared"],
-        determination=tested["determination"],
-        designs=np.array([epoch.designs for epoch in training.log], dtype=float),
-        accuracy=np.array([epoch.r_squared for epoch in training.log]),
-    ),
-    "learnt.png",
-)
 
 # %%
 # On the command line: ``bellcrank dataset build scaling-8``, ``bellcrank train scaling-8-dataset``,

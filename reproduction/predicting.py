@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.learning.building import reverse
+from bellcrank.campaign.dataset import reverse
 from bellcrank.mechanics import Status
 from bellcrank.model import find_problem
 from bellcrank.search import chain_blocks, make_evaluator, read_settings
@@ -68,10 +68,10 @@ def dataset(settings: Settings) -> Dataset:
 
 def shipped(settings: Settings) -> dict[str, Any]:
     """Predict with the network that comes along."""
-    from bellcrank.surrogate.predictor import load_models
+    from bellcrank.surrogate.predictor import load_model
 
     data = dataset(settings)
-    model: Any = load_models(data.problem)[0]
+    model: Any = load_model(data.problem)
     with one_thread():
         predicted = model.predict(data.packed)
     told = _tested(predicted, data.efficiency)

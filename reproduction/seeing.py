@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.learning.explanation import as_drawn, explain_design
 from bellcrank.model import Design, find_problem
 from bellcrank.plots.explanation import draw_explanation
+from reproduction.explanation import as_drawn, explain_design
 from reproduction.predicting import one_thread
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import design_of, run_chain

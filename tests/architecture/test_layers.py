@@ -41,11 +41,10 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     [
         "import bellcrank.cli.main",
         "import bellcrank.surrogate.predictor, bellcrank.surrogate.beginning",
-        "import bellcrank.surrogate.onnx",
         "from bellcrank.surrogate.dataset import read_dataset",
         HELP,
     ],
-    ids=["cli", "surrogate", "onnx", "dataset", "help"],
+    ids=["cli", "surrogate", "dataset", "help"],
 )
 def test_nothing_loads_pytorch_before_a_network_is_needed(statement: str) -> None:
     assert not imported_by(statement) & {"torch", "onnx", "onnxruntime", "safetensors"}

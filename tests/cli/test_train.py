@@ -18,8 +18,8 @@ import pytest
 
 from bellcrank.model import find_problem, pack_mask, write_problem
 from bellcrank.surrogate.trained import read_model
-from tests.learning.tiny import tiny_dataset, tiny_model, tiny_problem
 from tests.surrogate.helpers import random_dataset, same_weights, untrained
+from tests.surrogate.tiny import tiny_dataset, tiny_model, tiny_problem
 
 from .helpers import Outcome, call, refusal
 

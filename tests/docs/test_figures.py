@@ -242,15 +242,6 @@ def flips() -> Rows:
         yield row(words, *(f"{told[key]['mean']:.2f}" for key in ("pearson", "spearman", "recall")))
 
 
-def transfer() -> Rows:
-    for told in read("surrogate/transfer")["trials"]:
-        yield row(
-            told["how"], told["designs"] or "", f"{told['r_squared']:.2f}",
-            f"{told['determination']:.2f}",
-            *(f"{told['flips'][key]['mean']:.2f}" for key in ("spearman", "recall")),
-        )  # fmt: skip
-
-
 def driven() -> Rows:
     medians = read("surrogate/driven")["medians"]
     for name, words in (("final", "its end"), ("checked", "the best of ten as checked")):
@@ -275,7 +266,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "goals": (goals,),
     "validation": (levels, meshes, widths, correlation, searched),
     "machines": (showcases, lengths, strokes, two_ports, potentials),
-    "surrogate": (costs, shipped, epochs, flips, transfer, driven, elsewhere),
+    "surrogate": (costs, shipped, epochs, flips, driven, elsewhere),
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from bellcrank.learning.building import DatasetSpec, build_dataset
+from bellcrank.campaign.dataset import DatasetSpec, build_dataset
 from bellcrank.model import Problem, find_problem
 
 from .helpers import random_dataset

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from bellcrank.campaign import Store
+from bellcrank.campaign import dataset as building
+from bellcrank.campaign.dataset import CAMPAIGN, DatasetSpec, build_dataset, gather
 from bellcrank.errors import InvalidSettings, OutputExists, StorageError
-from bellcrank.learning import building
-from bellcrank.learning.building import CAMPAIGN, DatasetSpec, build_dataset, gather
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import find_problem
 from bellcrank.surrogate.dataset import DATASET_FILE, read_dataset

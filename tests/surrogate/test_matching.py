@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from bellcrank.campaign.dataset import reverse
 from bellcrank.errors import InvalidModel, InvalidProblem
-from bellcrank.learning.building import reverse
 from bellcrank.model import Lattice, Stiffness, Supports, find_problem, unpack_mask
 from bellcrank.surrogate.matching import beams_between
 from bellcrank.surrogate.predictor import Predictor, load_predictor

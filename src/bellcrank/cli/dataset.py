@@ -8,19 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import TextColumn, TimeRemainingColumn
 
 from bellcrank.cli.app import INTERRUPTED, app
 from bellcrank.cli.arguments import settings_of
 from bellcrank.cli.console import (
     announce_compilation,
     notes,
-    number_of,
     plain,
     print_json,
     results,
 )
-from bellcrank.cli.live import Live
 
 if TYPE_CHECKING:
     from bellcrank.surrogate.dataset import Dataset
@@ -50,9 +47,9 @@ def build(
     ] = None,
 ) -> None:
     """Run many short searches, and keep all that they proposed."""
+    from bellcrank.campaign.dataset import DatasetSpec, build_dataset
     from bellcrank.cli.campaign_view import CampaignProgress
     from bellcrank.cli.design import stopping_on_interrupt
-    from bellcrank.learning.building import DatasetSpec, build_dataset
     from bellcrank.model import find_problem
 
     found = find_problem(problem)
@@ -83,40 +80,6 @@ def info(
         print_json(json.dumps(told, indent=1))
     else:
         _print_summary(told)
-
-
-@dataset.command()
-def export(
-    file: DatasetFile,
-    png: Annotated[Path, typer.Option(help="Folder for the pictures.")],
-    count: Annotated[int | None, typer.Option(help="So many, evenly spread. \\[all]")] = None,
-    style: Annotated[
-        str, typer.Option(help="fine, as networks here see them; paper, as the paper's did.")
-    ] = "fine",
-) -> None:
-    """Write pictures of 192 x 128 pixels, and a table that names each one's efficiency.
-
-    The same command goes on with what a stop or a kill left.
-    """
-    from bellcrank.learning.exporting import export_pictures
-    from bellcrank.surrogate.dataset import read_dataset
-
-    data = read_dataset(file)
-    with ExportProgress() as progress:
-        written = export_pictures(data, png, count=count, style=style, tell=progress)
-    results.print(f"{number_of(written, 'picture')} and labels.csv written to {plain(png)}/")
-
-
-class ExportProgress(Live):
-    """Shows how many pictures are drawn."""
-
-    def __init__(self) -> None:
-        super().__init__("drawing", None, TextColumn("left"), TimeRemainingColumn())
-
-    def __call__(self, done: int, total: int) -> None:
-        """Take in how many are drawn."""
-        figures = f"{done} / {total}"
-        self._show(done, total, figures, f"drawing {100.0 * done / total:3.0f} %  {figures}")
 
 
 def summary_of(data: Dataset) -> dict[str, Any]:

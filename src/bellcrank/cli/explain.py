@@ -12,6 +12,7 @@ from rich.table import Table
 
 from bellcrank.cli.app import app
 from bellcrank.cli.arguments import DesignName, design_named
+from bellcrank.cli.checkout import require_reproduction
 from bellcrank.cli.console import (
     announce_compilation,
     notes,
@@ -61,12 +62,13 @@ def explain(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")] = False,
 ) -> None:
     """Say which beams matter, to a trained network and by mechanics, and how far they agree."""
+    require_reproduction()
     from bellcrank.surrogate.backend import import_torch
 
     design = design_named(what)
     import_torch()
-    from bellcrank.learning.explanation import explain_design
     from bellcrank.surrogate.occlusion import Block
+    from reproduction.explanation import explain_design
 
     given = {
         key: value for key, value in (("size", block), ("stride", stride)) if value is not None

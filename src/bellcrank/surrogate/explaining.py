@@ -236,9 +236,9 @@ def explain(
         raise InvalidSettings(f"{problem.name!r} has no designable beam to explain")
     beams_there = beams_between(model.problem, problem)
     effects = flip_effects(problem, design.mask[None])
-    predictor = Predictor(problem, [model], device=device)
+    predictor = Predictor(problem, model, device=device)
     (known,) = renumbered(design.mask[None], beams_there)
-    predicted = predictor.predict(design.mask[None]).efficiency[0]
+    predicted = predictor.predict(design.mask[None])[0]
     _, gradient = value_and_gradient(model, known, device=device)
     occlusion = None
     if isinstance(model.view, PictureView):

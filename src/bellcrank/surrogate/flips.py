@@ -135,7 +135,7 @@ def foreseen_by(
     for number, mask in enumerate(masks):
         asked = np.repeat(mask[None], len(beams) + 1, axis=0)
         asked[np.arange(len(beams)) + 1, beams] ^= True
-        said = predictor.predict(asked).efficiency
+        said = predictor.predict(asked)
         change[number] = said[1:] - said[0]
     return change
 
@@ -219,7 +219,7 @@ def flip_accuracy(
         As `flip_effects`.
     """
     if isinstance(network, TrainedModel):
-        network = Predictor(problem, [network])
+        network = Predictor(problem, network)
     truth = flip_effects(problem, masks) if effects is None else effects
     return compare_flips(foreseen_by(network, truth.masks, truth.beams), truth.exact)
 

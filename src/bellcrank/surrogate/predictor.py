@@ -1,94 +1,77 @@
-"""Predictions for the problem at hand, by one network or by several that keep each other honest.
+"""Efficiencies of designs, predicted by a trained network.
 
 Examples
 --------
-A network for the crane comes with bellcrank.
+A network for the crane is part of the package.
 
->>> import numpy as np
 >>> from bellcrank.model import find_problem
 >>> crane = find_problem("crane")
 >>> predictor = load_predictor(crane)  # doctest: +SKIP
->>> predictor.predict(np.array([crane.initial]))  # doctest: +SKIP
-Prediction(efficiency=array([-0.06...]), spread=None)
+>>> predictor.predict(crane.initial[None])  # doctest: +SKIP
+array([-0.06...])
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidModel, InvalidProblem
+from bellcrank.errors import InvalidFile, InvalidModel, InvalidProblem
+from bellcrank.surrogate.folder import MODEL
 from bellcrank.surrogate.matching import beams_between, renumbered
 from bellcrank.surrogate.trained import TrainedModel, read_model
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
-    from bellcrank.surrogate.onnx import OnnxModel
 
-SHIPPED = ("crane",)
-"""Problems that a trained network comes with bellcrank for."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Prediction:
-    """What networks say of designs.
-
-    Parameters
-    ----------
-    efficiency : (n,) float64
-        Mean over the networks.
-    spread : (n,) float64 or None
-        Standard deviation between them: how much they dispute. None for a single one.
-    """
-
-    efficiency: NDArray[np.float64]
-    spread: NDArray[np.float64] | None
+BUNDLED = ("crane",)
+"""Problems for which the package contains a trained network."""
 
 
 class Predictor:
-    """Networks that have learnt one problem, asked about designs as numbered in another file.
+    """A trained network that is evaluated on designs of a problem.
+
+    The problem's nodes and beams may be numbered differently from those of the problem that the
+    network was trained on.
 
     Parameters
     ----------
     problem
-        At hand; its masks are what `predict` takes.
-    members
-        Networks that have learnt it.
+        Its masks are the argument of `predict`.
+    model
+        The trained network.
     device, precision
-        Where and how they compute.
+        Where and in which arithmetic the network is evaluated; see `bellcrank.surrogate.backend`.
 
     Raises
     ------
     InvalidModel
-        If there is none, or one has learnt something else.
+        If the network was trained on another problem.
     """
 
     def __init__(
         self,
         problem: Problem,
-        members: Sequence[TrainedModel | OnnxModel],
+        model: TrainedModel,
         *,
         device: str = "auto",
         precision: str = "float32",
     ) -> None:
-        if not members:
-            raise InvalidModel("expected at least one trained model")
         self.problem = problem
-        self.members = tuple(members)
+        self.model = model
         self.device = device
         self.precision = precision
-        self._beams = [beams_between(member.problem, problem) for member in self.members]
+        self._beams = beams_between(model.problem, problem)
 
-    def predict(self, masks: NDArray[np.bool_]) -> Prediction:
+    def predict(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Predict the efficiencies of designs.
 
         Parameters
@@ -96,14 +79,18 @@ class Predictor:
         masks : (n, M) bool
             Over the beams of `problem`.
 
+        Returns
+        -------
+        (n,) float64
+
         Raises
         ------
         InvalidProblem
-            If they are not that.
+            If the masks have another shape or type.
         InvalidSettings
-            If the device or the precision makes no sense here.
+            If the device or the precision is not available.
         InvalidModel
-            If a network says something that is no number.
+            If a prediction is not a finite number.
         """
         given = np.asarray(masks)
         beams = self.problem.lattice.beam_count
@@ -112,113 +99,99 @@ class Predictor:
                 f"masks: expected booleans of shape (n, {beams}), one for each beam of "
                 f"{self.problem.name!r}, got {given.dtype} of shape {given.shape}"
             )
-        said = np.array(
-            [
-                member.predict(
-                    np.packbits(renumbered(given, beams_there), axis=1),
-                    device=self.device,
-                    precision=self.precision,
-                )
-                for member, beams_there in zip(self.members, self._beams, strict=True)
-            ]
-        )
-        wrong = np.argwhere(~np.isfinite(said))
+        packed = np.packbits(renumbered(given, self._beams), axis=1)
+        predicted = self.model.predict(packed, device=self.device, precision=self.precision)
+        wrong = np.flatnonzero(~np.isfinite(predicted))
         if len(wrong):
-            member, design = wrong[0].tolist()
             raise InvalidModel(
-                f"network {member + 1} of {len(said)}, a {self.members[member].architecture}, says "
-                f"{said[member, design]} of design {design}; its file may be damaged"
+                f"the {self.model.architecture} network predicts {predicted[wrong[0]]} for design "
+                f"{wrong[0]}; its file may be damaged"
             )
-        spread = said.std(axis=0, ddof=1) if len(said) > 1 else None
-        return Prediction(said.mean(axis=0), spread)
+        return predicted
 
 
 def load_predictor(
     problem: Problem,
-    paths: Sequence[str | os.PathLike[str]] = (),
+    path: str | os.PathLike[str] | None = None,
     *,
     device: str = "auto",
     precision: str = "float32",
     any_stiffness: bool = False,
 ) -> Predictor:
-    """Return a predictor for a problem.
+    """Load a trained network for a problem.
 
     Parameters
     ----------
-    paths
-        Files of trained models; by default the one that comes with bellcrank.
+    path
+        File of a trained network, or the folder of its training; the bundled network by default.
     any_stiffness
-        Whether a problem of another stiffness will do, as that of a design for a part: networks
-        know one, and the predictor's problem has that.
+        Accept a problem with another stiffness than the network was trained on, such as that of
+        a design for a part. The predictor's problem then has the stiffness of the network.
 
     Raises
     ------
     InvalidModel
-        If none comes with bellcrank, or one of them has learnt another problem or is damaged.
+        If the network was trained on another problem or is damaged, or there is no bundled one.
     InvalidFile
         If there is no such file.
     InvalidSettings
         If PyTorch is not installed.
     """
-    members = [_read(path) for path in paths] or load_models(problem, any_stiffness=any_stiffness)
-    asked = _as_learnt(members[0].problem, problem) if any_stiffness else problem
-    return Predictor(asked, members, device=device, precision=precision)
+    model = load_model(problem, path, any_stiffness=any_stiffness)
+    known = _with_stiffness_of(model.problem, problem) if any_stiffness else problem
+    return Predictor(known, model, device=device, precision=precision)
 
 
-def load_models(
-    problem: Problem, paths: Sequence[str | os.PathLike[str]] = (), *, any_stiffness: bool = False
-) -> list[TrainedModel]:
-    """Return trained networks for a problem: those in files, or the one that comes with bellcrank.
+def load_model(
+    problem: Problem, path: str | os.PathLike[str] | None = None, *, any_stiffness: bool = False
+) -> TrainedModel:
+    """Read a trained network from a file or folder, or the bundled network.
 
-    Parameters
-    ----------
-    paths, any_stiffness
-        As for `load_predictor`.
-
-    Raises
-    ------
-    InvalidModel
-        If none comes with bellcrank, or one of them has learnt another problem or is damaged.
-    InvalidFile, InvalidSettings
-        As `load_predictor`.
+    Parameters and errors are those of `load_predictor`.
     """
-    if paths:
-        found = [read_model(path) for path in paths]
-        for model in found:
-            _require_fit(model, problem, any_stiffness=any_stiffness)
-        return found
+    if path is not None:
+        model = read_model(model_file(path))
+        _require_match(model, problem, any_stiffness=any_stiffness)
+        return model
     refusals = []
-    for name in SHIPPED:
+    for name in BUNDLED:
         source = resources.files("bellcrank.surrogate") / "pretrained" / f"{name}.safetensors"
-        with resources.as_file(source) as path:
-            model = read_model(path)
+        with resources.as_file(source) as file:
+            model = read_model(file)
         try:
-            _require_fit(model, problem, any_stiffness=any_stiffness)
+            _require_match(model, problem, any_stiffness=any_stiffness)
         except InvalidModel as error:
             refusals.append(str(error))
         else:
-            return [model]
+            return model
     raise InvalidModel(
-        f"no trained model for {problem.name!r} comes with bellcrank ({refusals[0]}); train one "
-        f"(bellcrank dataset build, bellcrank train) and name its file or folder"
+        f"no bundled network for {problem.name!r} ({refusals[0]}); train one (bellcrank dataset "
+        f"build, bellcrank train) and give its file or folder"
     )
 
 
-def _require_fit(model: TrainedModel, problem: Problem, *, any_stiffness: bool) -> None:
-    """Refuse a network that has learnt something else."""
-    asked = _as_learnt(model.problem, problem) if any_stiffness else problem
-    beams_between(model.problem, asked)
+def model_file(path: str | os.PathLike[str]) -> Path:
+    """Return a model file: the path itself, or the model in the folder of a training.
+
+    Raises
+    ------
+    InvalidFile
+        If a folder contains none.
+    """
+    place = Path(path)
+    if not place.is_dir():
+        return place
+    if not (place / MODEL).exists():
+        raise InvalidFile(f"{place}: no trained model in this folder; expected {MODEL}")
+    return place / MODEL
 
 
-def _as_learnt(known: Problem, given: Problem) -> Problem:
-    """Return the problem at hand with the stiffness of the one that is known."""
+def _require_match(model: TrainedModel, problem: Problem, *, any_stiffness: bool) -> None:
+    """Raise InvalidModel if a network was trained on another problem."""
+    beams_between(
+        model.problem, _with_stiffness_of(model.problem, problem) if any_stiffness else problem
+    )
+
+
+def _with_stiffness_of(known: Problem, given: Problem) -> Problem:
     return replace(given, stiffness=known.stiffness)
-
-
-def _read(path: str | os.PathLike[str]) -> TrainedModel | OnnxModel:
-    """Read a network for PyTorch, or for ONNX Runtime where the name says so."""
-    if Path(path).suffix == ".onnx":
-        from bellcrank.surrogate.onnx import read_onnx
-
-        return read_onnx(path)
-    return read_model(path)

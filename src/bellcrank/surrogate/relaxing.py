@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.surrogate.trained import TrainedModel
-    from bellcrank.surrogate.views import BitsView, GridView, PictureView
+    from bellcrank.surrogate.views import BitsView, PictureView
 
 
 class Relaxation(Protocol):
@@ -93,27 +93,6 @@ class RelaxedBits:
         """Return the slope itself."""
         del presence
         return slope
-
-
-@relaxations.register("grid")
-class RelaxedGrid:
-    """Cells that are filled in part."""
-
-    def __init__(self, view: GridView) -> None:
-        self.place, self.shape = view.place, view.shape
-
-    def see(self, presence: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Put each beam's presence into its cell."""
-        cells = np.zeros(int(np.prod(self.shape)))
-        cells[self.place] = presence
-        return cells.reshape(self.shape)
-
-    def trace_back(
-        self, presence: NDArray[np.float64], slope: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Take each beam's cell."""
-        del presence
-        return np.asarray(slope.ravel()[self.place])
 
 
 def value_and_gradient(

@@ -1,4 +1,4 @@
-"""What a network looks at: pictures, bits, or the lattice as a grid of cells.
+"""What a network looks at: pictures or bits.
 
 A view turns packed masks into arrays of bytes, and says how bytes become numbers: training
 moves bytes, and the numbers are made where the network is.
@@ -77,60 +77,3 @@ class BitsView:
     def to_dict(self) -> dict[str, Any]:
         """Return nothing: there is no choice."""
         return {}
-
-
-BASIS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
-"""Steps from one node of a triangular lattice to the next."""
-DIRECTIONS = 3
-"""In each of which a node of a triangular lattice starts one beam."""
-
-
-@views.register("grid")
-class GridView:
-    """The lattice in its own coordinates: a cell a node, a channel a direction of beams.
-
-    Exact on triangular lattices, where beams to the right and up from a node are in its cell,
-    and those to the upper left in the cell before. On others, beams go to the cell of their
-    middle and the nearest direction, and to further channels where two would share one.
-    """
-
-    scale = 1.0
-
-    def __init__(self, problem: Problem) -> None:
-        lattice = problem.lattice
-        ends = lattice.positions[lattice.beams]
-        along = ends[:, 1] - ends[:, 0]
-        step = float(np.median(np.linalg.norm(along, axis=1)))
-        start = lattice.positions[0]  # a node: beams that start in one share their cell
-        middle = (ends.mean(axis=1) - start) / step @ np.linalg.inv(BASIS)
-        cell = np.floor(middle + 1e-3).astype(np.int64)
-        cell -= cell.min(axis=0)
-        angle = np.arctan2(along[:, 1], along[:, 0])
-        channel = np.round(angle * DIRECTIONS / np.pi).astype(np.int64) % DIRECTIONS
-        columns, rows = cell.max(axis=0) + 1
-        place = (channel * rows + cell[:, 1]) * columns + cell[:, 0]
-        layer = _rank_among_equals(place)
-        self.place = layer * (DIRECTIONS * rows * columns) + place
-        channels = int(layer.max() + 1) * DIRECTIONS
-        self.shape = (channels, int(rows), int(columns))
-
-    def look(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Put each bit into its cell."""
-        cells = np.zeros((len(packed), int(np.prod(self.shape))), np.uint8)
-        beams = len(self.place)
-        cells[:, self.place] = np.unpackbits(check_masks(packed, beams), axis=1, count=beams)
-        return cells.reshape(len(packed), *self.shape)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return nothing: there is no choice."""
-        return {}
-
-
-def _rank_among_equals(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return how many equal values come before each."""
-    order = np.argsort(values, kind="stable")
-    ordered = values[order]
-    first = np.searchsorted(ordered, ordered)
-    rank = np.empty(len(values), np.int64)
-    rank[order] = np.arange(len(values)) - first
-    return rank

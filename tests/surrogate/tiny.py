@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.learning.building import reverse
+from bellcrank.campaign.dataset import reverse
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Input, Output, Problem, Supports, lattices
 from bellcrank.search import MetropolisSettings, chain_blocks

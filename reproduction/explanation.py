@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
-from bellcrank.learning.fitting import model_files
 from bellcrank.model import Design
 from bellcrank.plots.agreements import Measure
 from bellcrank.plots.explanation import Explained, draw_explanation
 from bellcrank.plots.saving import check_target
 from bellcrank.plots.shadings import HeatMap, Shading
 from bellcrank.surrogate.explaining import Explanation, explain
-from bellcrank.surrogate.predictor import load_models
+from bellcrank.surrogate.predictor import load_model
 from bellcrank.surrogate.regions import overlap_of_regions
 
 if TYPE_CHECKING:
@@ -90,13 +88,7 @@ def explain_design(
 def _learnt(design: Design, path: str | os.PathLike[str] | None) -> tuple[TrainedModel, Design]:
     """Return the network, and the design with the stiffness that it has learnt."""
     problem = design.problem
-    files = [] if path is None else model_files(path)
-    if len(files) > 1:
-        raise InvalidSettings(
-            f"{path}: {len(files)} networks lie there, and only one can be explained at a "
-            f"time; name one of them, for example {files[0]}"
-        )
-    (network,) = load_models(problem, files, any_stiffness=True)
+    network = load_model(problem, path, any_stiffness=True)
     known = replace(problem, stiffness=network.problem.stiffness)
     return network, Design(known, design.mask)
 

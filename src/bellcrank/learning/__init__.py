@@ -1,1 +1,0 @@
-"""Whole jobs of the learned surrogate: building data, searching, explaining, comparing."""
