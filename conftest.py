@@ -1,15 +1,15 @@
-"""How the tests are spread over processors."""
+"""Distribution of the tests over processors."""
 
 import os
 
 import pytest
 
 MOST_WORKERS = 8
-"""Each compiles the kernels when they are new, and takes about a gigabyte."""
+"""Each worker compiles the kernels when they are new, and uses about a gigabyte."""
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Share out a run of all tests; what is named on the command line runs at once, in one."""
+    """Use all processors for a run of all tests, and one process for tests that are named."""
     if config.args_source is not pytest.Config.ArgsSource.TESTPATHS:
         return 0
     return min(os.cpu_count() or 1, MOST_WORKERS)

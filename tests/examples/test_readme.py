@@ -1,4 +1,4 @@
-"""What the README says can be done, can be done."""
+"""The commands, figures and links of the README."""
 
 from __future__ import annotations
 
@@ -80,10 +80,10 @@ def test_the_part_of_the_readme_is_that_of_its_record() -> None:
     record = json.loads((README.parent / "docs" / "start" / "summary.json").read_text())
     text = " ".join(README.read_text(encoding="utf-8").split())
     part = record["as_part"]
-    assert f"efficiency {record['efficiency']:.2f} in the model" in text
+    assert f"efficiency {record['efficiency']:.2f} in the spring model" in text
     assert f"{part['efficiency']:.2f} as a frame of struts" in text
     assert (part["status"], part["contacts"], part["part"]["width"]) == ("converged", [], 2.0)
-    assert f"3 mm down, {3.0 * part['efficiency']:.0f} mm up" in text
+    assert f"3 mm down, output {3.0 * part['efficiency']:.0f} mm up" in text
 
 
 def test_every_command_is_known_with_all_its_options(
