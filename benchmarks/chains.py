@@ -1,4 +1,4 @@
-"""Real chains, recorded once and walked again with any minimiser."""
+"""Metropolis chains, recorded once and evaluated again for timings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """What a chain proposed, and how long all of it took.
+    """The proposals of a chain, and their total time.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class Recording:
         The proposed designs.
     accepted : (n,) bool
     efficiency : (n,) float64
-        Of the proposed designs.
+        Efficiency of each proposed design.
     seconds
         Wall time of the whole run: proposals, responses, records.
     """
@@ -54,7 +54,7 @@ class Recording:
 
 @cache
 def record(name: str, steps: int, seed: int = 0) -> Recording:
-    """Run a chain with the paper's settings, as the program runs it."""
+    """Run a chain with the settings of the paper."""
     evaluator = SpringEvaluator(find_problem(name))
     settings = MetropolisSettings(steps=steps, seed=seed)
     next(chain_blocks(evaluator, MetropolisSettings(steps=20), 0))  # compiles
@@ -80,7 +80,7 @@ def walk(evaluator: SpringEvaluator, stretch: Recording) -> NDArray[np.float64]:
 
 
 def walk_on(evaluator: SpringEvaluator, stretch: Recording) -> NDArray[np.float64]:
-    """As `walk`, from the equilibrium that is already remembered."""
+    """As `walk`, from the reference equilibrium that is already set."""
     efficiency = np.empty(len(stretch.masks) - 1)
     for step, (mask, accepted) in enumerate(
         zip(stretch.masks[1:], stretch.accepted[1:], strict=True)

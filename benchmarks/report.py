@@ -1,38 +1,26 @@
-"""One Markdown table of what a step costs: ``python -m benchmarks.report [--quick]``.
+"""Markdown tables of the cost of mechanics: ``python -m benchmarks.report [--quick]``.
 
-All figures of a row, and so all ratios, are measured in the same run.
+A Metropolis step, a response and the prediction of all flips. All figures of a row are measured in
+the same run.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
 import time
-from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import spearmanr
 
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import find_problem
-from benchmarks.chains import Recording, record, walk_on
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-SAME = 1e-8
-"""Largest difference in efficiency at which two minimisers count as equally accurate."""
-TOLERANCES = (1e-11, 3e-12, 1e-12, 3e-13, 1e-13)
-"""Largest forces, in units of bond stiffness, at which first-order minimisers may stop."""
-PATIENCE = 30.0
-"""Seconds of one pass, above which a minimiser is not tried with a tighter tolerance."""
+from benchmarks.chains import Recording, record, walk, walk_on
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much of everything to measure."""
+    """Sizes of the measurements."""
 
     crane_steps: int
     crane_seeds: int
@@ -44,62 +32,7 @@ class Effort:
 
 FULL = Effort(20_000, 8, 5_000, tuple(range(8, 21, 2)), (200, 1000, 5000, 12_000, 19_000), 10)
 QUICK = Effort(2_000, 2, 500, (8, 14, 20), (200, 1500), 5)
-"""Of the chain: where stretches begin that all minimisers walk, and how long they are."""
-
-
-@contextmanager
-def force_tolerance(value: float) -> Iterator[None]:
-    """Let the first-order minimisers stop at another force for a while."""
-    module = importlib.import_module("bellcrank.mechanics.minimisers")
-    before = module.FORCE_TOLERANCE
-    module.FORCE_TOLERANCE = value
-    try:
-        yield
-    finally:
-        module.FORCE_TOLERANCE = before
-
-
-def time_walk(name: str, minimiser: str, stretches: list[Recording]) -> tuple[float, np.ndarray]:
-    """Seconds for each response along the stretches, and the efficiencies.
-
-    The equilibrium at the start of each stretch comes from Newton, untimed.
-    """
-    newton, evaluator = (
-        SpringEvaluator(find_problem(name)),
-        SpringEvaluator(find_problem(name), minimiser=minimiser),
-    )
-    seconds, efficiencies = 0.0, []
-    for stretch in stretches:
-        newton.evaluate(stretch.masks[0])
-        newton.set_reference()
-        for source, target in zip(newton.known, evaluator.known, strict=True):
-            target[:] = source
-        start = time.perf_counter()
-        efficiencies.append(walk_on(evaluator, stretch))
-        seconds += time.perf_counter() - start
-    found = np.concatenate(efficiencies)
-    return seconds / len(found), found
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """A first-order minimiser beside Newton, along the same proposals."""
-
-    minimiser: str
-    seconds: float
-    tolerance: float
-    difference: float
-
-
-def compare(name: str, minimiser: str, stretches: list[Recording], exact: np.ndarray) -> Comparison:
-    """Time a minimiser at the loosest force tolerance that reaches Newton's efficiencies."""
-    for tolerance in TOLERANCES:
-        with force_tolerance(tolerance):
-            seconds, found = time_walk(name, minimiser, stretches)
-        difference = float(np.abs(found - exact).max())
-        if difference <= SAME or seconds * len(found) > PATIENCE:
-            break
-    return Comparison(minimiser, seconds, tolerance, difference)
+"""The chain of the crane is timed from the steps `stretches` on, over `length` steps each."""
 
 
 def fitted_exponent(beams: list[int], cost: list[float]) -> float:
@@ -137,41 +70,52 @@ def print_steps(effort: Effort) -> Recording:
     return cranes[0]
 
 
-def print_minimisers(crane: Recording, effort: Effort) -> None:
-    """Print what a response costs with each minimiser, along the same proposals."""
-    stretches = [crane.stretch(start, effort.length) for start in effort.stretches]
-    time_walk("crane", "newton", stretches)
-    newton, exact = time_walk("crane", "newton", stretches)
-    print("| crane, along the same chain | us per response | Newton is faster by | stops at force |"
-          " largest difference in efficiency |")  # fmt: skip
-    print("|---|---|---|---|---|")
-    print(f"| newton | {1e6 * newton:.0f} | 1 | none | |")
-    for name in ("cg", "fire"):
-        found = compare("crane", name, stretches, exact)
-        flag = "" if found.difference <= SAME else " (not as accurate)"
-        print(
-            f"| {name} | {1e6 * found.seconds:.0f} | {found.seconds / newton:.0f} "
-            f"| {found.tolerance:.0e} k | {found.difference:.1e}{flag} |"
-        )
-    steps = 1e-6 * crane.microseconds_per_step
-    print(
-        f"\nA whole Newton step takes {1e6 * steps:.0f} us, a single FIRE response "
-        f"{1e6 * found.seconds:.0f} us: {found.seconds / steps:.0f} times the steps per second."
-    )
+def print_responses(crane: Recording, effort: Effort) -> None:
+    """Print the time of a response, from rest and along a chain."""
+    seconds = {"from rest": 0.0, "along the chain": 0.0}
+    count = 0
+    for start in effort.stretches:
+        evaluator = SpringEvaluator(find_problem("crane"))
+        stretch = crane.stretch(start, effort.length)
+        walk(evaluator, stretch)
+        clock = time.perf_counter()
+        walk_on(evaluator, stretch)
+        seconds["along the chain"] += time.perf_counter() - clock
+        clock = time.perf_counter()
+        for mask in stretch.masks[1:]:
+            evaluator.evaluate(mask)
+        seconds["from rest"] += time.perf_counter() - clock
+        count += len(stretch.masks) - 1
+    print("| crane | us per response |")
+    print("|---|---|")
+    for name, total in seconds.items():
+        print(f"| {name} | {1e6 * total / count:.0f} |")
 
 
-def foresee(name: str, run: Recording, start: int) -> tuple[int, float, float, float, float]:
-    """FlipWorkspace all flips of the design that is current at a step of a chain.
+@dataclass(frozen=True, slots=True)
+class PredictionCost:
+    """Time and rank correlation of a prediction of all flips.
 
-    Returns
-    -------
+    Parameters
+    ----------
     flips
-        How many.
-    seconds, response
-        Of the screening; of a response to one of the flips.
-    screened, first_order
-        Rank correlation of what is foreseen, and of the sensitivity, with the true changes.
+        Number of flips predicted.
+    seconds, response_seconds
+        Time of the prediction of all flips, and of one response to a flip.
+    predicted, first_order
+        Spearman's rank correlation of the predicted changes, and of the sensitivity, with the
+        computed changes of the efficiency.
     """
+
+    flips: int
+    seconds: float
+    response_seconds: float
+    predicted: float
+    first_order: float
+
+
+def measure_prediction(name: str, run: Recording, start: int) -> PredictionCost:
+    """Predict all flips of the design that is current at a step of a chain, and check them."""
     evaluator = SpringEvaluator(find_problem(name))
     mask = run.stretch(start, 1).masks[0] if start else evaluator.problem.initial
     before = evaluator.evaluate(mask).efficiency
@@ -179,52 +123,53 @@ def foresee(name: str, run: Recording, start: int) -> tuple[int, float, float, f
     evaluator.predict_flips(mask)
     clock = time.perf_counter()
     for _ in range(20):
-        screening = evaluator.predict_flips(mask)
+        prediction = evaluator.predict_flips(mask)
     seconds = (time.perf_counter() - clock) / 20
-    assert screening is not None
+    assert prediction is not None
     evaluator.set_reference()
-    gained = np.full(len(screening.beams), np.nan)
+    gained = np.full(len(prediction.beams), np.nan)
     clock = time.perf_counter()
-    for index, beam in enumerate(screening.beams):
+    for index, beam in enumerate(prediction.beams):
         flipped = mask.copy()
         flipped[beam] ^= True
         response = evaluator.evaluate(flipped, warm_start=True)
         if response.status is Status.CONVERGED:
             gained[index] = response.efficiency - before
     response_seconds = (time.perf_counter() - clock) / len(gained)
-    counts = np.isfinite(gained)
-    foreseen = [
-        float(spearmanr(found[counts], gained[counts]).statistic)
-        for found in (screening.change, slope)
-    ]
-    return len(gained), seconds, response_seconds, foreseen[0], foreseen[1]
+    known = np.isfinite(gained)
+    predicted, first_order = (
+        float(spearmanr(found[known], gained[known]).statistic)
+        for found in (prediction.change, slope)
+    )
+    return PredictionCost(len(gained), seconds, response_seconds, predicted, first_order)
 
 
-def print_screening(crane: Recording, effort: Effort) -> None:
-    """Print what it costs to foresee all flips, and how well they are ranked."""
-    print("\n| problem | at step | flips | ms for all | a response is | rank correlation "
-          "| first order alone |")  # fmt: skip
+def print_predictions(crane: Recording, effort: Effort) -> None:
+    """Print the time of the prediction of all flips, and how well they are ranked."""
+    print("\n| problem | at step | flips | ms for all | ms per response | rank correlation "
+          "| of the sensitivity |")  # fmt: skip
     print("|---|---|---|---|---|---|---|")
     runs = [("crane", crane, start) for start in (0, *effort.stretches)]
     for size in effort.sizes[:: max(1, len(effort.sizes) // 3)]:
         name = f"scaling-{size}"
         runs.append((name, record(name, effort.scaling_steps), effort.scaling_steps - 1))
     for name, run, start in runs:
-        flips, seconds, response, screened, slope = foresee(name, run, start)
+        cost = measure_prediction(name, run, start)
         print(
-            f"| {name} | {start} | {flips} | {1e3 * seconds:.2f} | {1e3 * response:.2f} ms "
-            f"| {screened:.2f} | {slope:.2f} |"
+            f"| {name} | {start} | {cost.flips} | {1e3 * cost.seconds:.2f} "
+            f"| {1e3 * cost.response_seconds:.2f} | {cost.predicted:.2f} "
+            f"| {cost.first_order:.2f} |"
         )
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a rough look in a few seconds")
+    parser.add_argument("--quick", action="store_true", help="a rough measurement in a few seconds")
     effort = QUICK if parser.parse_args().quick else FULL
     crane = print_steps(effort)
-    print_minimisers(crane, effort)
-    print_screening(crane, effort)
+    print_responses(crane, effort)
+    print_predictions(crane, effort)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Timings of responses and of the whole Metropolis step, per problem and minimiser."""
+"""Timings of responses, of flip prediction and of the Metropolis step, for several problems."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bellcrank.mechanics import SpringEvaluator, minimisers
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.search import MetropolisSettings, advance_chain, chain_blocks
 from benchmarks.chains import record, walk, walk_on
@@ -18,27 +18,22 @@ PROBLEMS = ["crane", *(f"scaling-{size}" for size in range(8, 21, 4))]
 BURN_IN = 500
 
 
-@pytest.mark.parametrize("minimiser", list(minimisers))
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_response_from_rest(benchmark: Benchmark, name: str, minimiser: str) -> None:
-    evaluator = SpringEvaluator(find_problem(name), minimiser=minimiser)
+def test_response_from_rest(benchmark: Benchmark, name: str) -> None:
+    evaluator = SpringEvaluator(find_problem(name))
     mask = record(name, BURN_IN + 250).masks[BURN_IN]
     evaluator.evaluate(mask)
-    benchmark.pedantic(evaluator.respond, args=(mask,), rounds=20 if minimiser == "newton" else 1)
+    benchmark.pedantic(evaluator.evaluate, args=(mask,), rounds=20)
 
 
-@pytest.mark.parametrize("minimiser", list(minimisers))
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_ten_responses_along_a_chain(benchmark: Benchmark, name: str, minimiser: str) -> None:
-    evaluator = SpringEvaluator(find_problem(name), minimiser=minimiser)
+def test_ten_responses_along_a_chain(benchmark: Benchmark, name: str) -> None:
+    evaluator = SpringEvaluator(find_problem(name))
     stretch = record(name, BURN_IN + 250).stretch(BURN_IN, 10)
-    if minimiser == "newton":
-        walk(evaluator, stretch)
+    walk(evaluator, stretch)
     evaluator.evaluate(stretch.masks[0])
     evaluator.set_reference()
-    benchmark.pedantic(
-        walk_on, args=(evaluator, stretch), rounds=20 if minimiser == "newton" else 1
-    )
+    benchmark.pedantic(walk_on, args=(evaluator, stretch), rounds=20)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
@@ -51,8 +46,8 @@ def test_block_of_250_metropolis_steps(benchmark: Benchmark, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_screening_of_all_flips(benchmark: Benchmark, name: str) -> None:
+def test_prediction_of_all_flips(benchmark: Benchmark, name: str) -> None:
     evaluator = SpringEvaluator(find_problem(name))
     mask = record(name, BURN_IN + 250).masks[BURN_IN]
     evaluator.evaluate(mask)
-    benchmark.pedantic(evaluator.screen, args=(mask,), rounds=50, warmup_rounds=1)
+    benchmark.pedantic(evaluator.predict_flips, args=(mask,), rounds=50, warmup_rounds=1)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.plots import style
 from bellcrank.plots.charts import Chart, Series
@@ -17,7 +15,7 @@ from bellcrank.plots.sheets import Sheet, draw_sheet
 from bellcrank.search import read_settings
 from reproduction import published
 from reproduction.registry import Claim, Figures, Study, register
-from reproduction.searching import design_of, run_chain
+from reproduction.searching import run_chain
 from reproduction.words import count, number
 
 if TYPE_CHECKING:
@@ -41,15 +39,11 @@ class Settings:
         Of each size: the larger the lattice, the fewer, as their time grows faster than anything.
     proposals_per_beam
         Length of a run, by the number of designable beams.
-    relaxed
-        Responses of each size that are timed with a first-order minimiser too.
     """
 
     sizes: tuple[int, ...] = (8, 10, 12, 14, 16, 18, 20)
     runs: tuple[int, ...] = (100, 100, 100, 100, 50, 30, 20)
     proposals_per_beam: int = 15
-    relaxed: int = 4
-    minimiser: str = "fire"
     seed: int = 0
 
 
@@ -68,35 +62,13 @@ def run(settings: Settings, bench: Bench) -> Figures:
         search = read_settings(told)
         work = {str(k): partial(run_chain, problem, search, k) for k in range(runs)}
         chains = list(bench.all(f"size-{size}", work).values())
-        masks = [chain["offered"][0]["mask"] for chain in chains if chain["offered"]]
-        relaxed = bench.one(
-            f"relaxed-{size}",
-            partial(relaxed_seconds, size, settings.minimiser, masks[: settings.relaxed]),
-        )
-        rows.append(
-            {"size": size, "beams": beams, "runs": runs, **_summary(chains), "relaxed": relaxed}
-        )
+        rows.append({"size": size, "beams": beams, "runs": runs, **_summary(chains)})
     return {
         "runs": list(settings.runs),
         "proposals_per_beam": settings.proposals_per_beam,
-        "minimiser": settings.minimiser,
         "sizes": rows,
         "exponents": exponents(rows),
     }
-
-
-def relaxed_seconds(size: int, minimiser: str, masks: Sequence[str]) -> float | None:
-    """Return the processor time of a response by a first-order minimiser, median over designs."""
-    problem = find_problem(f"scaling-{size}")
-    evaluator = SpringEvaluator(problem, minimiser=minimiser)
-    evaluator.evaluate(problem.initial)
-    found = []
-    for mask in masks:
-        design = design_of(problem, mask)
-        began = time.thread_time()
-        evaluator.evaluate(design.mask)
-        found.append(time.thread_time() - began)
-    return float(np.median(found)) if found else None
 
 
 def _summary(chains: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -122,7 +94,6 @@ MEASURES: dict[str, tuple[str, Callable[[Mapping[str, Any]], float | None]]] = {
     "run": ("run", lambda row: row["seconds"][1]),
     "proposal": ("proposal", lambda row: row["per_proposal"]),
     "to_one": ("until efficiency 1", lambda row: row["seconds_to_one"]),
-    "relaxed": ("response, first-order", lambda row: row["relaxed"]),
 }
 
 
@@ -147,7 +118,7 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
     rows = figures["sizes"]
     beams = np.array([row["beams"] for row in rows], dtype=float)
     series = []
-    shades = (style.BEST, style.BUILT, style.WANTED, style.INPUT)
+    shades = (style.BEST, style.BUILT, style.WANTED)
     for (name, (words, of)), colour in zip(MEASURES.items(), shades, strict=True):
         values = np.array([np.nan if of(row) is None else of(row) for row in rows], dtype=float)
         power = figures["exponents"][name]
@@ -209,8 +180,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
             "exponent of the time of a run with the number of beams",
             number(published.EXPONENT),
             f"{number(powers['run'])}; of a proposal {number(powers['proposal'])}, until "
-            f"efficiency 1 {number(powers['to_one'])}, of a response by "
-            f"`{figures['minimiser']}` {number(powers['relaxed'])}",
+            f"efficiency 1 {number(powers['to_one'])}",
             f"{first['beams']} to {last['beams']} designable beams; what the paper's time is "
             "that of is not known to us",
         ),
@@ -230,7 +200,7 @@ STUDY = register(
         title="Time and efficiency against the number of beams",
         after="scaling with size",
         full=Settings(),
-        quick=Settings(sizes=(8, 10, 12), runs=(2, 2, 2), proposals_per_beam=6, relaxed=2),
+        quick=Settings(sizes=(8, 10, 12), runs=(2, 2, 2), proposals_per_beam=6),
         run=run,
         draw=draw,
         claims=claims,

@@ -1,7 +1,7 @@
 """Named choices: one small dictionary that explains itself when asked wrongly.
 
-A registry replaces if-chains over names. Adding an objective, a schedule, a
-minimiser, a lattice or a file format means writing one function and putting
+A registry replaces if-chains over names. Adding an objective, a schedule, a lattice
+or a file format means writing one function and putting
 ``@registry.register("name")`` over it; the contract tests pick it up by itself.
 
 Examples

@@ -156,7 +156,6 @@ def test_a_missing_file_of_designs_is_refused(small: str) -> None:
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        ("--minimiser", "unknown minimiser 'best'; known: newton, cg, fire"),
         ("--objective", "unknown objective 'best'; known: displacement, directional, force"),
         ("--search", f"unknown search 'best'; known: {SEARCHES}"),
         ("--schedule", "unknown schedule 'best'; known: linear, geometric, constant"),
@@ -170,7 +169,7 @@ def test_a_missing_file_of_designs_is_refused(small: str) -> None:
 def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: str) -> None:
     chain = ("--search", "paper") if option in ("--schedule", "--cost") else ()
     assert refusal("design", PROBLEM, *chain, option, "best") == f"error: {message}"
-    if option in ("--minimiser", "--objective", "--unloaded-beams"):
+    if option in ("--objective", "--unloaded-beams"):
         assert refusal("evaluate", PROBLEM, option, "best") == f"error: {message}"
 
 

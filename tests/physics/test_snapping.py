@@ -43,16 +43,8 @@ def test_a_perfect_column_buckles_at_its_critical_load(joint: float) -> None:
     assert status(column(1.03 * critical, joint)) is Status.SNAPPED
 
 
-@pytest.mark.parametrize("minimiser", ["cg", "fire"])
-def test_a_column_that_stayed_straight_is_not_taken_for_stable(minimiser: str) -> None:
-    # Without a disturbance, a gradient has no component that leads off the axis.
-    critical = buckling_shortening(0.1)
-    assert status(column(0.97 * critical), minimiser) is Status.CONVERGED
-    assert status(column(1.15 * critical), minimiser) is not Status.CONVERGED
-
-
-def status(problem: Problem, minimiser: str = "newton") -> Status:
-    return SpringEvaluator(problem, minimiser=minimiser).evaluate(problem.initial).status
+def status(problem: Problem) -> Status:
+    return SpringEvaluator(problem).evaluate(problem.initial).status
 
 
 def test_a_buckled_column_ends_in_a_stable_state_off_the_axis() -> None:
@@ -98,11 +90,10 @@ def limit_load(height: float) -> float:
 
 
 @pytest.mark.parametrize("height", [0.2, 0.3, 0.4])
-@pytest.mark.parametrize("minimiser", ["newton", "cg", "fire"])
-def test_a_shallow_truss_snaps_through_at_its_limit_load(height: float, minimiser: str) -> None:
+def test_a_shallow_truss_snaps_through_at_its_limit_load(height: float) -> None:
     limit = limit_load(height)
-    assert status(truss(0.8 * limit, height), minimiser) is Status.CONVERGED
-    assert status(truss(1.2 * limit, height), minimiser) is Status.SNAPPED
+    assert status(truss(0.8 * limit, height)) is Status.CONVERGED
+    assert status(truss(1.2 * limit, height)) is Status.SNAPPED
 
 
 def test_a_truss_that_snapped_hangs_below_its_supports() -> None:

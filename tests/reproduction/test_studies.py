@@ -22,7 +22,7 @@ TINY: dict[str, dict[str, Any]] = {
     "structure": {"problem": "crane", "steps": 600, "chains": 1},
     "paths": {"steps": 600, "chains": 2},
     "crane": {"paper_steps": 600, "paper_chains": 1, "steps": 500, "chains": 1, "levels": ()},
-    "scaling": {"sizes": (8, 9), "runs": (1, 1), "proposals_per_beam": 4, "relaxed": 1},
+    "scaling": {"sizes": (8, 9), "runs": (1, 1), "proposals_per_beam": 4},
     "disorder": {"lattices": 2, "steps": 600},
     "amplitude": {
         "problems": ("crane",), "points": 3, "steps": 600, "chains": 1, "frames": False,

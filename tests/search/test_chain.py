@@ -44,9 +44,7 @@ def same(first: Proposals, second: Proposals) -> bool:
 def whole(
     problem: Problem, settings: MetropolisSettings, chain: int = 0
 ) -> tuple[ChainState, Proposals]:
-    evaluator = SpringEvaluator(
-        problem, settings.objective, settings.unloaded_beams, settings.minimiser
-    )
+    evaluator = SpringEvaluator(problem, settings.objective, settings.unloaded_beams)
     blocks = list(chain_blocks(evaluator, settings, chain))
     joined = (np.concatenate(column) for column in zip(*(b for _, b in blocks), strict=True))
     return blocks[-1][0], Proposals(*joined)
@@ -194,7 +192,7 @@ def test_settings_that_make_no_sense_are_refused(wrong: dict, message: str) -> N
         MetropolisSettings(**wrong)
 
 
-@pytest.mark.parametrize("wrong", [{"cost": "x"}, {"schedule": "x"}, {"minimiser": "x"}])
+@pytest.mark.parametrize("wrong", [{"cost": "x"}, {"schedule": "x"}])
 def test_unknown_names_list_the_known_ones(wrong: dict) -> None:
     with pytest.raises(UnknownName, match="known: "):
         MetropolisSettings(**wrong)

@@ -59,7 +59,6 @@ def design(
             help="stripped (what bears no load), ignored (dead ends) or counted (as in 'paper')."
         ),
     ] = None,
-    minimiser: Annotated[str | None, typer.Option(help="newton, cg or fire. \\[newton]")] = None,
     cost: Annotated[
         str | None, typer.Option(help="exponential (the paper) or negative; for chains.")
     ] = None,
@@ -124,7 +123,7 @@ def design(
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
     given = {
         "steps": steps, "chains": chains, "seed": seed, "objective": objective,
-        "unloaded_beams": unloaded_beams, "minimiser": minimiser,
+        "unloaded_beams": unloaded_beams,
         "cost": cost, "schedule": schedule,
         "minimum_degree": minimum_degree, "patience": patience,
         "goals": goal and tuple(goal), "strokes": strokes and _numbers("--strokes", strokes),
@@ -233,7 +232,7 @@ def _print_report(report: DesignReport) -> None:
     table.add_row("beams", f"{selection.design.beam_count}")
     table.add_row(
         "verified",
-        f"from rest by {' and '.join(report.checks)}, which differ by {report.agreement:.0e}",
+        f"from rest in {' and '.join(report.checks)}, which differ by {report.agreement:.0e}",
     )
     table.add_row("designs looked at", f"{report.proposals}")
     table.add_row("results", plain(f"{report.folder}/"))
@@ -250,4 +249,7 @@ def _print_report(report: DesignReport) -> None:
             "for other struts (--strut-width)."
         )
     if not report.verified:
-        notes.print("[bold yellow]warning:[/] the minimisers disagree; treat the design with care.")
+        notes.print(
+            "[bold yellow]warning:[/] the efficiency depends on the load increments: the design "
+            "may snap."
+        )

@@ -26,7 +26,6 @@ def evaluate(
         Path | None,
         typer.Option(help="JSON with results\\[].mask or masks; default: the initial design."),
     ] = None,
-    minimiser: Annotated[str, typer.Option(help="newton, cg or fire.")] = "newton",
     objective: Annotated[
         str | None, typer.Option(help="displacement, directional:N or force.")
     ] = None,
@@ -42,7 +41,7 @@ def evaluate(
 
     design = design_named(problem)
     masks = read_masks(designs, design.problem) if designs else [design.mask]
-    evaluator = SpringEvaluator(design.problem, objective, unloaded_beams, minimiser)  # type: ignore[arg-type]
+    evaluator = SpringEvaluator(design.problem, objective, unloaded_beams)  # type: ignore[arg-type]
     announce_compilation()
     rows = []
     for mask in masks:

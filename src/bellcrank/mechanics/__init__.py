@@ -21,7 +21,6 @@ from bellcrank.mechanics.evaluator import (
 )
 from bellcrank.mechanics.following import Arrival, follow
 from bellcrank.mechanics.grips import Grip, Loose, Rigid, Sliding
-from bellcrank.mechanics.minimisers import Minimiser, minimisers
 from bellcrank.mechanics.objectives import Objective, efficiency_of, objective_of, objectives
 from bellcrank.mechanics.status import Outcome, Status
 from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction
@@ -38,7 +37,6 @@ __all__ = [
     "Grip",
     "Linear",
     "Loose",
-    "Minimiser",
     "Objective",
     "Outcome",
     "Response",
@@ -56,7 +54,6 @@ __all__ = [
     "follow",
     "foresee_stiffness",
     "load_bearing_core",
-    "minimisers",
     "objective_of",
     "objectives",
     "output_stiffness",

@@ -15,7 +15,6 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
-from bellcrank.mechanics.minimisers import minimisers
 from bellcrank.mechanics.objectives import objective_of
 from bellcrank.mechanics.status import Status
 from bellcrank.mechanics.system import (
@@ -112,8 +111,6 @@ class SpringEvaluator:
         dead-end beams, whose splitting of angular springs no real part has.
         ``"prune_all"``: also without what hangs by a single node or stands on supports
         alone, which splits them as well.
-    minimiser
-        ``"newton"``, ``"cg"`` or ``"fire"``.
 
     Examples
     --------
@@ -129,7 +126,6 @@ class SpringEvaluator:
         problem: Problem,
         objective: str | None = None,
         unloaded_beams: UnloadedBeams = "keep",
-        minimiser: str = "newton",
     ) -> None:
         if unloaded_beams not in get_args(UnloadedBeams):
             raise InvalidSettings(
@@ -138,7 +134,6 @@ class SpringEvaluator:
             )
         self.problem = problem
         self.core = get_args(UnloadedBeams).index(unloaded_beams)
-        self.minimiser = minimisers[minimiser]()
         self.system: System = build_system(problem, objective_of(problem, objective))
         self.structure: Structure = allocate_structure(self.system)
         self.scratch = allocate_scratch(self.system, self.structure)
@@ -189,7 +184,9 @@ class SpringEvaluator:
     def _load(
         self, mask: ArrayLike, core: int, nearby: bool, least: float, largest_increment: float
     ) -> Response:
-        status, efficiency, energy = self.minimiser(
+        from bellcrank.mechanics.kernels.response import respond
+
+        status, efficiency, energy = respond(
             self.system, self._checked(mask), core, self.known, nearby, least,
             largest_increment, self.structure, self.displacement, self.scratch,
         )  # fmt: skip

@@ -55,7 +55,7 @@ def make_evaluator(problem: Problem, settings: SearchSettings) -> Evaluator:
     InvalidSettings, UnknownName
         If the problem has not got the objective, or a goal makes no sense for it.
     """
-    told = settings.objective, settings.unloaded_beams, settings.minimiser
+    told = settings.objective, settings.unloaded_beams
     if not settings.goals and settings.strokes == (1.0,):
         return SpringEvaluator(problem, *told)
     return GoalEvaluator(at_strokes(problem, settings.strokes), settings.goals, *told)

@@ -287,7 +287,6 @@ class Hopper:
             schedule="constant",
             cold=self.settings.warmth * (abs(state.best) or 1.0),
             unloaded_beams=self.settings.unloaded_beams,
-            minimiser=self.settings.minimiser,
         )
         score = response.score
         chain = ChainState(0, state.walker, score, -score, score)

@@ -195,7 +195,7 @@ def make_steps(
 ) -> tuple[ChainState, Proposals]:
     """Make so many steps, at most a block of them, or less if the patience ends first."""
     flips_only = set(settings.moves) == {"flip"}
-    if isinstance(evaluator, SpringEvaluator) and settings.minimiser == "newton" and flips_only:
+    if isinstance(evaluator, SpringEvaluator) and flips_only:
         return _advance_compiled(evaluator, settings, state, rng.random((BLOCK, 2))[:count])
     return advance_in_python(evaluator, settings, state, rng, count)
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, fields
-from typing import Any, ClassVar, Self, TypeGuard
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeGuard
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import UnloadedBeams, minimisers
 from bellcrank.search.goals.terms import read_goal
+
+if TYPE_CHECKING:
+    from bellcrank.mechanics import UnloadedBeams
 
 NO_LIMIT = 2**62
 MOST_CHAINS = 2**15
@@ -32,8 +34,6 @@ class SearchSettings:
     unloaded_beams
         Whether dead-end beams count (the literal model), are ignored, or stripped together
         with all else that no load can reach.
-    minimiser
-        Name of a minimiser.
     goals
         What a design must keep, each a text like ``"mass <= 0.6"`` (`bellcrank.search.goals`).
     strokes
@@ -52,7 +52,6 @@ class SearchSettings:
     seed: int = 0
     objective: str | None = None
     unloaded_beams: UnloadedBeams = "prune_all"
-    minimiser: str = "newton"
     goals: tuple[str, ...] = ()
     strokes: tuple[float, ...] = (1.0,)
 
@@ -60,7 +59,6 @@ class SearchSettings:
         check_whole("steps", self.steps, 1)
         check_whole("seed", self.seed, 0)
         check_whole("chains", self.chains, 1, MOST_CHAINS)
-        minimisers[self.minimiser]  # an unknown name explains itself
         check_goals(self.goals)
         check_strokes(self.strokes)
 

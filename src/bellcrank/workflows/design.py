@@ -187,14 +187,14 @@ def accepted_candidates(
 
 def judge_for(problem: Problem, settings: SearchSettings, **changes: Any) -> Evaluator:
     """Return who judges finished designs: in the literal model, with the goals of the search."""
-    told = {"unloaded_beams": "keep", "minimiser": "newton", **changes}
+    told = {"unloaded_beams": "keep", **changes}
     return make_evaluator(problem, replace(settings, **told))
 
 
 def verify(design: Design, settings: SearchSettings, response: Response) -> dict[str, float]:
-    """Compute the efficiency of a design from rest by a second minimiser."""
-    second = judge_for(design.problem, settings, minimiser="cg", goals=()).evaluate(design.mask)
-    return {"newton": response.efficiency, "cg": second.efficiency}
+    """Return the efficiency of a design from rest, in fine and in adaptive load increments."""
+    second = judge_for(design.problem, settings, goals=()).evaluate(design.mask)
+    return {"increments of 1/32": response.efficiency, "adaptive increments": second.efficiency}
 
 
 def conclude(

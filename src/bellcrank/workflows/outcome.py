@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from bellcrank.workflows.validate import Validation
 
 AGREEMENT = 1e-6
-"""Largest difference between two minimisers that verify each other, as a part of the efficiency, or
-of 1 where that is less."""
+"""Largest difference between the efficiencies of two loading paths that verify each other, relative
+to the efficiency, or to 1 where that is less."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class DesignReport:
     selection
         The design, and where it comes from.
     checks
-        Efficiency of the design from rest by each minimiser that verified it.
+        Efficiency of the design from rest, by the load increments that it was computed in.
     initial_efficiency
         Where the search began, under the same objective; nan if that has none.
     human
@@ -61,10 +61,10 @@ class DesignReport:
 
     @property
     def agreement(self) -> float:
-        """Largest difference between the minimisers."""
+        """Largest difference between the checks."""
         return max(self.checks.values()) - min(self.checks.values())
 
     @property
     def verified(self) -> bool:
-        """Whether the minimisers agree."""
+        """Whether the checks agree."""
         return self.agreement <= AGREEMENT * max(1.0, *map(abs, self.checks.values()))

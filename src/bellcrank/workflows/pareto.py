@@ -52,7 +52,7 @@ class Scale:
 
     def __init__(self, problem: Problem, settings: SearchSettings) -> None:
         self.problem = problem
-        literal = replace(settings, unloaded_beams="keep", minimiser="newton")
+        literal = replace(settings, unloaded_beams="keep")
         self.judge: Evaluator = make_evaluator(problem, literal)
         one = self.judge.evaluators[0] if isinstance(self.judge, GoalEvaluator) else self.judge
         assert isinstance(one, SpringEvaluator)

@@ -34,10 +34,6 @@ COUNTED = 0
 IGNORED = 1
 STRIPPED = 2
 
-NEWTON = 0
-CG = 1
-FIRE = 2
-
 
 class System(NamedTuple):
     """A problem as arrays. Lengths in lattice units."""

@@ -67,7 +67,7 @@ class GoalEvaluator:
         What is asked of a design; response and screening are those of the first.
     goals
         Texts such as ``"mass <= 0.6"``.
-    objective, unloaded_beams, minimiser
+    objective, unloaded_beams
         As in `SpringEvaluator`.
 
     Raises
@@ -90,14 +90,13 @@ class GoalEvaluator:
         goals: Sequence[str] = (),
         objective: str | None = None,
         unloaded_beams: UnloadedBeams = "keep",
-        minimiser: str = "newton",
     ) -> None:
         check_alike(cases)
         self.cases = list(cases)
         self.goals = tuple(goals)
         self.weights = [case.weight / sum(case.weight for case in cases) for case in cases]
         self.evaluators = [
-            SpringEvaluator(case.problem, objective, unloaded_beams, minimiser) for case in cases
+            SpringEvaluator(case.problem, objective, unloaded_beams) for case in cases
         ]
         self._cores = [Core(evaluator) for evaluator in self.evaluators]
         original = cases[0].problem
