@@ -15,7 +15,7 @@ from bellcrank.model.builtin.scaling import scaling
 from bellcrank.part import PartSpec
 from bellcrank.plots.movies import movie_settings
 from bellcrank.workflows import find_design
-from bellcrank.workflows.animate import Looks, animate_motion
+from bellcrank.workflows.animate import MotionOptions, animate_motion
 from bellcrank.workflows.fabricate import print_design
 
 SLOW = ("step",)
@@ -51,7 +51,11 @@ def main() -> None:
         path = Path(folder) / "crane.mp4"
         settings = movie_settings(path, 5.0, None, None)
         animate_motion(
-            [("crane", find_design("machine:crane"))], path, settings, Looks(), overwrite=False
+            [("crane", find_design("machine:crane"))],
+            path,
+            settings,
+            MotionOptions(),
+            overwrite=False,
         )
         print(f"\nA movie of 5 s in 1080p: {time.perf_counter() - began:.1f} s")
         if shutil.which("prusa-slicer"):

@@ -358,7 +358,7 @@ def _write(name: str, record: dict[str, object]) -> None:
 def _scatter(pictured: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
     """Draw discrete model against frames, before and after."""
     figure = style.new_figure(9.0, 4.4)
-    style.write_heading(
+    style.add_heading(
         figure,
         f"Discrete model against nonlinear frames, struts {WIDTH:g} mm wide on 10 mm",
         "each dot is a design that a search came by; on the line they agree",

@@ -17,7 +17,7 @@ from pathlib import Path
 from bellcrank.model import find_problem, human_design
 from bellcrank.plots import draw_comparison
 from bellcrank.search import HoppingSettings
-from bellcrank.workflows import complete_design, move, start_design
+from bellcrank.workflows import complete_design, motion_of, start_design
 
 crane = find_problem("crane")
 print(crane.lattice.beam_count, "beams, of which", len(crane.designable), "may go")
@@ -45,7 +45,9 @@ print(f"human   {report.human_response.efficiency:.2f}")
 # Grey is at rest, black is pushed.
 
 draw_comparison(
-    move(human_design("crane"), name="human"), move(machine, name="machine"), "comparison.png"
+    motion_of(human_design("crane"), name="human"),
+    motion_of(machine, name="machine"),
+    "comparison.png",
 )
 
 # %%

@@ -16,7 +16,7 @@ from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.plots import draw_design, draw_motion
 from bellcrank.search import HoppingSettings
-from bellcrank.workflows import complete_design, move, start_design
+from bellcrank.workflows import complete_design, motion_of, start_design
 
 Path("lift.toml").write_text("""
 schema = "bellcrank/problem/1"
@@ -61,4 +61,4 @@ settings = HoppingSettings(
 report = complete_design(start_design(lift, settings, Path("lift")))
 found = report.selection
 print(f"efficiency {found.efficiency_after:.2f}, {found.design.beam_count} beams")
-draw_motion(move(found.design), "moved.png", title="lift")
+draw_motion(motion_of(found.design), "moved.png", title="lift")

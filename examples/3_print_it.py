@@ -18,7 +18,7 @@ from bellcrank.model import gallery_design
 from bellcrank.part import PartSpec
 from bellcrank.workflows import validate
 from bellcrank.workflows.card import make_card
-from bellcrank.workflows.figures import draw_validations
+from bellcrank.workflows.pictures import draw_validations
 
 crane = gallery_design("machine", "crane")
 spec = PartSpec(width=1.6, thickness=5.0, scale=10.0, material="ninjaflex")

@@ -18,7 +18,7 @@ from bellcrank.machines.library import library
 from bellcrank.machines.plan import read_plan
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.plots import draw_motion
-from bellcrank.workflows import move
+from bellcrank.workflows import motion_of
 
 strong = library().find("down-9-loaded").design
 easy = library().find("down-9-light").design
@@ -68,7 +68,7 @@ print(f"by all nodes of the ports: {predict(machine).efficiency:.2f}")
 
 response = SpringEvaluator(machine.design.problem).evaluate(machine.design.mask)
 print(f"the whole lattice, along its whole stroke: {response.efficiency:.2f}")
-draw_motion(move(machine.design), "two-stage.png", title="two stages")
+draw_motion(motion_of(machine.design), "two-stage.png", title="two stages")
 
 # %%
 # ``bellcrank machine build two-stage.toml`` writes it; ``bellcrank design --from two-stage.json``

@@ -21,7 +21,7 @@ from bellcrank.campaign import (
     write_harvest,
 )
 from bellcrank.plots import draw_comparison
-from bellcrank.workflows import move
+from bellcrank.workflows import motion_of
 
 Path("sizes.toml").write_text("""
 name = "sizes"
@@ -76,5 +76,7 @@ for best in best_designs(store, 4):
 
 small, large = write_harvest(store, Path("designs"))
 draw_comparison(
-    move(small.design, name=small.task), move(large.design, name=large.task), "harvest.png"
+    motion_of(small.design, name=small.task),
+    motion_of(large.design, name=large.task),
+    "harvest.png",
 )

@@ -21,13 +21,13 @@ from reproduction import angular_springs
 from reproduction import learning
 from reproduction import seeing
 from reproduction import rivals
-from reproduction.bench import Bench
+from reproduction.result_store import ResultStore
 from reproduction.records import draw_record, read_record, read_records, run_study
 from reproduction.registry import Claim, Study, studies
 
 __all__ = [
-    "Bench",
     "Claim",
+    "ResultStore",
     "Study",
     "actuators",
     "amplitude",

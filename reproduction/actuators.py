@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from reproduction import duels, published
-from reproduction.duels import Duel, efficiency, in_all_models
+from reproduction import comparisons, published
+from reproduction.comparisons import Duel, efficiency, in_all_models
+from reproduction.formatting import number, share
 from reproduction.registry import Claim, Study, register
-from reproduction.words import number, share
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -94,11 +94,11 @@ def _ratios(figures: Mapping[str, Any]) -> list[str]:
         if by not in figures["designs"]:
             continue
         words = []
-        for model in duels.levels_in(figures):
+        for model in comparisons.levels_in(figures):
             machine, hand = (efficiency(figures, one, model) for one in (by, "hand"))
             if machine is not None and hand:
-                words.append(f"{machine / hand:.1f} ({duels.MODELS[model][0]})")
-        found.append(f"{duels.SHORT[by]} {', '.join(words)}")
+                words.append(f"{machine / hand:.1f} ({comparisons.MODELS[model][0]})")
+        found.append(f"{comparisons.SHORT[by]} {', '.join(words)}")
     return found
 
 
@@ -112,10 +112,10 @@ def _study(name: str, after: str, full: Duel, quick: Duel, deviations: tuple[str
             after=after,
             full=full,
             quick=quick,
-            run=duels.run,
-            draw=partial(duels.draw, title=title, published=reported),
+            run=comparisons.run,
+            draw=partial(comparisons.draw, title=title, published=reported),
             claims=claims,
-            runs=duels.runs,
+            runs=comparisons.runs,
             deviations=deviations,
         )
     )

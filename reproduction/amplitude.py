@@ -12,20 +12,20 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.model import find_problem, gallery_design
 from bellcrank.part import PartSpec
 from bellcrank.plots import style
-from bellcrank.plots.charts import Chart, Level, Series
-from bellcrank.plots.sheets import Sheet, draw_sheet
 from bellcrank.workflows import with_stroke
 from reproduction.checking import analyse
+from reproduction.formatting import count, number
+from reproduction.pictures.charts import Chart, Level, Series
+from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import best_design, design_of, respond, run_chains
-from reproduction.words import count, number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
     from bellcrank.model import Design
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 WIDTH, SCALE = 2.0, 10.0
 NAMES = {
@@ -47,22 +47,22 @@ class Settings:
     frames: bool = True
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Follow each design along strokes, in the model and as frames."""
     strokes = np.linspace(0.0, settings.furthest, settings.points + 1)[1:].tolist()
     tasks: dict[str, Any] = {}
     for name in settings.problems:
-        designs = _designs(name, settings, bench)
+        designs = _designs(name, settings, store)
         work = {by: partial(along, design, strokes) for by, design in designs.items()}
         tasks[name] = {
             by: {"mask": designs[by].mask_hex, "model": told}
-            for by, told in bench.all(f"{name}-model", work).items()
+            for by, told in store.compute_all(f"{name}-model", work).items()
         }
         if settings.frames:
             frames = {
                 by: partial(as_frame, design, settings.furthest) for by, design in designs.items()
             }
-            for by, told in bench.all(f"{name}-frame", frames).items():
+            for by, told in store.compute_all(f"{name}-frame", frames).items():
                 tasks[name][by]["frame"] = told
     return {
         "strokes": strokes,
@@ -74,10 +74,10 @@ def run(settings: Settings, bench: Bench) -> Figures:
     }
 
 
-def _designs(name: str, settings: Settings, bench: Bench) -> dict[str, Design]:
+def _designs(name: str, settings: Settings, store: ResultStore) -> dict[str, Design]:
     problem = find_problem(name)
     search = {"search": "paper", "steps": settings.steps}
-    chains = run_chains(bench, f"{name}-chain", problem, search, settings.chains)
+    chains = run_chains(store, f"{name}-chain", problem, search, settings.chains)
     found = {
         "hand": gallery_design("human", name),
         "paper": design_of(problem, best_design(problem, chains).design.mask_hex),

@@ -10,16 +10,16 @@ import numpy as np
 
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Input, Lattice, Output, Problem, Supports
-from bellcrank.plots.joints import Joint, draw_joints
+from reproduction.formatting import number
+from reproduction.pictures.joints import Joint, draw_joints
 from reproduction.registry import Claim, Figures, Study, register
-from reproduction.words import number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
     from bellcrank.mechanics import UnloadedBeams
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 CASES: dict[str, dict[str, Any]] = {
     "six": {"title": "Six beams", "angles": [0, 60, 120, 180, 240, 300]},
@@ -81,9 +81,9 @@ def resistance(
     return (response.energy - stretch) / (problem.stiffness.angle * turned**2)
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Turn the first beam of each joint, and measure what resists."""
-    bench.tell("joints", 0, len(CASES))
+    store.progress("joints", 0, len(CASES))
     found = {}
     for name, case in CASES.items():
         angles, dead = case["angles"], case.get("dead", [])
@@ -93,7 +93,7 @@ def run(settings: Settings, bench: Bench) -> Figures:
             "keep": resistance(angles, dead, settings.turn, "keep"),
             "prune_dead_ends": resistance(angles, dead, settings.turn, "prune_dead_ends"),
         }
-    bench.tell("joints", len(CASES), len(CASES))
+    store.progress("joints", len(CASES), len(CASES))
     return {"turn": settings.turn, "joints": found}
 
 

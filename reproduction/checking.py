@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Design
     from bellcrank.part import PartSpec
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 KEPT = ("status", "reached", "efficiency", "von_mises_MPa", "principal_strain")
 
@@ -32,7 +32,7 @@ def analyse(design: Design, spec: PartSpec, level: str) -> dict[str, Any]:
 
 
 def analyse_all(
-    bench: Bench, designs: Mapping[str, Design], spec: PartSpec, levels: Sequence[str]
+    store: ResultStore, designs: Mapping[str, Design], spec: PartSpec, levels: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
     """Analyse designs at several levels.
 
@@ -50,6 +50,6 @@ def analyse_all(
         }
         # NGSolve has one heap for all threads.
         workers = None if level == "frame" else 1
-        for name, told in bench.all(level, work, workers=workers).items():
+        for name, told in store.compute_all(level, work, workers=workers).items():
             found[name][level] = told
     return found

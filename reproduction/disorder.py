@@ -12,18 +12,18 @@ from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.model import Problem, find_problem
 from bellcrank.model.builtin.discs import discs
 from bellcrank.plots import Motion, style
-from bellcrank.plots.charts import Chart, Level, Series
-from bellcrank.plots.sheets import Sheet, draw_sheet
 from bellcrank.search import read_settings
+from reproduction.formatting import count, number, span
+from reproduction.pictures.charts import Chart, Level, Series
+from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import best_design, design_of, respond, run_chain
-from reproduction.words import count, number, span
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 ORDERED = "scaling-8"
 """Of about as many nodes and beams, driven and watched at the same places by as much."""
@@ -40,16 +40,16 @@ class Settings:
     first: int = 1
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Search on each lattice, and as often on an ordered one."""
     seeds = range(settings.first, settings.first + settings.lattices)
     found: dict[str, Any] = {}
     for search in SEARCHES:
         told = {"search": search, "steps": settings.steps}
         work = {str(seed): partial(on_discs, seed, told) for seed in seeds}
-        disordered = bench.all(f"{search}-discs", work)
+        disordered = store.compute_all(f"{search}-discs", work)
         again = {str(seed): partial(on_ordered, seed, told) for seed in seeds}
-        ordered = bench.all(f"{search}-ordered", again)
+        ordered = store.compute_all(f"{search}-ordered", again)
         found[search] = {
             "discs": [each["efficiency"] for each in disordered.values()],
             "ordered": [each["efficiency"] for each in ordered.values()],

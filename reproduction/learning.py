@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.plots import style
-from bellcrank.plots.charts import Chart, Density, Level, Series
-from bellcrank.plots.sheets import Sheet, draw_sheet
 from reproduction import published
+from reproduction.formatting import count, number, share
 from reproduction.longer import longer_jobs
+from reproduction.pictures.charts import Chart, Density, Level, Series
+from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.predicting import BINS, Settings, shipped, trained
 from reproduction.registry import Claim, Figures, Study, register
-from reproduction.words import count, number, share
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Make runs, predict them, and let the network search."""
-    bench.tell("network", 0, 1)
-    found = bench.one("predicted", partial(trained if settings.train else shipped, settings))
-    bench.tell("network", 1, 1)
+    store.progress("network", 0, 1)
+    found = store.compute("predicted", partial(trained if settings.train else shipped, settings))
+    store.progress("network", 1, 1)
     return {
         "problem": settings.problem,
         "runs": settings.runs,

@@ -9,18 +9,18 @@ import numpy as np
 
 from bellcrank.model import find_problem, human_design
 from bellcrank.plots import style
-from bellcrank.plots.charts import Chart, Level, Series
-from bellcrank.plots.sheets import Sheet, draw_sheet
 from reproduction import published
+from reproduction.formatting import count, number, span
+from reproduction.pictures.charts import Chart, Level, Series
+from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import respond, run_chains
-from reproduction.words import count, number, span
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 MARKS = ("0.5", "1.0", "2.0")
 
@@ -35,11 +35,11 @@ class Settings:
     seed: int = 0
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Run the chains."""
     problem = find_problem(settings.problem)
     search = {"search": "paper", "steps": settings.steps, "seed": settings.seed}
-    chains = run_chains(bench, "chain", problem, search, settings.chains)
+    chains = run_chains(store, "chain", problem, search, settings.chains)
     human = human_design(settings.problem)
     by_hand = respond(human).efficiency if human else None
     ends = [chain["last"] for chain in chains]

@@ -1,4 +1,4 @@
-"""Running a study, and what it leaves: a record and a picture."""
+"""Running of studies, their records and pictures."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_bytes, write_text
 from bellcrank.provenance import provenance
 from bellcrank.storage.files import make_folder
-from reproduction.bench import Bench, silent
 from reproduction.registry import studies
+from reproduction.result_store import ResultStore, no_progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
 
     from reproduction.registry import Study
+    from reproduction.result_store import Progress
 
 SCHEMA = "bellcrank/study/1"
-LARGEST = 145_000
-"""Bytes of a picture that is kept."""
+MAX_BYTES = 145_000
+"""Largest size of a stored picture."""
 SIZES = ((1.0, 160), (0.85, 160), (0.72, 160), (0.6, 160), (0.6, 64), (0.5, 64), (0.42, 64))
-"""Parts of a picture's size and numbers of colours, tried in turn: 160 are enough for thin lines on
-white, and take a third of the bytes."""
+"""Scales and numbers of colours, tried in order: 160 colours suffice for thin lines on white and
+need a third of the bytes."""
 DIGITS = 6
-"""Of the figures in a record."""
+"""Significant digits of the figures in a record."""
 
 
 def run_study(
@@ -38,25 +39,25 @@ def run_study(
     *,
     quick: bool = False,
     workers: int | None = None,
-    tell: Callable[[str, int, int], None] = silent,
+    progress: Progress = no_progress,
 ) -> dict[str, Any]:
-    """Run a study and leave ``NAME.json`` and ``NAME.png`` in a folder.
+    """Run a study and write ``NAME.json`` and ``NAME.png`` to a folder.
 
-    What the folder has of its raw records with the same settings is not computed again, so
-    that a run that was killed goes on. Record and picture are replaced.
+    Raw results that the folder already has for the same settings are not computed again, so that
+    an interrupted run resumes. Record and picture are replaced.
 
     Parameters
     ----------
     name
-        Of the study.
+        Name of the study.
     out
         Folder.
     quick
-        Whether a look is enough.
+        Whether the quick settings are used.
     workers
-        Pieces of work at the same time; all cores by default.
-    tell
-        Called with what is at hand, how many pieces of it are done, and of how many.
+        Number of threads; all cores by default.
+    progress
+        Called with the current activity, the number of finished computations, and their total.
 
     Returns
     -------
@@ -66,17 +67,17 @@ def run_study(
     Raises
     ------
     UnknownName
-        If there is no such study.
+        If the study is unknown.
     InvalidSettings
-        If something is not installed.
+        If a package is not installed.
     StorageError, CorruptRun
     """
     study = studies[name]
     make_folder(out)
     settings = study.quick if quick else study.full
-    bench = Bench.in_folder(out, name, settings, workers, tell)
+    store = ResultStore.for_study(out, name, settings, workers, progress)
     began = time.perf_counter()
-    figures = rounded(study.run(settings, bench))
+    figures = rounded(study.run(settings, store))
     seconds = time.perf_counter() - began
     record = {
         "schema": SCHEMA,
@@ -98,12 +99,12 @@ def run_study(
 
 
 def refresh(path: Path) -> dict[str, Any]:
-    """Say and draw anew what the figures of a record mean; nothing is computed.
+    """Update the texts and the picture of a record from its figures; nothing is computed.
 
     Returns
     -------
     dict
-        The record, as it lies there then.
+        The updated record.
 
     Raises
     ------
@@ -124,33 +125,33 @@ def refresh(path: Path) -> dict[str, Any]:
 
 
 def command_of(study: Study, *, quick: bool) -> str:
-    """Return what to type."""
+    """Return the command that runs a study."""
     return f"bellcrank study {study.name}" + (" --quick" if quick else "")
 
 
 def draw_record(record: Mapping[str, Any], path: Path) -> None:
-    """Draw the picture of a record, small enough to be kept with it; replaces what is there."""
+    """Draw the picture of a record, small enough for the repository; replaces an existing file."""
     studies[str(record["study"])].draw(record["figures"], path)
     if path.suffix == ".png":
         write_bytes(path, shrunk(path.read_bytes()), overwrite=True)
 
 
 def shrunk(png: bytes) -> bytes:
-    """Return a PNG picture with few colours, and smaller where that is not enough."""
+    """Return a PNG picture with fewer colours and, if necessary, fewer pixels."""
     from PIL import Image
 
     with Image.open(BytesIO(png)) as opened:
         picture = opened.convert("RGB")
     width, height = picture.size
     found = b""
-    for part, colours in SIZES:
-        size = (round(part * width), round(part * height))
-        scaled = picture if part == 1.0 else picture.resize(size, Image.Resampling.LANCZOS)
+    for scale, colours in SIZES:
+        size = (round(scale * width), round(scale * height))
+        scaled = picture if scale == 1.0 else picture.resize(size, Image.Resampling.LANCZOS)
         few = scaled.quantize(colours, kmeans=1, dither=Image.Dither.NONE)
         content = BytesIO()
-        few.save(content, format="PNG", optimize=True, dpi=(200 * part, 200 * part))
+        few.save(content, format="PNG", optimize=True, dpi=(200 * scale, 200 * scale))
         found = content.getvalue()
-        if len(found) <= LARGEST:
+        if len(found) <= MAX_BYTES:
             break
     return found
 
@@ -161,7 +162,7 @@ def read_record(path: Path) -> dict[str, Any]:
     Raises
     ------
     InvalidFile
-        If it is none, or of a study that is not known.
+        If the file is no record, or its study is unknown.
     """
     record = read_json(path)
     if not isinstance(record, dict) or record.get("schema") != SCHEMA:
@@ -172,13 +173,13 @@ def read_record(path: Path) -> dict[str, Any]:
 
 
 def read_records(folder: Path) -> dict[str, dict[str, Any]]:
-    """Read the records that a folder has, in the order of the studies."""
+    """Read the records in a folder, in the order of the studies."""
     found = {name: folder / f"{name}.json" for name in studies}
     return {name: read_record(path) for name, path in found.items() if path.is_file()}
 
 
 def rounded(value: Any) -> Any:
-    """Return plain data with numbers of few digits; what is not a number is None.
+    """Return plain data with rounded numbers; values that are not finite become None.
 
     Examples
     --------
@@ -196,7 +197,7 @@ def rounded(value: Any) -> Any:
 
 
 def as_text(record: Mapping[str, Any]) -> str:
-    """Return a record as JSON that can be read: a line for each list of numbers."""
+    """Return a record as indented JSON with each list of numbers on one line."""
     import re
 
     text = json.dumps(record, indent=1, ensure_ascii=False)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 Figures = dict[str, Any]
 """Plain figures of a study, ready for JSON."""
@@ -58,7 +58,7 @@ class Study:
     full, quick
         Settings, dataclasses of plain data: as far as a day allows, and for a look.
     run
-        From settings and a bench to plain figures.
+        From settings and a store to plain figures.
     draw
         From the figures to a picture.
     claims
@@ -74,7 +74,7 @@ class Study:
     after: str
     full: Any
     quick: Any
-    run: Callable[[Any, Bench], Figures]
+    run: Callable[[Any, ResultStore], Figures]
     draw: Callable[[Mapping[str, Any], Path], None]
     claims: Callable[[Mapping[str, Any]], list[Claim]]
     runs: Callable[[Mapping[str, Any]], str]

@@ -15,7 +15,7 @@ from bellcrank.search import read_settings
 from bellcrank.workflows.choosing import PartChoice
 from bellcrank.workflows.design import judge_for
 from reproduction.boxes import Box, box_of
-from reproduction.neutral import contour_of, judge, narrowest, polygon_of
+from reproduction.outline_analysis import contour_of, judge, narrowest, polygon_of
 from reproduction.registry import Figures, Study, register
 from reproduction.rivals_shown import claims, draw, runs
 from reproduction.searching import best_design, design_of, run_chains
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from shapely import Polygon
 
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 LAW = "neo-hookean"
 
@@ -77,7 +77,7 @@ class Settings:
     finer: float = 0.7
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Let both sides design for each task, and judge them."""
     pymoto()
     ngsolve()
@@ -91,19 +91,19 @@ def run(settings: Settings, bench: Bench) -> Figures:
         "width_mm": settings.width,
         "goals": [list(goals) for goals in settings.goals],
         "tried": len(settings.springs) + len(settings.radii) - 1,
-        "tasks": {box[0]: _task(*box, settings, bench) for box in settings.boxes},
+        "tasks": {box[0]: _task(*box, settings, store) for box in settings.boxes},
     }
 
 
 def _task(
-    title: str, task: str, columns: int, rows: int, settings: Settings, bench: Bench
+    title: str, task: str, columns: int, rows: int, settings: Settings, store: ResultStore
 ) -> dict[str, Any]:
     box = box_of(task, columns, rows, settings.stroke, settings.spring, settings.width)
     name = title.replace(" ", "-")
-    ours, shape = _ours(box, name, settings, bench)
+    ours, shape = _ours(box, name, settings, store)
     size = float(np.prod(box.high - box.low))
-    rival, other = _rival(box, name, shape.area / size, settings, bench)
-    finer = bench.all(
+    rival, other = _rival(box, name, shape.area / size, settings, store)
+    finer = store.compute_all(
         f"{name}-finer",
         {
             side: partial(_judged, box, each, settings.finer)
@@ -122,7 +122,9 @@ def _task(
     }
 
 
-def _ours(box: Box, name: str, settings: Settings, bench: Bench) -> tuple[dict[str, Any], Polygon]:
+def _ours(
+    box: Box, name: str, settings: Settings, store: ResultStore
+) -> tuple[dict[str, Any], Polygon]:
     """Return the best that bellcrank makes of a task, judged, and its shape."""
     tried, shapes = [], []
     for goals in settings.goals:
@@ -133,10 +135,10 @@ def _ours(box: Box, name: str, settings: Settings, bench: Bench) -> tuple[dict[s
             "goals": goals,
         }
         key = "-".join([name, *goals]).replace(" ", "-")
-        chains = run_chains(bench, f"{key}-chain", box.problem, told, settings.chains)
-        chosen = bench.one(f"{key}-chosen", partial(_chosen, box, chains, told))
+        chains = run_chains(store, f"{key}-chain", box.problem, told, settings.chains)
+        chosen = store.compute(f"{key}-chosen", partial(_chosen, box, chains, told))
         shape = polygon_of(box.spec.of(design_of(box.problem, chosen["mask"])))
-        score = bench.one(f"{key}-ours-judged", partial(_judged, box, shape, settings.triangle))
+        score = store.compute(f"{key}-ours-judged", partial(_judged, box, shape, settings.triangle))
         seconds = sum(chain["seconds"] for chain in chains) + chosen["seconds"]
         tried.append(
             {
@@ -176,7 +178,7 @@ def _table(tried: Sequence[Mapping[str, Any]], *of: str) -> list[dict[str, Any]]
 
 
 def _rival(
-    box: Box, name: str, volume: float, settings: Settings, bench: Bench
+    box: Box, name: str, volume: float, settings: Settings, store: ResultStore
 ) -> tuple[dict[str, Any], Polygon | None]:
     """Return the best that the rival makes of a task with a volume, judged, and its shape.
 
@@ -191,9 +193,9 @@ def _rival(
         work = partial(
             optimise, box, settings.element, volume, springs, radius, settings.iterations
         )
-        made = bench.one(f"{name}-rival-{key}", work)
+        made = store.compute(f"{name}-rival-{key}", work)
         shape = contour_of(box, np.array(made["density"]), area)
-        score = bench.one(
+        score = store.compute(
             f"{name}-rival-judged-{key}", partial(_judged, box, shape, settings.triangle)
         )
         tried.append(
@@ -206,7 +208,7 @@ def _rival(
             }
         )
         shapes.append(shape)
-        bench.tell(f"{name}-rival", len(tried), len(settings.springs) + len(settings.radii) - 1)
+        store.progress(f"{name}-rival", len(tried), len(settings.springs) + len(settings.radii) - 1)
 
     for springs in settings.springs:
         attempt(springs, settings.radii[0])

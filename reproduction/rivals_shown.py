@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.plots.shapes import Shape, draw_shapes
+from reproduction.formatting import count, number
+from reproduction.pictures.outlines import Shape, draw_shapes
 from reproduction.registry import Claim
-from reproduction.words import count, number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

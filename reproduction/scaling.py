@@ -10,19 +10,19 @@ import numpy as np
 
 from bellcrank.model import find_problem
 from bellcrank.plots import style
-from bellcrank.plots.charts import Chart, Series
-from bellcrank.plots.sheets import Sheet, draw_sheet
 from bellcrank.search import read_settings
 from reproduction import published
+from reproduction.formatting import count, number
+from reproduction.pictures.charts import Chart, Series
+from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import run_chain
-from reproduction.words import count, number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 MARK = "1.0"
 
@@ -47,7 +47,7 @@ class Settings:
     seed: int = 0
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Run and time the chains of each size."""
     rows = []
     for size, runs in zip(settings.sizes, settings.runs, strict=True):
@@ -61,7 +61,7 @@ def run(settings: Settings, bench: Bench) -> Figures:
         }
         search = read_settings(told)
         work = {str(k): partial(run_chain, problem, search, k) for k in range(runs)}
-        chains = list(bench.all(f"size-{size}", work).values())
+        chains = list(store.compute_all(f"size-{size}", work).values())
         rows.append({"size": size, "beams": beams, "runs": runs, **_summary(chains)})
     return {
         "runs": list(settings.runs),

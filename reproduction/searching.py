@@ -11,7 +11,7 @@ import numpy as np
 
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
 from bellcrank.model import Design, unpack_mask
-from bellcrank.plots.downsampling import thin
+from bellcrank.plots.downsampling import downsample
 from bellcrank.search import (
     Candidate,
     advance_chain,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Problem
     from bellcrank.search import Choice, Evaluator, SearchSettings, Selection
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 POINTS = 160
 """Of a path that is kept, about."""
@@ -96,7 +96,7 @@ def thinned_path(value: NDArray[np.float64]) -> dict[str, list[float]]:
     if not len(value):
         return {"accepted": [], "efficiency": []}
     accepted = np.arange(1.0, len(value) + 1.0)
-    kept = thin(np.log(accepted), value, POINTS // 4)
+    kept = downsample(np.log(accepted), value, POINTS // 4)
     return {
         "accepted": accepted[kept].astype(int).tolist(),
         "efficiency": np.round(value[kept], 4).tolist(),
@@ -104,7 +104,7 @@ def thinned_path(value: NDArray[np.float64]) -> dict[str, list[float]]:
 
 
 def run_chains(
-    bench: Bench, what: str, problem: Problem, search: Mapping[str, Any], chains: int
+    store: ResultStore, what: str, problem: Problem, search: Mapping[str, Any], chains: int
 ) -> list[dict[str, Any]]:
     """Run so many chains of a search, each kept in a file of its own.
 
@@ -115,7 +115,7 @@ def run_chains(
     """
     settings = read_settings({**search, "chains": chains})
     work = {str(chain): partial(run_chain, problem, settings, chain) for chain in range(chains)}
-    return list(bench.all(what, work).values())
+    return list(store.compute_all(what, work).values())
 
 
 def best_design(

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.model import Design, find_problem
 from bellcrank.plots.explanation import draw_explanation
 from reproduction.explanation import as_drawn, explain_design
+from reproduction.formatting import number, share
 from reproduction.predicting import one_thread
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import design_of, run_chain
-from reproduction.words import number, share
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
     from bellcrank.surrogate.explaining import Explanation
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 MEASURES = ("screening", "network", "gradient", "occlusion", "white", "black")
 
@@ -44,7 +44,7 @@ class Settings:
     stride: int = 4
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Explain each design."""
     from bellcrank.search import read_settings
 
@@ -52,14 +52,14 @@ def run(settings: Settings, bench: Bench) -> Figures:
     told = {"search": "paper", "steps": settings.steps, "seed": 2_000_000}
     search = read_settings({**told, "chains": settings.chains})
     rows = []
-    bench.tell("designs", 0, settings.chains)
+    store.progress("designs", 0, settings.chains)
     for chain in range(settings.chains):
-        found = bench.one(f"chain-{chain}", partial(run_chain, problem, search, chain))
+        found = store.compute(f"chain-{chain}", partial(run_chain, problem, search, chain))
         mask = found["offered"][0]["mask"]
         rows.append(
-            bench.one(f"seen-{chain}", partial(_told, settings.problem, mask, settings.stride))
+            store.compute(f"seen-{chain}", partial(_told, settings.problem, mask, settings.stride))
         )
-        bench.tell("designs", chain + 1, settings.chains)
+        store.progress("designs", chain + 1, settings.chains)
     names = [name for name in MEASURES if name in rows[0]["agreement"]]
     return {
         "problem": settings.problem,

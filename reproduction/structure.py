@@ -10,17 +10,17 @@ import numpy as np
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.plots import Motion
-from bellcrank.plots.sheets import Sheet, draw_sheet
 from reproduction import published
+from reproduction.formatting import count, number
+from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import best_design, design_of, run_chains
-from reproduction.words import count, number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from reproduction.bench import Bench
+    from reproduction.result_store import ResultStore
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +33,11 @@ class Settings:
     seed: int = 0
 
 
-def run(settings: Settings, bench: Bench) -> Figures:
+def run(settings: Settings, store: ResultStore) -> Figures:
     """Count what the lattice has, and search by the paper's rule."""
     problem = find_problem(settings.problem)
     search = {"search": "paper", "steps": settings.steps, "seed": settings.seed}
-    chains = run_chains(bench, "chain", problem, search, settings.chains)
+    chains = run_chains(store, "chain", problem, search, settings.chains)
     chosen = best_design(problem, chains)
     whole = SpringEvaluator(problem).evaluate(problem.initial)
     lattice, given = problem.lattice, problem.input

@@ -10,10 +10,10 @@ import numpy as np
 from bellcrank.model import write_design
 from bellcrank.model.storage import write_text
 from bellcrank.plots import style
-from bellcrank.plots.charts import Chart, Level, Series
-from bellcrank.plots.sheets import Sheet, draw_sheet
 from bellcrank.storage import check_free
 from bellcrank.storage.files import make_folder
+from reproduction.pictures.charts import Chart, Level, Series
+from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.surrogate_search import OFFERS
 
 if TYPE_CHECKING:

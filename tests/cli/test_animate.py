@@ -13,7 +13,7 @@ from PIL import Image
 from bellcrank.plots.movies import movie_settings
 from bellcrank.search import read_settings
 from bellcrank.storage import RunFolder
-from bellcrank.workflows.animate_search import read_story, search_movie
+from bellcrank.workflows.animate_search import read_history, search_movie
 
 from .helpers import PROBLEM, call, design_of, files, refusal, write
 
@@ -87,28 +87,30 @@ def test_the_story_of_a_search_leads_from_the_full_lattice_to_the_chosen_design(
     whole: Path,
 ) -> None:
     folder = RunFolder.open(whole)
-    story = read_story(folder, read_settings(folder.settings))
+    history = read_history(folder, read_settings(folder.settings))
     chosen = json.loads((whole / "design.json").read_text())["provenance"]
-    assert (story.chain, story.step[-1]) == (chosen["chain"], chosen["step"] + 1)
-    assert story.mask[0].all()
-    assert story.step[0] == 0
-    assert (np.diff(story.step) > 0).all()
-    assert (np.diff(story.efficiency) > 0.0).all()
-    assert story.efficiency[-1] == pytest.approx(design_of(whole)["efficiency"], rel=0.1)
+    assert (history.chain, history.step[-1]) == (chosen["chain"], chosen["step"] + 1)
+    assert history.mask[0].all()
+    assert history.step[0] == 0
+    assert (np.diff(history.step) > 0).all()
+    assert (np.diff(history.efficiency) > 0.0).all()
+    assert history.efficiency[-1] == pytest.approx(design_of(whole)["efficiency"], rel=0.1)
 
 
 def test_the_movie_of_a_search_ends_with_its_best_design_and_no_news(whole: Path) -> None:
     folder = RunFolder.open(whole)
     told: list[tuple[str, int, int]] = []
-    movie = search_movie(folder, movie_settings("a.mp4", 4.0), tell=lambda *news: told.append(news))
-    (course,) = movie.courses
+    movie = search_movie(
+        folder, movie_settings("a.mp4", 4.0), progress=lambda *news: told.append(news)
+    )
+    (sequence,) = movie.sequences
     efficiency = movie.graphs[0].lines[0]
-    assert np.array_equal(course.present[-1], course.present[-2])
-    assert course.present[0].all()
+    assert np.array_equal(sequence.present[-1], sequence.present[-2])
+    assert sequence.present[0].all()
     assert efficiency.at[-1] == len(efficiency.y) - 1
-    assert told[-1] == ("loading", len(course.notes), len(course.notes))
-    assert set(movie.order) == set(range(len(course.notes)))
-    assert np.isfinite(course.displacement).all()
+    assert told[-1] == ("loading", len(sequence.notes), len(sequence.notes))
+    assert set(movie.order) == set(range(len(sequence.notes)))
+    assert np.isfinite(sequence.displacement).all()
 
 
 def test_a_movie_is_replaced_on_request_only(here: Path, small: str) -> None:

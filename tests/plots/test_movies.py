@@ -15,23 +15,23 @@ from bellcrank.mechanics import SpringEvaluator
 from bellcrank.mechanics.strain import strain_of
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Stiffness, Supports
 from bellcrank.plots.movies import (
-    Course,
     Graph,
     Line,
     Movie,
+    MovieFigure,
     MovieSettings,
-    Stage,
+    StateSequence,
     check_movie,
-    film,
-    most_states,
+    max_states,
     movie_settings,
     mp4,
     pick_states,
     search_schedule,
     stroke_schedule,
+    write_movie,
 )
 from bellcrank.workflows import find_design
-from bellcrank.workflows.animate import Looks, animate_motion, motion_movie
+from bellcrank.workflows.animate import MotionOptions, animate_motion, motion_movie
 from bellcrank.workflows.loading import loading_path
 
 SMALL = (320, 180)
@@ -49,25 +49,25 @@ def filmed(movie, tmp_path_factory):
     """The movie in each format."""
     folder = tmp_path_factory.mktemp("filmed")
     for kind in FORMATS:
-        film(movie, folder / f"crane.{kind}", SETTINGS)
+        write_movie(movie, folder / f"crane.{kind}", SETTINGS)
     return folder
 
 
 @pytest.fixture(scope="module")
 def changing():
-    """A course on which beams go, of eight designs."""
+    """A sequence on which beams go, of eight designs."""
     design = find_design("scaling-8")
     present = np.repeat(design.mask[None], 8, axis=0)
     for k in range(8):
         present[k, design.problem.designable[: 5 * k]] = False
     evaluator = SpringEvaluator(design.problem)
     moved = np.array([evaluator.evaluate(mask).displacement for mask in present])
-    course = Course(
+    sequence = StateSequence(
         design.problem, present, present, moved, None, "search", tuple("abcdefgh"), ("",) * 8
     )
     line = Line(np.arange(8.0), np.arange(8.0) ** 2, np.arange(8))
-    graph = Graph("steps", "efficiency", (line,), foreseen=False, logarithmic=True)
-    return Movie((course,), (graph,), search_schedule(40, 8))
+    graph = Graph("steps", "efficiency", (line,), preview=False, logarithmic=True)
+    return Movie((sequence,), (graph,), search_schedule(40, 8))
 
 
 def truss(force: float) -> Design:
@@ -166,7 +166,7 @@ def test_a_motion_is_slow_at_its_ends():
 @pytest.mark.parametrize("frames", [3, 4, 10, 75, 300])
 @pytest.mark.parametrize("fps", [1, 25, 60])
 def test_every_chosen_design_of_a_search_is_seen(frames, fps):
-    for states in range(1, most_states(frames, fps) + 1):
+    for states in range(1, max_states(frames, fps) + 1):
         order = search_schedule(frames, states)
         assert len(order) == frames
         assert set(np.diff(order)) <= {0, 1}
@@ -190,15 +190,15 @@ def test_of_few_designs_all_are_chosen(count):
 
 
 def test_the_first_frame_is_rest_and_the_middle_one_the_full_stroke(movie):
-    course = movie.courses[0]
+    sequence = movie.sequences[0]
     design = find_design("human:crane")
     full = SpringEvaluator(design.problem).evaluate(design.mask)
     middle = movie.order[len(movie.order) // 2]
-    assert (course.displacement[movie.order[0]] == 0.0).all()
-    assert np.allclose(course.displacement[middle], full.displacement, atol=1e-9)
-    assert course.energy[middle].sum() == pytest.approx(full.energy, rel=1e-8)
+    assert (sequence.displacement[movie.order[0]] == 0.0).all()
+    assert np.allclose(sequence.displacement[middle], full.displacement, atol=1e-9)
+    assert sequence.energy[middle].sum() == pytest.approx(full.energy, rel=1e-8)
     assert movie.graphs[0].lines[0].y[-1] == pytest.approx(full.efficiency, abs=1e-8)
-    assert course.notes[middle] == "198 beams · stroke 100 % · efficiency 1.010"
+    assert sequence.notes[middle] == "198 beams · stroke 100 % · efficiency 1.010"
 
 
 def test_each_frame_shows_the_response_to_a_part_of_the_stroke():
@@ -215,16 +215,16 @@ def test_each_frame_shows_the_response_to_a_part_of_the_stroke():
 def test_the_moment_at_which_a_design_snaps_is_said_and_its_curves_break_there():
     design = truss(0.12)
     snapping = motion_movie([("truss", design)], SETTINGS)
-    course, line = snapping.courses[0], snapping.graphs[0].lines[0]
-    snapped = np.array([bool(alarm) for alarm in course.alarms])
+    sequence, line = snapping.sequences[0], snapping.graphs[0].lines[0]
+    snapped = np.array([bool(alarm) for alarm in sequence.alarms])
     assert not snapped[0]
     assert snapped[-1]
     assert np.count_nonzero(np.diff(snapped)) == 1
-    assert course.alarms[-1].startswith("has snapped at ")
+    assert sequence.alarms[-1].startswith("snaps at ")
     assert np.count_nonzero(np.isnan(line.y)) == 1
     assert np.isfinite(line.y[line.at]).all()
-    assert not any(motion_movie([("truss", truss(0.05))], SETTINGS).courses[0].alarms)
-    Stage(snapping, SMALL).draw(len(snapped) - 1)
+    assert not any(motion_movie([("truss", truss(0.05))], SETTINGS).sequences[0].alarms)
+    MovieFigure(snapping, SMALL).draw(len(snapped) - 1)
 
 
 def test_a_design_that_is_not_held_has_no_motion_to_show(tmp_path):
@@ -250,9 +250,9 @@ def test_an_mp4_has_the_length_and_size_asked_for(filmed):
 
 
 def test_an_mp4_shows_what_was_drawn(movie, filmed):
-    stage = Stage(movie, SMALL)
+    figure = MovieFigure(movie, SMALL)
     for state, picture in zip(movie.order, decoded(filmed / "crane.mp4"), strict=True):
-        drawn = stage.draw(int(state))[:, :, :3].astype(float)
+        drawn = figure.draw(int(state))[:, :, :3].astype(float)
         assert np.abs(picture - drawn).mean() < 4.0
         assert np.abs((picture - drawn).mean(axis=(0, 1))).max() < 1.0
 
@@ -270,10 +270,10 @@ def test_a_gif_loops_and_lasts_as_long_as_asked_for(filmed):
 
 
 def test_a_gif_shows_what_was_drawn_on_a_clean_ground(movie, filmed):
-    stage = Stage(movie, SMALL)
+    figure = MovieFigure(movie, SMALL)
     with Image.open(filmed / "crane.gif") as picture:
         first = np.array(picture.convert("RGB"), dtype=float)
-    drawn = stage.draw(0)[:, :, :3]
+    drawn = figure.draw(0)[:, :, :3]
     assert np.abs(first - drawn).mean() < 1.5
     assert (first[:3] == 255.0).all()
 
@@ -289,31 +289,31 @@ def test_frames_of_a_gif_keep_time(fps):
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_the_same_movie_is_the_same_file(movie, filmed, tmp_path, kind):
-    film(movie, tmp_path / f"again.{kind}", SETTINGS)
+    write_movie(movie, tmp_path / f"again.{kind}", SETTINGS)
     assert (tmp_path / f"again.{kind}").read_bytes() == (filmed / f"crane.{kind}").read_bytes()
 
 
 def test_pictures_drawn_anew_and_pictures_kept_make_the_same_file(
     movie, filmed, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(mp4, "KEPT_BYTES", 5 * SMALL[0] * SMALL[1])
-    film(movie, tmp_path / "again.mp4", SETTINGS)
+    monkeypatch.setattr(mp4, "CACHE_BYTES", 5 * SMALL[0] * SMALL[1])
+    write_movie(movie, tmp_path / "again.mp4", SETTINGS)
     assert (tmp_path / "again.mp4").read_bytes() == (filmed / "crane.mp4").read_bytes()
 
 
 def test_states_can_be_drawn_in_any_order(movie, changing):
     for one in (movie, changing):
-        stage = Stage(one, SMALL)
+        figure = MovieFigure(one, SMALL)
         states = np.unique(one.order)
-        forth = [stage.draw(int(state)) for state in states]
-        back = [stage.draw(int(state)) for state in states[::-1]][::-1]
+        forth = [figure.draw(int(state)) for state in states]
+        back = [figure.draw(int(state)) for state in states[::-1]][::-1]
         assert all(np.array_equal(a, b) for a, b in zip(forth, back, strict=True))
         assert not np.array_equal(forth[0], forth[-1])
 
 
 def test_the_camera_stands_still(movie):
-    stage = Stage(movie, (960, 540))
-    pictures = [stage.draw(int(state)) for state in np.unique(movie.order)]
+    figure = MovieFigure(movie, (960, 540))
+    pictures = [figure.draw(int(state)) for state in np.unique(movie.order)]
     support = np.s_[480:]
     assert all(np.array_equal(one[support], pictures[0][support]) for one in pictures)
     assert pictures[0][support].min() < 100
@@ -325,9 +325,9 @@ def test_no_ink_is_cut_off_at_the_edge_of_a_movie(name, size):
     few = MovieSettings(seconds=0.2, fps=25, size=size)
     for designs in ([name], [name, name]):
         whole = motion_movie([(one, find_design(one)) for one in designs], few)
-        stage = Stage(whole, size)
+        figure = MovieFigure(whole, size)
         for state in np.unique(whole.order):
-            picture = stage.draw(int(state))
+            picture = figure.draw(int(state))
             assert picture.shape == (size[1], size[0], 4)
             rim = [picture[:2], picture[-2:], picture[:, :2], picture[:, -2:]]
             assert all((part == 255).all() for part in rim)
@@ -336,29 +336,29 @@ def test_no_ink_is_cut_off_at_the_edge_of_a_movie(name, size):
 def test_designs_side_by_side_share_one_scale_of_colours():
     names = ["human:crane", "machine:crane"]
     both = motion_movie([(name, find_design(name)) for name in names], SETTINGS)
-    assert [course.title for course in both.courses] == names
+    assert [sequence.title for sequence in both.sequences] == names
     assert [len(graph.lines) for graph in both.graphs] == [2, 2]
-    assert Stage(both, SMALL).draw(0).shape == (180, 320, 4)
+    assert MovieFigure(both, SMALL).draw(0).shape == (180, 320, 4)
 
 
 def test_designs_with_different_drives_are_compared_along_their_strokes():
     names = ["human:crane", "human:pliers"]
     both = motion_movie([(name, find_design(name)) for name in names], SETTINGS)
-    assert [graph.across for graph in both.graphs] == ["part of the stroke, %"]
-    Stage(both, SMALL)
+    assert [graph.x_label for graph in both.graphs] == ["part of the stroke, %"]
+    MovieFigure(both, SMALL)
 
 
 def test_magnified_motion_is_drawn_larger_and_said_to_be():
     design = find_design("human:pliers")
-    large = motion_movie([("pliers", design)], SETTINGS, Looks(magnify=2.5)).courses[0]
+    large = motion_movie([("pliers", design)], SETTINGS, MotionOptions(magnify=2.5)).sequences[0]
     rest = design.problem.lattice.positions
     assert np.allclose(large.moved - rest, 2.5 * large.displacement)
     assert large.notes[-1].startswith("motion drawn × 2.5 · load 100 % · ")
 
 
 def test_beams_that_come_and_go_are_marked(changing):
-    stage = Stage(changing, (960, 540))
-    news, none = stage.draw(3), stage.draw(0)
+    figure = MovieFigure(changing, (960, 540))
+    news, none = figure.draw(3), figure.draw(0)
 
     def reddish(picture):
         red, green, blue = (picture[:, :, k].astype(int) for k in range(3))
@@ -370,7 +370,7 @@ def test_beams_that_come_and_go_are_marked(changing):
 @pytest.mark.parametrize("name", ["movie.avi", "movie", "movie.mp4.txt"])
 def test_an_unknown_suffix_is_refused(movie, tmp_path, name):
     with pytest.raises(InvalidSettings, match=r"expected a movie name ending in \.mp4, \.gif"):
-        film(movie, tmp_path / name)
+        write_movie(movie, tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -378,17 +378,17 @@ def test_an_unknown_suffix_is_refused(movie, tmp_path, name):
 def test_an_existing_movie_is_replaced_on_demand_only(movie, tmp_path, kind):
     path = tmp_path / f"movie.{kind}"
     path.write_text("precious")
-    with pytest.raises(OutputExists, match="exists already"):
-        film(movie, path, SETTINGS)
+    with pytest.raises(OutputExists, match="exists"):
+        write_movie(movie, path, SETTINGS)
     assert path.read_text() == "precious"
-    film(movie, path, SETTINGS, overwrite=True)
+    write_movie(movie, path, SETTINGS, overwrite=True)
     assert len(path.read_bytes()) > 2000
 
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_missing_folder_is_a_storage_error(movie, tmp_path, kind):
     with pytest.raises(StorageError, match="No such file or directory"):
-        film(movie, tmp_path / "missing" / f"movie.{kind}", SETTINGS)
+        write_movie(movie, tmp_path / "missing" / f"movie.{kind}", SETTINGS)
 
 
 @pytest.mark.parametrize("kind", FORMATS)
@@ -399,7 +399,7 @@ def test_a_stop_while_drawing_leaves_nothing(movie, tmp_path, monkeypatch, kind)
 
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with pytest.raises(KeyboardInterrupt):
-        film(movie, tmp_path / f"movie.{kind}", SETTINGS, tell=stop)
+        write_movie(movie, tmp_path / f"movie.{kind}", SETTINGS, progress=stop)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -407,9 +407,9 @@ def test_a_failing_encoder_is_heard_of(movie, tmp_path, monkeypatch):
     def fail(*_words):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(mp4._Track, "put", fail)
+    monkeypatch.setattr(mp4._VideoStream, "put", fail)
     with pytest.raises(StorageError, match="No space left on device"):
-        film(movie, tmp_path / "movie.mp4", SETTINGS)
+        write_movie(movie, tmp_path / "movie.mp4", SETTINGS)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -447,30 +447,30 @@ def test_settings_that_make_no_sense_are_refused(wrong, message):
 
 def test_a_gif_may_have_an_odd_size_and_no_more_frames_than_browsers_show(movie, tmp_path):
     odd = movie_settings("movie.gif", 0.2, size=(321, 181))
-    film(movie, tmp_path / "odd.gif", odd)
+    write_movie(movie, tmp_path / "odd.gif", odd)
     with Image.open(io.BytesIO((tmp_path / "odd.gif").read_bytes())) as picture:
         assert picture.size == (321, 181)
     with pytest.raises(InvalidSettings, match="fps: expected at most 50 for a GIF, got 60"):
         movie_settings("movie.gif", 1.0, fps=60)
 
 
-@pytest.mark.parametrize("field", ["present", "bearing", "displacement", "energy", "alarms"])
+@pytest.mark.parametrize("field", ["present", "load_bearing", "displacement", "energy", "alarms"])
 def test_courses_of_the_wrong_shape_are_refused(movie, field):
-    course = movie.courses[0]
+    sequence = movie.sequences[0]
     with pytest.raises(InvalidProblem, match=f"{field}: expected shape"):
-        replace(course, **{field: getattr(course, field)[1:]})
+        replace(sequence, **{field: getattr(sequence, field)[1:]})
 
 
 @pytest.mark.parametrize("magnify", [0.0, -1.0, float("nan"), float("inf")])
 def test_motion_cannot_be_magnified_by_nonsense(movie, magnify):
     with pytest.raises(InvalidSettings, match="magnify: expected a number above 0"):
-        replace(movie.courses[0], magnify=magnify)
+        replace(movie.sequences[0], magnify=magnify)
 
 
 def test_unknown_displacements_are_drawn_at_rest(movie):
-    course = movie.courses[0]
-    lost = replace(course, displacement=np.full_like(course.displacement, np.nan))
-    assert (lost.moved == course.problem.lattice.positions).all()
+    sequence = movie.sequences[0]
+    lost = replace(sequence, displacement=np.full_like(sequence.displacement, np.nan))
+    assert (lost.moved == sequence.problem.lattice.positions).all()
 
 
 def test_drawing_movies_needs_neither_pyplot_nor_an_encoder():

@@ -15,13 +15,13 @@ from bellcrank.model import Design, Lattice, Output, builtin, find_problem, huma
 from bellcrank.plots import (
     ChainPath,
     Motion,
-    PathsStyle,
+    PathOptions,
     draw_comparison,
     draw_design,
     draw_motion,
     draw_paths,
 )
-from bellcrank.plots.scene import beam_kinds, input_arrows, motion_arrows, wanted_arrows
+from bellcrank.plots.scene import beam_kinds, displacement_arrows, input_arrows, output_arrows
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +103,7 @@ def test_an_unknown_suffix_is_refused(draw, tmp_path, name, file):
 def test_an_existing_file_is_kept_unless_told_otherwise(draw, tmp_path, name):
     path = tmp_path / "picture.png"
     path.write_text("precious")
-    with pytest.raises(OutputExists, match="exists already"):
+    with pytest.raises(OutputExists, match="exists"):
         draw[name](path)
     assert path.read_text() == "precious"
 
@@ -172,9 +172,9 @@ def test_loose_pieces_and_dead_ends_are_told_from_the_rest(motion, tmp_path):
     loose, ends = absent[~touching[absent]], absent[touching[absent]]
     mask[loose[:1]] = True
     kinds = beam_kinds(motion.design.with_mask(mask))
-    assert loose[0] in kinds.idle
+    assert loose[0] in kinds.unloaded
     assert len(ends)
-    everything = np.concatenate([kinds.ground, kinds.idle, kinds.bearing])
+    everything = np.concatenate([kinds.ground, kinds.unloaded, kinds.load_bearing])
     assert np.array_equal(np.sort(everything), np.flatnonzero(mask))
     draw_motion(replace(motion, design=motion.design.with_mask(mask)), tmp_path / "loose.png")
 
@@ -229,12 +229,12 @@ def test_a_displacement_for_other_nodes_is_refused(motion):
 def test_arrows_point_the_way_they_name(motion):
     problem = motion.design.problem
     (push,) = input_arrows(problem)
-    (wanted,) = wanted_arrows(problem, motion.moved)
+    (wanted,) = output_arrows(problem, motion.moved)
     assert push.tip[0] == pytest.approx(push.tail[0])
     assert push.tip[1] < push.tail[1]
     assert push.tip[1] > problem.lattice.positions[problem.input.nodes, 1].max()
     assert wanted.tip[0] < wanted.tail[0] < motion.moved[problem.output.nodes, 0].min()
-    assert len(motion_arrows(motion)) == len(problem.output.nodes)
+    assert len(displacement_arrows(motion)) == len(problem.output.nodes)
 
 
 def test_nodes_with_directions_of_their_own_get_arrows_of_their_own(motion, tmp_path):
@@ -243,13 +243,13 @@ def test_nodes_with_directions_of_their_own_get_arrows_of_their_own(motion, tmp_
     angle = np.linspace(0.0, 3.0, len(nodes))
     around = Output(nodes=nodes, direction=np.stack([np.cos(angle), np.sin(angle)], axis=1))
     turned = replace(motion.design, problem=replace(problem, output=around))
-    assert len(wanted_arrows(turned.problem, motion.moved)) == len(nodes)
+    assert len(output_arrows(turned.problem, motion.moved)) == len(nodes)
     draw_design(turned, tmp_path / "turned.png")
 
 
 def test_chains_without_any_efficiency_can_be_drawn(tmp_path):
     chains = [ChainPath(np.full(5, np.nan)), ChainPath(np.empty(0))]
-    draw_paths(chains, tmp_path / "nothing.png", PathsStyle(annealing_steps=100))
+    draw_paths(chains, tmp_path / "nothing.png", PathOptions(annealing_steps=100))
 
 
 def test_gaps_and_infinities_in_a_path_do_not_hide_its_best():
@@ -265,7 +265,7 @@ def test_few_and_many_chains_can_be_drawn(tmp_path, chains, axis):
         ChainPath(np.cumsum(rng.normal(0.01, 0.02, 3000)), np.cumsum(rng.integers(1, 9, 3000)))
         for _ in range(chains)
     ]
-    shown = PathsStyle(
+    shown = PathOptions(
         title="crane", annealing_steps=100, human_efficiency=1.0, built_efficiency=2.0,
         best=(chains - 1, 17), axis=axis,
     )  # fmt: skip
@@ -275,10 +275,10 @@ def test_few_and_many_chains_can_be_drawn(tmp_path, chains, axis):
 @pytest.mark.parametrize(
     ("chains", "shown", "message"),
     [
-        ([], PathsStyle(), "at least one"),
-        ([ChainPath(np.zeros(3))], PathsStyle(best=(0, 3)), "no design number 3 in chain 0"),
-        ([ChainPath(np.zeros(3))], PathsStyle(axis="time"), "accepted, proposals, got 'time'"),
-        ([ChainPath(np.zeros(3))], PathsStyle(axis="proposals"), "step: needed"),
+        ([], PathOptions(), "at least one"),
+        ([ChainPath(np.zeros(3))], PathOptions(best=(0, 3)), "no design number 3 in chain 0"),
+        ([ChainPath(np.zeros(3))], PathOptions(axis="time"), "accepted, proposals, got 'time'"),
+        ([ChainPath(np.zeros(3))], PathOptions(axis="proposals"), "step: needed"),
     ],
 )
 def test_impossible_paths_are_refused(tmp_path, chains, shown, message):

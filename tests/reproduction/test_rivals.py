@@ -7,7 +7,7 @@ import pytest
 
 from bellcrank.errors import InvalidSettings
 from reproduction.boxes import TASKS, box_of
-from reproduction.neutral import contour_of, drawing, judge, polygon_of
+from reproduction.outline_analysis import contour_of, drawing, judge, polygon_of
 from reproduction.topology import optimise, pymoto
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import CorruptRun, InvalidFile
-from reproduction import Bench, draw_record, read_record, read_records, run_study, studies
+from reproduction import ResultStore, draw_record, read_record, read_records, run_study, studies
 from reproduction.angular_springs import resistance
 from reproduction.page import page_of
-from reproduction.records import LARGEST, as_text, rounded, shrunk
+from reproduction.records import MAX_BYTES, as_text, rounded, shrunk
 from reproduction.scaling import slope
 
 RECORDS = Path(__file__).parents[2] / "docs" / "studies"
@@ -50,7 +50,7 @@ def test_every_study_leaves_a_record_and_a_small_picture(made) -> None:
         assert json.loads(json.dumps(record)) == read_record(out / f"{name}.json")
         assert record["mode"] == "quick"
         assert record["provenance"]["version"]
-        assert 2_000 < (out / f"{name}.png").stat().st_size <= LARGEST
+        assert 2_000 < (out / f"{name}.png").stat().st_size <= MAX_BYTES
         assert [claim.to_dict() for claim in studies[name].claims(record["figures"])] == (
             record["comparison"]
         )
@@ -71,34 +71,34 @@ def test_the_page_has_every_claim_of_every_record(made) -> None:
 
 
 def test_work_that_is_kept_is_not_done_again(tmp_path: Path) -> None:
-    bench = Bench.in_folder(tmp_path, "some", {"n": 1})
-    assert bench.all("piece", {"a": lambda: 1, "b": lambda: 2}) == {"a": 1, "b": 2}
+    store = ResultStore.for_study(tmp_path, "some", {"n": 1})
+    assert store.compute_all("piece", {"a": lambda: 1, "b": lambda: 2}) == {"a": 1, "b": 2}
 
     def never() -> int:
         raise AssertionError
 
-    again = Bench.in_folder(tmp_path, "some", {"n": 1})
+    again = ResultStore.for_study(tmp_path, "some", {"n": 1})
     assert again.all("piece", {"a": never, "b": never, "c": lambda: 3})["c"] == 3
-    other = Bench.in_folder(tmp_path, "some", {"n": 2})
+    other = ResultStore.for_study(tmp_path, "some", {"n": 2})
     assert other.one("piece-a", lambda: 7) == 7
 
 
 def test_what_was_done_before_an_error_is_kept(tmp_path: Path) -> None:
-    bench = Bench.in_folder(tmp_path, "some", {})
+    store = ResultStore.for_study(tmp_path, "some", {})
 
     def fail() -> int:
         raise RuntimeError("killed")
 
     with pytest.raises(RuntimeError, match="killed"):
-        bench.all("piece", {"a": lambda: 1, "b": fail}, workers=1)
-    assert [path.name for path in bench.folder.iterdir()] == ["piece-a.json"]
+        store.compute_all("piece", {"a": lambda: 1, "b": fail}, workers=1)
+    assert [path.name for path in store.folder.iterdir()] == ["piece-a.json"]
 
 
 def test_a_damaged_raw_record_is_named(tmp_path: Path) -> None:
-    bench = Bench.in_folder(tmp_path, "some", {})
-    (bench.folder / "a.json").write_text("{")
+    store = ResultStore.for_study(tmp_path, "some", {})
+    (store.folder / "a.json").write_text("{")
     with pytest.raises(CorruptRun, match=r"a\.json: expected JSON; delete it"):
-        bench.one("a", lambda: 1)
+        store.compute("a", lambda: 1)
 
 
 def test_other_files_are_no_records(tmp_path: Path) -> None:
@@ -130,7 +130,7 @@ def test_a_large_picture_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> Non
 
     from PIL import Image
 
-    monkeypatch.setattr("reproduction.records.LARGEST", 1000)
+    monkeypatch.setattr("reproduction.records.MAX_BYTES", 1000)
     noise = np.random.default_rng(0).integers(0, 255, (70, 90, 3), dtype=np.uint8)
     content = BytesIO()
     Image.fromarray(noise).save(content, format="PNG")

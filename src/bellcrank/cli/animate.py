@@ -67,7 +67,7 @@ def animate(
 ) -> None:
     """Film a design from rest to its full stroke and back, or the search that found one."""
     from bellcrank.plots.movies import check_movie, movie_settings
-    from bellcrank.workflows.animate import Looks, animate_motion
+    from bellcrank.workflows.animate import MotionOptions, animate_motion
     from bellcrank.workflows.animate_search import animate_search
 
     if search and (beside is not None or objective is not None):
@@ -78,18 +78,18 @@ def animate(
     settings = movie_settings(
         out, usual if seconds is None else seconds, fps, None if size is None else _size(size)
     )
-    looks = Looks(objective, magnify)
+    options = MotionOptions(objective, magnify)
     check_movie(out, overwrite=overwrite)
     names = [what] if beside is None else [what, beside]
     designs = [] if search else [(name, design_named(name)) for name in names]
     announce_compilation()
-    with MovieProgress() as tell:
+    with MovieProgress() as progress:
         if search:
             animate_search(
-                Path(what), out, settings, magnify=magnify, overwrite=overwrite, tell=tell
+                Path(what), out, settings, magnify=magnify, overwrite=overwrite, progress=progress
             )
         else:
-            animate_motion(designs, out, settings, looks, overwrite=overwrite, tell=tell)
+            animate_motion(designs, out, settings, options, overwrite=overwrite, progress=progress)
     notes.print(f"wrote {plain(out)}")
 
 

@@ -109,10 +109,10 @@ def show(
         print_entry(entry, known.path(entry.name))
     if out is not None:
         from bellcrank.plots import draw_motion
-        from bellcrank.workflows import move
+        from bellcrank.workflows import motion_of
 
         announce_compilation()
-        draw_motion(move(entry.design), out, title=entry.name, overwrite=overwrite)
+        draw_motion(motion_of(entry.design), out, title=entry.name, overwrite=overwrite)
         notes.print(f"wrote {plain(out)}")
 
 

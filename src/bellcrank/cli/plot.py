@@ -37,7 +37,7 @@ def plot(
 ) -> None:
     """Draw a design at rest and moved, a problem, or the paths of a search."""
     from bellcrank.plots import draw_comparison, draw_design, draw_motion
-    from bellcrank.workflows import draw_run, move
+    from bellcrank.workflows import draw_run, motion_of
 
     if beside is not None and (paths or rest):
         raise InvalidSettings("--beside compares motions; leave out --rest and --paths")
@@ -54,13 +54,13 @@ def plot(
             draw_design(design, target, overwrite=overwrite)
         else:
             announce_compilation()
-            first = move(design, objective, magnify=magnify)
+            first = motion_of(design, objective, magnify=magnify)
             if beside is None:
                 draw_motion(first, target, overwrite=overwrite)
             else:
-                second = move(design_named(beside), objective, name=beside, magnify=magnify)
+                second = motion_of(design_named(beside), objective, name=beside, magnify=magnify)
                 draw_comparison(
-                    move(design, objective, name=what, magnify=magnify),
+                    motion_of(design, objective, name=what, magnify=magnify),
                     second,
                     target,
                     overwrite=overwrite,

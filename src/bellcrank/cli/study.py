@@ -59,8 +59,8 @@ def study(
     records = []
     for each in chosen:
         began = time.perf_counter()
-        with _progress(each) as tell:
-            record = run_study(each, out, quick=quick, workers=workers, tell=tell)
+        with _progress(each) as progress:
+            record = run_study(each, out, quick=quick, workers=workers, progress=progress)
         records.append(record)
         if not as_json:
             _print(record)

@@ -94,10 +94,10 @@ def validate(
 ) -> None:
     """Check a design by finite elements: does the part move as it should."""
     from bellcrank.workflows import check_plan, spec_for, validate, with_stroke
-    from bellcrank.workflows.figures import draw_validations, prepare_targets, write_vtu
+    from bellcrank.workflows.pictures import check_targets, draw_validations, write_vtu
 
     chosen = design_named(design)
-    prepare_targets(picture, vtu, overwrite=overwrite)
+    check_targets(picture, vtu, overwrite=overwrite)
     target = record or record_beside(design)
     _check_record(target, chosen, asked=record is not None)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}

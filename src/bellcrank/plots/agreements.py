@@ -56,7 +56,7 @@ def ticks_up_to(largest: float, least: float) -> list[float]:
     return [*(-power for power in reversed(powers)), 0.0, *powers]
 
 
-def put_scatter(
+def add_scatter(
     axes: Axes,
     exact: NDArray[np.float64],
     measures: Sequence[Measure],
@@ -89,12 +89,12 @@ def put_scatter(
         ticks = ticks_up_to(largest, linear)
         place(ticks, labels=[f"{tick:g}" for tick in ticks])
         place([], minor=True)
-    style.label(axes, "change by mechanics", "change foreseen", style.SMALL_SIZE)
+    style.label_axes(axes, "change by mechanics", "change foreseen", style.SMALL_SIZE)
     axes.legend(loc="lower right", **_legend_looks())
-    style.quieten(axes)
+    style.style_axes(axes)
 
 
-def put_agreement(axes: Axes, measures: Sequence[Measure]) -> None:
+def add_agreement(axes: Axes, measures: Sequence[Measure]) -> None:
     """Draw a row for each measure, with a sign for each kind of agreement."""
     rows = np.arange(len(measures))[::-1]
     for name, sign, colour in SIGNS:
@@ -109,8 +109,8 @@ def put_agreement(axes: Axes, measures: Sequence[Measure]) -> None:
     axes.set_xlim(min(0.0, float(least)) - 0.05, 1.05)
     axes.set_ylim(-0.6, len(measures) - 0.4)
     axes.axvline(0.0, color=style.IDLE, linewidth=1.0, zorder=0.5)
-    style.label(axes, "", "", style.SMALL_SIZE)
-    style.quieten(axes)
+    style.label_axes(axes, "", "", style.SMALL_SIZE)
+    style.style_axes(axes)
     axes.grid(axis="x", color=style.IDLE_REST, linewidth=0.8)
     axes.set_yticks(rows, labels=[measure.name for measure in measures])
     axes.tick_params(axis="y", length=0.0, labelcolor=style.INK)

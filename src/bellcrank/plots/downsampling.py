@@ -1,4 +1,4 @@
-"""Long curves, thinned for drawing without losing a peak."""
+"""Downsampling of long curves for drawing without losing a peak."""
 
 from __future__ import annotations
 
@@ -10,33 +10,34 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def thin(x: NDArray[np.float64], y: NDArray[np.float64], columns: int = 1500) -> NDArray[np.int64]:
-    """Choose the points of a curve that are enough to draw it.
+def downsample(
+    x: NDArray[np.float64], y: NDArray[np.float64], columns: int = 1500
+) -> NDArray[np.int64]:
+    """Select the points of a curve that determine its picture.
 
-    The width is cut into columns, about as fine as the picture; of each, the first
-    and last point and those with the least and greatest y are kept, so that the curve
-    covers the same ink as the whole. Gaps stay: the points around runs that are not
-    finite are kept, with one of the run.
+    The width is divided into columns, about as fine as the resolution of the picture. In each
+    column the first and last point and those with the smallest and largest y are kept. At gaps,
+    the points beside a run of values that are not finite are kept, with one point of the run.
 
     Parameters
     ----------
     x : (n,)
-        Not decreasing; transformed already where the axis is not linear.
+        Not decreasing; already transformed if the axis is not linear.
     y : (n,)
-        May hold nan.
+        Values; nan for gaps.
     columns
-        How many to cut into.
+        Number of columns.
 
     Returns
     -------
     (k,) int64
-        Indices in order; all of them if there are at most ``4 * columns``.
+        Indices in order; all indices if there are at most ``4 * columns``.
 
     Examples
     --------
     >>> y = np.zeros(100_000)
     >>> y[31_415] = 1.0
-    >>> kept = thin(np.arange(100_000.0), y, columns=100)
+    >>> kept = downsample(np.arange(100_000.0), y, columns=100)
     >>> len(kept) <= 400, 31_415 in kept
     (True, True)
     """
@@ -50,21 +51,21 @@ def thin(x: NDArray[np.float64], y: NDArray[np.float64], columns: int = 1500) ->
     kept = [starts, np.r_[starts[1:], count] - 1]
     finite = np.isfinite(y)
     kept += [
-        _first_extreme(np.where(finite, y, fill), starts, least=fill > 0)
+        _first_extreme(np.where(finite, y, fill), starts, smallest=fill > 0)
         for fill in (np.inf, -np.inf)
     ]
     gaps = np.flatnonzero(finite[1:] != finite[:-1])
-    # Alternating wildly, there may be as many gaps as points; few are visible.
+    # Alternating values can have as many gaps as points; then they are not kept.
     if len(gaps) <= 4 * columns:
         kept += [gaps, gaps + 1]
     return np.unique(np.concatenate(kept))
 
 
 def _first_extreme(
-    y: NDArray[np.float64], starts: NDArray[np.int64], *, least: bool
+    y: NDArray[np.float64], starts: NDArray[np.int64], *, smallest: bool
 ) -> NDArray[np.int64]:
-    """Index of the first least (or greatest) y of each column."""
-    extreme = (np.minimum if least else np.maximum).reduceat(y, starts)
+    """Return the index of the first smallest (or largest) y of each column."""
+    extreme = (np.minimum if smallest else np.maximum).reduceat(y, starts)
     sizes = np.diff(np.r_[starts, len(y)])
     hits = np.flatnonzero(y == np.repeat(extreme, sizes))
     owner = np.searchsorted(starts, hits, side="right") - 1

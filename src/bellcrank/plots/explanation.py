@@ -14,21 +14,21 @@ import numpy as np
 from matplotlib.colors import AsinhNorm
 
 from bellcrank.plots import style
-from bellcrank.plots.agreements import Measure, put_agreement, put_scatter
+from bellcrank.plots.agreements import Measure, add_agreement, add_scatter
 from bellcrank.plots.legend import ROW_HEIGHT, add_legend, strut_entry, support_entries
-from bellcrank.plots.marks import Panel, add_panel, put_arrows
+from bellcrank.plots.marks import Panel, add_arrows, add_panel
 from bellcrank.plots.motion import MARGIN, WIDE
 from bellcrank.plots.saving import check_target, save_figure
-from bellcrank.plots.scene import extent, input_arrows, outline_around, spacing, wanted_arrows
+from bellcrank.plots.scene import extent, input_arrows, outline_around, output_arrows, spacing
 from bellcrank.plots.shadings import (
     REGIONS,
     UNKNOWN,
     HeatMap,
     Shading,
-    put_bar,
-    put_change,
-    put_map,
-    put_regions,
+    add_bar,
+    add_change,
+    add_map,
+    add_regions,
 )
 
 if TYPE_CHECKING:
@@ -142,12 +142,12 @@ class _Grid:
         """Lay a panel of the lattice, with words over it and arrows in it."""
         corner = (self.left(column), self.bottoms[row])
         top = float(self.figure.get_size_inches()[1]) - corner[1] - float(self.size[1])
-        style.write_heading(self.figure, title, note, corner[0], top - TITLE + 0.02)
+        style.add_heading(self.figure, title, note, corner[0], top - TITLE + 0.02)
         problem = self.explained.design.problem
         panel = add_panel(self.figure, problem, corner, self.scale, self.low, self.high)
-        put_arrows(panel, input_arrows(problem), style.INPUT, bold=True)
-        put_arrows(
-            panel, wanted_arrows(problem, problem.lattice.positions), style.WANTED, bold=True
+        add_arrows(panel, input_arrows(problem), style.INPUT, bold=True)
+        add_arrows(
+            panel, output_arrows(problem, problem.lattice.positions), style.WANTED, bold=True
         )
         return panel
 
@@ -156,7 +156,7 @@ class _Grid:
         left, bottom = self.left(column), self.bottoms[row]
         width, height = self.figure.get_size_inches()
         across, up = self.size
-        style.write_heading(self.figure, title, note, left, height - bottom - up - TITLE + 0.02)
+        style.add_heading(self.figure, title, note, left, height - bottom - up - TITLE + 0.02)
         return self.figure.add_axes((
             (left + room[0]) / width, (bottom + room[1]) / height,
             (across - room[0]) / width, (up - room[1] - 0.1) / height,
@@ -170,7 +170,7 @@ def _sheet(explained: Explained) -> Figure:
     if len(problem.supports.nodes):
         held = problem.lattice.positions[problem.supports.nodes]
         places.append(outline_around(held, 0.35 * spacing(problem)))
-    arrows = [*input_arrows(problem), *wanted_arrows(problem, problem.lattice.positions)]
+    arrows = [*input_arrows(problem), *output_arrows(problem, problem.lattice.positions)]
     low, high = extent(places, arrows, 0.2 * spacing(problem))
     scale = float((WIDE - 2 * MARGIN - 2 * COLUMN_GAP) / 3.0 / (high - low)[0])
     scale = min(scale, float(4.2 / (high - low)[1]))
@@ -184,16 +184,16 @@ def _sheet(explained: Explained) -> Figure:
     largest = explained.largest
     norm = AsinhNorm(linear_width=LINEAR * largest, vmin=-largest, vmax=largest)
     grid = _Grid(figure, explained, low, high, scale, bottoms)
-    style.write_heading(figure, explained.title, explained.note, grid.left(0), MARGIN)
+    style.add_heading(figure, explained.title, explained.note, grid.left(0), MARGIN)
     mask, beams = explained.design.mask, explained.beams
     for column, shading in enumerate(explained.changes):
-        put_change(grid.panel(0, column, shading.title, shading.note), mask, beams, shading, norm)
+        add_change(grid.panel(0, column, shading.title, shading.note), mask, beams, shading, norm)
     for column, shading in enumerate(explained.regions):
-        put_regions(grid.panel(1, column, shading.title, shading.note), mask, beams, shading)
+        add_regions(grid.panel(1, column, shading.title, shading.note), mask, beams, shading)
     for column, heat in enumerate(explained.maps):
-        put_map(grid.panel(2, column, heat.title, heat.note), mask, heat, norm)
-    _put_charts(grid)
-    put_bar(figure, norm, largest, LINEAR * largest, below - 0.32)
+        add_map(grid.panel(2, column, heat.title, heat.note), mask, heat, norm)
+    _add_charts(grid)
+    add_bar(figure, norm, largest, LINEAR * largest, below - 0.32)
     add_legend(figure, entries, MARGIN, len(entries))
     return figure
 
@@ -212,12 +212,12 @@ def _entries(explained: Explained) -> list[tuple[str, Any]]:
     return entries + support_entries([explained.design.problem])
 
 
-def _put_charts(grid: _Grid) -> None:
+def _add_charts(grid: _Grid) -> None:
     """Draw points and correlations at the right."""
     told = grid.explained
     words = "each flip, as foreseen and as it is"
     axes = grid.axes(1, 2, "One by one", words, (0.55, 0.45))
-    put_scatter(axes, told.exact, told.measures, told.largest, LINEAR * told.largest)
+    add_scatter(axes, told.exact, told.measures, told.largest, LINEAR * told.largest)
     if told.maps:
         axes = grid.axes(2, 2, "All together", "agreement with the mechanics", (0.95, 0.62))
-        put_agreement(axes, told.measures)
+        add_agreement(axes, told.measures)

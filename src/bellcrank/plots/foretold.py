@@ -77,13 +77,13 @@ def draw_foretold(
     """
     check_target(path, overwrite=overwrite)
     figure = style.new_figure(*SIZE)
-    style.write_heading(figure, title, note, MARGIN, 0.22)
+    style.add_heading(figure, title, note, MARGIN, 0.22)
     panels = style.row_of_axes(figure, 2, MARGIN, 0.25, TOP, BOTTOM, GAP)
     quantities = (("output", "output motion"), ("force", "input force"))
     for axes, (quantity, words), slope in zip(panels, quantities, slopes, strict=True):
         _draw(axes, found, simulated, quantity, slope)
-        style.label(axes, "input motion", words, style.SMALL_SIZE)
-        style.quieten(axes)
+        style.label_axes(axes, "input motion", words, style.SMALL_SIZE)
+        style.style_axes(axes)
         axes.axhline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)
     panels[0].legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False,

@@ -1,4 +1,4 @@
-"""Designs that no other beats in all respects, as points in the plane of two measures."""
+"""Pareto fronts: non-dominated designs in the plane of two objectives."""
 
 from __future__ import annotations
 
@@ -23,21 +23,23 @@ def draw_front(
     title: str = "",
     overwrite: bool = False,
 ) -> None:
-    """Draw a Pareto front: the second measure across, the first up, the third as colour.
+    """Draw a Pareto front: second objective on the x axis, first on the y axis, third as colour.
 
     Parameters
     ----------
     points
-        The measures of each design, by name.
+        Objective values of each design, by name.
     measures
-        Two or three names.
+        Names of two or three objectives.
     path
-        Where to; the suffix png, svg or pdf chooses the format.
+        Output file; the suffix png, svg or pdf selects the format.
 
     Raises
     ------
     InvalidSettings
-        If there are not two or three measures.
+        If there are not two or three objectives, or the suffix is unknown.
+    OutputExists, StorageError
+        If the file exists or cannot be written.
     """
     if not 2 <= len(measures) <= 3:
         raise InvalidSettings(f"measures: expected two or three, got {len(measures)}")
@@ -52,7 +54,7 @@ def draw_front(
         axes.plot(columns[1], columns[0], "o-", color=style.BEST, markersize=4.5, linewidth=1.0)
     axes.set_xlabel(measures[1])
     axes.set_ylabel(measures[0])
-    designs = "design" if len(points) == 1 else "designs"
-    axes.set_title(f"{title}: {len(points)} {designs} that no other beats", fontsize=11)
+    count = f"{len(points)} non-dominated design{'s' * (len(points) != 1)}"
+    axes.set_title(f"{title}: {count}" if title else count, fontsize=11)
     axes.grid(alpha=0.25, linewidth=0.6)
-    save_figure(figure, target)
+    save_figure(figure, target, overwrite=overwrite)

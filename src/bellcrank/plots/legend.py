@@ -1,4 +1,4 @@
-"""The legend under a drawing."""
+"""The legend of a drawing."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 ROW_HEIGHT = 0.24
-"""Inches that a row of the legend takes."""
+"""Height of a row of the legend, inches."""
 
 
 def strut_entry(colour: str, width: float = 4.0) -> Line2D:
-    """Sample of a strut."""
+    """Return the legend handle of a strut."""
     return Line2D([], [], color=colour, linewidth=width, solid_capstyle="round")
 
 
 def arrow_entry(colour: str) -> FancyArrow:
-    """Sample of an arrow."""
+    """Return the legend handle of an arrow."""
     return FancyArrow(0, 0, 1, 0, facecolor=colour, edgecolor="none")
 
 
-def ground_entry() -> Patch:
-    """Sample of the hatched ground."""
+def support_entry() -> Patch:
+    """Return the legend handle of a support."""
     return Patch(facecolor=style.GROUND_FILL, edgecolor=style.GROUND, hatch="//////", linewidth=0.8)
 
 
-def wheel_entry() -> Line2D:
-    """Sample of a wheel under a node that may roll."""
+def roller_entry() -> Line2D:
+    """Return the legend handle of a roller."""
     return Line2D(
         [], [], linestyle="none", marker="o", markersize=6.0,
         markerfacecolor="white", markeredgecolor=style.NOTE,
@@ -45,12 +45,12 @@ def wheel_entry() -> Line2D:
 
 
 def support_entries(problems: list[Problem]) -> list[tuple[str, Any]]:
-    """Entries for the supports and rollers that any of some problems has."""
+    """Return legend entries for the supports and rollers of problems."""
     entries: list[tuple[str, Any]] = []
     if any(len(problem.supports.fixed) for problem in problems):
-        entries.append(("support", ground_entry()))
+        entries.append(("support", support_entry()))
     if any(len(p.supports.fixed_x) + len(p.supports.fixed_y) for p in problems):
-        entries.append(("roller", wheel_entry()))
+        entries.append(("roller", roller_entry()))
     return entries
 
 
@@ -58,7 +58,7 @@ def _draw_arrow(
     legend: Legend, orig_handle: Artist, xdescent: float, ydescent: float,
     width: float, height: float, fontsize: float,
 ) -> FancyArrow:  # fmt: skip
-    """Draw an arrow as long as its place in the legend."""
+    """Return an arrow that fills the width of a legend handle."""
     del legend, orig_handle, fontsize
     return FancyArrow(
         -xdescent, -ydescent + 0.5 * height, width, 0.0,
@@ -70,20 +70,25 @@ def _draw_arrow(
 def add_legend(
     figure: Figure,
     entries: list[tuple[str, Any]],
-    at: float,
+    bottom: float,
     columns: int,
     *,
     left: float | None = None,
     size: float = style.SMALL_SIZE,
 ) -> None:
-    """Write a legend.
+    """Add a legend.
 
     Parameters
     ----------
-    at
-        Inches above the lower edge: of its foot, or of its head if `left` is given.
+    bottom
+        Distance of its lower edge (of its upper edge if `left` is given) from the lower edge of
+        the figure, inches.
+    columns
+        Number of columns.
     left
-        Inches from the left edge; by default it stands in the middle.
+        Distance from the left edge of the figure, inches; by default the legend is centred.
+    size
+        Font size.
     """
     width, height = figure.get_size_inches()
     across = 0.5 if left is None else left / width
@@ -92,7 +97,7 @@ def add_legend(
         [label for label, _ in entries],
         handler_map={FancyArrow: HandlerPatch(patch_func=_draw_arrow)},
         loc="lower center" if left is None else "upper left",
-        bbox_to_anchor=(across, at / height),
+        bbox_to_anchor=(across, bottom / height),
         ncols=columns,
         frameon=False,
         prop={"family": style.FONT, "size": size},

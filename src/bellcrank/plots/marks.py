@@ -1,4 +1,4 @@
-"""Marks on a drawing: struts, supports, regions, arrows."""
+"""Elements of a drawing: struts, supports, nodes, arrows."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 STRUT = 0.13
-"""Width of a drawn strut, as a fraction of the distance between nodes."""
+"""Width of a drawn strut, as a fraction of the lattice spacing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """Axes to draw a lattice on, true to scale.
+    """Axes for the drawing of a lattice, with equal scales.
 
     Parameters
     ----------
     axes
-        Without frame; one lattice unit is equally long both ways.
+        Axes without frame, with equal scales.
     problem
-        What is drawn.
+        Problem that is drawn.
     points
-        Points (1/72 inch) per lattice unit, so that line widths can be true to scale.
+        Points (1/72 inch) per lattice unit, for line widths in lattice units.
     """
 
     axes: Axes
@@ -43,7 +43,7 @@ class Panel:
 
     @property
     def strut(self) -> float:
-        """Width of a strut in points."""
+        """Width of a strut, points."""
         return max(STRUT * spacing(self.problem) * self.points, 0.6)
 
 
@@ -55,16 +55,16 @@ def add_panel(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> Panel:
-    """Lay a panel on a figure.
+    """Add a panel to a figure.
 
     Parameters
     ----------
     corner
-        Its lower left corner, inches.
+        Lower left corner, inches.
     scale
         Inches per lattice unit.
     low, high : (2,) lattice units
-        The part of the plane to show.
+        Lower left and upper right corner of the visible area.
     """
     across, up = scale * (high - low)
     width, height = figure.get_size_inches()
@@ -77,7 +77,7 @@ def add_panel(
     return Panel(axes, problem, 72.0 * scale)
 
 
-def put_struts(
+def add_struts(
     panel: Panel,
     positions: NDArray[np.float64],
     beams: NDArray[np.int64],
@@ -94,9 +94,9 @@ def put_struts(
     beams : (n,) int64
         Indices of the beams to draw.
     width
-        In widths of a strut.
+        Multiple of the strut width.
     level
-        What lies higher covers what lies lower.
+        Drawing order; higher levels cover lower ones.
     """
     if len(beams):
         panel.axes.add_collection(
@@ -111,10 +111,10 @@ def put_struts(
         )
 
 
-def put_nodes(
+def add_nodes(
     panel: Panel, places: NDArray[np.float64], colour: str, *, hollow: bool = False
 ) -> None:
-    """Mark nodes of a region by dots."""
+    """Mark nodes by dots."""
     panel.axes.plot(
         places[:, 0],
         places[:, 1],
@@ -129,8 +129,8 @@ def put_nodes(
     )
 
 
-def put_supports(panel: Panel) -> None:
-    """Mark the ground: hatched where nodes are held fast, wheels where they may roll."""
+def add_supports(panel: Panel) -> None:
+    """Draw fixed supports as hatched areas and rollers as wheels."""
     problem = panel.problem
     positions, step = problem.lattice.positions, spacing(problem)
     for group in support_groups(problem):
@@ -148,11 +148,11 @@ def put_supports(panel: Panel) -> None:
         (problem.supports.fixed_y, np.array([0.0, -0.26])),
         (problem.supports.fixed_x, np.array([-0.26, 0.0])),
     ):
-        _put_wheels(panel, positions[nodes], offset * step)
+        _add_wheels(panel, positions[nodes], offset * step)
 
 
-def _put_wheels(panel: Panel, places: NDArray[np.float64], offset: NDArray[np.float64]) -> None:
-    """Draw wheels beside nodes, and the rail that they roll on."""
+def _add_wheels(panel: Panel, places: NDArray[np.float64], offset: NDArray[np.float64]) -> None:
+    """Draw wheels beside nodes, with their rails."""
     if len(places) == 0:
         return
     radius = float(np.hypot(*offset)) / 2.0
@@ -182,10 +182,10 @@ def _put_wheels(panel: Panel, places: NDArray[np.float64], offset: NDArray[np.fl
     )
 
 
-def put_arrows(
+def add_arrows(
     panel: Panel, arrows: list[Arrow], colour: str, *, bold: bool = False, level: float = 7.0
 ) -> None:
-    """Draw arrows; bold ones name a region, thin ones a motion."""
+    """Draw arrows; bold arrows mark a region, thin ones a displacement."""
     step = spacing(panel.problem)
     body = 0.13 * arrow_length(panel.problem) if bold else 0.065 * step
     for arrow in arrows:

@@ -1,4 +1,4 @@
-"""Pictures on disk: format by suffix, never over another file, never half a file."""
+"""Writing of pictures: format by suffix, atomic, without overwriting by default."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from bellcrank.plots.style import DPI
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Without dates inside, the same picture is the same file (except for the random ids in SVG,
-# which only a global setting of matplotlib would fix).
+# Without dates, equal pictures are equal files (except for random ids in SVG, which only a
+# global setting of matplotlib makes constant).
 FORMATS: dict[str, dict[str, Any]] = {
     ".png": {},
     ".svg": {"Date": None},
     ".pdf": {"CreationDate": None},
 }
-"""Suffixes of pictures, with the metadata to leave out."""
+"""Suffixes of pictures, with the metadata to omit."""
 
 
 def check_target(path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-    """Refuse a picture that could not be written anyway, before it is drawn.
+    """Check before any computation that a picture can be written.
 
     Raises
     ------
     InvalidSettings
-        If the suffix is none of png, svg and pdf.
+        If the suffix is not png, svg or pdf.
     OutputExists
-        If there is something of that name and `overwrite` is not set.
+        If the file exists and `overwrite` is not set.
 
     Examples
     --------
@@ -50,16 +50,14 @@ def check_target(path: str | os.PathLike[str], *, overwrite: bool = False) -> Pa
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a figure whole or not at all, at 200 dots per inch.
+    """Write a figure at 200 dots per inch, completely or not at all.
 
     Raises
     ------
-    InvalidSettings
-        If the suffix is none of png, svg and pdf.
-    OutputExists
-        If there is something of that name and `overwrite` is not set.
+    InvalidSettings, OutputExists
+        As `check_target`.
     StorageError
-        If it cannot be written.
+        If the file cannot be written.
     """
     target = check_target(path, overwrite=overwrite)
     suffix = target.suffix.lower()

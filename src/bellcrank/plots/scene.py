@@ -1,4 +1,4 @@
-"""What is to be drawn, as plain geometry: kinds of beams, arrows, extent."""
+"""The geometry of a drawing: kinds of beams, arrows, supports, extent."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A design and where its nodes go.
+    """A design and the displacement of its nodes.
 
     Parameters
     ----------
     design
-        The problem and the beams that are present.
+        Problem and beams.
     displacement : (N, 2) float64, lattice units
-        Of each node; not finite where it is not known, which is drawn as at rest.
+        Displacement of each node. Nodes with values that are not finite are drawn at rest.
     efficiency
-        To be written under the title; None or nan if it is not known.
+        Written below the title; None or nan if unknown.
     name
-        What to call it where two are drawn side by side.
+        Title in pictures with several designs.
     note
-        More to be written after the efficiency, for example a status.
+        Text after the efficiency, for example a status.
     magnify
-        How many times its size the motion is drawn; said in the caption unless 1.
+        Factor by which the drawn displacement is larger than the given one; part of the caption.
 
     Raises
     ------
     InvalidProblem
-        If the displacement has not one row per node.
+        If the displacement has not one row for each node.
     InvalidSettings
-        If it is to be magnified by something that is not a positive number.
+        If `magnify` is not positive and finite.
 
     Examples
     --------
@@ -72,12 +72,12 @@ class Motion:
 
     @property
     def moved(self) -> NDArray[np.float64]:
-        """(N, 2) positions of the nodes after the motion, as drawn, lattice units."""
+        """(N, 2) drawn positions of the displaced nodes, lattice units."""
         return self.design.problem.lattice.positions + self.magnify * self.displacement
 
     @property
     def caption(self) -> str:
-        """Efficiency, number of beams and note, in a line."""
+        """Efficiency, number of beams and note on one line."""
         known = self.efficiency is not None and np.isfinite(self.efficiency)
         efficiency = f"efficiency {self.efficiency:.3f}" if known else "no efficiency"
         magnified = "" if self.magnify == 1.0 else f"motion drawn {self.magnify:g} times its size"
@@ -87,28 +87,28 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BeamKinds:
-    """The beams of a design by what they do.
+    """The beams of a design by function.
 
     Parameters
     ----------
-    ground, idle, bearing : (n,) int64, beam indices
-        Between supported nodes; loose or dead-end, so that they carry no load; all others.
+    ground, unloaded, load_bearing : (n,) int64, beam indices
+        Beams between fixed nodes; loose beams and dead ends, which carry no load; all others.
     """
 
     ground: NDArray[np.int64]
-    idle: NDArray[np.int64]
-    bearing: NDArray[np.int64]
+    unloaded: NDArray[np.int64]
+    load_bearing: NDArray[np.int64]
 
 
 def beam_kinds(design: Design) -> BeamKinds:
-    """Sort the beams of a design by what they do."""
+    """Classify the beams of a design by function."""
     problem = design.problem
     held = np.isin(problem.lattice.beams, problem.supports.fixed).all(axis=1)
-    bearing = load_bearing_core(design) & ~held
+    load_bearing = load_bearing_core(design) & ~held
     return BeamKinds(
         ground=np.flatnonzero(design.mask & held),
-        idle=np.flatnonzero(design.mask & ~held & ~bearing),
-        bearing=np.flatnonzero(bearing),
+        unloaded=np.flatnonzero(design.mask & ~held & ~load_bearing),
+        load_bearing=np.flatnonzero(load_bearing),
     )
 
 
@@ -121,24 +121,24 @@ class Arrow:
 
 
 def spacing(problem: Problem) -> float:
-    """Return the typical distance between neighbouring nodes, lattice units."""
+    """Return the median beam length, lattice units."""
     return float(np.median(problem.lattice.rest_length))
 
 
 def arrow_length(problem: Problem) -> float:
-    """Length of the arrows at a region: visible at any size of the lattice."""
+    """Return the length of the arrows at input and output, lattice units."""
     width, height = np.ptp(problem.lattice.positions, axis=0)
     return max(1.5 * spacing(problem), float(np.sqrt(width * height)) / 9.0)
 
 
 def input_arrows(problem: Problem) -> list[Arrow]:
-    """Return arrows that end where the region begins, pushing on each of its pieces."""
+    """Return arrows along the input direction that end at each connected part of the input."""
     region = problem.input
     places = problem.lattice.positions[region.nodes]
     length, gap = arrow_length(problem), 0.45 * spacing(problem)
     arrows = []
-    for own, directions in _pieces(problem, region, places):
-        if _one_direction(directions):
+    for own, directions in _parts(problem, region, places):
+        if _is_uniform(directions):
             tip = _edge(own, directions[0], side=-1.0) - gap * directions[0]
             arrows.append(Arrow(_pair(tip - length * directions[0]), _pair(tip)))
             continue
@@ -150,21 +150,21 @@ def input_arrows(problem: Problem) -> list[Arrow]:
     return arrows
 
 
-def wanted_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
-    """Return arrows that start where the region's pieces end, showing where they should go.
+def output_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
+    """Return arrows along the output direction that start at each connected part of the output.
 
     Parameters
     ----------
     moved : (N, 2) lattice units
-        Where the nodes go; the arrows stay clear of them.
+        Positions of the displaced nodes, which the arrows do not overlap.
     """
     region = problem.output
     places = np.concatenate([problem.lattice.positions, moved], axis=1)[region.nodes]
     length, gap = arrow_length(problem), 0.45 * spacing(problem)
     arrows = []
-    for own, directions in _pieces(problem, region, places):
+    for own, directions in _parts(problem, region, places):
         at_rest, gone = own[:, :2], own[:, 2:]
-        if not _one_direction(directions):
+        if not _is_uniform(directions):
             arrows += [
                 Arrow(_pair(place), _pair(place + 0.6 * length * t))
                 for place, t in zip(at_rest, directions, strict=True)
@@ -178,8 +178,8 @@ def wanted_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
     return arrows
 
 
-def motion_arrows(motion: Motion) -> list[Arrow]:
-    """Return an arrow per output node from rest to where it went, if that can be seen."""
+def displacement_arrows(motion: Motion) -> list[Arrow]:
+    """Return the displacements of the output nodes as arrows, if they are visible."""
     problem = motion.design.problem
     nodes = problem.output.nodes
     pairs = zip(problem.lattice.positions[nodes], motion.moved[nodes], strict=True)
@@ -188,7 +188,7 @@ def motion_arrows(motion: Motion) -> list[Arrow]:
 
 
 def outline_around(points: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
-    """Return the convex outline that keeps `radius` away from all points.
+    """Return the convex outline at distance `radius` around points.
 
     Parameters
     ----------
@@ -214,12 +214,12 @@ def outline_around(points: NDArray[np.float64], radius: float) -> NDArray[np.flo
 
 
 def support_groups(problem: Problem) -> list[NDArray[np.int64]]:
-    """Group fully held nodes that are joined by beams of the lattice."""
-    return _joined(problem, problem.supports.fixed)
+    """Group the fixed nodes that are connected by beams of the lattice."""
+    return _connected_groups(problem, problem.supports.fixed)
 
 
-def _joined(problem: Problem, nodes: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Group nodes that are joined by beams of the lattice between them."""
+def _connected_groups(problem: Problem, nodes: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Group nodes that are connected by beams between them."""
     beams = problem.lattice.beams
     owner = {int(node): int(node) for node in nodes}
 
@@ -234,15 +234,15 @@ def _joined(problem: Problem, nodes: NDArray[np.int64]) -> list[NDArray[np.int64
     return [nodes[roots == one] for one in np.unique(roots)]
 
 
-def _pieces(
+def _parts(
     problem: Problem, region: Input | Output, rows: NDArray[np.float64]
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Return rows and directions of the nodes of each piece of a region.
+    """Return rows and directions of the nodes of each connected part of a region.
 
-    A region of one direction and scattered nodes counts as one piece: a discrete packing may
-    have no beam between any two of them.
+    A region with isolated nodes counts as one part: a packing of discs may have no beam
+    between them.
     """
-    groups = _joined(problem, region.nodes)
+    groups = _connected_groups(problem, region.nodes)
     if min(map(len, groups)) == 1:
         groups = [region.nodes]
     inside = [np.isin(region.nodes, group) for group in groups]
@@ -252,39 +252,39 @@ def _pieces(
 def extent(
     places: list[NDArray[np.float64]], arrows: list[Arrow], margin: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower left and upper right corner, (2,) each, of all that is drawn."""
+    """Return the lower left and upper right corner, (2,) each, of points and arrows."""
     ends = [np.array([arrow.tail, arrow.tip]) for arrow in arrows]
     points = np.concatenate([*places, *ends])
     return points.min(axis=0) - margin, points.max(axis=0) + margin
 
 
-def level_with(
+def aligned_frames(
     frames: list[tuple[NDArray[np.float64], NDArray[np.float64]]], problems: list[Problem]
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Make frames equally high around the lattices' feet, so that all stand on one level.
+    """Extend frames to one height, so that the lower edges of the lattices are aligned.
 
     Parameters
     ----------
     frames
-        Lower left and upper right corner, (2,) each, of what is seen of each problem.
+        Lower left and upper right corner, (2,) each, of the visible area of each problem.
     """
-    feet = [float(problem.lattice.positions[:, 1].min()) for problem in problems]
-    below = max(foot - float(low[1]) for foot, (low, _) in zip(feet, frames, strict=True))
-    above = max(float(high[1]) - foot for foot, (_, high) in zip(feet, frames, strict=True))
+    bases = [float(problem.lattice.positions[:, 1].min()) for problem in problems]
+    below = max(base - float(low[1]) for base, (low, _) in zip(bases, frames, strict=True))
+    above = max(float(high[1]) - base for base, (_, high) in zip(bases, frames, strict=True))
     return [
-        (np.array([low[0], foot - below]), np.array([high[0], foot + above]))
-        for foot, (low, high) in zip(feet, frames, strict=True)
+        (np.array([low[0], base - below]), np.array([high[0], base + above]))
+        for base, (low, high) in zip(bases, frames, strict=True)
     ]
 
 
-def _one_direction(direction: NDArray[np.float64]) -> bool:
+def _is_uniform(direction: NDArray[np.float64]) -> bool:
     return bool(np.allclose(direction, direction[0]))
 
 
 def _edge(
     places: NDArray[np.float64], direction: NDArray[np.float64], side: float
 ) -> NDArray[np.float64]:
-    """Middle of the side of a region that lies farthest along ``side * direction``."""
+    """Return the middle of the side of a region that is farthest along ``side * direction``."""
     across = np.array([-direction[1], direction[0]])
     sideways = places @ across
     along = side * (side * places @ direction).max()

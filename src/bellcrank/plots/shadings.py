@@ -12,7 +12,7 @@ from matplotlib.colors import LinearSegmentedColormap, to_rgba
 
 from bellcrank.plots import style
 from bellcrank.plots.agreements import ticks_up_to
-from bellcrank.plots.marks import Panel, put_struts, put_supports
+from bellcrank.plots.marks import Panel, add_struts, add_supports
 
 if TYPE_CHECKING:
     from matplotlib.colors import Normalize
@@ -77,7 +77,7 @@ class HeatMap:
     high: NDArray[np.float64]
 
 
-def put_change(
+def add_change(
     panel: Panel,
     mask: NDArray[np.bool_],
     beams: NDArray[np.int64],
@@ -107,16 +107,16 @@ def put_change(
 def _put_rest(panel: Panel, mask: NDArray[np.bool_], beams: NDArray[np.int64], colour: str) -> None:
     """Draw the ground, and beams that are not designable."""
     problem = panel.problem
-    put_supports(panel)
+    add_supports(panel)
     held = np.isin(problem.lattice.beams, problem.supports.fixed).all(axis=1)
     kept = mask & ~held
     kept[beams] = False
     rest = problem.lattice.positions
-    put_struts(panel, rest, np.flatnonzero(mask & held), style.GROUND, width=0.6, level=1.0)
-    put_struts(panel, rest, np.flatnonzero(kept), colour, width=0.9, level=1.5)
+    add_struts(panel, rest, np.flatnonzero(mask & held), style.GROUND, width=0.6, level=1.0)
+    add_struts(panel, rest, np.flatnonzero(kept), colour, width=0.9, level=1.5)
 
 
-def put_regions(
+def add_regions(
     panel: Panel, mask: NDArray[np.bool_], beams: NDArray[np.int64], shading: Shading
 ) -> None:
     """Draw the design, and around its beams the regions that they belong to."""
@@ -125,11 +125,11 @@ def put_regions(
     for number, (_, colour) in enumerate(REGIONS):
         chosen = beams[there & (shading.values == number)]
         if colour:  # what matters most lies on top where regions meet
-            put_struts(panel, rest, chosen, colour, width=HALO, level=0.9 - 0.05 * number)
-    put_struts(panel, rest, beams[there], style.INK, width=0.75, level=3.0)
+            add_struts(panel, rest, chosen, colour, width=HALO, level=0.9 - 0.05 * number)
+    add_struts(panel, rest, beams[there], style.INK, width=0.75, level=3.0)
 
 
-def put_map(panel: Panel, mask: NDArray[np.bool_], heat: HeatMap, norm: Normalize) -> None:
+def add_map(panel: Panel, mask: NDArray[np.bool_], heat: HeatMap, norm: Normalize) -> None:
     """Draw a map of changes, and the design over it."""
     window = panel.axes.axis()
     panel.axes.imshow(
@@ -140,10 +140,10 @@ def put_map(panel: Panel, mask: NDArray[np.bool_], heat: HeatMap, norm: Normaliz
     panel.axes.axis(window)
     rest = panel.problem.lattice.positions
     present = np.flatnonzero(mask)
-    put_struts(panel, rest, present, style.INK, width=0.4, level=3.0)
+    add_struts(panel, rest, present, style.INK, width=0.4, level=3.0)
 
 
-def put_bar(figure: Figure, norm: Normalize, largest: float, linear: float, bottom: float) -> None:
+def add_bar(figure: Figure, norm: Normalize, largest: float, linear: float, bottom: float) -> None:
     """Draw the colour bar of all changes, `bottom` inches above the lower edge."""
     up = float(figure.get_size_inches()[1])
     axes = figure.add_axes((0.25, bottom / up, 0.5, BAR / up))

@@ -1,4 +1,4 @@
-"""How efficiency and force grow along the stroke of a part."""
+"""Curves of efficiency and force along the stroke of a part."""
 
 from __future__ import annotations
 
@@ -17,13 +17,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StrokeCurve:
-    """A part's way from rest to its full stroke.
+    """Equilibria of a part from rest to its full stroke.
 
     Parameters
     ----------
-    stroke, efficiency, force : (p,)
-        Input motion in mm, or force in N where that is given; efficiency; what stands against
-        it on the axis of the force.
+    stroke : (p,)
+        Input displacement in mm, or input force in N for a force drive.
+    efficiency : (p,)
+    force : (p,)
+        Input force in N, or output displacement in mm for a force drive.
     """
 
     stroke: NDArray[np.float64]
@@ -32,52 +34,41 @@ class StrokeCurve:
 
 
 @dataclass(frozen=True, slots=True)
-class StrokeAxes:
-    """Words on the axes of the curves.
+class StrokeLabels:
+    """Axis labels of the curves, with units."""
 
-    Parameters
-    ----------
-    stroke, force
-        With units.
-    """
-
-    stroke: str = "input motion, mm"
+    stroke: str = "input displacement, mm"
     force: str = "input force, N"
 
 
 def draw_strokes(
     pair: tuple[Axes, Axes],
     curves: Sequence[StrokeCurve],
-    words: StrokeAxes,
+    labels: StrokeLabels,
     names: Sequence[str] = (),
 ) -> None:
-    """Draw efficiencies into one pair of axes' first, forces into its second.
+    """Draw efficiencies on the first of two axes and forces on the second.
 
     Parameters
     ----------
     curves
-        One, or two: of a design by hand and of one by machine.
+        One curve, or two: of a human and of a machine design.
     names
-        Of the curves, for a legend where there are two.
+        Legend entries of two curves.
     """
-    shades = (style.HUMAN, style.OUTPUT) if len(curves) > 1 else (style.OUTPUT,)
-    for axes, kind, label in zip(
-        pair, ("efficiency", "force"), ("efficiency", words.force), strict=True
+    colours = (style.HUMAN, style.OUTPUT) if len(curves) > 1 else (style.OUTPUT,)
+    for axes, quantity, label in zip(
+        pair, ("efficiency", "force"), ("efficiency", labels.force), strict=True
     ):
-        for curve, colour in zip(curves, shades, strict=True):
+        for curve, colour in zip(curves, colours, strict=True):
             axes.plot(
-                curve.stroke, getattr(curve, kind),
+                curve.stroke, getattr(curve, quantity),
                 color=colour, marker="o", markersize=3.0, linewidth=1.4,
             )  # fmt: skip
-        _dress(axes, words.stroke, label)
+        style.label_axes(axes, labels.stroke, label, style.SMALL_SIZE)
+        axes.set_xlim(left=0.0)
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, 0.0), high + 0.06 * abs(high))
+        style.style_axes(axes)
         if len(curves) > 1:
             axes.legend(names, frameon=False, prop={"family": style.FONT, "size": style.SMALL_SIZE})
-
-
-def _dress(axes: Axes, below: str, beside: str) -> None:
-    """Label axes, quietly."""
-    style.label(axes, below, beside, style.SMALL_SIZE)
-    axes.set_xlim(left=0.0)
-    low, high = axes.get_ylim()
-    axes.set_ylim(min(low, 0.0), high + 0.06 * abs(high))
-    style.quieten(axes)

@@ -1,8 +1,8 @@
-"""What all pictures share: colours, letters, resolution.
+"""Style shared by all pictures: colours, font, resolution, headings, axes.
 
-The colours are those of Okabe and Ito (2008), which stay apart for colour-blind
-readers and in print, on greys for the structure itself. Everything is passed on
-explicitly: matplotlib's global settings are neither read for looks nor changed.
+The colours are those of Okabe and Ito (2008), which colour-blind readers can distinguish, on
+greys for the structure. All style is passed explicitly: the global settings of matplotlib are
+not changed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 DPI = 200
 FONT = "DejaVu Sans"
-"""Comes with matplotlib, so that pictures look the same everywhere."""
+"""Part of matplotlib, so that pictures are the same on all machines."""
 TITLE_SIZE = 13.0
 LABEL_SIZE = 10.5
 SMALL_SIZE = 9.5
@@ -53,17 +53,17 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def write_heading(figure: Figure, title: str, note: str, left: float, top: float) -> list[Text]:
-    """Write a title and a grey note under it.
+def add_heading(figure: Figure, title: str, note: str, left: float, top: float) -> list[Text]:
+    """Add a title and a grey note below it.
 
     Parameters
     ----------
     left, top
-        Upper left corner, inches from the left and from the upper edge.
+        Position of the upper left corner, inches from the left and the upper edge.
     """
     width, height = figure.get_size_inches()
     texts = []
-    for text, size, colour, weight, drop in (
+    for text, size, colour, weight, offset in (
         (title, TITLE_SIZE, INK, "bold", 0.0),
         (note, LABEL_SIZE, NOTE, "normal", 0.27 if title else 0.0),
     ):
@@ -71,7 +71,7 @@ def write_heading(figure: Figure, title: str, note: str, left: float, top: float
             texts.append(
                 figure.text(
                     left / width,
-                    1.0 - (top + drop) / height,
+                    1.0 - (top + offset) / height,
                     text,
                     size=size,
                     color=colour,
@@ -79,28 +79,28 @@ def write_heading(figure: Figure, title: str, note: str, left: float, top: float
                     family=FONT,
                     ha="left",
                     va="top",
-                    parse_math=False,  # a name with $ in it is just a name
+                    parse_math=False,  # names may contain $
                 )
             )
     return texts
 
 
 def heading_height(title: str, note: str) -> float:
-    """Height in inches that `write_heading` needs."""
+    """Return the height of the text of `add_heading`, inches."""
     return 0.27 * bool(title) + 0.24 * bool(note)
 
 
 def row_of_axes(
     figure: Figure, count: int, left: float, right: float, top: float, bottom: float, gap: float
 ) -> list[Axes]:
-    """Add axes of one size beside each other.
+    """Add axes of equal size in a row.
 
     Parameters
     ----------
     left, right, top, bottom
-        Inches kept free at the edges of the figure.
+        Margins of the figure, inches.
     gap
-        Inches between two of them.
+        Distance between axes, inches.
 
     Examples
     --------
@@ -123,8 +123,8 @@ def row_of_axes(
     ]
 
 
-def quieten(axes: Axes) -> None:
-    """Draw numbers, a grid of levels and two spines so that curves stand out."""
+def style_axes(axes: Axes) -> None:
+    """Set ticks, a horizontal grid and two spines in grey."""
     axes.tick_params(which="both", labelsize=SMALL_SIZE, colors=NOTE, labelfontfamily=FONT)
     axes.grid(axis="y", color=IDLE_REST, linewidth=0.8)
     axes.set_axisbelow(True)
@@ -134,7 +134,7 @@ def quieten(axes: Axes) -> None:
         axes.spines[side].set_color(IDLE)
 
 
-def label(axes: Axes, across: str, up: str, size: float = LABEL_SIZE) -> None:
-    """Say what the two axes are."""
-    axes.set_xlabel(across, size=size, color=INK, family=FONT)
-    axes.set_ylabel(up, size=size, color=INK, family=FONT)
+def label_axes(axes: Axes, x_label: str, y_label: str, size: float = LABEL_SIZE) -> None:
+    """Set the labels of both axes."""
+    axes.set_xlabel(x_label, size=size, color=INK, family=FONT)
+    axes.set_ylabel(y_label, size=size, color=INK, family=FONT)

@@ -1,4 +1,4 @@
-"""An actuator as a two-port: curves along its stroke against loads, and its load line."""
+"""Two-port characteristics of an actuator: curves against loads, and the load line."""
 
 from __future__ import annotations
 
@@ -17,25 +17,26 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SIZE = (11.4, 4.3)
-"""Of the figure, in inches."""
+"""Size of the figure, inches."""
 MARGIN, TOP, BOTTOM, GAP = 0.75, 1.05, 0.62, 0.85
 COLOURS = (style.OUTPUT, style.INPUT, style.BUILT, "#cc79a7", "#e69f00", "#56b4e9", style.INK)
-"""Of the curves, one after the other (Okabe and Ito, 2008)."""
+"""Colours of the curves in order (Okabe and Ito, 2008)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedCurve:
-    """What an actuator does along its stroke against one load.
+    """The response of an actuator along its stroke against one load.
 
     Parameters
     ----------
     name
-        Of the load.
-    motion, input_force, output, push : (p,)
-        Motion of and force on the input; motion of the output, and the force with which it
-        pushes on its load.
+        Name of the load.
+    motion, input_force : (p,)
+        Displacement of the input and force on it.
+    output, push : (p,)
+        Displacement of the output and its force on the load.
     complete
-        Whether it is stable up to the full stroke.
+        Whether all equilibria up to the full stroke are stable.
     """
 
     name: str
@@ -48,14 +49,14 @@ class LoadedCurve:
 
 @dataclass(frozen=True, slots=True)
 class LoadLine:
-    """The linear answer at one input motion: from a free to a blocked output.
+    """The linear load line at one input displacement.
 
     Parameters
     ----------
     free
-        Motion of a free output.
+        Displacement of the free output.
     blocked
-        Push of a blocked one.
+        Force of the blocked output.
     """
 
     free: float
@@ -71,16 +72,16 @@ def draw_two_port(
     note: str = "",
     overwrite: bool = False,
 ) -> None:
-    """Draw output motion and input force along the stroke, and where the strokes end.
+    """Draw output displacement, input force and output force along the stroke.
 
     Parameters
     ----------
     curves
-        One for each load.
+        One curve for each load.
     line
-        Drawn beside the ends of the strokes, if there is one.
+        Load line, if known.
     path
-        Where to; the suffix png, svg or pdf chooses the format.
+        Output file; the suffix png, svg or pdf selects the format.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def draw_two_port(
     """
     check_target(path, overwrite=overwrite)
     figure = style.new_figure(*SIZE)
-    style.write_heading(figure, title, note, MARGIN, 0.22)
+    style.add_heading(figure, title, note, MARGIN, 0.22)
     panels = style.row_of_axes(figure, 3, MARGIN, 0.25, TOP, BOTTOM, GAP)
     for curve, colour in zip(curves, _colours(len(curves)), strict=True):
         _draw_curve(panels[0], curve.motion, curve.output, curve, colour)
@@ -108,19 +109,19 @@ def draw_two_port(
         panels[2].plot(
             [line.free, 0.0], [0.0, line.blocked],
             color=style.NOTE, linewidth=1.1, linestyle=(0, (4, 2)), zorder=1.5,
-            label="load line, linear",
+            label="linear load line",
         )  # fmt: skip
-    words = (
-        ("input motion", "output motion"),
-        ("input motion", "input force"),
-        ("output motion", "push of the output on its load"),
+    labels = (
+        ("input displacement", "output displacement"),
+        ("input displacement", "input force"),
+        ("output displacement", "output force on the load"),
     )
-    for axes, (below, beside) in zip(panels, words, strict=True):
-        style.label(axes, below, beside, style.SMALL_SIZE)
-        style.quieten(axes)
+    for axes, (below, beside) in zip(panels, labels, strict=True):
+        style.label_axes(axes, below, beside, style.SMALL_SIZE)
+        style.style_axes(axes)
         axes.axhline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)
     panels[2].axvline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)
-    _explain(panels[0], panels[2], has_line=line is not None)
+    _add_legends(panels[0], panels[2], has_line=line is not None)
     save_figure(figure, path, overwrite=overwrite)
 
 
@@ -135,7 +136,7 @@ def _draw_curve(
     curve: LoadedCurve,
     colour: str,
 ) -> None:
-    """Draw one curve; its end is a dot, or a cross where stability is lost."""
+    """Draw one curve; a dot marks its end, or a cross the loss of stability."""
     axes.plot(across, up, color=colour, linewidth=1.6, label=curve.name)
     marker, size = ("o", 5.0) if curve.complete else ("X", 8.0)
     axes.plot(
@@ -144,8 +145,8 @@ def _draw_curve(
     )  # fmt: skip
 
 
-def _explain(first: Axes, last: Axes, *, has_line: bool) -> None:
-    """Say which curve is which, above the panels, where none can be hidden."""
+def _add_legends(first: Axes, last: Axes, *, has_line: bool) -> None:
+    """Add the legends above the panels, where they hide no curve."""
     font = {"family": style.FONT, "size": style.SMALL_SIZE}
     handles, labels = first.get_legend_handles_labels()
     first.legend(

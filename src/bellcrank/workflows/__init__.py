@@ -7,7 +7,7 @@ from bellcrank.workflows.design import (
 )
 from bellcrank.workflows.find import find_design
 from bellcrank.workflows.outcome import DesignReport
-from bellcrank.workflows.pictures import draw_run, move
+from bellcrank.workflows.pictures import draw_run, motion_of
 from bellcrank.workflows.record import check_record, keep_record
 from bellcrank.workflows.validate import (
     Validation,
@@ -28,7 +28,7 @@ __all__ = [
     "find_design",
     "identity",
     "keep_record",
-    "move",
+    "motion_of",
     "reopen_design",
     "spec_for",
     "start_design",

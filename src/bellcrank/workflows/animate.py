@@ -1,4 +1,4 @@
-"""Movies of designs that move: from rest to the full stroke and back."""
+"""Movies of designs that move from rest to the full stroke and back."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from bellcrank.mechanics import load_bearing_core
 from bellcrank.plots.movies import (
-    Course,
     Graph,
     Line,
     Movie,
     MovieSettings,
+    StateSequence,
     check_movie,
-    film,
     stroke_schedule,
+    write_movie,
 )
 from bellcrank.workflows.loading import LoadingPath, loading_path
 
@@ -28,27 +28,26 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Design
 
-    Tell = Callable[[str, int, int], None]
-
+    Progress = Callable[[str, int, int], None]
 
 FIGURE_SPACE = "\u2007"
-"""As wide as a digit, so that words stand still while numbers grow."""
+"""A space as wide as a digit, so that text does not move while numbers grow."""
 
 
-def silent(_what: str, _done: int, _total: int) -> None:
-    """Tell nobody."""
+def no_progress(_activity: str, _done: int, _total: int) -> None:
+    """Ignore progress reports."""
 
 
 @dataclass(frozen=True, slots=True)
-class Looks:
-    """How a motion is looked at.
+class MotionOptions:
+    """Options of a movie of a motion.
 
     Parameters
     ----------
     objective
-        What is called efficiency; the problem's own by default.
+        Objective that is shown as efficiency; that of the problem by default.
     magnify
-        How many times its size the motion is drawn.
+        Factor by which the drawn displacement is larger than the computed one.
     """
 
     objective: str | None = None
@@ -59,130 +58,131 @@ def animate_motion(
     designs: Sequence[tuple[str, Design]],
     path: Path,
     settings: MovieSettings,
-    looks: Looks | None = None,
+    options: MotionOptions | None = None,
     *,
     overwrite: bool = False,
-    tell: Tell = silent,
+    progress: Progress = no_progress,
 ) -> None:
-    """Film one design, or two side by side, from rest to the full stroke and back.
+    """Write a movie of one design, or of two side by side, from rest to the full stroke and back.
 
-    Each frame shows an equilibrium; beams have the colour of their strain energy. A design
-    that snaps is drawn back along the way it came.
+    Each frame shows an equilibrium; the colour of a beam shows its strain energy. The return
+    motion repeats the forward motion in reverse, also if the design snaps.
 
     Parameters
     ----------
     designs
-        With what to call them.
+        Pairs of a title and a design.
     path
-        Where to; the suffix mp4 or gif chooses the format.
+        Output file; the suffix mp4 or gif selects the format.
     settings
-        Length, frames per second, size.
-    looks
-        What is called efficiency, and how large the motion is drawn.
+        Length, frame rate, size.
+    options
+        Objective and magnification.
     overwrite
-        Whether to replace what is there.
-    tell
-        Called with what is being done, how much of it is done, and how much there is.
+        Whether an existing file is replaced.
+    progress
+        Called with the current activity, the number of finished steps, and their total.
 
     Raises
     ------
     InvalidSettings
-        If a design has no motion to show, or a setting makes no sense.
+        If a design has no motion to show, or a setting is invalid.
     OutputExists, StorageError
-        If there is such a file, or it cannot be written.
+        If the file exists or cannot be written.
     """
     check_movie(path, overwrite=overwrite)
-    film(
-        motion_movie(designs, settings, looks, tell),
+    write_movie(
+        motion_movie(designs, settings, options, progress),
         path,
         settings,
         overwrite=overwrite,
-        tell=lambda done: tell("drawing", done, settings.frames),
+        progress=lambda done: progress("drawing", done, settings.frames),
     )
 
 
 def motion_movie(
     designs: Sequence[tuple[str, Design]],
     settings: MovieSettings,
-    looks: Looks | None = None,
-    tell: Tell = silent,
+    options: MotionOptions | None = None,
+    progress: Progress = no_progress,
 ) -> Movie:
-    """Compute what `animate_motion` shows; arguments and errors are the same."""
-    looks = looks or Looks()
+    """Compute the movie of `animate_motion`; arguments and errors are the same."""
+    options = options or MotionOptions()
     part, order = stroke_schedule(settings.frames)
     states = len(part)
-    ways: list[LoadingPath] = []
+    responses: list[LoadingPath] = []
 
-    def loaded(done: int) -> None:
-        tell("loading", len(ways) * states + done, len(designs) * states)
+    def computed(done: int) -> None:
+        progress("loading", len(responses) * states + done, len(designs) * states)
 
     for _, design in designs:
-        ways.append(loading_path(design, part, looks.objective, loaded))
-    shown = [(name, design, way) for (name, design), way in zip(designs, ways, strict=True)]
-    courses = tuple(_moving(*one, looks.magnify) for one in shown)
-    return Movie(courses, _graphs(shown), order)
+        responses.append(loading_path(design, part, options.objective, computed))
+    shown = [(name, design, way) for (name, design), way in zip(designs, responses, strict=True)]
+    sequences = tuple(_sequence(*one, options.magnify) for one in shown)
+    return Movie(sequences, _graphs(shown), order)
 
 
-def _moving(name: str, design: Design, way: LoadingPath, magnify: float) -> Course:
-    """Return the course of a design along its stroke."""
-    states, beams = way.energy.shape
-    bearing = load_bearing_core(design)
+def _sequence(name: str, design: Design, response: LoadingPath, magnify: float) -> StateSequence:
+    """Return the states of a design along its stroke."""
+    states, beams = response.energy.shape
     word = "stroke" if design.problem.input.drive == "displacement" else "load"
     size = f"{design.beam_count} beams" if magnify == 1.0 else f"motion drawn × {magnify:g}"
     notes = tuple(
-        f"{size} · {word} {_percent(share)} · {efficiency_note(efficiency)}"
-        for efficiency, share in zip(way.efficiency, way.fraction, strict=True)
+        f"{size} · {word} {_percent(fraction)} · {efficiency_note(efficiency)}"
+        for efficiency, fraction in zip(response.efficiency, response.fraction, strict=True)
     )
-    snap = f"has snapped at {100.0 * way.fraction[way.snapped.argmax()]:.0f} % of the {word}"
-    return Course(
+    snap = f"snaps at {100.0 * response.fraction[response.snapped.argmax()]:.0f} % of the {word}"
+    return StateSequence(
         problem=design.problem,
         present=np.broadcast_to(design.mask, (states, beams)),
-        bearing=np.broadcast_to(bearing, (states, beams)),
-        displacement=way.displacement,
-        energy=way.energy,
+        load_bearing=np.broadcast_to(load_bearing_core(design), (states, beams)),
+        displacement=response.displacement,
+        energy=response.energy,
         title=name,
         notes=notes,
-        alarms=tuple(snap if snapped else "" for snapped in way.snapped),
+        alarms=tuple(snap if snapped else "" for snapped in response.snapped),
         magnify=magnify,
     )
 
 
-def _percent(share: float) -> str:
-    """Write a part of the stroke, always equally wide."""
-    return f"{round(100.0 * share):d}".rjust(3, FIGURE_SPACE) + " %"
+def _percent(fraction: float) -> str:
+    """Format a fraction of the stroke with constant width."""
+    return f"{round(100.0 * fraction):d}".rjust(3, FIGURE_SPACE) + " %"
 
 
 def efficiency_note(efficiency: float) -> str:
-    """Say how efficient a design is."""
+    """Format an efficiency."""
     return f"efficiency {efficiency:.3f}" if np.isfinite(efficiency) else "no efficiency"
 
 
 def _graphs(shown: list[tuple[str, Design, LoadingPath]]) -> tuple[Graph, ...]:
-    """Return efficiency, and what answers the input, against the input."""
+    """Return graphs of the efficiency, and of the conjugate quantity, against the input."""
     drives = {design.problem.input.drive for _, design, _ in shown}
     if len(drives) > 1:
-        along = [_line(name, 100.0 * way.fraction, way.efficiency, way) for name, _, way in shown]
-        return (Graph("part of the stroke, %", "efficiency", tuple(along)),)
+        lines = [_line(name, 100.0 * way.fraction, way.efficiency, way) for name, _, way in shown]
+        return (Graph("part of the stroke, %", "efficiency", tuple(lines)),)
     by_motion = drives == {"displacement"}
-    across = "input motion, lattice units" if by_motion else "force on an input node"
-    efficiency, answer = [], []
-    for name, design, way in shown:
+    x_label = "input displacement, lattice units" if by_motion else "force on each input node"
+    efficiency, conjugate = [], []
+    for name, design, response in shown:
         given, output = design.problem.input, design.problem.output
-        along_output = (way.displacement[:, output.nodes] * output.direction).sum(axis=2)
-        against = way.input_force if by_motion else along_output.mean(axis=1)
-        efficiency.append(_line(name, given.amount * way.fraction, way.efficiency, way))
-        answer.append(_line(name, given.amount * way.fraction, against, way))
+        along_output = (response.displacement[:, output.nodes] * output.direction).sum(axis=2)
+        values = response.input_force if by_motion else along_output.mean(axis=1)
+        efficiency.append(
+            _line(name, given.amount * response.fraction, response.efficiency, response)
+        )
+        conjugate.append(_line(name, given.amount * response.fraction, values, response))
     return (
-        Graph(across, "efficiency", tuple(efficiency)),
-        Graph(across, "input force" if by_motion else "output motion", tuple(answer)),
+        Graph(x_label, "efficiency", tuple(efficiency)),
+        Graph(x_label, "input force" if by_motion else "output displacement", tuple(conjugate)),
     )
 
 
-def _line(name: str, x: NDArray[np.float64], y: NDArray[np.float64], way: LoadingPath) -> Line:
-    """Return a curve along the stroke, broken where the design snaps."""
+def _line(name: str, x: NDArray[np.float64], y: NDArray[np.float64], response: LoadingPath) -> Line:
+    """Return a curve along the stroke with a gap where the design snaps."""
     at = np.arange(len(x))
-    if way.snapped.any():
-        snap = int(way.snapped.argmax())
+    if response.snapped.any():
+        snap = int(response.snapped.argmax())
         x, y = np.insert(x, snap, x[snap]), np.insert(y, snap, np.nan)
         at[snap:] += 1
     return Line(x, y, at, name)

@@ -14,7 +14,7 @@ from bellcrank.plots.saving import check_target
 from bellcrank.plots.scene import Motion
 from bellcrank.provenance import provenance
 from bellcrank.workflows.fabricate import profile_for
-from bellcrank.workflows.figures import stressed, stroke_axes
+from bellcrank.workflows.pictures import stressed_part, stroke_labels
 from bellcrank.workflows.record import check_record
 from bellcrank.workflows.validate import identity, validate
 
@@ -86,15 +86,15 @@ def make_card(
         note=f"efficiency {response.efficiency:.3f} by the discrete model · "
         f"{design.beam_count} beams · {design_hash(design)}",
         motion=Motion(design, response.displacement, response.efficiency),
-        curve=stressed(validation.analyses[0]).curve,
-        axes=stroke_axes(validation),
+        curve=stressed_part(validation.analyses[0]).curve,
+        labels=stroke_labels(validation),
         tables=[
             _part_table(bundle, part),
             _print_table(bundle, profile),
             _fem_table(validation, kept),
             _origin_table(design),
         ],
-        foot=_foot(design),
+        footer=_foot(design),
     )
     draw_card(card, path, overwrite=overwrite)
 

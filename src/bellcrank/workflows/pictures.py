@@ -1,4 +1,4 @@
-"""Which pictures a job leaves, and what is in them."""
+"""Pictures of runs, designs and validated parts, and the export of stress fields."""
 
 from __future__ import annotations
 
@@ -7,25 +7,41 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.errors import InvalidSettings
+from bellcrank.export.formats.vtu import mesh_to_bytes
 from bellcrank.mechanics import SpringEvaluator, Status
-from bellcrank.plots import ChainPath, Motion, PathsStyle, draw_comparison, draw_motion, draw_paths
+from bellcrank.model.storage import already_exists, check_folder, write_bytes
+from bellcrank.plots import (
+    ChainPath,
+    Motion,
+    PathOptions,
+    StressedPart,
+    StrokeCurve,
+    StrokeLabels,
+    draw_comparison,
+    draw_motion,
+    draw_paths,
+    draw_stress,
+)
+from bellcrank.plots.saving import check_target
 from bellcrank.search import MetropolisSettings, SearchSettings, read_settings, searches
 from bellcrank.storage import RunFolder
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
+    from bellcrank.fem import Analysis
     from bellcrank.model import Design
     from bellcrank.workflows.outcome import DesignReport
-
-
-def _annealing(settings: SearchSettings) -> int:
-    """Return the accepted steps over which the temperature falls, where there is one."""
-    return settings.annealing if isinstance(settings, MetropolisSettings) else 0
+    from bellcrank.workflows.validate import Validation
 
 
 def chain_paths(folder: RunFolder, settings: SearchSettings) -> list[ChainPath]:
-    """Read the accepted efficiencies of each chain of a run, or the best of them so far."""
+    """Read the accepted efficiencies of each chain of a run.
+
+    For a search that accepts losses, the largest efficiency so far is returned.
+    """
     paths = []
     for chain in range(settings.chains):
         columns = folder.read(chain, ["step", "efficiency", "accepted", "status"])
@@ -37,13 +53,14 @@ def chain_paths(folder: RunFolder, settings: SearchSettings) -> list[ChainPath]:
     return paths
 
 
-def paths_style(folder: RunFolder, settings: SearchSettings) -> PathsStyle:
-    """How to draw the chains of a run."""
+def path_options(folder: RunFolder, settings: SearchSettings) -> PathOptions:
+    """Return options for drawing the chains of a run."""
     if searches[settings.name].leaps:
-        return PathsStyle(
+        return PathOptions(
             title=folder.problem.name, axis="proposals", measure="best efficiency so far"
         )
-    return PathsStyle(title=folder.problem.name, annealing_steps=_annealing(settings))
+    annealing = settings.annealing if isinstance(settings, MetropolisSettings) else 0
+    return PathOptions(title=folder.problem.name, annealing_steps=annealing)
 
 
 def draw_run(path: Path, target: Path, *, overwrite: bool = False) -> None:
@@ -57,13 +74,13 @@ def draw_run(path: Path, target: Path, *, overwrite: bool = False) -> None:
     folder = RunFolder.open(path)
     settings = read_settings(folder.settings)
     paths = chain_paths(folder, settings)
-    draw_paths(paths, target, paths_style(folder, settings), overwrite=overwrite)
+    draw_paths(paths, target, path_options(folder, settings), overwrite=overwrite)
 
 
-def move(
+def motion_of(
     design: Design, objective: str | None = None, *, name: str = "", magnify: float = 1.0
 ) -> Motion:
-    """Compute the response of a design, ready to be drawn."""
+    """Compute the response of a design and return it for drawing."""
     response = SpringEvaluator(design.problem, objective).evaluate(design.mask)
     note = "" if response.status is Status.CONVERGED else response.status.label
     return Motion(
@@ -78,16 +95,15 @@ def draw_report(report: DesignReport, folder: RunFolder) -> None:
     found = selection.found
     steps = paths[found.chain].step
     assert steps is not None
-    best = (found.chain, int(np.searchsorted(steps, found.step)))
     human = report.human_response
     draw_paths(
         paths,
         folder.path / "efficiency.png",
         replace(
-            paths_style(folder, report.settings),
+            path_options(folder, report.settings),
             human_efficiency=human.efficiency if human else None,
-            built_efficiency=selection.efficiency_after,
-            best=best,
+            final_efficiency=selection.efficiency_after,
+            best=(found.chain, int(np.searchsorted(steps, found.step))),
         ),
         overwrite=True,
     )
@@ -101,3 +117,102 @@ def draw_report(report: DesignReport, folder: RunFolder) -> None:
     if report.human is not None and human is not None:
         drawn = Motion(report.human, human.displacement, human.efficiency, name="human")
         draw_comparison(drawn, machine, folder.path / "comparison.png", overwrite=True)
+
+
+def check_targets(picture: Path | None, vtu: Path | None, *, overwrite: bool) -> None:
+    """Check before any computation that the outputs of a validation can be written.
+
+    Raises
+    ------
+    InvalidSettings
+        If a suffix is unknown.
+    OutputExists
+        If a file exists and `overwrite` is not set.
+    StorageError
+        If a folder does not exist or is not writable.
+    """
+    if picture is not None:
+        check_target(picture, overwrite=overwrite)
+        check_folder(picture)
+    if vtu is not None:
+        if vtu.suffix != ".vtu":
+            raise InvalidSettings(f"{vtu}: expected a name ending in .vtu")
+        if vtu.exists() and not overwrite:
+            raise already_exists(vtu)
+        check_folder(vtu)
+
+
+def draw_validations(
+    validations: Sequence[Validation], names: Sequence[str], path: Path, *, overwrite: bool = False
+) -> None:
+    """Draw validated designs in columns, with the result of their last and finest analysis.
+
+    Raises
+    ------
+    InvalidSettings, OutputExists, StorageError
+    """
+    columns = []
+    for validation, name in zip(validations, names, strict=True):
+        status = validation.response.status.label
+        motion = Motion(
+            validation.design,
+            validation.response.displacement,
+            validation.response.efficiency,
+            name=name,
+            note="discrete model" + ("" if status == "converged" else f", {status}"),
+        )
+        columns.append((motion, stressed_part(validation.analyses[-1])))
+    draw_stress(columns, path, stroke_labels(validations[0]), overwrite=overwrite)
+
+
+def stroke_labels(validation: Validation) -> StrokeLabels:
+    """Return the axis labels of the curves of a design."""
+    if validation.design.problem.input.drive == "displacement":
+        return StrokeLabels()
+    return StrokeLabels(stroke="input force, N", force="mean output displacement, mm")
+
+
+def stressed_part(analysis: Analysis) -> StressedPart:
+    """Return an analysis for drawing."""
+    part, points = analysis.part, analysis.points
+    load = np.array([0.0, *(point.load for point in points)])
+    force = np.array([0.0, *(point.push for point in points)])
+    output = np.array([0.0, *(np.hypot(*point.output) for point in points)])
+    by_motion = part.design.problem.input.drive == "displacement"
+    known = f"efficiency {analysis.last.efficiency:.3f}"
+    if np.isnan(analysis.efficiency):
+        known += f", {analysis.status.value} at {analysis.last.load:.0%} of the stroke"
+    theory = analysis.theory + (", linear" if analysis.linear else "")
+    field = analysis.field
+    return StressedPart(
+        rest=field.rest[:, :2] / part.scale,
+        displacement=field.displacement[:, :2] / part.scale,
+        cells=field.cells,
+        stress=field.stress,
+        width=part.section.width / part.scale,
+        note=f"{known} · {analysis.level}, {theory}",
+        curve=StrokeCurve(
+            stroke=load * part.stroke if by_motion else force,
+            efficiency=np.array([np.nan, *(point.efficiency for point in points)]),
+            force=force if by_motion else output,
+        ),
+    )
+
+
+def write_vtu(analysis: Analysis, path: Path, *, overwrite: bool = False) -> None:
+    """Write the last state of an analysis for ParaView: vertices, displacement and stress.
+
+    Raises
+    ------
+    OutputExists, StorageError
+    """
+    field = analysis.field
+    stress = {"von_mises_MPa": field.stress}
+    by_cell = len(field.stress) == len(field.cells)
+    content = mesh_to_bytes(
+        field.rest,
+        field.cells,
+        {"displacement_mm": field.displacement, **({} if by_cell else stress)},
+        stress if by_cell else {},
+    )
+    write_bytes(path, content, overwrite=overwrite)

@@ -15,8 +15,8 @@ from bellcrank.plots.scene import (
     arrow_length,
     beam_kinds,
     input_arrows,
+    output_arrows,
     spacing,
-    wanted_arrows,
 )
 
 if TYPE_CHECKING:
@@ -115,11 +115,11 @@ def thumbnail(design: Design, displacement: NDArray[np.float64]) -> Thumbnail:
     places = problem.lattice.positions + np.nan_to_num(displacement)
     moved = (places * flip).round().astype(np.int64)
     kinds = beam_kinds(design)
-    ends = problem.lattice.beams[kinds.bearing]
+    ends = problem.lattice.beams[kinds.load_bearing]
     of_input = np.isin(ends, problem.input.nodes).all(axis=1)
     of_output = np.isin(ends, problem.output.nodes).all(axis=1)
     groups = {"m": ends[~of_input & ~of_output], "i": ends[of_input], "o": ends[of_output]}
-    arrows = {"i": input_arrows(problem), "o": wanted_arrows(problem, places)}
+    arrows = {"i": input_arrows(problem), "o": output_arrows(problem, places)}
     tips = np.array([point for each in arrows.values() for a in each for point in (a.tail, a.tip)])
     # Room for an arrow to any side of the ports, so that drawings of a size are to one scale.
     room = int(scale * arrow_length(problem)) + np.array([UNITS // 2, 0])

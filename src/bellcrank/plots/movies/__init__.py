@@ -1,32 +1,36 @@
-"""Movies: lattices that move or change, with curves beside them that grow along.
+"""Movies of lattices that move or change, with curves that are drawn alongside.
 
-Draws plain arrays, whoever made them. What never moves is drawn once; for each frame only
-what moves is drawn over a copy of it.
+The drawings are made from plain arrays. The parts of a picture that do not change are drawn
+once; each frame adds the moving parts to a copy.
 
-- a `Movie` holds `Course`s (what a lattice goes through, state by state), `Graph`s of `Line`s
-  and the order in which frames show the states;
-- `MovieSettings` says how long, how often and how large, and `film` writes the file;
-- `stroke_schedule`, `search_schedule` and `pick_states` give the order of frames.
+- a `Movie` holds a `StateSequence` for each lattice, `Graph`s of `Line`s, and the state that
+  each frame shows;
+- `MovieSettings` holds the length, frame rate and size; `write_movie` writes the file;
+- `stroke_schedule`, `search_schedule` and `pick_states` choose the states of the frames.
 """
 
-from bellcrank.plots.movies.film import film
-from bellcrank.plots.movies.records import Course, Graph, Line, Movie
-from bellcrank.plots.movies.settings import MovieSettings, check_movie, movie_settings
-from bellcrank.plots.movies.stage import Stage
-from bellcrank.plots.movies.timing import most_states, pick_states, search_schedule, stroke_schedule
+from bellcrank.plots.movies.figure import MovieFigure
+from bellcrank.plots.movies.output import MovieSettings, check_movie, movie_settings, write_movie
+from bellcrank.plots.movies.records import Graph, Line, Movie, StateSequence
+from bellcrank.plots.movies.schedule import (
+    max_states,
+    pick_states,
+    search_schedule,
+    stroke_schedule,
+)
 
 __all__ = [
-    "Course",
     "Graph",
     "Line",
     "Movie",
+    "MovieFigure",
     "MovieSettings",
-    "Stage",
+    "StateSequence",
     "check_movie",
-    "film",
-    "most_states",
+    "max_states",
     "movie_settings",
     "pick_states",
     "search_schedule",
     "stroke_schedule",
+    "write_movie",
 ]

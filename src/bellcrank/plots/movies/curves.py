@@ -1,4 +1,4 @@
-"""Graphs beside a lattice: curves with dots that move along them."""
+"""Graphs of a movie: curves with a marker that moves along them."""
 
 from __future__ import annotations
 
@@ -21,50 +21,55 @@ if TYPE_CHECKING:
     Box = tuple[float, float, float, float]
 
 LABEL_LEFT, LABEL_BELOW = 0.62, 0.46
-"""Inches for words and numbers beside and under a graph."""
+"""Inches for labels and numbers beside and below a graph."""
 HEADROOM = 0.08
 SMALL = 0.05
-"""Below it, numbers are written in a smaller unit."""
+"""Numbers below this are written in units of a power of ten."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Curves:
-    """Draws one graph.
+    """The artists of one graph.
 
     Parameters
     ----------
     figure
-        Where.
+        Figure to draw on.
     graph
-        What.
+        Content.
     box
-        Left, bottom, width and height in inches, words included.
-    shades
-        A colour for each line.
+        Left, bottom, width and height in inches, labels included.
+    colours
+        Colour of each line.
     legend
-        Whether to say which is which.
+        Whether a legend is added.
+
+    Attributes
+    ----------
+    artists
+        Matplotlib artists that are redrawn for each state.
     """
 
     def __init__(
-        self, figure: Figure, graph: Graph, box: Box, shades: tuple[str, ...], *, legend: bool
+        self, figure: Figure, graph: Graph, box: Box, colours: tuple[str, ...], *, legend: bool
     ) -> None:
         width, height = figure.get_size_inches()
         left, bottom = box[0] + LABEL_LEFT, box[1] + LABEL_BELOW
         across, up = box[2] - LABEL_LEFT, box[3] - LABEL_BELOW
         axes = figure.add_axes((left / width, bottom / height, across / width, up / height))
         self._lines = graph.lines
-        _dress(axes, graph, up)
+        _style(axes, graph, up)
         self._grown: list[tuple[Line2D, Line2D]] = []
-        for line, shade in zip(graph.lines, shades, strict=False):
-            if graph.foreseen:
-                axes.plot(line.x, line.y, color=shade, linewidth=1.4, alpha=0.28)
-            looks: dict[str, Any] = {"color": shade, "clip_on": False, "animated": True}
+        for line, colour in zip(graph.lines, colours, strict=False):
+            if graph.preview:
+                axes.plot(line.x, line.y, color=colour, linewidth=1.4, alpha=0.28)
+            options: dict[str, Any] = {"color": colour, "clip_on": False, "animated": True}
             (grown,) = axes.plot(
-                [], [], linewidth=1.9, solid_capstyle="round", label=line.label, **looks
+                [], [], linewidth=1.9, solid_capstyle="round", label=line.label, **options
             )
             (dot,) = axes.plot(
                 [], [], marker="o", markersize=6.5, markeredgecolor="white",
-                markeredgewidth=1.0, **looks,
+                markeredgewidth=1.0, **options,
             )  # fmt: skip
             self._grown.append((grown, dot))
         if legend:
@@ -77,24 +82,27 @@ class Curves:
         self.artists: list[Line2D] = [one for both in self._grown for one in both]
 
     def place(self, state: int) -> None:
-        """Move the dots to a state."""
+        """Update the curves and markers to a state."""
         for line, (grown, dot) in zip(self._lines, self._grown, strict=True):
             end = int(line.at[state]) + 1
             grown.set_data(line.x[:end], line.y[:end])
             dot.set_data(line.x[end - 1 : end], line.y[end - 1 : end])
 
 
-def _dress(axes: Axes, graph: Graph, height: float) -> None:
-    """Fix the limits and label the axes, quietly."""
-    span, rise = _span(graph), _rise(graph.lines)
-    for axis, word, limits in ((axes.xaxis, graph.across, span), (axes.yaxis, graph.up, rise)):
+def _style(axes: Axes, graph: Graph, height: float) -> None:
+    """Set limits, labels and ticks."""
+    x_limits, y_limits = _x_limits(graph), _y_limits(graph.lines)
+    for axis, text, limits in (
+        (axes.xaxis, graph.x_label, x_limits),
+        (axes.yaxis, graph.y_label, y_limits),
+    ):
         unit = power_of_ten(max(map(abs, limits)))
         axis.set_label_text(
-            word + in_words(unit), family=style.FONT, size=style.SMALL_SIZE, color=style.INK
+            text + unit_label(unit), family=style.FONT, size=style.SMALL_SIZE, color=style.INK
         )
         axis.set_major_formatter(FuncFormatter(lambda x, _place, u=unit: _number(x / u)))
     axes.xaxis.labelpad = 2.0
-    axes.set_ylim(*rise)
+    axes.set_ylim(*y_limits)
     axes.yaxis.set_major_locator(MaxNLocator(max(2, min(5, int(height / 0.3)))))
     if graph.logarithmic:
         axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)
@@ -102,20 +110,20 @@ def _dress(axes: Axes, graph: Graph, height: float) -> None:
         axes.xaxis.set_minor_locator(NullLocator())
     else:
         axes.xaxis.set_major_locator(MaxNLocator(5))
-    axes.set_xlim(*span)
-    axes.yaxis.set_label_coords(-0.52 / axes.get_position().width / _wide(axes), 0.5)
-    style.quieten(axes)
+    axes.set_xlim(*x_limits)
+    axes.yaxis.set_label_coords(-0.52 / axes.get_position().width / _figure_width(axes), 0.5)
+    style.style_axes(axes)
 
 
-def _wide(axes: Axes) -> float:
-    """Width of the figure that axes are on, inches."""
+def _figure_width(axes: Axes) -> float:
+    """Return the width of the figure of axes, inches."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     return float(figure.get_size_inches()[0])
 
 
 def power_of_ten(largest: float) -> float:
-    """Return the unit in which numbers up to the largest one are short.
+    """Return a power of ten in which numbers up to `largest` have few digits.
 
     Examples
     --------
@@ -127,12 +135,12 @@ def power_of_ten(largest: float) -> float:
     return float(10.0 ** (3 * math.floor(math.log10(largest) / 3)))
 
 
-def in_words(unit: float) -> str:
-    """Return a unit as it stands after a word.
+def unit_label(unit: float) -> str:
+    """Return the text that is appended to an axis label for a unit.
 
     Examples
     --------
-    >>> in_words(1e-6), in_words(1.0)
+    >>> unit_label(1e-6), unit_label(1.0)
     (' (10⁻⁶)', '')
     """
     power = str(round(math.log10(unit))).translate(SUPERSCRIPTS)
@@ -140,18 +148,18 @@ def in_words(unit: float) -> str:
 
 
 def _number(x: float) -> str:
-    """Write the number of a tick."""
+    """Format the number of a tick."""
     return f"{x:,.0f}".replace(",", "\u202f") if abs(x) >= 1000.0 else f"{x:.4g}"
 
 
-def _span(graph: Graph) -> tuple[float, float]:
-    """Limits of the horizontal axis."""
-    most = max(float(line.x.max()) for line in graph.lines)
-    return 0.0, (1.1 if graph.logarithmic else 1.03) * most or 1.0
+def _x_limits(graph: Graph) -> tuple[float, float]:
+    """Return the limits of the horizontal axis."""
+    largest = max(float(line.x.max()) for line in graph.lines)
+    return 0.0, (1.1 if graph.logarithmic else 1.03) * largest or 1.0
 
 
-def _rise(lines: tuple[Line, ...]) -> tuple[float, float]:
-    """Limits of the vertical axis: nothing is hidden, and zero is among them."""
+def _y_limits(lines: tuple[Line, ...]) -> tuple[float, float]:
+    """Return limits of the vertical axis that include all values and zero."""
     seen: NDArray[np.float64] = np.concatenate([line.y for line in lines])
     seen = seen[np.isfinite(seen)]
     low, high = min(0.0, seen.min(initial=0.0)), max(0.0, seen.max(initial=0.0))

@@ -1,4 +1,4 @@
-"""GIF by Pillow: one palette for all frames, without dithering, in an endless loop."""
+"""GIF encoding by Pillow: one palette for all frames, without dithering, in an endless loop."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.plots.movies.formats import Pictures
+    from bellcrank.plots.movies.records import FrameSource
 
-FASTEST = 50
-"""Frames in a second that browsers show; they slow down what is faster."""
-COLOURS, COMMON = 255, 32
-"""In the palette, and how many of them are taken as they are."""
-APART = 10
-"""Least distance of a colour to the common ones, between which Pillow cannot tell otherwise."""
+MAX_FPS = 50
+"""Largest frame rate that browsers show; they slow down faster animations."""
+COLOURS, FREQUENT = 255, 32
+"""Size of the palette, and number of the most frequent colours that are taken unchanged."""
+MIN_DISTANCE = 10
+"""Smallest distance of a palette colour to the most frequent ones, which Pillow can resolve."""
 SAMPLES = 6
-"""States from which the palette is taken."""
+"""Number of states from which the palette is taken."""
 
 
 def require_pillow() -> None:
-    """Refuse if there is no Pillow.
+    """Check that Pillow is installed.
 
     Raises
     ------
@@ -37,18 +37,18 @@ def require_pillow() -> None:
 
 
 def check(fps: int, _size: tuple[int, int]) -> None:
-    """Refuse what no browser shows at its speed.
+    """Check that browsers show the frame rate.
 
     Raises
     ------
     InvalidSettings
     """
-    if fps > FASTEST:
-        raise InvalidSettings(f"fps: expected at most {FASTEST} for a GIF, got {fps}")
+    if fps > MAX_FPS:
+        raise InvalidSettings(f"fps: expected at most {MAX_FPS} for a GIF, got {fps}")
 
 
 def durations(frames: int, fps: int) -> list[int]:
-    """Return milliseconds of each frame: whole hundredths of a second, right in the sum.
+    """Return the milliseconds of each frame: multiples of 10 ms with the correct sum.
 
     Examples
     --------
@@ -59,28 +59,28 @@ def durations(frames: int, fps: int) -> list[int]:
     return [10 * int(length) for length in np.diff(ends)]
 
 
-def encode(pictures: Pictures, fps: int, tell: Callable[[int], None]) -> bytes:
+def encode(source: FrameSource, fps: int, progress: Callable[[int], None]) -> bytes:
     """Encode all frames.
 
     Raises
     ------
     InvalidSettings
-        If there is no Pillow.
+        If Pillow is not installed.
     """
     module = _image()
-    order = pictures.order.tolist()
+    order = source.order.tolist()
     states = sorted(set(order))
     samples = states[:: max(1, len(states) // SAMPLES)] + states[-1:]
-    palette = _palette(module, [pictures.draw(state) for state in samples])
+    palette = _palette(module, [source.draw(state) for state in samples])
     known: dict[int, Any] = {}
 
     def frames() -> Iterator[Any]:
         for number, state in enumerate(order):
             if state not in known:
-                picture = module.fromarray(pictures.draw(state)[:, :, :3])
+                picture = module.fromarray(source.draw(state)[:, :, :3])
                 known[state] = picture.quantize(palette=palette, dither=module.Dither.NONE)
-            tell(number + 1)
-            # A copy, since what is written notes in the picture where it stands.
+            progress(number + 1)
+            # Pillow stores the frame position in the picture, so each frame is a copy.
             yield known[state].copy()
 
     sequence = frames()
@@ -101,23 +101,23 @@ def encode(pictures: Pictures, fps: int, tell: Callable[[int], None]) -> bytes:
 def _palette(module: Any, samples: list[NDArray[np.uint8]]) -> Any:
     """Return a picture whose palette suits all samples.
 
-    The most frequent colours, those of ground and letters, stay as they are. Of all others each
-    counts once, so that a small hot spot has its own beside a large quiet ground.
+    The most frequent colours (background, text) are kept unchanged. Every other colour has
+    weight one, so that a small highlighted region is represented beside a large background.
     """
     weights = np.array([65536, 256, 1])
     codes = np.concatenate([(one[:, :, :3] @ weights).ravel() for one in samples])
     codes, counts = np.unique(codes, return_counts=True)
     colours = _bands(codes)
-    common: list[int] = []
+    frequent: list[int] = []
     far = np.ones(len(codes), dtype=bool)
     for index in np.argsort(-counts, kind="stable").tolist():
-        if len(common) < COMMON and far[index]:
-            common.append(index)
-            far &= np.abs(colours - colours[index]).max(axis=1) >= APART
-    entries = colours[common].ravel().tolist()
+        if len(frequent) < FREQUENT and far[index]:
+            frequent.append(index)
+            far &= np.abs(colours - colours[index]).max(axis=1) >= MIN_DISTANCE
+    entries = colours[frequent].ravel().tolist()
     if far.any():
         mixed = module.fromarray(colours[None, far].astype(np.uint8)).quantize(
-            COLOURS - COMMON, method=module.Quantize.MEDIANCUT, dither=module.Dither.NONE
+            COLOURS - FREQUENT, method=module.Quantize.MEDIANCUT, dither=module.Dither.NONE
         )
         entries += mixed.getpalette()
     palette = module.new("P", (1, 1))
@@ -126,7 +126,7 @@ def _palette(module: Any, samples: list[NDArray[np.uint8]]) -> Any:
 
 
 def _bands(codes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return (n, 3) red, green and blue of colours as numbers of 24 bits."""
+    """Return (n, 3) red, green and blue of 24-bit colours."""
     return np.stack([codes >> 16, codes >> 8 & 255, codes & 255], axis=-1)
 
 
@@ -136,7 +136,7 @@ def _image() -> Any:
     Raises
     ------
     InvalidSettings
-        If it is not installed.
+        If Pillow is not installed.
     """
     try:
         from PIL import Image

@@ -1,4 +1,4 @@
-"""MP4 by PyAV: H.264, 4:2:0, in the colours of HD television, ready to be streamed."""
+"""MP4 encoding by PyAV: H.264, 4:2:0, BT.709 colours, index at the start of the file."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from bellcrank.plots.movies.formats import Pictures
+    from bellcrank.plots.movies.records import FrameSource
 
 ENCODERS: dict[str, dict[str, str]] = {
     "libx264": {"crf": "17", "preset": "veryfast", "tune": "animation"},
     "libopenh264": {"rc_mode": "quality", "b": "12M"},
 }
-"""With their options, the first that is there is taken."""
-WAITING = 4
-"""Pictures drawn ahead of the encoder."""
-KEPT_BYTES = 2**28
-"""Memory for pictures that come again on the way back."""
+"""Encoders with their options; the first available one is used."""
+QUEUE_LENGTH = 4
+"""Number of pictures drawn ahead of the encoder."""
+CACHE_BYTES = 2**28
+"""Memory for pictures that are shown more than once."""
 THREADS = 1
-"""Of the encoder: with more, the same movie is not always the same file."""
+"""Threads of the encoder; with more than one, files are not reproducible."""
 BT709, STUDIO = 1, 1
-"""Codes of the colour space of HD television, and of its range of brightness."""
+"""Codes of the BT.709 colour space and of the limited (studio) luminance range."""
 
 
 def require_encoder() -> str:
@@ -39,7 +39,7 @@ def require_encoder() -> str:
     Raises
     ------
     InvalidSettings
-        If there is none, or no PyAV.
+        If PyAV is not installed or has no such encoder.
     """
     module = _av()
     for name in ENCODERS:
@@ -55,7 +55,7 @@ def require_encoder() -> str:
 
 
 def check(_fps: int, size: tuple[int, int]) -> None:
-    """Refuse odd sizes, which 4:2:0 cannot have.
+    """Check that the size is even, as 4:2:0 requires.
 
     Raises
     ------
@@ -65,64 +65,69 @@ def check(_fps: int, size: tuple[int, int]) -> None:
         raise InvalidSettings(f"size: expected even numbers for an MP4, got {size[0]}x{size[1]}")
 
 
-def encode(pictures: Pictures, fps: int, tell: Callable[[int], None]) -> bytes:
+def encode(source: FrameSource, fps: int, progress: Callable[[int], None]) -> bytes:
     """Encode all frames; drawing and encoding overlap.
 
     Raises
     ------
     InvalidSettings
-        If there is no encoder.
+        If no encoder is available.
     StorageError
-        If the disk for temporary files is full.
+        If the temporary file cannot be written.
     """
     module, name = _av(), require_encoder()
-    # In a folder of its own: moving the index to the front needs a file that can be read again.
+    # A file, because moving the index to the start needs a seekable, readable output.
     with TemporaryDirectory() as folder:
         path = Path(folder) / "movie.mp4"
         try:
-            _write(module, name, path, pictures, fps, tell)
+            _write(module, name, path, source, fps, progress)
             return path.read_bytes()
         except OSError as error:
             raise StorageError(f"{path}: cannot be written ({error.strerror})") from error
 
 
 def _write(
-    module: Any, name: str, path: Path, pictures: Pictures, fps: int, tell: Callable[[int], None]
+    module: Any,
+    name: str,
+    path: Path,
+    source: FrameSource,
+    fps: int,
+    progress: Callable[[int], None],
 ) -> None:
     """Write all frames to a file."""
     with (
         module.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container,
         ThreadPoolExecutor(1) as encoder,
     ):
-        track = _Track(module, container, name, pictures.size, fps)
+        stream = _VideoStream(module, container, name, source.size, fps)
         work: deque[Future[None]] = deque()
         try:
-            for frame, state in enumerate(pictures.order.tolist()):
-                picture = pictures.draw(state) if track.asks_for(state) else None
-                work.append(encoder.submit(track.put, frame, state, picture))
-                if len(work) > WAITING:
+            for frame, state in enumerate(source.order.tolist()):
+                picture = source.draw(state) if stream.needs_drawing(state) else None
+                work.append(encoder.submit(stream.put, frame, state, picture))
+                if len(work) > QUEUE_LENGTH:
                     work.popleft().result()
-                tell(frame + 1)
+                progress(frame + 1)
             for waiting in work:
                 waiting.result()
-            track.end()
+            stream.end()
         finally:
             encoder.shutdown(cancel_futures=True)
 
 
-class _Track:
-    """The stream of pictures in a file; keeps those that may come again, while there is room.
+class _VideoStream:
+    """The video stream of a file, with a cache of pictures that are shown more than once.
 
-    All but `asks_for` is called in the encoder's thread.
+    All methods except `needs_drawing` are called in the thread of the encoder.
     """
 
     def __init__(
         self, module: Any, container: Any, name: str, size: tuple[int, int], fps: int
     ) -> None:
         self._module, self._container = module, container
-        self._room = KEPT_BYTES // (size[0] * size[1] * 3 // 2)
+        self._room = CACHE_BYTES // (size[0] * size[1] * 3 // 2)
         self._known: set[int] = set()
-        self._kept: dict[int, Any] = {}
+        self._cached: dict[int, Any] = {}
         self._stream = container.add_stream(name, rate=fps, options=dict(ENCODERS[name]))
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = "yuv420p"
@@ -131,8 +136,8 @@ class _Track:
         context.colorspace = context.color_primaries = context.color_trc = BT709
         context.color_range = STUDIO
 
-    def asks_for(self, state: int) -> bool:
-        """Whether a state must be drawn; it will then be kept if there is room."""
+    def needs_drawing(self, state: int) -> bool:
+        """Whether a state must be drawn; it is then cached if memory allows."""
         if state in self._known:
             return False
         if len(self._known) < self._room:
@@ -140,9 +145,9 @@ class _Track:
         return True
 
     def put(self, frame: int, state: int, picture: NDArray[np.uint8] | None) -> None:
-        """Encode one picture; None for one that was kept."""
+        """Encode one picture; None selects the cached picture of the state."""
         if picture is None:
-            image = self._kept[state]
+            image = self._cached[state]
         else:
             drawn = self._module.VideoFrame.from_ndarray(picture, format="rgba")
             image = drawn.reformat(
@@ -150,12 +155,12 @@ class _Track:
                 interpolation="BICUBIC",
             )  # fmt: skip
             if state in self._known:
-                self._kept[state] = image
+                self._cached[state] = image
         image.pts = frame
         self._container.mux(self._stream.encode(image))
 
     def end(self) -> None:
-        """Encode what waits in the encoder."""
+        """Flush the encoder."""
         self._container.mux(self._stream.encode(None))
 
 
@@ -165,7 +170,7 @@ def _av() -> Any:
     Raises
     ------
     InvalidSettings
-        If it is not installed.
+        If PyAV is not installed.
     """
     try:
         import av as module

@@ -1,9 +1,9 @@
-"""What there is to see in a movie, as plain arrays."""
+"""The content of a movie as plain arrays, and the protocol of a source of frames."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -16,42 +16,42 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
-    """What one lattice goes through, state by state.
+class StateSequence:
+    """The states of one lattice.
 
     Parameters
     ----------
     problem
-        Whose lattice it is; N nodes, M beams.
+        Problem with N nodes and M beams.
     present : (K, M) bool
-        Which beams there are in each of K states.
-    bearing : (K, M) bool
-        Those that carry load.
+        Beams of the design in each of K states.
+    load_bearing : (K, M) bool
+        Beams that carry load.
     displacement : (K, N, 2) float64, lattice units
-        Of each node; not finite where it is not known, which is drawn as at rest.
+        Displacement of each node. Nodes with values that are not finite are drawn at rest.
     energy : (K, M) float64
-        Strain energy of each beam, which gives it its colour. None draws beams in black and
-        marks those that came and went since the state before.
+        Strain energy of each beam, shown as its colour. If None, beams are drawn in black, and
+        beams that were added or removed since the previous state are marked.
     title
-        To stand over the lattice.
+        Heading of the lattice.
     notes
-        K lines under the title.
+        K lines below the heading.
     alarms
-        K lines under the notes, in the colour of warnings; may be empty.
+        K lines below the notes, in the warning colour; may be empty.
     magnify
-        How many times its size the motion is drawn.
+        Factor by which the drawn displacement is larger than the computed one.
 
     Raises
     ------
     InvalidProblem
-        If shapes do not fit.
+        If an array has the wrong shape.
     InvalidSettings
-        If it is to be magnified by something that is not a positive number.
+        If `magnify` is not positive and finite.
     """
 
     problem: Problem
     present: NDArray[np.bool_]
-    bearing: NDArray[np.bool_]
+    load_bearing: NDArray[np.bool_]
     displacement: NDArray[np.float64]
     energy: NDArray[np.float64] | None
     title: str
@@ -64,7 +64,7 @@ class Course:
         beams = (states, lattice.beam_count)
         expected = {
             "present": beams,
-            "bearing": beams,
+            "load_bearing": beams,
             "displacement": (states, lattice.node_count, 2),
             "energy": beams,
             "alarms": (states,),
@@ -78,7 +78,7 @@ class Course:
 
     @property
     def moved(self) -> NDArray[np.float64]:
-        """(K, N, 2) places of the nodes as drawn, lattice units."""
+        """(K, N, 2) drawn positions of the nodes, lattice units."""
         known = np.isfinite(self.displacement).all(axis=2, keepdims=True)
         shift = np.where(known, self.displacement, 0.0)
         places: NDArray[np.float64] = self.problem.lattice.positions + self.magnify * shift
@@ -86,22 +86,22 @@ class Course:
 
     @property
     def is_one_design(self) -> bool:
-        """Whether no beam comes or goes."""
+        """Whether all states have the same beams."""
         return bool((self.present == self.present[0]).all())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A curve with a dot that moves along.
+    """A curve with a marker that moves along it.
 
     Parameters
     ----------
     x, y : (n,) float64
-        May hold nan, where the curve has gaps.
+        Coordinates; nan leaves a gap.
     at : (K,) int64
-        The point at which the dot is in each state.
+        Index of the point that the marker shows in each state.
     label
-        What it is, where there are several.
+        Legend entry, used if a graph has several lines.
     """
 
     x: NDArray[np.float64]
@@ -112,41 +112,56 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Graph:
-    """Curves in one frame.
+    """The curves of one pair of axes.
 
     Parameters
     ----------
-    across, up
-        Words on the axes.
+    x_label, y_label
+        Axis labels.
     lines
-        At most one for each course.
-    foreseen
-        Whether what is still to come is drawn faintly from the start.
+        At most one line for each state sequence.
+    preview
+        Whether the whole curve is drawn faintly from the first frame on.
     logarithmic
-        The horizontal axis.
+        Whether the horizontal axis is logarithmic.
     """
 
-    across: str
-    up: str
+    x_label: str
+    y_label: str
     lines: tuple[Line, ...]
-    foreseen: bool = True
+    preview: bool = True
     logarithmic: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Movie:
-    """All that a movie shows.
+    """The complete content of a movie.
 
     Parameters
     ----------
-    courses
-        One, or two side by side, of K states each.
+    sequences
+        One lattice, or two side by side, with K states each.
     graphs
         At least one.
     order : (F,) int64
-        The state that each frame shows.
+        State that each frame shows.
     """
 
-    courses: tuple[Course, ...]
+    sequences: tuple[StateSequence, ...]
     graphs: tuple[Graph, ...]
     order: NDArray[np.int64]
+
+
+class FrameSource(Protocol):
+    """An object that draws the frames of a movie."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+
+    @property
+    def order(self) -> NDArray[np.int64]:
+        """(F,) state that each frame shows; equal states have equal pictures."""
+
+    def draw(self, state: int) -> NDArray[np.uint8]:
+        """Return a new (height, width, 4) array of red, green, blue and opacity."""

@@ -9,11 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.plots import style
-from bellcrank.plots.charts import put_chart
 from bellcrank.plots.legend import ROW_HEIGHT, add_legend
 from bellcrank.plots.marks import add_panel
-from bellcrank.plots.motion import GAP, MARGIN, WIDE, WIDTH, Drawing, entries_of, fill, level_frames
+from bellcrank.plots.motion import (
+    GAP,
+    MARGIN,
+    WIDE,
+    WIDTH,
+    Drawing,
+    add_drawing,
+    drawing_frames,
+    legend_entries,
+)
 from bellcrank.plots.saving import check_target, save_figure
+from reproduction.pictures.charts import add_chart
 
 if TYPE_CHECKING:
     import os
@@ -21,8 +30,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from bellcrank.plots.charts import Chart
     from bellcrank.plots.scene import Motion
+    from reproduction.pictures.charts import Chart
 
 TALLEST = 4.4
 """Inches of the largest drawing."""
@@ -94,11 +103,11 @@ def _figure(sheet: Sheet) -> Figure:
     drawings = _Drawings.of(sheet, width)
     charts = sheet.height + BELOW + ABOVE + 0.1 if sheet.charts else 0.0
     figure = style.new_figure(width, heading + drawings.height + charts + MARGIN)
-    style.write_heading(figure, sheet.title, sheet.note, MARGIN, MARGIN)
+    style.add_heading(figure, sheet.title, sheet.note, MARGIN, MARGIN)
     if sheet.motions:
         drawings.put(figure, heading)
     if sheet.charts:
-        _put_charts(figure, sheet)
+        _add_charts(figure, sheet)
     return figure
 
 
@@ -114,12 +123,12 @@ class _Drawings:
     def of(cls, sheet: Sheet, width: float) -> _Drawings:
         parts = [
             Drawing(motion.name, _caption(motion) if k not in sheet.still else motion.note, motion,
-                    moving=k not in sheet.still)
+                    displaced=k not in sheet.still)
             for k, motion in enumerate(sheet.motions)
         ]  # fmt: skip
         if not parts:
             return cls([], [], 1.0)
-        frames = level_frames(parts)
+        frames = drawing_frames(parts)
         sizes = np.array([high - low for low, high in frames])
         room = width - 2 * MARGIN - GAP * (len(parts) - 1)
         scale = float(min(room / sizes[:, 0].sum(), TALLEST / sizes[:, 1].max()))
@@ -144,12 +153,12 @@ class _Drawings:
         return self.words + self.tallest + 0.12 + ROW_HEIGHT * rows + 0.12
 
     def entries(self) -> list[tuple[str, object]]:
-        """Legend entries of moving and of still drawings, each once."""
+        """Legend entries of displaced and of still drawings, each once."""
         found: dict[str, object] = {}
-        for moving in (False, True):
-            chosen = [part for part in self.parts if part.moving is moving]
+        for displaced in (False, True):
+            chosen = [part for part in self.parts if part.displaced is displaced]
             if chosen:
-                found |= dict(entries_of(chosen))
+                found |= dict(legend_entries(chosen))
         return list(found.items())
 
     def put(self, figure: Figure, top: float) -> None:
@@ -160,9 +169,11 @@ class _Drawings:
         left = 0.5 * (width - sum(across) - gap * (len(across) - 1))
         bottom = height - top - self.words - self.tallest
         for part, (low, high), size in zip(self.parts, self.frames, across, strict=True):
-            style.write_heading(figure, part.title, part.note, left, top)
+            style.add_heading(figure, part.title, part.note, left, top)
             corner = (left, bottom)
-            fill(add_panel(figure, part.motion.design.problem, corner, self.scale, low, high), part)
+            add_drawing(
+                add_panel(figure, part.motion.design.problem, corner, self.scale, low, high), part
+            )
             left += size + gap
         entries = self.entries()
         rows = math.ceil(len(entries) / COLUMNS)
@@ -170,7 +181,7 @@ class _Drawings:
         add_legend(figure, entries, foot, min(COLUMNS, len(entries)))
 
 
-def _put_charts(figure: Figure, sheet: Sheet) -> None:
+def _add_charts(figure: Figure, sheet: Sheet) -> None:
     width, height = figure.get_size_inches()
     count = len(sheet.charts)
     room = (width - 2 * MARGIN - LEFT - BETWEEN * (count - 1)) / count
@@ -179,4 +190,4 @@ def _put_charts(figure: Figure, sheet: Sheet) -> None:
         axes = figure.add_axes(
             (left / width, (MARGIN + BELOW) / height, room / width, sheet.height / height)
         )
-        put_chart(axes, chart)
+        add_chart(axes, chart)

@@ -11,18 +11,18 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.model import Design, Stiffness, find_problem, gallery_design
 from bellcrank.part import PartSpec
 from bellcrank.plots import Motion, style
-from bellcrank.plots.charts import Chart, Series
-from bellcrank.plots.sheets import Sheet, draw_sheet
 from reproduction.checking import analyse_all
+from reproduction.formatting import count, number
+from reproduction.pictures.charts import Chart, Series
+from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.searching import best_design, design_of, respond, run_chains
-from reproduction.words import count, number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from reproduction.bench import Bench
     from reproduction.registry import Figures
+    from reproduction.result_store import ResultStore
 
 BY = {
     "hand": "By hand",
@@ -68,7 +68,7 @@ class Duel:
     width: float = 2.0
 
 
-def run(settings: Duel, bench: Bench) -> Figures:
+def run(settings: Duel, store: ResultStore) -> Figures:
     """Search, and look at all designs at all levels."""
     problem = find_problem(settings.problem)
     found: dict[str, Design] = {}
@@ -81,10 +81,10 @@ def run(settings: Duel, bench: Bench) -> Figures:
         ("default", "basin-hopping", settings.steps, settings.chains),
     ):
         told = {"search": search, "steps": steps, "seed": settings.seed}
-        ran = run_chains(bench, f"{by}-chain", problem, told, chains)
+        ran = run_chains(store, f"{by}-chain", problem, told, chains)
         found[by] = best_design(problem, ran).design
     designs = {by: found[by] for by in BY if by in found}
-    parts = analyse_all(bench, designs, PartSpec(width=settings.width), settings.levels)
+    parts = analyse_all(store, designs, PartSpec(width=settings.width), settings.levels)
     return {
         "problem": settings.problem,
         "width": settings.width,

@@ -80,19 +80,19 @@ def draw_shapes(
     tall = WORDS + up + GAP
     figure = style.new_figure(WIDTH, top + rows * tall - GAP + FOOT)
     height = float(figure.get_size_inches()[1])
-    style.write_heading(figure, title, note, MARGIN, MARGIN)
+    style.add_heading(figure, title, note, MARGIN, MARGIN)
     for place, shape in enumerate(shapes):
         row, column = divmod(place, IN_A_ROW)
         left, above = MARGIN + column * (across + GAP), top + row * tall
-        style.write_heading(figure, shape.title, shape.notes[0], left, above)
+        style.add_heading(figure, shape.title, shape.notes[0], left, above)
         for line, words in enumerate(shape.notes[1:], start=1):
-            style.write_heading(figure, "", words, left, above + 0.27 + 0.2 * line)
+            style.add_heading(figure, "", words, left, above + 0.27 + 0.2 * line)
         below = FOOT + (rows - 1 - row) * tall
         axes = figure.add_axes((left / WIDTH, below / height, across / WIDTH, up / height))
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         axes.set_axis_off()
-        _put_shape(axes, shape, arrow)
+        _add_shape(axes, shape, arrow)
     entries = [
         ("at rest", strut_entry(style.REST)), ("moved", strut_entry(style.INK)),
         ("held", strut_entry(style.GROUND, 6.0)), ("input", arrow_entry(style.INPUT)),
@@ -102,7 +102,7 @@ def draw_shapes(
     save_figure(figure, path, overwrite=overwrite)
 
 
-def _put_shape(axes: Axes, shape: Shape, arrow: float) -> None:
+def _add_shape(axes: Axes, shape: Shape, arrow: float) -> None:
     for first, colour, level in ((0, style.REST, 1.0), (2, style.INK, 2.0)):
         corners, codes = [], []
         for curve in shape.curves:
@@ -117,13 +117,13 @@ def _put_shape(axes: Axes, shape: Shape, arrow: float) -> None:
             zorder=4,
         )  # fmt: skip
     for x, y, dx, dy in shape.inputs:
-        _put_arrow(axes, (x - arrow * dx, y - arrow * dy), (dx, dy), arrow, style.INPUT)
+        _add_arrow(axes, (x - arrow * dx, y - arrow * dy), (dx, dy), arrow, style.INPUT)
     reach = (0.9 if len(shape.outputs) == 1 else 0.45) * arrow
     for x, y, dx, dy in shape.outputs:
-        _put_arrow(axes, (x, y), (dx, dy), reach, style.WANTED)
+        _add_arrow(axes, (x, y), (dx, dy), reach, style.WANTED)
 
 
-def _put_arrow(
+def _add_arrow(
     axes: Axes, tail: tuple[float, float], way: tuple[float, float], length: float, colour: str
 ) -> None:
     axes.add_patch(

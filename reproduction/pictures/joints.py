@@ -78,26 +78,26 @@ def draw_joints(
     top = MARGIN + style.heading_height(title, note) + 0.16
     height = top + WORDS + SIDE * (1.0 - FLAT / 2.56) + 0.1
     figure = style.new_figure(width, height)
-    style.write_heading(figure, title, note, MARGIN, MARGIN)
+    style.add_heading(figure, title, note, MARGIN, MARGIN)
     for place, joint in enumerate(joints):
         left = MARGIN + place * (SIDE + GAP)
-        style.write_heading(figure, joint.title, joint.note, left, top)
+        style.add_heading(figure, joint.title, joint.note, left, top)
         axes = figure.add_axes(
             (left / width, 0.08 / height, SIDE / width, SIDE * (1.0 - FLAT / 2.56) / height)
         )
         axes.set_xlim(-1.28, 1.28)
         axes.set_ylim(-1.28, 1.28 - FLAT)
         axes.set_axis_off()
-        _put_joint(axes, joint)
+        _add_joint(axes, joint)
     save_figure(figure, path, overwrite=overwrite)
 
 
-def _put_joint(axes: Axes, joint: Joint) -> None:
+def _add_joint(axes: Axes, joint: Joint) -> None:
     for angle in joint.gone:
-        _put_beam(axes, angle, style.REST, 2.2, dashed=True)
+        _add_beam(axes, angle, style.REST, 2.2, dashed=True)
     for place, angle in enumerate(joint.angles):
         dead = place in joint.dead
-        _put_beam(axes, angle, style.IDLE if dead else style.INK, 3.0 if dead else 5.0)
+        _add_beam(axes, angle, style.IDLE if dead else style.INK, 3.0 if dead else 5.0)
         x, y = _at(angle, 1.0)
         axes.plot(
             [x], [y], marker="o", markersize=8.0, markerfacecolor="white" if dead else style.GROUND,
@@ -110,7 +110,7 @@ def _put_joint(axes: Axes, joint: Joint) -> None:
     for place, start in enumerate(joint.angles):
         end = joint.angles[(place + 1) % count]
         wide = (end - start) % 360.0
-        _put_spring(axes, start, wide, NEAR + STEP * (place % 2), new=place in joint.fresh)
+        _add_spring(axes, start, wide, NEAR + STEP * (place % 2), new=place in joint.fresh)
 
 
 def _at(angle: float, radius: float) -> tuple[float, float]:
@@ -118,7 +118,7 @@ def _at(angle: float, radius: float) -> tuple[float, float]:
     return float(radius * np.cos(turned)), float(radius * np.sin(turned))
 
 
-def _put_beam(axes: Axes, angle: float, colour: str, width: float, *, dashed: bool = False) -> None:
+def _add_beam(axes: Axes, angle: float, colour: str, width: float, *, dashed: bool = False) -> None:
     x, y = _at(angle, 1.0)
     axes.plot(
         [0, x], [0, y], color=colour, linewidth=width, zorder=2.0 if dashed else 3.0,
@@ -126,7 +126,7 @@ def _put_beam(axes: Axes, angle: float, colour: str, width: float, *, dashed: bo
     )  # fmt: skip
 
 
-def _put_spring(axes: Axes, start: float, wide: float, radius: float, *, new: bool) -> None:
+def _add_spring(axes: Axes, start: float, wide: float, radius: float, *, new: bool) -> None:
     """Draw an arc from beam to beam, with its rest angle."""
     colour = style.INPUT if new else style.BEST
     room = min(7.0, 0.14 * wide)

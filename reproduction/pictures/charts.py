@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, NullLocator
 
 from bellcrank.plots import style
-from bellcrank.plots.axis_numbers import plain_number, spell_out
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -141,14 +140,14 @@ class Chart:
     note: Sequence[str] = field(default=())
 
 
-def put_chart(axes: Axes, chart: Chart) -> None:
+def add_chart(axes: Axes, chart: Chart) -> None:
     """Draw a chart into its axes."""
     if chart.log_x:
         axes.set_xscale("log")
     if chart.log_y:
         axes.set_yscale("log")
     if chart.density is not None:
-        _put_density(axes, chart.density)
+        _add_density(axes, chart.density)
     for series in chart.series:
         _DRAWERS[series.kind](axes, series)
     for level in chart.levels:
@@ -170,7 +169,7 @@ def _named(chart: Chart) -> int:
     return sum(map(bool, names))
 
 
-def _put_line(axes: Axes, series: Series) -> None:
+def _add_line(axes: Axes, series: Series) -> None:
     looks: dict[str, Any] = {"color": series.colour, "zorder": series.level}
     if series.low is not None and series.high is not None:
         axes.fill_between(
@@ -188,7 +187,7 @@ def _put_line(axes: Axes, series: Series) -> None:
     )  # fmt: skip
 
 
-def _put_points(axes: Axes, series: Series) -> None:
+def _add_points(axes: Axes, series: Series) -> None:
     if series.low is not None and series.high is not None:
         reach = np.abs(np.array([series.y - series.low, series.high - series.y]))
         axes.errorbar(
@@ -204,7 +203,7 @@ def _put_points(axes: Axes, series: Series) -> None:
         _write(axes, words, (float(x), float(y)), offset=(6.0, 0.0), ha="left", va="center")
 
 
-def _put_bars(axes: Axes, series: Series) -> None:
+def _add_bars(axes: Axes, series: Series) -> None:
     axes.bar(
         series.x, series.y, width=series.width, color=series.colour, label=series.name or None,
         zorder=series.level, linewidth=0,
@@ -214,7 +213,7 @@ def _put_bars(axes: Axes, series: Series) -> None:
         _write(axes, words, (float(x), up), offset=(0.0, 3.0), ha="center", va="bottom")
 
 
-def _put_histogram(axes: Axes, series: Series) -> None:
+def _add_histogram(axes: Axes, series: Series) -> None:
     share = np.full(len(series.y), 100.0 / max(len(series.y), 1))
     looks: dict[str, Any] = {"bins": series.x, "weights": share, "color": series.colour}
     axes.hist(series.y, **looks, alpha=0.18, zorder=series.level)
@@ -225,16 +224,16 @@ def _put_histogram(axes: Axes, series: Series) -> None:
 
 
 _DRAWERS = {
-    "line": _put_line,
-    "steps": _put_line,
-    "both": _put_line,
-    "points": _put_points,
-    "bars": _put_bars,
-    "histogram": _put_histogram,
+    "line": _add_line,
+    "steps": _add_line,
+    "both": _add_line,
+    "points": _add_points,
+    "bars": _add_bars,
+    "histogram": _add_histogram,
 }
 
 
-def _put_density(axes: Axes, density: Density) -> None:
+def _add_density(axes: Axes, density: Density) -> None:
     """Draw counts in a logarithmic scale of blues."""
     from matplotlib.colors import LinearSegmentedColormap, LogNorm
 
@@ -262,8 +261,8 @@ def _dress(axes: Axes, chart: Chart) -> None:
         chart.title, size=style.LABEL_SIZE, weight="bold", loc="left", pad=9.0,
         family=style.FONT, color=style.INK,
     )  # fmt: skip
-    style.label(axes, chart.across, chart.up, style.LABEL_SIZE - 0.5)
-    style.quieten(axes)
+    style.label_axes(axes, chart.across, chart.up, style.LABEL_SIZE - 0.5)
+    style.style_axes(axes)
     for axis, logarithmic in ((axes.xaxis, chart.log_x), (axes.yaxis, chart.log_y)):
         if logarithmic:
             axis.set_major_formatter(FuncFormatter(plain_number))
@@ -271,7 +270,7 @@ def _dress(axes: Axes, chart: Chart) -> None:
         else:
             axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     if chart.log_x:
-        spell_out(axes)
+        add_decimal_ticks(axes)
     if chart.names:
         axes.set_xticks(range(len(chart.names)), chart.names, family=style.FONT)
         axes.tick_params(axis="x", length=0.0, labelcolor=style.INK)
@@ -286,3 +285,33 @@ def _dress(axes: Axes, chart: Chart) -> None:
             loc=where, frameon=False, labelcolor=style.INK, handlelength=1.7,
             prop={"family": style.FONT, "size": style.SMALL_SIZE}, labelspacing=0.35,
         ).set_zorder(9)  # fmt: skip
+
+
+MANY = 1.0e5
+"""From here on numbers on an axis are written as powers of ten."""
+
+
+def plain_number(value: float, _place: int = 0) -> str:
+    r"""Write a number as it stands on an axis.
+
+    Examples
+    --------
+    >>> plain_number(20000.0), plain_number(0.05), plain_number(1e6)
+    ('20\u202f000', '0.05', '10⁶')
+    """
+    size = abs(value)
+    if size >= MANY or 0.0 < size < 1e-3:
+        power = round(float(np.log10(size)))
+        return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{value:,.0f}".replace(",", "\u202f") if size >= 1000 else f"{value:g}"
+
+
+def add_decimal_ticks(axes: Axes) -> None:
+    """Put numbers at 1, 2 and 5 times powers of ten where an axis spans less than 1.5 decades."""
+    low, high = axes.get_xlim()
+    if high > 32.0 * low:
+        return
+    powers = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
+    places = [k * 10.0**p for p in powers for k in (1, 2, 5) if low <= k * 10.0**p <= high]
+    axes.set_xticks(places, [plain_number(place) for place in places])
+    axes.xaxis.set_minor_locator(NullLocator())

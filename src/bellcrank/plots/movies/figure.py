@@ -1,4 +1,4 @@
-"""All that a movie shows on one sheet: laid out once, drawn frame by frame."""
+"""The figure of a movie: layout, fixed parts, and drawing of states."""
 
 from __future__ import annotations
 
@@ -20,46 +20,52 @@ from bellcrank.plots.legend import (
     support_entries,
 )
 from bellcrank.plots.marks import add_panel
-from bellcrank.plots.movies.actors import CAME, ENERGY, GONE, Actor, energy_scale, frame_of
-from bellcrank.plots.movies.curves import Curves, in_words, power_of_ten
-from bellcrank.plots.scene import level_with
+from bellcrank.plots.movies.curves import Curves, power_of_ten, unit_label
+from bellcrank.plots.movies.lattice_artist import (
+    ADDED,
+    ENERGY,
+    REMOVED,
+    LatticeArtist,
+    energy_scale,
+    frame_of,
+)
+from bellcrank.plots.scene import aligned_frames
 
 if TYPE_CHECKING:
     from matplotlib.colors import PowerNorm
     from matplotlib.text import Text
     from numpy.typing import NDArray
 
-    from bellcrank.plots.movies.records import Course, Movie
+    from bellcrank.plots.movies.records import Movie, StateSequence
 
 BASE = ((9.6, 5.4), (12.0, 6.75))
-"""Least inches of the sheet for one and for two lattices: pixels are shared out from these, so
-that letters have one size in all wide pictures."""
+"""Smallest size of the figure for one and for two lattices, inches. The resolution follows from
+it, so that text has the same relative size in all wide movies."""
 MARGIN = 0.28
 GAP = 0.35
 LINE = 0.24
 COLUMN = 2.9
-"""Inches of width of graphs beside the lattice."""
+"""Width of graphs beside the lattice, inches."""
 ROW = 1.55
-"""Inches of height of graphs under it."""
-ENTRIES = 7
-"""Of a row of the legend."""
-LONGEST = 44
-"""Letters of a title."""
+"""Height of graphs below the lattice, inches."""
+LEGEND_COLUMNS = 7
+MAX_TITLE = 44
+"""Characters of a title."""
 BAR, BAR_WIDTH = 0.09, 2.4
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where lattices and graphs stand.
+    """Positions of lattices and graphs.
 
     Parameters
     ----------
     scale
         Inches per lattice unit.
     room
-        Left, bottom, width and height in inches for all lattices.
+        Left, bottom, width and height of the area of the lattices, inches.
     boxes
-        The same for each graph.
+        Left, bottom, width and height of each graph, inches.
     """
 
     scale: float
@@ -67,89 +73,89 @@ class Layout:
     boxes: tuple[tuple[float, float, float, float], ...]
 
 
-class Stage:
-    """Draws the frames of a movie.
+class MovieFigure:
+    """A figure that draws the states of a movie.
 
-    The sheet is drawn once without what moves; for each state that is drawn over a copy.
+    The fixed parts are drawn once; each state adds the moving parts to a copy.
 
     Parameters
     ----------
     movie
-        What to show.
+        Content.
     size
-        Pixels across and up.
+        Width and height in pixels.
 
     Attributes
     ----------
     size
-        Pixels across and up.
+        Width and height in pixels.
     order : (F,) int64
-        The state that each frame shows.
+        State that each frame shows.
     """
 
     def __init__(self, movie: Movie, size: tuple[int, int]) -> None:
         self.size, self.order = size, movie.order
-        base = BASE[len(movie.courses) - 1]
+        base = BASE[len(movie.sequences) - 1]
         dpi = min(size[0] / base[0], size[1] / base[1])
-        # A breath more than whole pixels, which matplotlib rounds down.
+        # Slightly more than whole pixels, because matplotlib rounds down.
         inches = ((size[0] + 1e-3) / dpi, (size[1] + 1e-3) / dpi)
         self._figure = Figure(figsize=inches, dpi=dpi, facecolor="white")
-        # Matplotlib gives the methods of its canvas no types.
+        # The methods of the canvas have no type annotations.
         self._canvas = cast("Any", FigureCanvasAgg(self._figure))
-        self._courses = movie.courses
-        scale = energy_scale(movie.courses)
-        shades = (style.HUMAN, style.OUTPUT) if len(movie.courses) > 1 else (style.OUTPUT,)
+        self._sequences = movie.sequences
+        scale = energy_scale(movie.sequences)
+        colours = (style.HUMAN, style.OUTPUT) if len(movie.sequences) > 1 else (style.OUTPUT,)
         heading = MARGIN + 0.27 + LINE + LINE * self._has_alarms + 0.1
-        entries = _entries(movie.courses)
-        rows = math.ceil(len(entries) / ENTRIES)
+        entries = _legend_entries(movie.sequences)
+        rows = math.ceil(len(entries) / LEGEND_COLUMNS)
         foot = MARGIN + ROW_HEIGHT * rows + 0.1 + (0.0 if scale is None else 0.46)
-        frames = level_with(
-            [frame_of(course) for course in movie.courses],
-            [course.problem for course in movie.courses],
+        frames = aligned_frames(
+            [frame_of(sequence) for sequence in movie.sequences],
+            [sequence.problem for sequence in movie.sequences],
         )
         layout = _layout(inches, frames, len(movie.graphs), heading, foot)
         self._curves = [
-            Curves(self._figure, graph, box, shades, legend=len(shades) > 1 and number == 0)
+            Curves(self._figure, graph, box, colours, legend=len(colours) > 1 and number == 0)
             for number, (graph, box) in enumerate(zip(movie.graphs, layout.boxes, strict=True))
         ]
         self._texts: list[tuple[Text, Text | None]] = []
-        self._actors = self._put_actors(layout, frames, scale)
+        self._artists = self._add_actors(layout, frames, scale)
         if scale is not None:
-            _put_bar(self._figure, scale, MARGIN + ROW_HEIGHT * rows + 0.32)
+            _add_colour_bar(self._figure, scale, MARGIN + ROW_HEIGHT * rows + 0.32)
         add_legend(self._figure, entries, MARGIN, columns=math.ceil(len(entries) / rows))
-        self._parts: list[Actor | Curves] = [*self._actors, *self._curves]
+        self._parts: list[LatticeArtist | Curves] = [*self._artists, *self._curves]
         self._canvas.draw()
-        self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
+        self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
     @property
     def _has_alarms(self) -> bool:
-        return any(any(course.alarms) for course in self._courses)
+        return any(any(sequence.alarms) for sequence in self._sequences)
 
-    def _put_actors(
+    def _add_actors(
         self, layout: Layout, frames: list[tuple[Any, Any]], scale: PowerNorm | None
-    ) -> list[Actor]:
-        """Put the lattices side by side, with words over each."""
+    ) -> list[LatticeArtist]:
+        """Add the lattices side by side, each with a heading."""
         left, bottom, width, height = layout.room
         sizes = [layout.scale * (high - low) for low, high in frames]
         share = (width - sum(float(size[0]) for size in sizes)) / len(sizes)
         lift = bottom + 0.5 * (height - float(sizes[0][1]))
-        actors = []
-        for course, (low, high), size in zip(self._courses, frames, sizes, strict=True):
-            self._write(course, left)
+        artists = []
+        for sequence, (low, high), size in zip(self._sequences, frames, sizes, strict=True):
+            self._add_heading(sequence, left)
             corner = (left + 0.5 * share, lift)
-            panel = add_panel(self._figure, course.problem, corner, layout.scale, low, high)
-            actors.append(Actor(panel, course, scale))
+            panel = add_panel(self._figure, sequence.problem, corner, layout.scale, low, high)
+            artists.append(LatticeArtist(panel, sequence, scale))
             left += float(size[0]) + share
-        return actors
+        return artists
 
-    def _write(self, course: Course, left: float) -> None:
-        """Write the words over a lattice; those that change are drawn with each frame."""
-        _, note = style.write_heading(
-            self._figure, _short(course.title), " ", max(left, MARGIN), MARGIN
+    def _add_heading(self, sequence: StateSequence, left: float) -> None:
+        """Add the heading of a lattice; its notes are redrawn for each frame."""
+        _, note = style.add_heading(
+            self._figure, _shortened(sequence.title), " ", max(left, MARGIN), MARGIN
         )
         alarm = None
         if self._has_alarms:
-            (alarm,) = style.write_heading(
+            (alarm,) = style.add_heading(
                 self._figure, "", " ", max(left, MARGIN), MARGIN + 0.27 + LINE
             )
             alarm.set(color=style.INPUT, animated=True)
@@ -158,24 +164,24 @@ class Stage:
 
     def draw(self, state: int) -> NDArray[np.uint8]:
         """Return (height, width, 4) red, green, blue and opacity of a state."""
-        self._canvas.restore_region(self._ground)
+        self._canvas.restore_region(self._background)
         renderer = self._canvas.get_renderer()
         for part in self._parts:
             part.place(state)
             for artist in part.artists:
                 artist.draw(renderer)
-        for course, (note, alarm) in zip(self._courses, self._texts, strict=True):
-            note.set_text(course.notes[state])
+        for sequence, (note, alarm) in zip(self._sequences, self._texts, strict=True):
+            note.set_text(sequence.notes[state])
             note.draw(renderer)
             if alarm is not None:
-                alarm.set_text(course.alarms[state])
+                alarm.set_text(sequence.alarms[state])
                 alarm.draw(renderer)
         return np.array(self._canvas.buffer_rgba(), dtype=np.uint8)
 
 
-def _short(title: str) -> str:
-    """Leave the end of a title that would not fit."""
-    return title if len(title) <= LONGEST else "…" + title[1 - LONGEST :]
+def _shortened(title: str) -> str:
+    """Return the end of a title that is too long."""
+    return title if len(title) <= MAX_TITLE else "…" + title[1 - MAX_TITLE :]
 
 
 def _layout(
@@ -185,7 +191,7 @@ def _layout(
     heading: float,
     foot: float,
 ) -> Layout:
-    """Put graphs beside or under the lattices, whichever leaves these larger."""
+    """Place graphs beside or below the lattices, whichever makes the lattices larger."""
     wide, tall = inches[0] - 2 * MARGIN, inches[1] - heading - foot
     beside = (MARGIN, foot, wide - COLUMN - GAP, tall)
     each = (inches[1] - MARGIN - foot - GAP * (graphs - 1)) / graphs
@@ -206,26 +212,26 @@ def _layout(
     return max(found, key=lambda layout: layout.scale)
 
 
-def _entries(courses: tuple[Course, ...]) -> list[tuple[str, Any]]:
-    """Legend entries for what the movie holds, and for nothing else."""
-    problems = [course.problem for course in courses]
+def _legend_entries(sequences: tuple[StateSequence, ...]) -> list[tuple[str, Any]]:
+    """Return legend entries for the elements that the movie contains."""
+    problems = [sequence.problem for sequence in sequences]
     entries: list[tuple[str, Any]] = [("at rest", strut_entry(style.IDLE_REST))]
-    changing = not all(course.is_one_design for course in courses)
+    changing = not all(sequence.is_one_design for sequence in sequences)
     if changing:
-        entries += [("removed", strut_entry(GONE, 2.2)), ("added", strut_entry(CAME))]
-    if any((course.present & ~course.bearing).any() for course in courses):
-        entries.append(("bears no load", strut_entry(style.IDLE, 2.2)))
+        entries += [("removed", strut_entry(REMOVED, 2.2)), ("added", strut_entry(ADDED))]
+    if any((sequence.present & ~sequence.load_bearing).any() for sequence in sequences):
+        entries.append(("unloaded", strut_entry(style.IDLE, 2.2)))
     entries += support_entries(problems)
     entries.append(("input", arrow_entry(style.INPUT)))
-    entries.append(("output, wanted", arrow_entry(style.WANTED)))
+    entries.append(("output, wanted direction", arrow_entry(style.WANTED)))
     entries.append(
-        ("output, motion" if changing else "output, path", strut_entry(style.OUTPUT, 1.2))
+        ("output, displacement" if changing else "output, path", strut_entry(style.OUTPUT, 1.2))
     )
     return entries
 
 
-def _put_bar(figure: Figure, scale: PowerNorm, bottom: float) -> None:
-    """Draw the colour bar, its words on its left."""
+def _add_colour_bar(figure: Figure, scale: PowerNorm, bottom: float) -> None:
+    """Add the colour bar with its label on the left."""
     across, up = figure.get_size_inches()
     left = 0.5 * across - 0.15
     axes = figure.add_axes((left / across, bottom / up, BAR_WIDTH / across, BAR / up))
@@ -243,7 +249,7 @@ def _put_bar(figure: Figure, scale: PowerNorm, bottom: float) -> None:
     figure.text(
         (left - 0.12) / across,
         (bottom + 0.5 * BAR) / up,
-        "strain energy of a beam" + in_words(unit),
+        "strain energy of a beam" + unit_label(unit),
         family=style.FONT,
         size=style.SMALL_SIZE,
         color=style.INK,

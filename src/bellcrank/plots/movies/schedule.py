@@ -1,4 +1,4 @@
-"""Which frame shows what: easing, stills, and which designs of a search are worth a look."""
+"""The state that each frame shows: easing, pauses, and the selection of designs of a search."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-STILL = 0.04
-"""Part of the frames that the motion rests at the start, before and after its turn, at the end."""
+PAUSE = 0.04
+"""Fraction of the frames in each pause: at the start, before and after the full stroke, at the
+end."""
 OPENING, ENDING = 0.06, 0.16
-"""Parts of the frames that the movie of a search dwells on its first and last design."""
-PACE = 8.0
-"""Most designs in a second."""
+"""Fractions of the frames that show the first and the last design of a search."""
+MAX_RATE = 8.0
+"""Largest number of designs per second."""
 
 
 def stroke_schedule(frames: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Plan the way from rest to the full stroke and back, slow at both ends.
+    """Schedule the motion from rest to the full stroke and back, slow at both ends.
 
-    The way back is the way there reversed, so that the movie can be played in a loop.
+    The return is the reversed forward motion, so that the movie can be played in a loop.
 
     Parameters
     ----------
@@ -30,9 +31,9 @@ def stroke_schedule(frames: int) -> tuple[NDArray[np.float64], NDArray[np.int64]
     Returns
     -------
     part : (K,) float64
-        Parts of the stroke at which the design is seen, from 0 to 1.
+        Fractions of the stroke that are shown, from 0 to 1.
     order : (frames,) int64
-        Which of them each frame shows.
+        Index into `part` for each frame.
 
     Examples
     --------
@@ -41,31 +42,31 @@ def stroke_schedule(frames: int) -> tuple[NDArray[np.float64], NDArray[np.int64]
     ([0.0, 0.15, 0.5, 0.85, 1.0], [0, 1, 2, 3, 4, 3, 2, 1, 0])
     """
     half = (frames + 1) // 2
-    still = max(1, round(STILL * frames))
-    last = half - 2 * still + 1
+    pause = max(1, round(PAUSE * frames))
+    last = half - 2 * pause + 1
     part = 0.5 - 0.5 * np.cos(np.pi * np.arange(last + 1) / last)
-    way = np.clip(np.arange(half) - still + 1, 0, last)
-    return part, np.concatenate([way, way[: frames // 2][::-1]])
+    forward = np.clip(np.arange(half) - pause + 1, 0, last)
+    return part, np.concatenate([forward, forward[: frames // 2][::-1]])
 
 
-def most_states(frames: int, fps: int) -> int:
-    """Return how many designs a movie of a search can show so that the eye can follow.
+def max_states(frames: int, fps: int) -> int:
+    """Return the largest number of designs that the movie of a search shows.
 
     Examples
     --------
-    >>> most_states(300, 30)
+    >>> max_states(300, 30)
     80
     """
-    return max(2, min(round(PACE * frames / fps), int((1.0 - OPENING - ENDING) * frames)))
+    return max(2, min(round(MAX_RATE * frames / fps), int((1.0 - OPENING - ENDING) * frames)))
 
 
 def search_schedule(frames: int, states: int) -> NDArray[np.int64]:
-    """Give each design of a search its frames; the first and the last have more.
+    """Assign the designs of a search to frames; the first and the last are shown longer.
 
     Parameters
     ----------
     frames, states
-        At least 3, and 1 to `most_states`.
+        At least 3, and 1 to `max_states`.
 
     Returns
     -------
@@ -85,21 +86,21 @@ def search_schedule(frames: int, states: int) -> NDArray[np.int64]:
 
 
 def pick_states(
-    efficiency: NDArray[np.float64], step: NDArray[np.int64], most: int
+    efficiency: NDArray[np.float64], step: NDArray[np.int64], count: int
 ) -> NDArray[np.int64]:
-    """Choose designs of a chain that tell its story: early changes, and those that gain.
+    """Select designs of a chain, both early changes and improvements.
 
-    Equally spaced in the mean of two measures of progress, the logarithm of the step and the
-    efficiency gained so far.
+    The designs are equally spaced in the mean of two measures of progress: the logarithm of the
+    step and the efficiency gained so far.
 
     Parameters
     ----------
     efficiency : (n,) float64
-        Of the designs of a chain in order, n >= 1, all finite.
+        Efficiencies of the designs in order, n >= 1, all finite.
     step : (n,) int64
-        When each was found, not decreasing.
-    most
-        How many at most, at least 2.
+        Step at which each was found, not decreasing.
+    count
+        Largest number of designs, at least 2.
 
     Returns
     -------
@@ -111,15 +112,15 @@ def pick_states(
     >>> pick_states(np.array([0.0, 0.1, 0.1, 0.9, 1.0]), np.array([0, 1, 2, 50, 100]), 3).tolist()
     [0, 3, 4]
     """
-    count = len(efficiency)
-    if count <= most:
-        return np.arange(count)
+    designs = len(efficiency)
+    if designs <= count:
+        return np.arange(designs)
     gained = np.maximum.accumulate(efficiency) - efficiency[0]
     late = np.log1p(step - step[0])
-    progress = np.zeros(count)
+    progress = np.zeros(designs)
     for measure in (gained, late):
         if measure[-1] > 0.0:
             progress += measure / measure[-1]
-    aims = np.linspace(progress[0], progress[-1], most)
+    aims = np.linspace(progress[0], progress[-1], count)
     found = np.searchsorted(progress, aims - 1e-12)
-    return np.unique(np.concatenate([[0], np.minimum(found, count - 1), [count - 1]]))
+    return np.unique(np.concatenate([[0], np.minimum(found, designs - 1), [designs - 1]]))

@@ -1,0 +1,1 @@
+"""Pictures of the studies: charts, sheets of drawings and charts, joints, outlines."""
