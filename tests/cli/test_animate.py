@@ -60,7 +60,7 @@ def test_the_design_of_a_run_is_filmed(here: Path, whole: Path, what: str) -> No
 
 
 def test_two_designs_are_filmed_beside_each_other(here: Path, whole: Path) -> None:
-    two = frames_of(filmed(here, PROBLEM, "two.mp4", "--beside", whole))
+    two = frames_of(filmed(here, PROBLEM, "two.mp4", "--compare", whole))
     one = frames_of(filmed(here, PROBLEM, "one.mp4"))
     assert np.abs(two[4].astype(int) - one[4]).mean() > 1.0
 
@@ -121,7 +121,7 @@ def test_a_movie_is_replaced_on_request_only(here: Path, small: str) -> None:
     assert (here / "m.gif").read_bytes().startswith(b"GIF89a")
 
 
-@pytest.mark.parametrize("form", [(), ("--search",), ("--beside", PROBLEM)])
+@pytest.mark.parametrize("form", [(), ("--search",), ("--compare", PROBLEM)])
 @pytest.mark.parametrize("name", ["m.avi", "m", "m.mp4.txt"])
 def test_an_unknown_format_is_refused(small: str, form: tuple[str, ...], name: str) -> None:
     line = refusal("animate", small, name, *form)
@@ -141,9 +141,9 @@ def test_an_unknown_format_is_refused(small: str, form: tuple[str, ...], name: s
         (("--size", "8x8"), "size: expected 96 to 7680 pixels each way, got 8x8"),
         (("--magnify", "0", *QUICK), "magnify: expected a number above 0, got 0.0"),
         (("--objective", "best"), "unknown objective 'best'; known: displacement, "),
-        (("--beside", "nowhere"), "unknown problem 'nowhere'; known: "),
-        (("--search", "--beside", PROBLEM), "leave out --beside and --objective"),
-        (("--search", "--objective", "force"), "leave out --beside and --objective"),
+        (("--compare", "nowhere"), "unknown problem 'nowhere'; known: "),
+        (("--search", "--compare", PROBLEM), "leave out --compare and --objective"),
+        (("--search", "--objective", "force"), "leave out --compare and --objective"),
         (("--search",), "no such folder"),
     ],
 )

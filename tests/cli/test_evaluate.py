@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from bellcrank import __version__
-from bellcrank.model import builtin, find_problem, gallery_design
+from bellcrank.model import builtin, find_problem, gallery_design, read_design, write_design
 
 from .helpers import SMALL, Outcome, call, files, table, write
 
@@ -150,3 +152,34 @@ def test_a_process_of_its_own_keeps_results_and_messages_apart(here: Path) -> No
     assert (bad.returncode, bad.stdout) == (2, b"")
     assert bad.stderr.startswith(b"error: ")
     assert b"Traceback" not in bad.stderr
+
+
+@pytest.mark.slow
+def test_a_design_keeps_the_objective_of_its_search(here: Path) -> None:
+    settings = ("--search", "paper", "--steps", "200", "--chains", "1")
+    made = call("design", "scaling-8", *settings, "--objective", "directional:200", "--out", "made")
+    assert made.code == 0, made.err
+    searched = json.loads((here / "made" / "summary.json").read_text())["efficiency"]
+    (result,) = results_of(call("evaluate", "made", "--json"))
+    assert result["efficiency"] == pytest.approx(searched, abs=1e-9)
+    assert result["objective"] == "directional:200"
+    (motion,) = results_of(call("evaluate", "made", "--objective", "displacement", "--json"))
+    assert motion["efficiency"] > searched + 0.01
+    frames = call("validate", "made", "--elements", "1", "--json").data
+    assert frames["objective"] == "directional:200"
+    design = read_design(here / "made" / "design.json")
+    same = replace(design, problem=replace(design.problem, objective=None))
+    write_design(same, here / "motion.json")
+    by_motion = call("validate", "motion.json", "--elements", "1", "--json").data
+    assert by_motion["objective"] == "displacement"
+    assert frames["efficiency"] < by_motion["efficiency"] - 0.01
+
+
+def test_efficiencies_by_other_definitions_are_labelled(here: Path) -> None:
+    assert "efficiency (force)" in call("evaluate", "pliers").out
+    assert "efficiency (displacement)" in call("evaluate", "crane").out
+    outcome = call("plot", "human:crane", "--compare", "human:pliers", "--out", "two.svg")
+    assert outcome.code == 0, outcome.err
+    picture = (here / "two.svg").read_text()
+    assert "human:crane (displacement)" in picture
+    assert "human:pliers (force)" in picture

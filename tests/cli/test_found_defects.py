@@ -45,7 +45,7 @@ def test_an_unknown_name_is_repeated_as_it_was_typed(here: Path, name: str) -> N
         (("design", PROBLEM, "--chains", "32769"), "chains: expected a whole number of at most"),
         (("frobnicate",), "frobnicate"),
         (("evaluate",), "problem"),
-        (("plot", PROBLEM, "--rest", "--beside", "nowhere"), "--beside"),
+        (("plot", PROBLEM, "--rest", "--compare", "nowhere"), "--compare"),
         (("plot", PROBLEM, "--rest", "--paths"), "--rest or --paths"),
     ],
 )

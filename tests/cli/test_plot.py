@@ -69,7 +69,7 @@ def test_the_same_design_is_the_same_picture_by_folder_and_by_file(here: Path, w
 
 
 def test_two_designs_are_drawn_beside_each_other(here: Path, whole: Path) -> None:
-    path = drawn(here, PROBLEM, "--beside", whole / "design.json", "--out", "two.png")
+    path = drawn(here, PROBLEM, "--compare", whole / "design.json", "--out", "two.png")
     picture = imread(path)
     assert picture.shape[1] > picture.shape[0]
     assert colours(path) > 20
@@ -105,7 +105,7 @@ def test_a_picture_is_replaced_on_request_only(here: Path, small: str) -> None:
     assert colours(here / "p.png") > 20
 
 
-@pytest.mark.parametrize("form", [(), ("--rest",), ("--beside", PROBLEM)])
+@pytest.mark.parametrize("form", [(), ("--rest",), ("--compare", PROBLEM)])
 @pytest.mark.parametrize("name", ["p.jpg", "p", "p.png.txt"])
 def test_an_unknown_format_is_refused(small: str, form: tuple[str, ...], name: str) -> None:
     line = refusal("plot", small, *form, "--out", name)
@@ -124,7 +124,7 @@ def test_an_unknown_objective_is_refused(small: str) -> None:
 
 
 def test_an_unknown_second_design_is_refused(small: str) -> None:
-    line = refusal("plot", small, "--beside", "nowhere")
+    line = refusal("plot", small, "--compare", "nowhere")
     assert line.startswith("error: unknown problem 'nowhere'; known: ")
 
 

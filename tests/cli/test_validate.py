@@ -183,7 +183,7 @@ def test_a_design_with_a_part_that_makes_no_sense_is_refused(
 
 @pytest.mark.parametrize("beside", [None, "machine:crane"])
 def test_a_picture_shows_stress_in_colours(here: Path, beside: str | None) -> None:
-    words = ("--beside", beside) if beside else ()
+    words = ("--compare", beside) if beside else ()
     outcome = call("validate", "human:crane", *words, "--picture", "stress.png", "--elements", 2)
     assert outcome.code == 0, outcome.err
     assert colours(here / "stress.png") > 500
@@ -284,9 +284,9 @@ def in_pieces(here: Path) -> str:
         (("crane", "--part", "none.toml"), "none.toml: no such file"),
         (("crane", "--picture", "shape.jpg"), "shape.jpg: expected a picture name"),
         (("crane", "--vtu", "shape.vtk"), "shape.vtk: expected a name ending in .vtu"),
-        (("crane", "--beside", "human:crane"), "--beside is for the picture"),
+        (("crane", "--compare", "human:crane"), "--compare is for the picture"),
         (
-            ("crane", "--beside", "human:pliers", "--picture", "a.png"),
+            ("crane", "--compare", "human:pliers", "--picture", "a.png"),
             "human:pliers is driven otherwise than crane",
         ),
         (("crane", "--theory", "euler-bernoulli,foo"), "unknown theory 'foo'"),

@@ -42,8 +42,8 @@ def animate(
         ),
     ],
     out: Annotated[Path, typer.Argument(metavar="FILE", help="Movie to write (mp4, gif).")],
-    beside: Annotated[
-        str | None, typer.Option(help="A second design, filmed beside the first.")
+    compare: Annotated[
+        str | None, typer.Option(help="Second design, filmed beside the first.")
     ] = None,
     search: Annotated[
         bool, typer.Option("--search", help="How the design of a run came about.")
@@ -70,9 +70,9 @@ def animate(
     from bellcrank.workflows.animate import MotionOptions, animate_motion
     from bellcrank.workflows.animate_search import animate_search
 
-    if search and (beside is not None or objective is not None):
+    if search and (compare is not None or objective is not None):
         raise InvalidSettings(
-            "--search films one run, by its own objective; leave out --beside and --objective"
+            "--search films one run, by its own objective; leave out --compare and --objective"
         )
     usual = SEARCH_SECONDS if search else SECONDS
     settings = movie_settings(
@@ -80,7 +80,7 @@ def animate(
     )
     options = MotionOptions(objective, magnify)
     check_movie(out, overwrite=overwrite)
-    names = [what] if beside is None else [what, beside]
+    names = [what] if compare is None else [what, compare]
     designs = [] if search else [(name, design_named(name)) for name in names]
     announce_compilation()
     with MovieProgress() as progress:

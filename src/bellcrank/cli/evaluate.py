@@ -1,4 +1,4 @@
-"""`bellcrank evaluate`: the responses of given designs."""
+"""`bellcrank evaluate`: responses of given designs."""
 
 from __future__ import annotations
 
@@ -21,52 +21,58 @@ if TYPE_CHECKING:
 
 @app.command()
 def evaluate(
-    problem: Annotated[str, typer.Argument(help="A built-in problem, a problem or a design file.")],
+    problem: Annotated[
+        str,
+        typer.Argument(help="Bundled problem, problem file, design file or result folder."),
+    ],
     designs: Annotated[
         Path | None,
-        typer.Option(help="JSON with results\\[].mask or masks; default: the initial design."),
+        typer.Option(help="JSON file with results\\[].mask or masks. \\[the design itself]"),
     ] = None,
     objective: Annotated[
-        str | None, typer.Option(help="displacement, directional:N or force.")
+        str | None,
+        typer.Option(help="displacement, directional:N or force. \\[that of the design]"),
     ] = None,
     unloaded_beams: Annotated[
         str,
-        typer.Option(help="counted (literal model), ignored (dead ends) or stripped (idle parts)."),
+        typer.Option(help="keep (the literal model), prune_dead_ends or prune_all."),
     ] = "keep",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Compute the response of designs, each from rest to the full stroke."""
-    from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
+    from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, objective_name
     from bellcrank.model import pack_mask, read_masks
 
     design = design_named(problem)
     masks = read_masks(designs, design.problem) if designs else [design.mask]
     evaluator = SpringEvaluator(design.problem, objective, unloaded_beams)  # type: ignore[arg-type]
+    ratio = objective_name(design.problem, objective)
     announce_compilation()
     rows = []
     for mask in masks:
-        row = {"mask": pack_mask(mask), **_row(evaluator.evaluate(mask, VERIFICATION_INCREMENT))}
-        rows.append({**row, "beams": int(mask.sum())})
+        response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
+        row = {"mask": pack_mask(mask), **_row(response)}
+        rows.append({**row, "beams": int(mask.sum()), "objective": ratio})
     if as_json:
         print_json(json.dumps({"results": rows}, indent=1))
         return
-    table = Table("design", "beams", "efficiency", "energy", "status", box=SIMPLE)
+    table = Table("design", "beams", f"efficiency ({ratio})", "energy", "status", box=SIMPLE)
     for number, row in enumerate(rows):
         table.add_row(
-            str(number), str(row["beams"]), _figure(row["efficiency"]), _figure(row["energy"]),
+            str(number), str(row["beams"]), _number(row["efficiency"]), _number(row["energy"]),
             row["status"],
         )  # fmt: skip
     results.print(table)
 
 
 def _row(response: Response) -> dict[str, Any]:
-    """Write a response as plain data; what is not a number becomes null."""
-    figures = {"efficiency": response.efficiency, "energy": response.energy}
+    """Return a response as plain data; numbers that are not finite become null."""
+    numbers = {"efficiency": response.efficiency, "energy": response.energy}
     return {
-        **{name: value if math.isfinite(value) else None for name, value in figures.items()},
+        **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
         "status": response.status.label,
     }
 
 
-def _figure(value: float | None) -> str:
+def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.7f}"

@@ -81,7 +81,7 @@ def validate(
     picture: Annotated[
         Path | None, typer.Option(help="Draw the moved part coloured by stress (png, svg, pdf).")
     ] = None,
-    beside: Annotated[
+    compare: Annotated[
         str | None, typer.Option(help="A second design for the picture, like human:crane.")
     ] = None,
     vtu: Annotated[Path | None, typer.Option(help="Write the moved part for ParaView.")] = None,
@@ -103,12 +103,12 @@ def validate(
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material, young, poisson)
     plan = _plan(level, theory, law, linear=linear, elements=elements, size=size)
-    others = [design_named(beside)] if beside is not None else []
+    others = [design_named(compare)] if compare is not None else []
     if others and picture is None:
-        raise InvalidSettings("--beside is for the picture; give --picture FILE too")
+        raise InvalidSettings("--compare is for the picture; give --picture FILE too")
     drives = {one.problem.input.drive for one in (chosen, *others)}
     if len(drives) > 1:
-        raise InvalidSettings(f"--beside: {beside} is driven otherwise than {design}")
+        raise InvalidSettings(f"--compare: {compare} is driven otherwise than {design}")
     driven = [
         one if stroke is None else with_stroke(one, stroke, spec.scale) for one in (chosen, *others)
     ]
@@ -128,7 +128,7 @@ def validate(
         _print(validation)
     if picture is not None:
         draw_validations(
-            found, [design, *([beside] if beside else [])], picture, overwrite=overwrite
+            found, [design, *([compare] if compare else [])], picture, overwrite=overwrite
         )
     if vtu is not None:
         write_vtu(validation.analyses[-1], vtu, overwrite=overwrite)
@@ -179,9 +179,11 @@ def _model(level: str, settings: FemSettings) -> str:
 def record_beside(design: str) -> Path | None:
     """Return where the record of a design that lies in a file belongs."""
     from bellcrank.model import builtin
+    from bellcrank.workflows.find import hides_problem
 
     path = Path(design)
-    if design.startswith(("human:", "machine:")) or design in builtin or not path.exists():
+    bundled = design in builtin and not hides_problem(design)
+    if bundled or design.startswith(("human:", "machine:")) or not path.exists():
         return None
     if path.is_dir():
         return path / "validation.json"
@@ -221,7 +223,9 @@ def _keeper(path: Path | None, *, asked: bool) -> Callable[[Validation], None]:
 
 
 def _print(validation: Validation) -> None:
-    """Say what each level says, in a table: a column for each."""
+    """Print the figures of each level in a table, one column for each."""
+    from bellcrank.mechanics import objective_name
+
     table = Table(box=SIMPLE)
     table.add_column("")
     table.add_column("discrete model", justify="right")
@@ -230,7 +234,15 @@ def _print(validation: Validation) -> None:
         table.add_column(_heading(analysis), justify="right")
     response = validation.response
     first = [f"{response.efficiency:.4f}", "", "", "", "", response.status.label]
-    names = ("efficiency", "output, mm", "force, N", "stress, MPa", "strain", "status")
+    objective = objective_name(validation.design.problem)
+    names = (
+        f"efficiency ({objective})",
+        "output, mm",
+        "force, N",
+        "stress, MPa",
+        "strain",
+        "status",
+    )
     for place, name in enumerate(names):
         table.add_row(name, first[place], *(column[place] for column in columns))
     results.print(table)

@@ -21,7 +21,13 @@ from bellcrank.mechanics.evaluator import (
 )
 from bellcrank.mechanics.following import Arrival, follow
 from bellcrank.mechanics.grips import Grip, Loose, Rigid, Sliding
-from bellcrank.mechanics.objectives import Objective, efficiency_of, objective_of, objectives
+from bellcrank.mechanics.objectives import (
+    Objective,
+    efficiency_of,
+    objective_name,
+    objective_of,
+    objectives,
+)
 from bellcrank.mechanics.status import Outcome, Status
 from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction
 from bellcrank.mechanics.substructure import Condensed, Substructure
@@ -54,6 +60,7 @@ __all__ = [
     "follow",
     "foresee_stiffness",
     "load_bearing_core",
+    "objective_name",
     "objective_of",
     "objectives",
     "output_stiffness",

@@ -117,8 +117,7 @@ def objective_of(problem: Problem, name: str | None = None) -> Objective:
     >>> objective_of(find_problem("crane"), "directional:3").exponent
     3.0
     """
-    name = name or problem.objective or _usual_objective(problem)
-    name, _, parameter = name.partition(":")
+    name, _, parameter = objective_name(problem, name).partition(":")
     make = objectives[name]
     if not parameter:
         return make(problem)
@@ -132,6 +131,20 @@ def objective_of(problem: Problem, name: str | None = None) -> Objective:
             "of 'directional' or 'force'"
         )
     return make(problem, exponent)
+
+
+def objective_name(problem: Problem, name: str | None = None) -> str:
+    """Return the name of the objective in use: `name`, else the problem's own, else the default.
+
+    The default is ``"force"`` for forces against output springs, otherwise ``"displacement"``.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> objective_name(find_problem("crane")), objective_name(find_problem("pliers"))
+    ('displacement', 'force')
+    """
+    return name or problem.objective or _usual_objective(problem)
 
 
 def _usual_objective(problem: Problem) -> str:

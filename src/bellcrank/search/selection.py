@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -278,7 +278,9 @@ def select(
         If no candidate qualifies.
     """
     candidates = list(candidates)
-    evaluator = SpringEvaluator(problem, objective)
+    # The design keeps the objective of its search: whatever reads it computes the same figure.
+    problem = replace(problem, objective=objective or problem.objective)
+    evaluator = SpringEvaluator(problem)
     judge = judge or evaluator
     finalists: list[Finalist] = []
     refused: Refusals = []

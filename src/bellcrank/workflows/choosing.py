@@ -132,7 +132,7 @@ class PartChoice:
         What the design will be made as.
     settings
         Of the search. Frames are ranked by their own efficiency if that is what was searched for,
-        by that of the model if it was another objective or a mean over strokes.
+        by that of the model if it was a mean over strokes.
     tell
         Called with how many designs have been tried, and of how many.
     """
@@ -169,7 +169,7 @@ class PartChoice:
     def trial(self, finalist: Finalist, settings: FemSettings = FINE) -> Trial:
         """Follow a finalist as a part."""
         analysis = levels[LEVEL](self.spec.of(finalist.design), settings)
-        own = self.settings.objective is None and self.settings.strokes == (1.0,)
+        own = self.settings.strokes == (1.0,)
         efficiency = analysis.efficiency if own else finalist.response.efficiency
         return Trial(finalist, analysis, -math.inf if math.isnan(efficiency) else efficiency)
 

@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings, levels
 from bellcrank.fem.results import finite
-from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    Response,
+    SpringEvaluator,
+    objective_name,
+)
 from bellcrank.part import PartSpec, read_length
 from bellcrank.part.pieces import doubts_about, require_held
 from bellcrank.provenance import provenance
@@ -84,6 +89,7 @@ class Validation:
             "problem": self.design.problem.name,
             "problem_hash": identity(self.design),
             "mask": self.design.mask_hex,
+            "objective": objective_name(self.design.problem),
             **{key: results[0][key] for key in TOP},
             "discrete_model": discrete,
             "doubts": self.doubts,
