@@ -21,6 +21,7 @@ from bellcrank.mechanics.evaluator import (
 )
 from bellcrank.mechanics.following import Arrival, follow
 from bellcrank.mechanics.grips import Grip, Loose, Rigid, Sliding
+from bellcrank.mechanics.memory import check_memory, evaluators_that_fit
 from bellcrank.mechanics.objectives import (
     Objective,
     efficiency_of,
@@ -56,7 +57,9 @@ __all__ = [
     "Superelement",
     "UnloadedBeams",
     "at_fraction",
+    "check_memory",
     "efficiency_of",
+    "evaluators_that_fit",
     "follow",
     "foresee_stiffness",
     "load_bearing_core",

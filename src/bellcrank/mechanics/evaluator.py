@@ -15,6 +15,7 @@ from bellcrank.mechanics.kernels.arrays import (
     Structure,
     System,
 )
+from bellcrank.mechanics.memory import check_memory
 from bellcrank.mechanics.objectives import objective_of
 from bellcrank.mechanics.status import Status
 from bellcrank.mechanics.system import (
@@ -132,6 +133,7 @@ class SpringEvaluator:
                 f"unloaded_beams must be one of {', '.join(get_args(UnloadedBeams))}; "
                 f"got {unloaded_beams!r}"
             )
+        check_memory(problem)
         self.problem = problem
         self.core = get_args(UnloadedBeams).index(unloaded_beams)
         self.system: System = build_system(problem, objective_of(problem, objective))
@@ -280,6 +282,7 @@ class SpringEvaluator:
 
         chosen = self.problem.designable if beams is None else np.asarray(beams, dtype=np.int64)
         if self._screen is None:
+            check_memory(self.problem, predict_flips=True)
             self._screen = allocate_flip_workspace(self.system, self.structure)
         change, strain = np.zeros(len(chosen)), np.zeros(len(chosen))
         found = predict_flips(

@@ -1,80 +1,112 @@
-"""In which order the free nodes are eliminated, and how much room their factor can take."""
+"""Elimination order of the free nodes, and the capacity that their factor needs."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix
+from scipy.sparse import csc_matrix, identity
 from scipy.sparse.linalg import splu
 
 if TYPE_CHECKING:
-    from bellcrank.mechanics.kernels.arrays import Bytes, Ints, System
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics.kernels.arrays import Ints
 
 
-def _coupled_nodes(beams: Ints, start: Ints, ring: Ints, block: Ints) -> csc_matrix:
-    """Pattern of which free nodes can share a beam or an angular spring in some design.
+def coupled_nodes(beams: Ints, held: NDArray[np.bool_]) -> csc_matrix:
+    """Return the pattern of the nodes that share a beam or an angular spring in some design.
 
-    Removing beams makes farther beams neighbours around a node, so all nodes around a
-    node are taken as coupled.
-    """
-    pairs: set[tuple[int, int]] = set()
-    for node in range(len(start) - 1):
-        around = ring[start[node] : start[node + 1]]
-        members = [node, *(beams[around].sum(axis=1) - node).tolist()]
-        pairs.update((a, b) for a in members for b in members)
-    ends = block[np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2)]
-    ends = ends[(ends >= 0).all(axis=1)]
-    count = int(block.max(initial=-1)) + 1
-    entries = (np.ones(len(ends)), (ends[:, 0], ends[:, 1]))
-    return csc_matrix(coo_matrix(entries, shape=(count, count)))
-
-
-def elimination_order(beams: Ints, ring_start: Ints, ring_beam: Ints, held: Bytes) -> Ints:
-    """Order the free nodes so that their factor stays sparse (multiple minimum degree).
-
-    The order is found once for each problem, on the pattern that covers all designs.
-    Ordering for the full lattice alone would let the factors of late designs, which
-    couple nodes across the gaps, grow tenfold at a thousand beams.
+    Removing beams makes more distant beams neighbours around a node. All nodes that have a
+    beam to the same node are therefore taken as coupled.
 
     Parameters
     ----------
+    beams : (M, 2) int64
     held : (N,) bool
-        Nodes that are no unknowns.
+        Nodes that are not unknowns; they are left out.
+
+    Returns
+    -------
+    (n, n) sparse matrix of ones
+        Over the n free nodes.
+    """
+    nodes, free = np.arange(len(held)), np.flatnonzero(~held)
+    index = np.full(len(held), -1)
+    index[free] = np.arange(len(free))
+    rows = np.concatenate([nodes, beams[:, 0], beams[:, 1]])
+    columns = index[np.concatenate([nodes, beams[:, 1], beams[:, 0]])]
+    kept = columns >= 0
+    entries = (np.ones(int(kept.sum())), (rows[kept], columns[kept]))
+    around = csc_matrix(entries, shape=(len(held), len(free)))
+    pattern = csc_matrix(around.T @ around)
+    pattern.sort_indices()
+    pattern.data[:] = 1.0
+    return pattern
+
+
+def elimination_order(beams: Ints, held: NDArray[np.bool_]) -> Ints:
+    """Order the free nodes so that their factor stays sparse (multiple minimum degree).
+
+    The order is computed once for each problem, on the pattern that covers all designs. With
+    the order of the full lattice alone, the factors of designs with few beams, which couple
+    nodes across the gaps, would be ten times larger at a thousand beams.
+
+    Parameters
+    ----------
+    beams : (M, 2) int64
+    held : (N,) bool
+        Nodes that are not unknowns.
 
     Returns
     -------
     (N,) int64
-        Elimination index of each free node, -1 for held ones.
+        Elimination index of each free node, -1 for held nodes.
     """
-    free = np.flatnonzero(~held)
     block = np.full(len(held), -1)
-    block[free] = np.arange(len(free))
-    if len(free):
-        pattern = _coupled_nodes(beams, ring_start, ring_beam, block)
+    pattern = coupled_nodes(beams, held)
+    count = pattern.shape[0]
+    if count:
+        # A dominant diagonal keeps the pivots on the diagonal.
+        matrix = csc_matrix(pattern + count * identity(count, format="csc"))
         factor = splu(
-            pattern + len(free) * csc_matrix(np.eye(len(free))),
+            matrix,
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
-        block[free] = factor.perm_c
+        block[~held] = factor.perm_c
     return block
 
 
-def factor_capacity(system: System) -> int:
-    """Upper bound on the blocks below the diagonal of the factor of any design."""
-    pattern = _coupled_nodes(system.beams, system.ring_start, system.ring_beam, system.block)
-    below = [set(column[column > k].tolist()) for k, column in enumerate(_columns(pattern))]
+def factor_capacity(beams: Ints, block: Ints) -> int:
+    """Return an upper bound on the blocks below the diagonal of the factor of any design.
+
+    For each row of the factor, the nonzero entries are the columns on the paths from the entries
+    of the pattern to the row in the elimination tree (Liu, SIAM J. Matrix Anal. Appl. 11, 134,
+    1990).
+
+    Parameters
+    ----------
+    beams : (M, 2) int64
+    block : (N,) int64
+        Elimination index of each node, -1 for held nodes.
+    """
+    pattern = coupled_nodes(beams, block < 0)
+    order = block[block >= 0]
+    place = np.argsort(order)
+    starts, entries = pattern.indptr.tolist(), order[pattern.indices].tolist()
+    parent = [-1] * len(place)
+    visited = [-1] * len(place)
     total = 0
-    for column in range(len(below)):
-        rows = below[column]
-        total += len(rows)
-        if rows:
-            parent = min(rows)
-            below[parent] |= rows - {parent}
+    for row, index in enumerate(place.tolist()):
+        visited[row] = row
+        for entry in entries[starts[index] : starts[index + 1]]:
+            column = entry
+            while column < row and visited[column] != row:
+                if parent[column] < 0:
+                    parent[column] = row
+                visited[column] = row
+                column = parent[column]
+                total += 1
     return total
-
-
-def _columns(pattern: csc_matrix) -> list[Ints]:
-    return np.split(pattern.indices.astype(np.int64), pattern.indptr[1:-1])

@@ -113,7 +113,7 @@ def build_system(problem: Problem, objective: Objective) -> System:
         held=held,
         protected=protected,
         grounded=grounded,
-        block=elimination_order(beams, ring_start, ring_beam, held == HELD),
+        block=elimination_order(beams, held == HELD),
         drive=motion if driven else np.zeros_like(motion),
         load=np.zeros_like(motion) if driven else motion,
         ground=_output_springs(problem),
@@ -153,7 +153,7 @@ def allocate_structure(system: System) -> Structure:
         column_bits=np.zeros((blocks, words), np.uint64),
         word_start=np.zeros((blocks, words), np.int64),
         column_start=np.zeros(blocks + 1, np.int64),
-        row=np.zeros(factor_capacity(system), np.int64),
+        row=np.zeros(factor_capacity(system.beams, system.block), np.int64),
         sizes=np.zeros(5, np.int64),
     )
 

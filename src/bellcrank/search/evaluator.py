@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Protocol
 
-from bellcrank.mechanics import FlipPrediction, Response, SpringEvaluator
+from bellcrank.mechanics import FlipPrediction, Response, SpringEvaluator, check_memory
 from bellcrank.search.goals import GoalEvaluator, at_strokes
 
 if TYPE_CHECKING:
@@ -53,8 +53,10 @@ def make_evaluator(problem: Problem, settings: SearchSettings) -> Evaluator:
     Raises
     ------
     InvalidSettings, UnknownName
-        If the problem has not got the objective, or a goal makes no sense for it.
+        If the problem needs more memory than is available, has not got the objective, or a goal
+        makes no sense for it.
     """
+    check_memory(problem, evaluators=len(settings.strokes), predict_flips=settings.predicts_flips)
     told = settings.objective, settings.unloaded_beams
     if not settings.goals and settings.strokes == (1.0,):
         return SpringEvaluator(problem, *told)

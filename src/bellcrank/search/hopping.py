@@ -69,6 +69,7 @@ class HoppingSettings(SearchSettings):
     """
 
     name: ClassVar[str] = "basin-hopping"
+    predicts_flips: ClassVar[bool] = True
 
     radius: float = 2.5
     thinnest: float = 0.95

@@ -113,6 +113,7 @@ class InformedSettings(MetropolisSettings):
     """
 
     name: ClassVar[str] = "informed"
+    predicts_flips: ClassVar[bool] = True
 
     unloaded_beams: UnloadedBeams = "prune_all"
     moves: tuple[str, ...] = ("balanced", "balanced", "delayed", "node")

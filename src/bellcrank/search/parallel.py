@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.mechanics import evaluators_that_fit
 from bellcrank.search.evaluator import make_evaluator
 from bellcrank.search.searches import (
     State,
@@ -122,7 +123,10 @@ def run_chains(
         Whether every chain is done.
     """
     stop = stop or threading.Event()
-    with ThreadPoolExecutor(workers or default_workers()) as pool:
+    threads = evaluators_that_fit(
+        folder.problem, workers or default_workers(), predict_flips=settings.predicts_flips
+    )
+    with ThreadPoolExecutor(threads) as pool:
         futures = [
             pool.submit(run_chain, folder, settings, chain, stop, tell)
             for chain in range(settings.chains)

@@ -46,6 +46,8 @@ class SearchSettings:
 
     name: ClassVar[str]
     """In the registry of searches."""
+    predicts_flips: ClassVar[bool] = False
+    """Whether the search predicts all flips, which needs a dense inverse of the stiffness."""
 
     steps: int = 20_000
     chains: int = 4

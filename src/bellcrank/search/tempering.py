@@ -56,6 +56,7 @@ class TemperingSettings(SearchSettings):
     """
 
     name: ClassVar[str] = "tempering"
+    predicts_flips: ClassVar[bool] = True
 
     replicas: int = 6
     hot: float = 0.2
