@@ -1,14 +1,14 @@
-"""The paper's figures and tables, remade by commands.
+"""Reproduction of the figures and tables of the paper, Bonfanti et al. (2020).
 
-Each study is a module with its settings, full and quick; it computes plain figures from raw
-records that it keeps, draws one picture from them, and says in rows what of it compares with
-Bonfanti et al. (2020). `run_study` leaves record and picture in a folder.
+Each study is a module with full and quick settings. It computes plain figures from stored raw
+results, draws one picture, and compares the figures with the paper in rows. `run_study` writes
+the record and the picture to a folder.
 
 Examples
 --------
 >>> from reproduction import studies
 >>> studies["paths"].title
-"Efficiency along the paper's chains"
+"Efficiency along the chains of the paper's search"
 """
 
 from reproduction import structure  # noqa: I001 - registered in the order of the paper

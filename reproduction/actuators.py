@@ -1,144 +1,341 @@
-"""Crane, anti-parallel and pliers: hand against machine, beside the paper's figures."""
+"""Crane, anti-parallel and pliers: human and machine designs, in the model and as parts."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from reproduction import comparisons, published
-from reproduction.comparisons import Duel, efficiency, in_all_models
-from reproduction.formatting import number, share
-from reproduction.registry import Claim, Study, register
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.model import Design, Stiffness, find_problem, gallery_design
+from bellcrank.part import PartSpec
+from bellcrank.plots import Motion, style
+from reproduction import published
+from reproduction.finite_elements import analyse_all
+from reproduction.formatting import count, number, percent
+from reproduction.pictures.charts import Chart, Series
+from reproduction.pictures.sheets import Sheet, draw_sheet
+from reproduction.registry import Claim, Figures, Study, register
+from reproduction.searching import best_design, design_of, respond, run_chains
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
-QUICK = {"paper_steps": 2000, "paper_chains": 3, "steps": 2500, "chains": 2, "levels": ("frame",)}
-TASKS = {
-    "crane": ("push down, move sideways", (published.CRANE_HUMAN, published.CRANE_MACHINE)),
-    "anti-parallel": (
-        "push down, move up",
-        (published.ANTI_PARALLEL_HUMAN, published.ANTI_PARALLEL_MACHINE),
-    ),
-    "pliers": ("squeeze, press", (published.PLIERS_HUMAN, published.PLIERS_MACHINE)),
+    from reproduction.result_store import ResultStore
+
+ORIGINS = {
+    "hand": ("Human design", "human"),
+    "paper": ("Paper's search", "paper's search"),
+    "default": ("Default search", "default search"),
+    "part": ("Search for 2 mm struts", "2 mm struts"),
 }
-OTHERS = (
-    (
-        "The paper's own designs, by hand and by machine, are not at hand: all designs here are "
-        "ours, those by hand drawn from lever mechanics before any machine design was looked at."
-    ),
-)
-DISPLACED = (
-    *OTHERS,
-    (
-        "The paper made and measured its parts; ours exist as finite elements only: frames, and "
-        "the printed outline in plane stress, both nonlinear."
-    ),
-    (
-        "The designs for 2 mm struts were searched with the stiffness of such struts, and so that "
-        "they touch nowhere; the others with the paper's stiffness, which stands for wider struts."
-    ),
-)
-FORCED = (
-    *OTHERS,
-    (
-        "Our pliers are another lattice than the paper's, of which only half is modelled; the "
-        "paper's own design by hand, recomputed elsewhere from a description, has 0.2211."
-    ),
-    "The paper's figures for pliers are of simulations.",
-    "Designs that snap as frames were not followed as printed outlines.",
-)
+"""Origins of the designs, with a title and a short label."""
+MODELS = {
+    "discrete": ("discrete model", style.INK),
+    "frame": ("nonlinear frame", style.BEST),
+    "plane": ("plane stress", style.BUILT),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """A task and the effort of the searches.
+
+    Parameters
+    ----------
+    problem
+        Bundled problem with a human design.
+    paper_steps, paper_chains
+        Length and number of chains of the paper's search.
+    steps, chains
+        Length and number of chains of the default search.
+    seed
+        Seed of both searches.
+    levels
+        Levels of finite elements.
+    width
+        Strut width, mm, for a lattice unit of 10 mm.
+    """
+
+    problem: str
+    paper_steps: int = 20_000
+    paper_chains: int = 8
+    steps: int = 20_000
+    chains: int = 4
+    seed: int = 0
+    levels: tuple[str, ...] = ("frame", "plane")
+    width: float = 2.0
+
+
+def run(settings: Settings, store: ResultStore) -> Figures:
+    """Search, and analyse all designs at all levels."""
+    problem = find_problem(settings.problem)
+    found: dict[str, Design] = {}
+    for origin in ("hand", "part"):
+        known = gallery_design("human" if origin == "hand" else "machine", settings.problem)
+        if known is not None:
+            found[origin] = known
+    for origin, search, steps, chains in (
+        ("paper", "paper", settings.paper_steps, settings.paper_chains),
+        ("default", "basin-hopping", settings.steps, settings.chains),
+    ):
+        values = {"search": search, "steps": steps, "seed": settings.seed}
+        results = run_chains(store, f"{origin}-chain", problem, values, chains)
+        found[origin] = best_design(problem, results).design
+    designs = {origin: found[origin] for origin in ORIGINS if origin in found}
+    parts = analyse_all(store, designs, PartSpec(width=settings.width), settings.levels)
+    return {
+        "problem": settings.problem,
+        "width": settings.width,
+        "searches": {
+            "paper": {"chains": settings.paper_chains, "steps": settings.paper_steps},
+            "default": {"chains": settings.chains, "steps": settings.steps},
+        },
+        "designs": {
+            origin: {**_discrete(design), **parts[origin]} for origin, design in designs.items()
+        },
+    }
+
+
+def _discrete(design: Design) -> dict[str, Any]:
+    """Return a design and its response in the discrete model as plain data."""
+    response = respond(design)
+    stiffness = design.problem.stiffness
+    return {
+        "mask": design.mask_hex,
+        "beams": design.beam_count,
+        "stiffness": [stiffness.bond, stiffness.angle],
+        "discrete": {
+            "efficiency": response.efficiency if response.is_admissible else None,
+            "status": response.status.label,
+        },
+    }
+
+
+def design_from(figures: Mapping[str, Any], origin: str) -> Design:
+    """Return a design of a record."""
+    row = figures["designs"][origin]
+    bond, angle = row["stiffness"]
+    problem = find_problem(figures["problem"])
+    return design_of(replace(problem, stiffness=Stiffness(bond, angle)), row["mask"])
+
+
+def efficiency(figures: Mapping[str, Any], origin: str, model: str) -> float | None:
+    """Return the efficiency of a design in a model, or None if the record has none."""
+    if origin not in figures["designs"]:
+        raise InvalidSettings(f"designs: no design {origin!r}")
+    value = figures["designs"][origin].get(model, {}).get("efficiency")
+    return None if value is None else float(value)
+
+
+def _models_in(figures: Mapping[str, Any]) -> list[str]:
+    """Return the models of which a record has figures."""
+    rows = figures["designs"].values()
+    return [model for model in MODELS if any(model in row for row in rows)]
+
+
+def draw(figures: Mapping[str, Any], path: Path, title: str, reported: tuple[float, float]) -> None:
+    """Draw the displaced designs and bars of their efficiencies.
+
+    Parameters
+    ----------
+    reported
+        Efficiencies of the human and the machine design in the paper.
+    """
+    motions = []
+    for origin in figures["designs"]:
+        design = design_from(figures, origin)
+        response = respond(design)
+        motions.append(
+            Motion(design, response.displacement, response.efficiency, name=ORIGINS[origin][0])
+        )
+    order = [origin for origin in ORIGINS if origin in figures["designs"]]
+    models = _models_in(figures)
+    width = 0.8 / len(models)
+    series = [
+        _bars(
+            np.arange(len(order)) + (k - 0.5 * (len(models) - 1)) * width,
+            [efficiency(figures, origin, model) for origin in order],
+            MODELS[model],
+            0.94 * width,
+            frozenset(i for i, name in enumerate(order) if model in figures["designs"][name]),
+        )
+        for k, model in enumerate(models)
+    ]
+    places = np.array([len(order), len(order) + 1.0])
+    series.append(_bars(places, list(reported), ("the paper", style.HUMAN), 0.55))
+    highest = max(float(np.max(each.y)) for each in series)
+    searches = figures["searches"]
+    chart = Chart(
+        f"Efficiency in the discrete model and by finite elements (struts {figures['width']:g} mm "
+        "wide, spacing 10 mm), and the paper's values",
+        "", "efficiency", series,
+        names=[*(ORIGINS[origin][1] for origin in order), "paper, human", "paper, machine"],
+        legend="upper right", limits_y=(None, 1.12 * highest),
+    )  # fmt: skip
+    effort = "; ".join(
+        f"{name}: best of {count(searches[key]['chains'], 'chain')} of "
+        f"{count(searches[key]['steps'], 'proposal')}"
+        for key, name in (("paper", "paper's search"), ("default", "default search"))
+    )
+    sheet = Sheet(title=title, note=effort, motions=motions, charts=[chart], height=2.1)
+    draw_sheet(sheet, path, overwrite=True)
+
+
+def _bars(
+    places: Any,
+    values: list[float | None],
+    look: tuple[str, str],
+    width: float,
+    analysed: frozenset[int] = frozenset(),
+) -> Series:
+    """Return bars; analysed designs without an efficiency are labelled as snapping."""
+    name, colour = look
+    heights = np.array([0.0 if value is None else value for value in values])
+    labels = [("snaps" if k in analysed else "") if value is None else number(value)
+              for k, value in enumerate(values)]  # fmt: skip
+    return Series(
+        places, heights, name=name, kind="bars", colour=colour, width=width, labels=labels
+    )
+
+
+def _effort(figures: Mapping[str, Any]) -> str:
+    """Return the number and length of the chains as text."""
+    searches = figures["searches"]
+    return " and ".join(
+        f"{count(searches[key]['chains'], 'chain')} of {count(searches[key]['steps'], 'proposal')} "
+        f"of the {name}"
+        for key, name in (("paper", "paper's search"), ("default", "default search"))
+    )
+
+
+def _in_all_models(figures: Mapping[str, Any], origin: str) -> str:
+    """Return the efficiencies of a design in all models as text."""
+    texts = []
+    for model in _models_in(figures):
+        row = figures["designs"][origin].get(model)
+        if row is None:
+            continue
+        value, name = efficiency(figures, origin, model), MODELS[model][0]
+        failure = "snaps" if row["status"] == "snapped" else "no equilibrium"
+        texts.append(f"{number(value)} ({name})" if value is not None else f"{failure} ({name})")
+    return ", ".join(texts)
 
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
     """Compare with the paper."""
     name = figures["problem"]
     by_hand, by_machine = TASKS[name][1]
-    told = [
-        Claim(f"{name}: efficiency by hand", share(by_hand), in_all_models(figures, "hand")),
-        Claim(
-            f"{name}: efficiency by machine, the paper's rule",
-            share(by_machine),
-            in_all_models(figures, "paper"),
-        ),
-        Claim(
-            f"{name}: efficiency by machine, our default search",
-            share(by_machine),
-            in_all_models(figures, "default"),
-        ),
-    ]
-    if "part" in figures["designs"]:
-        told.append(
-            Claim(
-                f"{name}: efficiency by machine, for 2 mm struts",
-                share(by_machine),
-                in_all_models(figures, "part"),
-                "comes with the package; searched for such struts",
+    rows = [Claim(f"{name}: human design", percent(by_hand), _in_all_models(figures, "hand"))]
+    for origin, what, note in (
+        ("paper", "machine design by the paper's search", ""),
+        ("default", "machine design by the default search", ""),
+        ("part", "machine design for 2 mm struts", "bundled design, searched for these struts"),
+    ):
+        if origin in figures["designs"]:
+            rows.append(
+                Claim(f"{name}: {what}", percent(by_machine), _in_all_models(figures, origin), note)
             )
-        )
-    told.append(
+    rows.append(
         Claim(
-            f"{name}: machine over hand",
-            number(by_machine / by_hand, 1) + " times",
+            f"{name}: ratio of machine to human efficiency",
+            number(by_machine / by_hand, 1),
             "; ".join(_ratios(figures)),
-            "each in the same model",
+            "both efficiencies in the same model",
         )
     )
-    return told
+    return rows
 
 
 def _ratios(figures: Mapping[str, Any]) -> list[str]:
-    """Return how many times better than by hand designs are, model by model."""
+    """Return the ratios to the human design, model by model, as text."""
     found = []
-    for by in ("paper", "default", "part"):
-        if by not in figures["designs"]:
+    for origin in ("paper", "default", "part"):
+        if origin not in figures["designs"]:
             continue
-        words = []
-        for model in comparisons.levels_in(figures):
-            machine, hand = (efficiency(figures, one, model) for one in (by, "hand"))
+        texts = []
+        for model in _models_in(figures):
+            machine, hand = (efficiency(figures, one, model) for one in (origin, "hand"))
             if machine is not None and hand:
-                words.append(f"{machine / hand:.1f} ({comparisons.MODELS[model][0]})")
-        found.append(f"{comparisons.SHORT[by]} {', '.join(words)}")
+                texts.append(f"{machine / hand:.1f} ({MODELS[model][0]})")
+        found.append(f"{ORIGINS[origin][1]}: {', '.join(texts)}")
     return found
 
 
-def _study(name: str, after: str, full: Duel, quick: Duel, deviations: tuple[str, ...]) -> Study:
+QUICK = {"paper_steps": 2000, "paper_chains": 3, "steps": 2500, "chains": 2, "levels": ("frame",)}
+TASKS = {
+    "crane": ("input down, output sideways", (published.CRANE_HUMAN, published.CRANE_MACHINE)),
+    "anti-parallel": (
+        "input down, output up",
+        (published.ANTI_PARALLEL_HUMAN, published.ANTI_PARALLEL_MACHINE),
+    ),
+    "pliers": ("handles and jaws close", (published.PLIERS_HUMAN, published.PLIERS_MACHINE)),
+}
+OWN_DESIGNS = (
+    "The paper's own designs are not available. All designs shown are ours; the human designs "
+    "were drawn from lever mechanics before any machine design was known."
+)
+DISPLACED = (
+    OWN_DESIGNS,
+    (
+        "The paper printed and measured its parts. Ours were analysed by finite elements only: "
+        "frames, and the printed outline in plane stress, both nonlinear."
+    ),
+    (
+        "The designs for 2 mm struts were searched with the stiffness of such struts and without "
+        "contact of struts; the others with the paper's stiffness, which corresponds to wider "
+        "struts."
+    ),
+)
+FORCED = (
+    OWN_DESIGNS,
+    (
+        "Our pliers use another lattice than the paper's, of which only half is modelled. The "
+        "paper's human design, recomputed from a description, has efficiency 0.2211."
+    ),
+    "The paper's values for pliers are simulated.",
+    "Designs that snap as frames were not analysed in plane stress.",
+)
+
+
+def _register(
+    name: str, after: str, full: Settings, quick: Settings, deviations: tuple[str, ...]
+) -> None:
     what, reported = TASKS[name]
-    title = f"{name.capitalize()}: {what}, by hand and by machine"
-    return register(
+    title = f"{name.capitalize()} ({what}): human and machine designs"
+    register(
         Study(
             name=name,
             title=title,
             after=after,
             full=full,
             quick=quick,
-            run=comparisons.run,
-            draw=partial(comparisons.draw, title=title, published=reported),
+            run=run,
+            draw=partial(draw, title=title, reported=reported),
             claims=claims,
-            runs=comparisons.runs,
+            runs=_effort,
             deviations=deviations,
         )
     )
 
 
-CRANE = _study(
-    "crane",
-    "its first two actuators",
-    Duel(problem="crane"),
-    Duel(problem="crane", **QUICK),  # type: ignore[arg-type]
-    DISPLACED,
-)
-ANTI_PARALLEL = _study(
-    "anti-parallel",
-    "its first two actuators",
-    Duel(problem="anti-parallel"),
-    Duel(problem="anti-parallel", **QUICK),  # type: ignore[arg-type]
-    DISPLACED,
-)
-PLIERS = _study(
+for _name in ("crane", "anti-parallel"):
+    _register(
+        _name,
+        "displacement actuators",
+        Settings(problem=_name),
+        Settings(problem=_name, **QUICK),  # type: ignore[arg-type]
+        DISPLACED,
+    )
+_register(
     "pliers",
-    "its pliers",
-    Duel(problem="pliers", paper_chains=4, steps=8000),
-    Duel(problem="pliers", paper_steps=600, paper_chains=2, steps=800, chains=2, levels=("frame",)),
+    "pliers",
+    Settings(problem="pliers", paper_chains=4, steps=8000),
+    Settings(
+        problem="pliers", paper_steps=600, paper_chains=2, steps=800, chains=2, levels=("frame",)
+    ),
     FORCED,
 )

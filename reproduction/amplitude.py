@@ -1,8 +1,8 @@
-"""How far efficiencies hold: along the stroke, beyond it, and where structures buckle."""
+"""Efficiency along the stroke and beyond it, and loss of stability."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from bellcrank.model import find_problem, gallery_design
 from bellcrank.part import PartSpec
 from bellcrank.plots import style
 from bellcrank.workflows import with_stroke
-from reproduction.checking import analyse
+from reproduction.finite_elements import analyse
 from reproduction.formatting import count, number
 from reproduction.pictures.charts import Chart, Level, Series
 from reproduction.pictures.sheets import Sheet, draw_sheet
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 
 WIDTH, SCALE = 2.0, 10.0
 NAMES = {
-    "hand": ("by hand", style.HUMAN),
-    "paper": ("paper's rule", style.BUILT),
-    "part": ("for 2 mm struts", style.BEST),
+    "hand": ("human", style.HUMAN),
+    "paper": ("paper's search", style.BUILT),
+    "part": ("2 mm struts", style.BEST),
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Strokes, as parts of the usual one, and how the paper's designs are searched."""
+    """Strokes as multiples of that of the task, and settings of the paper's search."""
 
     problems: tuple[str, ...] = ("crane", "anti-parallel")
     points: int = 30
@@ -48,22 +48,22 @@ class Settings:
 
 
 def run(settings: Settings, store: ResultStore) -> Figures:
-    """Follow each design along strokes, in the model and as frames."""
+    """Compute each design along the stroke, in the discrete model and as a frame."""
     strokes = np.linspace(0.0, settings.furthest, settings.points + 1)[1:].tolist()
     tasks: dict[str, Any] = {}
     for name in settings.problems:
         designs = _designs(name, settings, store)
         work = {by: partial(along, design, strokes) for by, design in designs.items()}
         tasks[name] = {
-            by: {"mask": designs[by].mask_hex, "model": told}
-            for by, told in store.compute_all(f"{name}-model", work).items()
+            by: {"mask": designs[by].mask_hex, "model": row}
+            for by, row in store.compute_all(f"{name}-model", work).items()
         }
         if settings.frames:
             frames = {
                 by: partial(as_frame, design, settings.furthest) for by, design in designs.items()
             }
-            for by, told in store.compute_all(f"{name}-frame", frames).items():
-                tasks[name][by]["frame"] = told
+            for by, row in store.compute_all(f"{name}-frame", frames).items():
+                tasks[name][by]["frame"] = row
     return {
         "strokes": strokes,
         "furthest": settings.furthest,
@@ -87,9 +87,9 @@ def _designs(name: str, settings: Settings, store: ResultStore) -> dict[str, Des
 
 
 def along(design: Design, strokes: list[float]) -> dict[str, Any]:
-    """Return efficiencies at each stroke by the model, and where stability is first lost.
+    """Return efficiencies in the discrete model, and the first loss of stability.
 
-    What follows is not told: after a loss of stability the response is not unique.
+    Efficiencies after a loss of stability are None, because the response is not unique.
     """
     efficiency: list[float | None] = []
     lost = None
@@ -102,49 +102,45 @@ def along(design: Design, strokes: list[float]) -> dict[str, Any]:
 
 
 def as_frame(design: Design, furthest: float) -> dict[str, Any]:
-    """Return the same of the design as a nonlinear frame."""
+    """Return the same for the design as a nonlinear frame."""
     amount = furthest * design.problem.input.amount * SCALE
-    told = analyse(with_stroke(design, amount, SCALE), PartSpec(width=WIDTH), "frame")
-    points = [[load * furthest, efficiency] for load, efficiency in told["stroke"]]
+    row = analyse(with_stroke(design, amount, SCALE), PartSpec(width=WIDTH), "frame")
+    points = [[load * furthest, efficiency] for load, efficiency in row["stroke"]]
     lost = None
-    if told["status"] != "converged":
-        lost = {"stroke": told["reached"] * furthest, "status": told["lost"] or told["status"]}
+    if row["status"] != "converged":
+        lost = {"stroke": row["reached"] * furthest, "status": row["lost"] or row["status"]}
     return {"points": points, "lost": lost}
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
-    """Draw efficiency against stroke, a panel for each task."""
+    """Draw the efficiency against the stroke, one chart for each task."""
     charts = []
     for name, designs in figures["tasks"].items():
         series = []
-        for by, told in designs.items():
-            words, colour = NAMES[by]
+        for by, row in designs.items():
+            label, colour = NAMES[by]
             strokes = np.array(figures["strokes"])
             known = np.array(
-                [np.nan if v is None else v for v in told["model"]["efficiency"]], dtype=float
+                [np.nan if v is None else v for v in row["model"]["efficiency"]], dtype=float
             )
-            series.append(Series(strokes, known, name=f"{words}, model", colour=colour, width=2.0))
-            if "frame" in told:
-                across, up = np.array(told["frame"]["points"], dtype=float).reshape(-1, 2).T
+            series.append(Series(strokes, known, name=f"{label}, model", colour=colour, width=2.0))
+            if "frame" in row:
+                x, y = np.array(row["frame"]["points"], dtype=float).reshape(-1, 2).T
                 series.append(
-                    Series(across, up, name=f"{words}, frame", colour=colour, dashed=True,
+                    Series(x, y, name=f"{label}, frame", colour=colour, dashed=True,
                            width=1.2)
                 )  # fmt: skip
-            series += _losses(told, known, strokes, colour)
+            series += _losses(row, known, strokes, colour)
         charts.append(
-            Chart(name, "input motion, in strokes of the task", "efficiency", series,
-                  [Level(1.0, colour=style.IDLE, upright=True)], legend=None,
+            Chart(name, "input displacement / stroke of the task", "efficiency", series,
+                  [Level(1.0, colour=style.IDLE, vertical=True)], legend=None,
                   limits_x=(0.0, figures["furthest"] * 1.02))
         )  # fmt: skip
-    chart = charts[-1]
-    charts[-1] = Chart(
-        chart.title, chart.across, chart.up, chart.series, chart.levels, legend="upper right",
-        limits_x=chart.limits_x,
-    )  # fmt: skip
+    charts[-1] = replace(charts[-1], legend="upper right")
     sheet = Sheet(
         title="Efficiency against input stroke",
-        note="1 is the stroke of the task; a dot: stability is lost; frames: struts "
-        f"{figures['width']:g} mm wide on 10 mm, nonlinear",
+        note="dots mark the loss of stability; nonlinear frames with struts "
+        f"{figures['width']:g} mm wide, spacing 10 mm",
         charts=charts,
         height=3.6,
     )
@@ -152,15 +148,15 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
 
 
 def _losses(
-    told: Mapping[str, Any], known: np.ndarray, strokes: np.ndarray, colour: str
+    row: Mapping[str, Any], known: np.ndarray, strokes: np.ndarray, colour: str
 ) -> list[Series]:
-    """Return dots where stability is lost."""
+    """Return dots at losses of stability."""
     found = []
     there = np.flatnonzero(np.isfinite(known))
-    if told["model"]["lost"] is not None and len(there):
+    if row["model"]["lost"] is not None and len(there):
         found.append((strokes[there[-1]], known[there[-1]]))
-    if told.get("frame", {}).get("lost") is not None and told["frame"]["points"]:
-        found.append(tuple(told["frame"]["points"][-1]))
+    if row.get("frame", {}).get("lost") is not None and row["frame"]["points"]:
+        found.append(tuple(row["frame"]["points"][-1]))
     return [
         Series(np.array([x]), np.array([y]), kind="points", colour=colour, width=2.4, level=6.0)
         for x, y in found
@@ -172,53 +168,53 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
     """Compare with the paper."""
     found = []
     for name, designs in figures["tasks"].items():
-        for by, told in designs.items():
+        for by, row in designs.items():
             found.append(
                 Claim(
-                    f"{name}, {NAMES[by][0]}: efficiency along the stroke",
+                    f"{name}, {NAMES[by][0]}: efficiency",
                     "",
-                    _sentence(figures["strokes"], told),
-                    "strokes of the task",
+                    _sentence(figures["strokes"], row),
+                    "in multiples of the stroke of the task",
                 )
             )
     return found
 
 
-def _sentence(strokes: list[float], told: Mapping[str, Any]) -> str:
+def _sentence(strokes: list[float], row: Mapping[str, Any]) -> str:
     model = [
         (stroke, value)
-        for stroke, value in zip(strokes, told["model"]["efficiency"], strict=True)
+        for stroke, value in zip(strokes, row["model"]["efficiency"], strict=True)
         if value is not None
     ]
     if not model:
-        raise InvalidSettings("a design without any stable response along its stroke")
-    words = (
+        raise InvalidSettings("amplitude: a design has no stable response")
+    text = (
         f"model {number(model[0][1])} at {model[0][0]:.1f}, {number(model[-1][1])} at "
         f"{model[-1][0]:.1f}"
     )
-    if told["model"]["lost"]:
-        words += f", then {told['model']['lost']['status']}"
-    if "frame" in told and told["frame"]["points"]:
-        last = told["frame"]["points"][-1]
-        words += f"; frame {number(last[1])} at {last[0]:.1f}"
-        if told["frame"]["lost"]:
-            words += f", then {told['frame']['lost']['status']}"
-    return words
+    if row["model"]["lost"]:
+        text += f", then {row['model']['lost']['status']}"
+    if "frame" in row and row["frame"]["points"]:
+        last = row["frame"]["points"][-1]
+        text += f"; frame {number(last[1])} at {last[0]:.1f}"
+        if row["frame"]["lost"]:
+            text += f", then {row['frame']['lost']['status']}"
+    return text
 
 
 STUDY = register(
     Study(
         name="amplitude",
-        title="Efficiency against input stroke, and buckling",
+        title="Efficiency against input stroke, and loss of stability",
         after="amplitude of the input",
         full=Settings(),
         quick=Settings(points=10, steps=1500, chains=2),
         run=run,
         draw=draw,
         claims=claims,
-        runs=lambda told: (
-            f"{sum(len(task) for task in told['tasks'].values())} designs at "
-            f"{count(len(told['strokes']), 'stroke')}"
+        runs=lambda figures: (
+            f"{sum(len(task) for task in figures['tasks'].values())} designs at "
+            f"{count(len(figures['strokes']), 'stroke')}"
         ),
         deviations=("The designs are ours.",),
     )

@@ -1,4 +1,4 @@
-"""How angular springs join the beams of a node, and what the removal of a beam does to them."""
+"""Angular springs between the beams of a node before and after the removal of beams."""
 
 from __future__ import annotations
 
@@ -24,17 +24,21 @@ if TYPE_CHECKING:
 CASES: dict[str, dict[str, Any]] = {
     "six": {"title": "Six beams", "angles": [0, 60, 120, 180, 240, 300]},
     "five": {
-        "title": "One removed", "angles": [0, 120, 180, 240, 300], "gone": [60], "fresh": [0],
+        "title": "One beam removed", "angles": [0, 120, 180, 240, 300], "removed": [60],
+        "merged": [0],
     },
-    "two": {"title": "Two left", "angles": [0, 120], "gone": [60, 180, 240, 300], "fresh": [0, 1]},
+    "two": {
+        "title": "Two beams", "angles": [0, 120], "removed": [60, 180, 240, 300], "merged": [0, 1],
+    },
     "dead end": {
-        "title": "A dead end", "angles": [0, 60, 120], "dead": [1], "gone": [180, 240, 300],
+        "title": "One dead end", "angles": [0, 60, 120], "dead": [1], "removed": [180, 240, 300],
     },
     "dead ends": {
-        "title": "Two dead ends", "angles": [0, 60, 120, 240], "dead": [1, 3], "gone": [180, 300],
+        "title": "Two dead ends", "angles": [0, 60, 120, 240], "dead": [1, 3],
+        "removed": [180, 300],
     },
 }  # fmt: skip
-"""Directions of the beams of a node in degrees; those that end freely carry nothing."""
+"""Directions of the beams of a node in degrees; dead ends carry no load."""
 
 
 UP = np.array([0.0, 1.0])
@@ -42,15 +46,15 @@ UP = np.array([0.0, 1.0])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """By how much the first beam is turned, in lengths of it."""
+    """Transverse displacement of the end of the first beam, in beam lengths."""
 
     turn: float = 0.01
 
 
 def star(angles: list[int], dead: list[int], turn: float) -> Problem:
-    """Return a node that is held, with beams of which the first is turned, and all others held.
+    """Return a problem with a fixed node whose first beam is rotated and whose others are fixed.
 
-    Dead ends are free. The output is a beam that hangs by a held end, and feels nothing.
+    Dead ends are free. The output is the free end of an additional, unloaded beam.
     """
     places = [(0.0, 0.0)]
     places += [(math.cos(math.radians(a)), math.sin(math.radians(a))) for a in angles]
@@ -73,16 +77,16 @@ def star(angles: list[int], dead: list[int], turn: float) -> Problem:
 def resistance(
     angles: list[int], dead: list[int], turn: float, unloaded_beams: UnloadedBeams
 ) -> float:
-    """Return what a joint resists a beam's turn with, in units of an angular spring."""
+    """Return the rotational stiffness of a beam at a node, in units of an angular spring."""
     problem = star(angles, dead, turn)
     response = SpringEvaluator(problem, unloaded_beams=unloaded_beams).evaluate(problem.initial)
-    stretch = problem.stiffness.bond * (math.hypot(1.0, turn) - 1.0) ** 2
-    turned = math.atan(turn)
-    return (response.energy - stretch) / (problem.stiffness.angle * turned**2)
+    elongation = problem.stiffness.bond * (math.hypot(1.0, turn) - 1.0) ** 2
+    angle = math.atan(turn)
+    return (response.energy - elongation) / (problem.stiffness.angle * angle**2)
 
 
 def run(settings: Settings, store: ResultStore) -> Figures:
-    """Turn the first beam of each joint, and measure what resists."""
+    """Compute the rotational stiffness of the first beam of each joint."""
     store.progress("joints", 0, len(CASES))
     found = {}
     for name, case in CASES.items():
@@ -101,46 +105,46 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
     """Draw the joints with their springs."""
     joints = []
     for name, case in CASES.items():
-        told = figures["joints"][name]
+        row = figures["joints"][name]
         joints.append(
             Joint(
                 title=case["title"],
-                note=f"{told['springs']} springs; resists {told['keep']:.2f}",
+                note=f"{row['springs']} springs; stiffness {row['keep']:.2f} λ",
                 angles=case["angles"],
                 dead=frozenset(case.get("dead", ())),
-                gone=case.get("gone", ()),
-                fresh=frozenset(case.get("fresh", ())),
+                removed=case.get("removed", ()),
+                merged=frozenset(case.get("merged", ())),
             )
         )
     draw_joints(
         joints,
         path,
-        title="Angular springs around a node, with their rest angles",
-        note="orange: springs that removals have merged; resists: energy of turning the right "
-        "beam by 1 rad, others held, in units of λ; white: ends that are free",
+        title="Angular springs of a node with their rest angles",
+        note="orange: springs merged by removals; stiffness: rotation of the right beam, other "
+        "beams fixed; white: free ends",
         overwrite=True,
     )
 
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
     """Compare with the paper."""
-    told = figures["joints"]
+    rows = figures["joints"]
     return [
         Claim(
-            "neighbouring beams of a node share a spring; removing a beam merges its two",
+            "removal of a beam merges the two angular springs beside it",
             "re-neighbouring",
-            f"{told['six']['springs']} springs with {told['six']['beams']} beams, "
-            f"{told['five']['springs']} with {told['five']['beams']}; a turned beam is resisted by "
-            f"{number(told['six']['keep'])} λ and {number(told['five']['keep'])} λ",
-            "measured with the energy that searches use",
+            f"{rows['six']['springs']} springs with {rows['six']['beams']} beams, "
+            f"{rows['five']['springs']} with {rows['five']['beams']}; rotational stiffness of a "
+            f"beam {number(rows['six']['keep'])} λ and {number(rows['five']['keep'])} λ",
+            "computed from the energy of the discrete model",
         ),
         Claim(
-            "what dead ends do in the literal model",
+            "rotational stiffness with dead ends between the beams",
             "",
-            f"{number(told['two']['keep'])} λ without, {number(told['dead end']['keep'])} λ "
-            f"with one and {number(told['dead ends']['keep'])} λ with two between the beams; "
-            f"ignored as loose ends: {number(told['dead ends']['prune_dead_ends'])} λ",
-            "no real part softens so; our default search does not count them",
+            f"{number(rows['two']['keep'])} λ with none, {number(rows['dead end']['keep'])} λ "
+            f"with one and {number(rows['dead ends']['keep'])} λ with two dead ends; "
+            f"{number(rows['dead ends']['prune_dead_ends'])} λ if dead ends are pruned",
+            "real parts are not softened by dead ends; the default search prunes them",
         ),
     ]
 
@@ -148,13 +152,13 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
 STUDY = register(
     Study(
         name="angular-springs",
-        title="Angular springs around a node, before and after removals",
+        title="Angular springs of a node before and after removals",
         after="sketch of angular springs",
         full=Settings(),
         quick=Settings(),
         run=run,
         draw=draw,
         claims=claims,
-        runs=lambda told: f"{len(told['joints'])} joints",
+        runs=lambda figures: f"{len(figures['joints'])} joints",
     )
 )

@@ -1,10 +1,10 @@
-"""Two classical tasks of compliant-mechanism design, on a box with a lattice in it.
+"""Two standard tasks of compliant-mechanism design on a box with a lattice.
 
-The force inverter and the gripper are the examples by which topology optimisation of compliant
-mechanisms is taught (Bendsoe and Sigmund, Topology Optimization, 2003, chapter 2). Input at the
-middle of the left side, pushed to the right; held at the two left corners. The inverter's output
-is the middle of the right side, which shall move to the left; the gripper's are two jaws beside a
-gap there, which shall close.
+The force inverter and the gripper are standard examples of topology optimisation (Bendsoe and
+Sigmund, Topology Optimization, 2003, chapter 2). The input is in the middle of the left side and
+moves to the right; the two left corners are fixed. The output of the inverter is in the middle of
+the right side and moves to the left; the outputs of the gripper are two jaws beside a gap, which
+close.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ if TYPE_CHECKING:
 
 TASKS = ("inverter", "gripper")
 GAP = 2.0
-"""Depth of the gripper's gap, in lattice units; it is one row high to each side."""
+"""Depth of the gap of the gripper, lattice units; it extends one row to each side."""
 
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A task.
+    """A task on a box.
 
     Parameters
     ----------
     problem
-        On a lattice, with springs that stand for the struts.
+        Problem on a lattice, with stiffness calibrated for the struts.
     spec
-        Size and material, for all designs.
+        Size and material of all designs.
     low, high : (2,) mm
-        Corners of the box: as far as struts reach.
+        Corners of the box, including half the strut width.
     void : (2, 2) mm or None
-        Corners of what must stay empty.
+        Corners of the region that must remain empty.
     """
 
     problem: Problem
@@ -50,7 +50,7 @@ class Box:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(N, 2) nodes, mm."""
+        """(N, 2) positions of the nodes, mm."""
         return self.problem.lattice.positions * self.spec.scale
 
 
@@ -64,13 +64,13 @@ def box_of(
     name
         ``"inverter"`` or ``"gripper"``.
     columns, rows
-        Nodes across, and rows up: 4 k + 3, so that the middle one reaches the sides.
+        Nodes per row, and number of rows: 4 k + 3, so that the middle row reaches both sides.
     stroke
-        Of the input, lattice units.
+        Input displacement, lattice units.
     spring
-        Against the output, in units of the discrete model.
+        Stiffness of the spring at the output, units of the discrete model.
     width
-        Of the struts, mm.
+        Strut width, mm.
     """
     lattice = lattices["triangular-rectangle"](columns=columns, rows=rows)
     spec = PartSpec(width=width)
@@ -92,16 +92,16 @@ def box_of(
     initial = np.ones(lattice.beam_count, dtype=bool)
     void = None
     if name == "inverter":
-        watched, direction = nearest((right, middle)), np.array([[-1.0, 0.0]])
+        outputs, direction = nearest((right, middle)), np.array([[-1.0, 0.0]])
     else:
-        watched = nearest((right - 0.5, middle + rise), (right - 0.5, middle - rise))
+        outputs = nearest((right - 0.5, middle + rise), (right - 0.5, middle - rise))
         direction = np.array([[0.0, -1.0], [0.0, 1.0]])
         centre = places[lattice.beams].mean(axis=1)
         inside = (np.abs(centre[:, 1] - middle) < rise - 1e-6) & (centre[:, 0] > right - GAP)
         initial &= ~inside
         half = rise - 0.5 * spec.width / spec.scale
         void = spec.scale * np.array([[right - GAP, middle - half], [right + 1.0, middle + half]])
-    output = Output(nodes=watched, direction=direction, spring=spring, spring_kind="directional")
+    output = Output(nodes=outputs, direction=direction, spring=spring, spring_kind="directional")
     problem = Problem(
         name=name,
         lattice=lattice,

@@ -1,4 +1,4 @@
-"""Numbers as they stand in sentences and tables."""
+"""Numbers as text for sentences and tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """Write a number with so many decimals; a dash where there is none.
+    """Format a number with a fixed number of decimals; a dash for None or nan.
 
     Examples
     --------
@@ -18,19 +18,19 @@ def number(value: float | None, digits: int = 2) -> str:
     return f"{value:.{digits}f}"
 
 
-def share(value: float | None) -> str:
-    """Write a part as per cent.
+def percent(value: float | None) -> str:
+    """Format a fraction as per cent.
 
     Examples
     --------
-    >>> share(0.256)
+    >>> percent(0.256)
     '26 %'
     """
     return "–" if value is None else f"{100.0 * value:.0f} %"
 
 
 def count(value: int, what: str) -> str:
-    """Write how many there are.
+    """Format a count with its noun.
 
     Examples
     --------
@@ -41,5 +41,5 @@ def count(value: int, what: str) -> str:
 
 
 def span(low: float | None, high: float | None, digits: int = 2) -> str:
-    """Write a range."""
+    """Format a range."""
     return f"{number(low, digits)} to {number(high, digits)}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.plots import style
 from reproduction import published
-from reproduction.formatting import count, number, share
+from reproduction.formatting import count, number, percent
 from reproduction.longer import longer_jobs
 from reproduction.pictures.charts import Chart, Density, Level, Series
 from reproduction.pictures.sheets import Sheet, draw_sheet
@@ -186,7 +186,7 @@ def runs(figures: Mapping[str, Any]) -> str:
     """Say how much was computed."""
     return (
         f"{count(figures['runs'], 'run')} of {count(figures['steps'], 'proposal')}, "
-        f"{share(1.0) if not figures['trained_here'] else share(0.25)} of them for the test"
+        f"{percent(1.0) if not figures['trained_here'] else percent(0.25)} of them for the test"
     )
 
 

@@ -1,8 +1,7 @@
-"""One judge for designs of any origin: outlines in nonlinear plane stress, gripped alike.
+"""Nonlinear plane-stress analysis of arbitrary outlines with equal conditions.
 
-An outline, whoever drew it, gets hubs of one size at the ports and supports of its task, is cut
-into second-order triangles of one size by one mesher, and followed along one stroke, in one
-material.
+All outlines get hubs of equal size at the ports and supports of their task, and are meshed with
+second-order triangles of equal size. Stroke and material are the same.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ if TYPE_CHECKING:
     from reproduction.boxes import Box
 
 CHORD = 0.02
-"""Largest distance of polygons from the arcs they stand for, mm."""
+"""Largest distance between polygons and the arcs that they approximate, mm."""
 SMOOTH = 0.35
-"""Radius by which corners of contours are rounded, mm."""
-DRAWN = 0.15
-"""How far outlines kept for pictures may be off, mm."""
+"""Radius of rounded corners of contours, mm."""
+PICTURE_TOLERANCE = 0.15
+"""Largest deviation of stored outlines for pictures, mm."""
 
 
 def polygon_of(part: Part) -> shapely.Polygon:
-    """Return the outline of a part made of struts."""
+    """Return the outline of the struts of a part."""
     lines = shapely.linestrings(part.positions[part.struts])
     half = 0.5 * part.section.width
     whole = shapely.union_all(shapely.buffer(lines, half, quad_segs=8))
@@ -43,14 +42,14 @@ def polygon_of(part: Part) -> shapely.Polygon:
 
 
 def contour_of(box: Box, density: NDArray[np.float64], area: float) -> shapely.Polygon | None:
-    """Return the shape that densities mean, at the level at which it has some area.
+    """Return the contour of densities at the level that gives an area.
 
-    Parts that hang together with no port are left out.
+    Pieces without a port are removed.
 
     Returns
     -------
     Polygon or None
-        None if what holds the input holds no output.
+        None if input, output and a support are not connected.
     """
     low, high = 0.02, 0.98
     for _ in range(25):
@@ -70,7 +69,7 @@ def _at_level(box: Box, density: NDArray[np.float64], level: float) -> shapely.P
     step = (box.high - box.low) / np.array([columns, rows])
     x = box.low[0] + step[0] * (np.arange(-1, columns + 1) + 0.5)
     y = box.low[1] + step[1] * (np.arange(-1, rows + 1) + 0.5)
-    # The filter ends at the edge of the box; so does the shape, but not by half an element.
+    # The contour extends to the edges of the box, not to the centres of the outer elements.
     x[0], x[-1] = box.low[0] - 1e-3, box.high[0] + 1e-3
     y[0], y[-1] = box.low[1] - 1e-3, box.high[1] + 1e-3
     padded = np.pad(density, 1, mode="edge")
@@ -86,7 +85,7 @@ def _at_level(box: Box, density: NDArray[np.float64], level: float) -> shapely.P
 
 
 def _rounded(shape: Any, radius: float) -> Any:
-    """Round corners outside and inside, and leave out what is thinner than a tenth of that."""
+    """Round all corners, and remove parts thinner than a fifth of the radius."""
     if radius <= 0.0:
         return shape
     filled = shape.buffer(radius, quad_segs=6).buffer(-radius, quad_segs=6)
@@ -94,7 +93,7 @@ def _rounded(shape: Any, radius: float) -> Any:
 
 
 def _around_ports(box: Box, shape: Any) -> shapely.Polygon | None:
-    """Return the one piece that holds input and output, and a support."""
+    """Return the piece that contains input, output and a support, or None."""
     pieces = list(shape.geoms) if hasattr(shape, "geoms") else [shape]
     problem = box.problem
     for piece in pieces:
@@ -112,9 +111,9 @@ def _around_ports(box: Box, shape: Any) -> shapely.Polygon | None:
 
 
 def narrowest(box: Box, shape: shapely.Polygon) -> float:
-    """Return the width of the narrowest place between input, output and a support, mm.
+    """Return the smallest width between input, output and a support, mm.
 
-    That is how wide a disc may be that passes from each to each without leaving the shape.
+    This is the largest diameter of a disc that can move between them within the shape.
     """
     low, high = 0.0, float(box.spec.scale)
     while high - low > 0.01:
@@ -126,17 +125,19 @@ def narrowest(box: Box, shape: shapely.Polygon) -> float:
     return round(low, 2)
 
 
-def judge(box: Box, part: Part, shape: shapely.Polygon, size: float, law: str) -> dict[str, Any]:
-    """Follow a shape along the stroke of its task.
+def analyse_outline(
+    box: Box, part: Part, shape: shapely.Polygon, size: float, law: str
+) -> dict[str, Any]:
+    """Compute the response of an outline along the stroke of its task.
 
     Parameters
     ----------
     part
-        Of the task: tells ports, stroke, material, springs; its own struts do not matter.
+        Part that defines ports, stroke, material and springs; its struts are not used.
     size
-        Of the largest triangles, mm.
+        Largest triangle size, mm.
     law
-        Of the material.
+        Material law.
     """
     began = time.perf_counter()
     radius = HUB * part.section.width
@@ -181,10 +182,10 @@ def _outline(shape: shapely.Polygon) -> Outline:
 def drawing(
     rest: NDArray[np.float64], displacement: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> list[list[list[float]]]:
-    """Return the closed curves that bound a mesh: x and y at rest, x and y moved, of each point."""
+    """Return the boundary curves of a mesh: x and y at rest and displaced of each point."""
     edges = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
-    known = {(int(a), int(b)) for a, b in edges}
-    after = {a: b for a, b in known if (b, a) not in known}
+    directed = {(int(a), int(b)) for a, b in edges}
+    after = {a: b for a, b in directed if (b, a) not in directed}
     curves = []
     while after:
         start, here = after.popitem()
@@ -192,14 +193,14 @@ def drawing(
         while here in after:
             here = after.pop(here)
             ring.append(here)
-        curves.append(_thinned(rest, np.array(ring), displacement))
+        curves.append(_simplified(rest, np.array(ring), displacement))
     return curves
 
 
-def _thinned(
+def _simplified(
     rest: NDArray[np.float64], ring: NDArray[np.int64], displacement: NDArray[np.float64]
 ) -> list[list[float]]:
-    """Leave out points that lie on the way from one to the next (Douglas and Peucker, 1973)."""
+    """Remove nearly collinear points (Douglas and Peucker, 1973)."""
     both = np.column_stack([rest[ring], rest[ring] + displacement[ring]])
     kept = {0, len(ring) - 1}
     open_ = [(0, len(ring) - 1)]
@@ -207,12 +208,12 @@ def _thinned(
         first, last = open_.pop()
         if last - first < 2:
             continue
-        way = both[last] - both[first]
+        chord = both[last] - both[first]
         offset = both[first + 1 : last] - both[first]
-        along = np.clip(offset @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
-        away = np.linalg.norm(offset - along[:, None] * way, axis=1)
+        along = np.clip(offset @ chord / max(float(chord @ chord), 1e-12), 0.0, 1.0)
+        away = np.linalg.norm(offset - along[:, None] * chord, axis=1)
         farthest = first + 1 + int(away.argmax())
-        if away.max() > DRAWN:
+        if away.max() > PICTURE_TOLERANCE:
             kept.add(farthest)
             open_ += [(first, farthest), (farthest, last)]
     found: list[list[float]] = both[sorted(kept)].round(1).tolist()

@@ -1,7 +1,7 @@
-"""The page "paper beside bellcrank", made of records and of nothing else.
+"""The page that compares bellcrank with the paper, generated from the records.
 
-Every figure on it comes out of a committed record through the claims of its study, so that no
-sentence can say what no record shows; a test makes the page again and compares.
+All figures on the page come from committed records through the claims of their studies. A test
+generates the page again and compares it.
 """
 
 from __future__ import annotations
@@ -16,31 +16,33 @@ if TYPE_CHECKING:
     from reproduction.registry import Claim
 
 INTRODUCTION = """\
-# The paper beside bellcrank
+# Comparison with the paper
 
-Bonfanti, Guerra, Font-Clos, Rayneau-Kirkhope and Zapperi, *Automatic design of mechanical
-metamaterial actuators*, Nature Communications 11, 4162 (2020), claim by claim: what the paper
-reports, what comes out here, the command that remakes it, and where the two differ.
+This page compares bellcrank with Bonfanti, Guerra, Font-Clos, Rayneau-Kirkhope and Zapperi,
+*Automatic design of mechanical metamaterial actuators*, Nature Communications 11, 4162 (2020).
+Each section gives the values of the paper, the values computed here, the command that reproduces
+them, and the differences in procedure.
 
-This page is made from the records in `docs/studies` by `bellcrank study page --out docs/studies`;
-a test compares them. Each record has the settings, figures, versions and commit; `bellcrank study
-NAME` computes it again, with `--quick` for a first look, and goes on where it was stopped.
+The page is generated from the records in `docs/studies` by `bellcrank study page --out
+docs/studies`; a test checks that they agree. Each record contains settings, figures, versions
+and commit. `bellcrank study NAME` computes a study again and resumes an interrupted run; the
+option `--quick` reduces the computation. The command needs a checkout of the repository.
 
-The paper's figures are known to us from its text and at second hand. A dash stands where it
-gives none that we know. Efficiencies of the paper are by finite elements, confirmed by print,
-unless said otherwise; nothing of ours has been printed.
+The paper's values are taken from its text and from secondary sources. A dash means that we know
+of no value. Efficiencies of the paper are from finite elements and confirmed by prints unless
+noted. None of our designs has been printed.
 """
 
 RUNS = 100
-"""Of each size in the paper's scaling."""
-NOT_REMADE = """\
-## What is not remade
+"""Runs of each size in the scaling study of the paper."""
+NOT_REPRODUCED = """\
+## Parts that are not reproduced
 
-- Prints and measurements: there is no printer and no testing machine here. Files for printing are
-  checked by reading and slicing them (`docs/fabrication.md`).
-- The full training of the paper's ResNet50: 8.7 million looks need a GPU.
-- Machines that combine actuators have no figure in the paper to compare with; `docs/machines.md`
-  describes ours.
+- Prints and measurements: no printer and no testing machine were available. Files for printing
+  are checked by reading and slicing them (`docs/fabrication.md`).
+- The full training of the paper's ResNet50: 8.7 million training samples require a GPU.
+- Machines that combine actuators: the paper reports no values; `docs/machines.md` describes
+  ours.
 {scaling}"""
 
 
@@ -50,22 +52,22 @@ def page_of(records: Mapping[str, Mapping[str, Any]], pictures: str = "") -> str
     Parameters
     ----------
     records
-        Of studies, by name.
+        Records of studies by name.
     pictures
-        Folder of the pictures, as seen from the page.
+        Path of the pictures relative to the page.
     """
     parts = [INTRODUCTION, _overview(records)]
     parts += [_section(record, pictures) for record in records.values()]
     runs = records["scaling"]["figures"]["runs"] if "scaling" in records else [RUNS]
     fewer = (
-        f"- All of the {RUNS} runs of each size in the paper's scaling: there are "
-        f"{', '.join(map(str, runs))}, from the smallest size to the largest.\n"
+        f"- {RUNS} runs of each size in the scaling study: the numbers here are "
+        f"{', '.join(map(str, runs))}, from the smallest to the largest size.\n"
     )
-    return "\n".join([*parts, NOT_REMADE.format(scaling=fewer if min(runs) < RUNS else "")])
+    return "\n".join([*parts, NOT_REPRODUCED.format(scaling=fewer if min(runs) < RUNS else "")])
 
 
 def _overview(records: Mapping[str, Mapping[str, Any]]) -> str:
-    lines = ["| study | remakes | how much was computed | command |", "|---|---|---|---|"]
+    lines = ["| study | part of the paper | computed | command |", "|---|---|---|---|"]
     for name, record in records.items():
         study = studies[name]
         lines.append(
@@ -76,7 +78,7 @@ def _overview(records: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _section(record: Mapping[str, Any], pictures: str) -> str:
-    """Return what the page says of one study."""
+    """Return the section of one study."""
     study = studies[str(record["study"])]
     origin = record["provenance"]
     lines = [
@@ -90,14 +92,14 @@ def _section(record: Mapping[str, Any], pictures: str) -> str:
         "",
         f"![{study.title}]({pictures}{study.name}.png)",
         "",
-        "| claim | the paper | bellcrank | remarks |",
+        "| quantity | paper | bellcrank | remarks |",
         "|---|---|---|---|",
         *(_row(claim) for claim in study.claims(record["figures"])),
         "",
     ]
     if study.deviations:
-        lines += ["Where this differs from what the paper did:", ""]
-        lines += [f"- {words}" for words in study.deviations]
+        lines += ["Differences from the procedure of the paper:", ""]
+        lines += [f"- {sentence}" for sentence in study.deviations]
         lines.append("")
     return "\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""How the efficiency of the crane grows along the paper's chains, from several seeds."""
+"""Efficiency of the crane along chains of the paper's search from several seeds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from reproduction.formatting import count, number, span
 from reproduction.pictures.charts import Chart, Level, Series
 from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.registry import Claim, Figures, Study, register
-from reproduction.searching import respond, run_chains
+from reproduction.searching import quantiles, respond, run_chains
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,7 +27,7 @@ MARKS = ("0.5", "1.0", "2.0")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """How many chains, and how long."""
+    """Number and length of the chains."""
 
     problem: str = "crane"
     steps: int = 20_000
@@ -60,62 +60,56 @@ def run(settings: Settings, store: ResultStore) -> Figures:
     }
 
 
-def quantiles(values: Sequence[float]) -> dict[str, float]:
-    """Return least, tenth percentile, median, ninetieth percentile and largest."""
-    found = np.quantile(values, [0.0, 0.1, 0.5, 0.9, 1.0])
-    return dict(zip(("least", "low", "median", "high", "largest"), found.tolist(), strict=True))
-
-
 def reached(steps: Sequence[int | None]) -> dict[str, float | int | None]:
-    """Return how many chains come so far, and after how many proposals in the median of these."""
+    """Return the number of chains that reach a value, and their median number of proposals."""
     there = [step for step in steps if step is not None]
     return {"chains": len(there), "proposals": float(np.median(there)) if there else None}
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
-    """Draw the paths, and how their ends are spread."""
+    """Draw the efficiency along the chains, and the distribution of the final values."""
     order = np.argsort([each["efficiency"][-1] for each in figures["paths"]])
-    count_of = len(order)
+    total = len(order)
     series = []
     for place, k in enumerate(order):
-        best = place == count_of - 1
+        best = place == total - 1
         series.append(
             Series(
                 np.array(figures["paths"][k]["accepted"], dtype=float),
                 np.array(figures["paths"][k]["efficiency"], dtype=float),
-                colour=style.BEST if best else _shade(place / max(count_of - 1, 1)),
+                colour=style.BEST if best else _grey(place / max(total - 1, 1)),
                 width=1.7 if best else 0.8,
                 level=3.0 if best else 2.0,
-                name="highest end" if best else "other seeds" * (place == 0),
+                name="largest final value" if best else "other seeds" * (place == 0),
             )
         )
     levels = [Level(figures["human"], "human design")] if figures["human"] else []
-    levels.append(Level(published.ANNEALING, "annealed", style.IDLE, upright=True))
+    levels.append(Level(published.ANNEALING, "end of annealing", style.IDLE, vertical=True))
     ends = np.array(figures["ends"])
     top = float(np.ceil(2.0 * max(ends.max(), figures["best"]["largest"])) / 2.0)
-    spread = Series(np.linspace(0.0, top, 15), ends, kind="histogram", name="ends of chains")
+    spread = Series(np.linspace(0.0, top, 15), ends, kind="histogram", name="final values")
     charts = [
         Chart(
-            "Along each chain", "accepted changes", "efficiency", series, levels,
+            "Efficiency along the chains", "accepted changes", "efficiency", series, levels,
             log_x=True, legend="upper left",
         ),
         Chart(
-            "Where they end", "efficiency at the end", "chains, %", [spread],
+            "Distribution of the final values", "final efficiency", "chains, %", [spread],
             [Level(figures["end"]["median"], f"median {figures['end']['median']:.2f}",
-                   style.BUILT, upright=True)],
+                   style.BUILT, vertical=True)],
             legend="upper left",
         ),
     ]  # fmt: skip
     sheet = Sheet(
         title=f"{figures['problem']}: efficiency along {figures['chains']} chains",
-        note=f"{count(figures['steps'], 'proposal')} each by the paper's rule; discrete model",
+        note=f"{count(figures['steps'], 'proposal')} each of the paper's search; discrete model",
         charts=charts,
         height=3.3,
     )
     draw_sheet(sheet, path, overwrite=True)
 
 
-def _shade(place: float) -> str:
+def _grey(place: float) -> str:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -125,58 +119,60 @@ def _shade(place: float) -> str:
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
     """Compare with the paper."""
     one = figures["reached"]["1.0"]
-    told = [
+    rows = [
         Claim(
-            "cooling: linear over accepted steps",
-            f"T from {published.HOT:g} to {published.COLD:g} over {published.ANNEALING}",
-            "the same",
-            "settings of `--search paper`",
+            "temperature, linear in the accepted steps",
+            f"{published.HOT:g} to {published.COLD:g} over {published.ANNEALING} steps",
+            "the same values",
+            "`--search paper`",
         ),
         Claim(
-            "efficiency at the end of paths from several seeds",
+            "final efficiency of chains from several seeds",
             "",
-            f"ends at {span(figures['end']['least'], figures['end']['largest'])}, median "
+            f"{span(figures['end']['least'], figures['end']['largest'])}, median "
             f"{number(figures['end']['median'])}, of {count(figures['chains'], 'chain')} after "
             f"{count(figures['steps'], 'proposal')}",
-            "discrete model, before cleaning",
+            "discrete model, before the removal of unloaded beams",
         ),
         Claim(
-            "proposals until the output moves as far as the input",
+            "proposals until efficiency 1",
             "",
-            f"{one['proposals']:.0f} in the median of {one['chains']} of "
-            f"{count(figures['chains'], 'chain')}" if one["proposals"] else "not reached",
+            f"{one['proposals']:.0f} (median of {one['chains']} of "
+            f"{count(figures['chains'], 'chain')})" if one["proposals"] else "not reached",
         ),
     ]  # fmt: skip
     if figures["above_human"] is not None:
-        told.append(
+        rows.append(
             Claim(
-                "machine designs pass the one by hand",
+                "chains that exceed the human design",
                 "",
-                f"{figures['above_human']} of {figures['chains']} pass its "
+                f"{figures['above_human']} of {figures['chains']}, human design "
                 f"{number(figures['human'])}",
-                "our design by hand, not the paper's",
+                "our human design, not the paper's",
             )
         )
-    return told
+    return rows
 
 
 STUDY = register(
     Study(
         name="paths",
-        title="Efficiency along the paper's chains",
+        title="Efficiency along the chains of the paper's search",
         after="figure 2",
         full=Settings(),
         quick=Settings(steps=2000, chains=8),
         run=run,
         draw=draw,
         claims=claims,
-        runs=lambda told: f"{count(told['chains'], 'chain')} of {count(told['steps'], 'proposal')}",
+        runs=lambda figures: (
+            f"{count(figures['chains'], 'chain')} of {count(figures['steps'], 'proposal')}"
+        ),
         deviations=(
             (
-                "Equilibria are found by Newton's method instead of conjugate gradients; the "
-                "response is the same, and always that from rest."
+                "Equilibria are computed by Newton's method instead of conjugate gradients. The "
+                "responses are the same; all are computed from rest."
             ),
-            "Designs that snap along the stroke are refused: they have no unique efficiency.",
+            "Designs that snap along the stroke are rejected: their efficiency is not unique.",
         ),
     )
 )

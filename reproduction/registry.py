@@ -1,4 +1,4 @@
-"""What a study is: a part of the paper, remade by one command."""
+"""Studies: parts of the paper, each reproduced by one command."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class Claim:
     Parameters
     ----------
     what
-        Is claimed, in our words.
+        The compared quantity.
     paper
-        The paper's figure; empty if it gives none.
+        Value of the paper; empty if it gives none.
     ours
-        Ours.
+        Value of this package.
     note
-        In what the two differ.
+        Remarks, for example on differences.
     """
 
     what: str
@@ -45,28 +45,28 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """One figure or table of the paper, remade.
+    """The reproduction of one figure or table of the paper.
 
     Parameters
     ----------
     name
-        On the command line.
+        Name on the command line.
     title
-        In a line.
+        Title on one line.
     after
-        Which part of the paper it remakes.
+        Part of the paper that is reproduced.
     full, quick
-        Settings, dataclasses of plain data: as far as a day allows, and for a look.
+        Settings as dataclasses of plain data: for a day of computation, and for a quick check.
     run
-        From settings and a store to plain figures.
+        Function of settings and a store that returns plain figures.
     draw
-        From the figures to a picture.
+        Function of the figures and a path that draws a picture.
     claims
-        From the figures to rows of the comparison; nothing else may claim anything.
+        Function of the figures that returns the rows of the comparison.
     runs
-        From the figures to how much was computed, in words.
+        Function of the figures that returns the computed amount as text.
     deviations
-        In what this differs from what the paper did, as sentences.
+        Differences from the procedure of the paper, as sentences.
     """
 
     name: str
@@ -86,6 +86,6 @@ studies: Registry[Study] = Registry("study")
 
 
 def register(study: Study) -> Study:
-    """File a study under its name."""
+    """Register a study under its name."""
     studies.register(study.name)(study)
     return study

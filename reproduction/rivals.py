@@ -1,4 +1,4 @@
-"""bellcrank and topology optimisation, on the same boxes, with the same mass, before one judge."""
+"""Comparison with topology optimisation: same tasks, same mass, same analysis."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from bellcrank.search import read_settings
 from bellcrank.workflows.choosing import PartChoice
 from bellcrank.workflows.design import judge_for
 from reproduction.boxes import Box, box_of
-from reproduction.outline_analysis import contour_of, judge, narrowest, polygon_of
+from reproduction.outline_analysis import analyse_outline, contour_of, narrowest, polygon_of
 from reproduction.registry import Figures, Study, register
-from reproduction.rivals_shown import claims, draw, runs
+from reproduction.rivals_report import claims, draw, runs
 from reproduction.searching import best_design, design_of, run_chains
 from reproduction.topology import optimise, pymoto
 
@@ -33,29 +33,32 @@ LAW = "neo-hookean"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Boxes, and how hard both sides try.
+    """Tasks, and the effort of both methods.
 
     Parameters
     ----------
     boxes
-        A title, a task, columns and rows of the lattice.
+        Title, task, columns and rows of the lattice.
     stroke, spring
-        In lattice units and units of the discrete model.
+        Stroke in lattice units, and output spring in units of the discrete model.
     width
-        Of bellcrank's struts, mm: about what the narrowest places of the rival's designs have.
+        Strut width of bellcrank's designs, mm, close to the narrowest width of the competing
+        designs.
     steps, chains
-        Of bellcrank's default search.
+        Length and number of chains of bellcrank's default search.
     goals
-        What its designs keep to: each is tried, the best result counts.
+        Sets of goals of bellcrank's search; the best result is reported.
     element
-        Of the rival, mm.
+        Element size of the topology optimisation, mm.
     radii
-        Of its filter, elements. The first is that of its examples.
+        Filter radii, in elements. The first is that of the examples of pyMOTO.
     springs
-        Pairs at its input and output, in units of Young's modulus times thickness; the best
-        result counts.
+        Springs at input and output, in units of Young's modulus times thickness; the best result
+        is reported.
+    iterations
+        Iterations of the optimiser.
     triangle, finer
-        Of the judge, mm; the finer ones show how far its word depends on them.
+        Triangle sizes of the analysis and of its convergence check, mm.
     """
 
     boxes: tuple[tuple[str, str, int, int], ...] = (
@@ -78,7 +81,7 @@ class Settings:
 
 
 def run(settings: Settings, store: ResultStore) -> Figures:
-    """Let both sides design for each task, and judge them."""
+    """Design each task by both methods, and analyse the results."""
     pymoto()
     ngsolve()
     return {
@@ -106,7 +109,7 @@ def _task(
     finer = store.compute_all(
         f"{name}-finer",
         {
-            side: partial(_judged, box, each, settings.finer)
+            side: partial(_analysed, box, each, settings.finer)
             for side, each in (("ours", shape), ("rival", other))
         },
         workers=1,
@@ -125,20 +128,22 @@ def _task(
 def _ours(
     box: Box, name: str, settings: Settings, store: ResultStore
 ) -> tuple[dict[str, Any], Polygon]:
-    """Return the best that bellcrank makes of a task, judged, and its shape."""
+    """Return the analysis and the outline of bellcrank's best design for a task."""
     tried, shapes = [], []
     for goals in settings.goals:
-        told = {
+        values = {
             "search": "basin-hopping",
             "steps": settings.steps,
             "chains": settings.chains,
             "goals": goals,
         }
         key = "-".join([name, *goals]).replace(" ", "-")
-        chains = run_chains(store, f"{key}-chain", box.problem, told, settings.chains)
-        chosen = store.compute(f"{key}-chosen", partial(_chosen, box, chains, told))
+        chains = run_chains(store, f"{key}-chain", box.problem, values, settings.chains)
+        chosen = store.compute(f"{key}-chosen", partial(_chosen, box, chains, values))
         shape = polygon_of(box.spec.of(design_of(box.problem, chosen["mask"])))
-        score = store.compute(f"{key}-ours-judged", partial(_judged, box, shape, settings.triangle))
+        score = store.compute(
+            f"{key}-ours-judged", partial(_analysed, box, shape, settings.triangle)
+        )
         seconds = sum(chain["seconds"] for chain in chains) + chosen["seconds"]
         tried.append(
             {
@@ -154,12 +159,12 @@ def _ours(
     return {**tried[best], "tried": _table(tried, "goals")}, shapes[best]
 
 
-def _chosen(box: Box, chains: Sequence[Mapping[str, Any]], told: Mapping[str, Any]) -> Any:
-    """Return the design that frames choose from what the chains found, as for any part."""
-    settings = read_settings(dict(told))
+def _chosen(box: Box, chains: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Any:
+    """Return the best candidate of the chains by frame analysis."""
+    settings = read_settings(dict(values))
     began = time.thread_time()
-    judge = judge_for(box.problem, settings)
-    found = best_design(box.problem, chains, judge, PartChoice(box.spec, settings))
+    evaluator = judge_for(box.problem, settings)
+    found = best_design(box.problem, chains, evaluator, PartChoice(box.spec, settings))
     return {
         "mask": found.design.mask_hex,
         "model": found.efficiency_after,
@@ -172,7 +177,7 @@ def _best(tried: Sequence[Mapping[str, Any]]) -> int:
 
 
 def _table(tried: Sequence[Mapping[str, Any]], *of: str) -> list[dict[str, Any]]:
-    """Return what was tried in short, from rows with all that is known."""
+    """Return a summary of the attempts."""
     short = (*of, "model", "efficiency", "design_seconds")
     return [{key: each[key] for key in short} for each in tried]
 
@@ -180,9 +185,9 @@ def _table(tried: Sequence[Mapping[str, Any]], *of: str) -> list[dict[str, Any]]
 def _rival(
     box: Box, name: str, volume: float, settings: Settings, store: ResultStore
 ) -> tuple[dict[str, Any], Polygon | None]:
-    """Return the best that the rival makes of a task with a volume, judged, and its shape.
+    """Return the analysis and the outline of the best topology-optimised design of a volume.
 
-    All springs are tried with the first filter, all filters with the best springs.
+    All springs are tried with the first filter, then all filters with the best springs.
     """
     area = volume * float(np.prod(box.high - box.low))
     tried: list[dict[str, Any]] = []
@@ -196,7 +201,7 @@ def _rival(
         made = store.compute(f"{name}-rival-{key}", work)
         shape = contour_of(box, np.array(made["density"]), area)
         score = store.compute(
-            f"{name}-rival-judged-{key}", partial(_judged, box, shape, settings.triangle)
+            f"{name}-rival-judged-{key}", partial(_analysed, box, shape, settings.triangle)
         )
         tried.append(
             {
@@ -219,17 +224,20 @@ def _rival(
     return {**tried[best], "tried": _table(tried, "springs", "radius")}, shapes[best]
 
 
-def _flat(told: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a judgement whose curves are plain rows of numbers."""
-    return {**told, "drawing": [np.ravel(curve).tolist() for curve in told["drawing"]]}
+def _flat(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an analysis with its curves as flat lists."""
+    return {**result, "drawing": [np.ravel(curve).tolist() for curve in result["drawing"]]}
 
 
-def _judged(box: Box, shape: Polygon | None, triangle: float) -> dict[str, Any]:
-    """Judge a shape; None is one that does not hold together."""
+def _analysed(box: Box, shape: Polygon | None, triangle: float) -> dict[str, Any]:
+    """Analyse an outline; None means that input, output and support are not connected."""
     if shape is None:
-        return {"status": "in pieces", "efficiency": None, "drawing": []}
+        return {"status": "not connected", "efficiency": None, "drawing": []}
     part = box.spec.of(box.problem.full_design())
-    return {**judge(box, part, shape, triangle, LAW), "narrowest_mm": narrowest(box, shape)}
+    return {
+        **analyse_outline(box, part, shape, triangle, LAW),
+        "narrowest_mm": narrowest(box, shape),
+    }
 
 
 def _ports(box: Box) -> dict[str, Any]:
@@ -254,8 +262,8 @@ def _ports(box: Box) -> dict[str, Any]:
 STUDY = register(
     Study(
         name="rivals",
-        title="Against topology optimisation, before one judge",
-        after="not in the paper",
+        title="Comparison with topology optimisation",
+        after="not part of the paper",
         full=Settings(),
         quick=Settings(
             boxes=(("small inverter", "inverter", 6, 7),), steps=1500, chains=1, goals=((),),
@@ -267,29 +275,31 @@ STUDY = register(
         runs=runs,
         deviations=(
             (
-                "The rival maximises small motions of the output under a given input force, as its "
-                "examples do; output over input at a given stroke is what is judged here."
+                "pyMOTO maximises the small output displacement under a given input force, as in "
+                "its examples; the comparison uses output over input displacement at a given "
+                "stroke."
             ),
             (
-                "Its densities are cut at the level that gives bellcrank's mass, or at the highest "
-                "at which it still holds together; loose pieces go."
+                "Its densities are cut at the level that gives the mass of bellcrank's design, or "
+                "at the highest level at which the design is connected; loose pieces are removed."
             ),
             (
-                "What suits each side is tried, and the judge takes the best: springs at input and "
-                "output, then the filter; mirror symmetry or none. The times are those of the best "
-                "settings alone, with all their chains."
+                "The best result of several settings is reported for each method: springs at input "
+                "and output, then the filter; with and without mirror symmetry. The times are of "
+                "the best settings with all their chains."
             ),
             (
-                "The rival's model is linear and knows no stroke, and nothing holds it to a width "
-                "that can be printed; bellcrank's springs are nonlinear, its struts 1.3 mm wide, "
-                "about as wide as the narrowest places of the rival's designs."
+                "The model of pyMOTO is linear, and no printable minimum width is imposed. "
+                "bellcrank's discrete model is nonlinear; its struts are 1.3 mm wide, about the "
+                "narrowest width of the designs by pyMOTO."
             ),
             (
-                "Width decides: with struts 2 mm wide, chosen by the model alone, bellcrank had "
-                "3.81, 2.21 and 2.26, and the rival at that mass 4.04, 2.59 and 3.26 "
+                "The result depends on the strut width: with struts 2 mm wide, selected by the "
+                "discrete model, the efficiencies are 3.81, 2.21 and 2.26 for bellcrank, and 4.04, "
+                "2.59 and 3.26 for pyMOTO at the same mass "
                 "(`docs/studies/wide/rivals.json`)."
             ),
-            "Struts that touch pass through each other, on both sides.",
+            "Contact is not modelled for either method.",
         ),
     )
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What larger lattices cost, and what they bring."""
+"""Computing time and efficiency as functions of the lattice size."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ MARK = "1.0"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Sizes, runs of each, and how long they are.
+    """Sizes, number of runs, and their length.
 
     Parameters
     ----------
     sizes
-        Of the built-in problems ``scaling-N``.
+        Sizes N of the bundled problems ``scaling-N``.
     runs
-        Of each size: the larger the lattice, the fewer, as their time grows faster than anything.
+        Number of runs of each size; smaller for the largest lattices.
     proposals_per_beam
-        Length of a run, by the number of designable beams.
+        Length of a run divided by the number of designable beams.
     """
 
     sizes: tuple[int, ...] = (8, 10, 12, 14, 16, 18, 20)
@@ -53,13 +53,13 @@ def run(settings: Settings, store: ResultStore) -> Figures:
     for size, runs in zip(settings.sizes, settings.runs, strict=True):
         problem = find_problem(f"scaling-{size}")
         beams = len(problem.designable)
-        told = {
+        values = {
             "search": "paper",
             "steps": settings.proposals_per_beam * beams,
             "chains": runs,
             "seed": settings.seed,
         }
-        search = read_settings(told)
+        search = read_settings(values)
         work = {str(k): partial(run_chain, problem, search, k) for k in range(runs)}
         chains = list(store.compute_all(f"size-{size}", work).values())
         rows.append({"size": size, "beams": beams, "runs": runs, **_summary(chains)})
@@ -75,7 +75,7 @@ def _summary(chains: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     seconds = np.array([chain["seconds"] for chain in chains])
     steps = np.array([chain["steps"] for chain in chains])
     best = np.array([chain["best"] for chain in chains])
-    there = [
+    reached = [
         chain["seconds"] * chain["reached"][MARK] / chain["steps"]
         for chain in chains
         if chain["reached"][MARK] is not None
@@ -85,51 +85,51 @@ def _summary(chains: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "seconds": np.quantile(seconds, [0.1, 0.5, 0.9]).tolist(),
         "best": np.quantile(best, [0.1, 0.5, 0.9]).tolist(),
         "per_proposal": float(np.median(seconds / steps)),
-        "reached": len(there),
-        "seconds_to_one": float(np.median(there)) if there else None,
+        "reached": len(reached),
+        "seconds_to_one": float(np.median(reached)) if reached else None,
     }
 
 
 MEASURES: dict[str, tuple[str, Callable[[Mapping[str, Any]], float | None]]] = {
     "run": ("run", lambda row: row["seconds"][1]),
     "proposal": ("proposal", lambda row: row["per_proposal"]),
-    "to_one": ("until efficiency 1", lambda row: row["seconds_to_one"]),
+    "to_one": ("to efficiency 1", lambda row: row["seconds_to_one"]),
 }
 
 
 def exponents(rows: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
-    """Return the slopes of times against the number of designable beams, both logarithmic."""
+    """Return the exponents of times as powers of the number of designable beams."""
     return {name: slope(rows, of) for name, (_, of) in MEASURES.items()}
 
 
 def slope(
     rows: Sequence[Mapping[str, Any]], of: Callable[[Mapping[str, Any]], float | None]
 ) -> float | None:
-    """Return the slope of the line of least squares through logarithms."""
+    """Return the slope of the least-squares line through the logarithms."""
     points = [(row["beams"], value) for row in rows if (value := of(row)) is not None and value > 0]
     if len(points) < 2:
         return None
-    across, up = np.log(np.array(points)).T
-    return float(np.polyfit(across, up, 1)[0])
+    x, y = np.log(np.array(points)).T
+    return float(np.polyfit(x, y, 1)[0])
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
-    """Draw times and efficiencies against the number of beams."""
+    """Draw times and efficiencies against the number of designable beams."""
     rows = figures["sizes"]
     beams = np.array([row["beams"] for row in rows], dtype=float)
     series = []
-    shades = (style.BEST, style.BUILT, style.WANTED)
-    for (name, (words, of)), colour in zip(MEASURES.items(), shades, strict=True):
+    colours = (style.BEST, style.BUILT, style.WANTED)
+    for (name, (what, of)), colour in zip(MEASURES.items(), colours, strict=True):
         values = np.array([np.nan if of(row) is None else of(row) for row in rows], dtype=float)
         power = figures["exponents"][name]
         if power is not None:
-            told = f"{words}: exponent {power:.2f}"
-            series.append(Series(beams, values, name=told, kind="both", colour=colour))
+            label = f"{what}: exponent {power:.2f}"
+            series.append(Series(beams, values, name=label, kind="both", colour=colour))
     runs = np.array([row["seconds"][1] for row in rows])
-    steep = runs[0] * (beams / beams[0]) ** published.EXPONENT
+    reference = runs[0] * (beams / beams[0]) ** published.EXPONENT
     series.append(
         Series(
-            beams, steep, name=f"the paper: exponent {published.EXPONENT:g}",
+            beams, reference, name=f"the paper: exponent {published.EXPONENT:g}",
             colour=style.IDLE, dashed=True, level=1.5,
         )
     )  # fmt: skip
@@ -140,31 +140,31 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
     )  # fmt: skip
     charts = [
         Chart(
-            "Processor time, one core", "designable beams N", "seconds", series,
+            "Processor time, one core", "designable beams", "seconds", series,
             log_x=True, log_y=True, legend="upper left",
             limits_y=(None, 100.0 * float(np.nanmax(runs))),
         ),
         Chart(
-            "What a run finds", "designable beams N", "best efficiency", [best],
+            "Best efficiency of a run", "designable beams", "best efficiency", [best],
             log_x=True, legend="lower right", limits_y=(0.0, None),
         ),
     ]  # fmt: skip
     sheet = Sheet(
-        title="Cost and gain of larger lattices",
-        note=f"{_how_many(figures['runs'])} by the paper's rule, "
-        f"{figures['proposals_per_beam']} proposals for each designable beam; discrete model",
+        title="Computing time and efficiency of larger lattices",
+        note=f"{_run_count(figures['runs'])} of the paper's search, "
+        f"{figures['proposals_per_beam']} proposals per designable beam; discrete model",
         charts=charts,
         height=3.6,
     )
     draw_sheet(sheet, path, overwrite=True)
 
 
-def _how_many(runs: Sequence[int]) -> str:
-    """Say how many runs of each size there are.
+def _run_count(runs: Sequence[int]) -> str:
+    """Return the number of runs of each size as text.
 
     Examples
     --------
-    >>> _how_many([2, 2]), _how_many([100, 100, 30])
+    >>> _run_count([2, 2]), _run_count([100, 100, 30])
     ('2 runs of each size', '100 to 30 runs of each size')
     """
     most, fewest = max(runs), min(runs)
@@ -177,19 +177,19 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
     first, last = rows[0], rows[-1]
     return [
         Claim(
-            "exponent of the time of a run with the number of beams",
+            "exponent of the computing time as a power of the number of beams",
             number(published.EXPONENT),
-            f"{number(powers['run'])}; of a proposal {number(powers['proposal'])}, until "
+            f"{number(powers['run'])}; per proposal {number(powers['proposal'])}, to "
             f"efficiency 1 {number(powers['to_one'])}",
-            f"{first['beams']} to {last['beams']} designable beams; what the paper's time is "
-            "that of is not known to us",
+            f"{first['beams']} to {last['beams']} designable beams; the "
+            "definition of the paper's time is not known",
         ),
         Claim(
-            "efficiency that runs reach, against size",
+            "best efficiency of a run",
             "",
-            f"median best {number(first['best'][1])} with {first['beams']} designable beams, "
+            f"median {number(first['best'][1])} with {first['beams']} designable beams, "
             f"{number(last['best'][1])} with {last['beams']}",
-            f"{figures['proposals_per_beam']} proposals for each beam",
+            f"{figures['proposals_per_beam']} proposals per beam",
         ),
     ]
 
@@ -197,20 +197,19 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
 STUDY = register(
     Study(
         name="scaling",
-        title="Time and efficiency against the number of beams",
+        title="Computing time and efficiency against the number of beams",
         after="scaling with size",
         full=Settings(),
         quick=Settings(sizes=(8, 10, 12), runs=(2, 2, 2), proposals_per_beam=6),
         run=run,
         draw=draw,
         claims=claims,
-        runs=lambda told: f"{_how_many(told['runs'])} (of {count(len(told['sizes']), 'size')})",
+        runs=lambda figures: (
+            f"{_run_count(figures['runs'])} (of {count(len(figures['sizes']), 'size')})"
+        ),
         deviations=(
-            (
-                "The paper averages over 100 runs of each size; ours are fewer of the largest "
-                "lattices."
-            ),
-            "A run ends after a number of proposals that grows with the lattice.",
+            ("The paper averages over 100 runs of each size; the largest sizes have fewer here."),
+            "The length of a run is proportional to the number of designable beams.",
         ),
     )
 )

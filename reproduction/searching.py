@@ -1,4 +1,4 @@
-"""Chains of searches as plain records: what every study asks them for."""
+"""Chains of searches as plain records, shared by the studies."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ if TYPE_CHECKING:
     from reproduction.result_store import ResultStore
 
 POINTS = 160
-"""Of a path that is kept, about."""
+"""Approximate number of stored points of a path."""
 OFFERED = 12
-"""Designs of a chain that are kept, to be cleaned and compared."""
+"""Number of stored candidate designs of a chain."""
 DIGITS = 7
 
 
 def run_chain(problem: Problem, settings: SearchSettings, chain: int = 0) -> dict[str, Any]:
-    """Run one chain and return what studies need of it, as plain data.
+    """Run one chain and return its results as plain data.
 
     Returns
     -------
     dict
-        steps, accepted, seconds (of this thread's processor time), best (efficiency of an
-        accepted design), path (accepted steps and efficiencies, thinned without losing a peak),
-        reached (proposals after which the best so far first exceeds 0.5, 1, 2), offered (masks,
-        efficiencies and steps of the designs worth building).
+        steps, accepted, seconds (processor time of the thread), best (largest accepted
+        efficiency), last (final efficiency), path (accepted steps and efficiencies, downsampled
+        without losing a peak), reached (proposals until efficiencies 0.5, 1 and 2), offered
+        (masks, efficiencies and steps of the candidates).
     """
-    prepare(problem, settings)  # compiles before the clock runs
+    prepare(problem, settings)  # compiles before the time is measured
     began = time.thread_time()
     evaluator = make_evaluator(problem, settings)
     state = start_chain(evaluator, settings, chain)
@@ -76,7 +76,7 @@ def run_chain(problem: Problem, settings: SearchSettings, chain: int = 0) -> dic
         "seconds": round(seconds, 4),
         "best": round(float(value.max(initial=-np.inf)), DIGITS),
         "last": round(float(value[-1]), DIGITS) if len(value) else None,
-        "path": thinned_path(value),
+        "path": downsampled_path(value),
         "reached": {str(mark): _reached(step, value, mark) for mark in (0.5, 1.0, 2.0)},
         "offered": [
             {"mask": each.mask.hex(), "efficiency": each.efficiency, "step": each.step}
@@ -86,13 +86,13 @@ def run_chain(problem: Problem, settings: SearchSettings, chain: int = 0) -> dic
 
 
 def _reached(step: NDArray[np.int64], value: NDArray[np.float64], mark: float) -> int | None:
-    """Return the proposals after which an efficiency is first reached; None if never."""
+    """Return the number of proposals until an efficiency is first reached, or None."""
     there = np.flatnonzero(value >= mark)
     return int(step[there[0]]) + 1 if len(there) else None
 
 
-def thinned_path(value: NDArray[np.float64]) -> dict[str, list[float]]:
-    """Return accepted steps and efficiencies along a chain, by the logarithm of the step."""
+def downsampled_path(value: NDArray[np.float64]) -> dict[str, list[float]]:
+    """Return accepted steps and efficiencies, downsampled on a logarithmic axis."""
     if not len(value):
         return {"accepted": [], "efficiency": []}
     accepted = np.arange(1.0, len(value) + 1.0)
@@ -106,12 +106,12 @@ def thinned_path(value: NDArray[np.float64]) -> dict[str, list[float]]:
 def run_chains(
     store: ResultStore, what: str, problem: Problem, search: Mapping[str, Any], chains: int
 ) -> list[dict[str, Any]]:
-    """Run so many chains of a search, each kept in a file of its own.
+    """Run chains of a search in parallel; the result of each is stored.
 
     Parameters
     ----------
     search
-        Settings as plain data, with the name of the search.
+        Settings as plain data, including the name of the search.
     """
     settings = read_settings({**search, "chains": chains})
     work = {str(chain): partial(run_chain, problem, settings, chain) for chain in range(chains)}
@@ -124,19 +124,19 @@ def best_design(
     judge: Evaluator | None = None,
     choose: Choice = most_efficient,
 ) -> Selection:
-    """Clean and compare what chains offer, and return the most efficient design.
+    """Return the best candidate of chains after the removal of unloaded beams.
 
     Parameters
     ----------
     judge
-        Who knows the goals of the search; none by default.
+        Evaluator with the goals of the search; none by default.
     choose
-        Who has the last word among those that qualify.
+        Function that selects among the admissible candidates.
 
     Raises
     ------
     InvalidSettings
-        If none of them is one stable piece.
+        If no candidate is stable and connected.
     """
     offers = [
         Candidate(each["efficiency"], number, each["step"], bytes.fromhex(each["mask"]))
@@ -146,13 +146,19 @@ def best_design(
     return select(problem, offers, None, judge, choose)
 
 
+def quantiles(values: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
+    """Return minimum, 10th percentile, median, 90th percentile and maximum."""
+    found = np.quantile(values, [0.0, 0.1, 0.5, 0.9, 1.0])
+    return dict(zip(("least", "low", "median", "high", "largest"), found.tolist(), strict=True))
+
+
 def design_of(problem: Problem, mask: str) -> Design:
     """Return the design with a mask in hexadecimal."""
     return Design(problem, unpack_mask(mask, problem.lattice.beam_count))
 
 
 def respond(design: Design, part_of_stroke: float = 1.0) -> Response:
-    """Return the response of a finished design, followed carefully from rest."""
+    """Return the response of a design from rest with small increments."""
     problem = design.problem
     if part_of_stroke != 1.0:
         given = replace(problem.input, amount=part_of_stroke * problem.input.amount)

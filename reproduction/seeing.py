@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.model import Design, find_problem
 from bellcrank.plots.explanation import draw_explanation
 from reproduction.explanation import as_drawn, explain_design
-from reproduction.formatting import number, share
+from reproduction.formatting import number, percent
 from reproduction.predicting import one_thread
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import design_of, run_chain
@@ -140,7 +140,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
         Claim(
             "regions that the network takes for vital are",
             "",
-            f"{share(figures['vital_shared'])} of the beams that either calls vital are so for "
+            f"{percent(figures['vital_shared'])} of the beams that either calls vital are so for "
             "both",
             "Jaccard's index, mean over the designs",
         ),

@@ -1,4 +1,4 @@
-"""What the method starts from, does and ends with: the crane, full, searched and moved."""
+"""From the full lattice to an actuator: the crane at rest, searched, and displaced."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """One problem, and the chains whose best design is shown."""
+    """Problem, and the chains whose best design is shown."""
 
     problem: str = "crane"
     steps: int = 20_000
@@ -34,7 +34,7 @@ class Settings:
 
 
 def run(settings: Settings, store: ResultStore) -> Figures:
-    """Count what the lattice has, and search by the paper's rule."""
+    """Count nodes and beams, and run the paper's search."""
     problem = find_problem(settings.problem)
     search = {"search": "paper", "steps": settings.steps, "seed": settings.seed}
     chains = run_chains(store, "chain", problem, search, settings.chains)
@@ -65,25 +65,25 @@ def run(settings: Settings, store: ResultStore) -> Figures:
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
-    """Draw the lattice with its regions, the design, and the design moved."""
+    """Draw the full lattice, the design at rest, and the displaced design."""
     problem = find_problem(figures["problem"])
     still = np.zeros((problem.lattice.node_count, 2))
     full, machine = problem.full_design(), design_of(problem, figures["machine"]["mask"])
     evaluator = SpringEvaluator(problem)
-    told = evaluator.evaluate(machine.mask)
+    response = evaluator.evaluate(machine.mask)
     lattice = f"{figures['nodes']} nodes, {figures['beams']} beams"
     sheet = Sheet(
-        title=f"{problem.name}: the lattice, what is removed, and how the rest moves",
+        title=f"{problem.name}: full lattice, design, and displaced design",
         note=f"{count(figures['chains'], 'chain')} of {count(figures['steps'], 'proposal')} "
-        "by the paper's rule; the best design, cleaned of what carries no load",
+        "of the paper's search; best design without unloaded beams",
         motions=[
             Motion(full, still, name="Full lattice",
                    note=f"{lattice}, {figures['designable']} designable"),
-            Motion(machine, still, name="Designed",
-                   note=f"{figures['machine']['beams']} beams left"),
-            Motion(machine, told.displacement, told.efficiency, name="Moved"),
+            Motion(machine, still, name="Design",
+                   note=f"{figures['machine']['beams']} beams"),
+            Motion(machine, response.displacement, response.efficiency, name="Displaced"),
         ],
-        still=frozenset({0, 1}),
+        at_rest=frozenset({0, 1}),
     )  # fmt: skip
     draw_sheet(sheet, path, overwrite=True)
 
@@ -96,13 +96,13 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
             "stiffness of beams and of angular springs",
             f"{published.BOND:g} and {published.ANGLE:g}",
             f"{figures['bond_stiffness']:g} and {figures['angle_stiffness']:g}",
-            "the same energy",
+            "same energy",
         ),
         Claim(
-            "the full lattice hardly moves its output; removing beams makes an actuator of it",
+            "efficiency of the full lattice and of the design",
             "",
-            f"efficiency {number(figures['efficiency_of_full_lattice'], 3)} with "
-            f"{figures['beams']} beams, {number(machine['efficiency'])} with {machine['beams']}",
+            f"{number(figures['efficiency_of_full_lattice'], 3)} ({figures['beams']} beams) and "
+            f"{number(machine['efficiency'])} ({machine['beams']} beams)",
             "discrete model",
         ),
     ]
@@ -118,11 +118,11 @@ STUDY = register(
         run=run,
         draw=draw,
         claims=claims,
-        runs=lambda told: (
-            f"{count(told['chains'], 'chain')} of {count(told['steps'], 'proposal')}"
+        runs=lambda figures: (
+            f"{count(figures['chains'], 'chain')} of {count(figures['steps'], 'proposal')}"
         ),
         deviations=(
-            "The paper's own designs are not at hand; the design shown is ours.",
+            "The paper's own designs are not available; the design shown is ours.",
         ),
     )
 )  # fmt: skip

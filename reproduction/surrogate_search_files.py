@@ -115,7 +115,7 @@ def _distances(designs: list[OfferedDesign]) -> Chart:
         "beams that differ from the nearest design",
         "designs, %",
         [Series(edges_of(distance), distance, kind="histogram", colour=style.BUILT)],
-        [Level(middle, f"median {middle:.0f}", upright=True)],
+        [Level(middle, f"median {middle:.0f}", vertical=True)],
         legend="upper left",
     )
 

@@ -1,8 +1,8 @@
-"""The rival: topology optimisation of a box by pyMOTO, as its own examples do it.
+"""Topology optimisation of a box by pyMOTO, with the settings of its examples.
 
-Densities on square elements, a linear density filter, stiffness by the power 3 (SIMP), springs at
-input and output, the largest output under a given input force and volume, by MMA: the textbook's
-formulation (Sigmund, Mech. Struct. Mach. 25, 493, 1997), with the settings of pyMOTO's examples.
+The formulation is that of Sigmund (Mech. Struct. Mach. 25, 493, 1997): densities on square
+elements, a linear density filter, stiffness by the power 3 (SIMP), springs at input and output,
+and the maximal output displacement under a given input force and volume by MMA.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ if TYPE_CHECKING:
 
 INSTALL = "pip install 'bellcrank[rivals]'"
 LEAST = 1e-6
-"""Stiffness of emptiness."""
+"""Relative stiffness of void elements."""
 POISSON = 0.3
 PAD = 1.7
-"""Radius round ports and supports that is solid, mm: a little more than bellcrank keeps there."""
+"""Radius of the solid regions around ports and supports, mm; slightly larger than in bellcrank."""
 
 
 def pymoto() -> Any:
-    """Return the module pyMOTO.
+    """Return the module pymoto.
 
     Raises
     ------
     InvalidSettings
-        If it is not installed.
+        If pyMOTO is not installed.
     """
     import matplotlib as mpl
 
-    # On import pyMOTO chooses a window system for all pictures of the process, or fails.
+    # pyMOTO selects a backend of matplotlib on import, which fails without a display.
     chosen = mpl.use
     mpl.use = lambda *_names, **_more: None
     try:
         import pymoto as module
     except ImportError as missing:
         raise InvalidSettings(
-            f"the study of rivals needs pyMOTO and NGSolve; install them with: {INSTALL}"
+            f"the study rivals needs pyMOTO and NGSolve; install them with: {INSTALL}"
         ) from missing
     finally:
         mpl.use = chosen
@@ -62,25 +62,26 @@ def optimise(
     radius: float,
     iterations: int,
 ) -> dict[str, Any]:
-    """Return densities that move the output of a box far.
+    """Return densities with a large output displacement.
 
     Parameters
     ----------
     element
-        Size of the elements, mm.
+        Element size, mm.
     volume
-        Part of the box that may be filled.
+        Largest volume fraction.
     springs
-        At input and output, in units of Young's modulus times the thickness.
+        Stiffness of the springs at input and output, in units of Young's modulus times thickness.
     radius
-        Of the filter, elements.
+        Filter radius, elements.
     iterations
-        Of MMA.
+        Number of MMA iterations.
 
     Returns
     -------
     dict
-        density (rows from below), seconds (processor time), iterations, objective.
+        density (rows from the bottom), elements, seconds (processor time), springs,
+        output_over_input.
     """
     module = pymoto()
     size = box.high - box.low
@@ -90,7 +91,7 @@ def optimise(
     solid, empty = _passive(box, domain, step, (across, up))
     load, output, held = _ports(box, domain, step)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # its solvers convert matrices, and say so each time
+        warnings.simplefilter("ignore")  # its solvers warn at each matrix conversion
         began = time.thread_time()
         density = module.Signal("x", state=np.full(domain.nel, volume))
         constant = _springs(load, output, springs)
@@ -124,7 +125,7 @@ def optimise(
 def _passive(
     box: Box, domain: Any, step: NDArray[np.float64], shape: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the elements that are solid, and those that are empty, whatever is designed."""
+    """Return the numbers of the fixed solid and of the fixed void elements."""
     columns, rows = np.meshgrid(np.arange(shape[0]), np.arange(shape[1]))
     number = domain.get_elemnumber(columns.ravel(), rows.ravel())
     centres = box.low + step * (np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
@@ -141,7 +142,7 @@ def _passive(
 def _ports(
     box: Box, domain: Any, step: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return the unit load at the input, the mean output, and the degrees of freedom held."""
+    """Return the unit load at the input, the mean output, and the fixed degrees of freedom."""
     problem = box.problem
     corners = np.arange(domain.nnodes)
     places = box.low + step * np.column_stack(
@@ -168,7 +169,7 @@ def _ports(
 def _springs(
     load: NDArray[np.float64], output: NDArray[np.float64], springs: tuple[float, float]
 ) -> Any:
-    """Return the stiffness of springs along the mean motions of input and output."""
+    """Return the stiffness matrix of springs along the mean input and output displacements."""
     from scipy.sparse import csr_matrix
 
     vectors = [csr_matrix(vector) for vector in (load, output)]

@@ -1,4 +1,4 @@
-"""Plain charts in the looks of all other pictures: curves, points, histograms, densities."""
+"""Charts in the common style: curves, points, bars, histograms, densities."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Kind = Literal["line", "steps", "points", "both", "bars", "histogram"]
-ROOM_FOR_NAME = 0.11
-"""Height that a line of the legend takes over histograms, as a part of the highest bar."""
+LEGEND_ROW = 0.11
+"""Height of a legend row above histograms, as a fraction of the highest bar."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """A row of numbers to be drawn.
+    """A data series.
 
     Parameters
     ----------
     x, y : (n,) float64
-        Places. Of a histogram, `x` are the (b + 1,) edges of its bins and `y` the values.
+        Coordinates. For a histogram, `x` are the (b + 1,) bin edges and `y` the values.
     name
-        In the legend; not there if it is empty.
+        Legend entry; none if empty.
     kind
-        How it is drawn.
+        Type of drawing.
     colour
-        As matplotlib reads it.
+        Colour in a form that matplotlib accepts.
     low, high : (n,) float64 or None
-        Ends of a band around a curve, or of bars through points.
+        Limits of a band around a curve, or of error bars.
     dashed
-        Whether curves are broken.
+        Whether the curve is dashed.
     width
-        Of curves, points; of bars, in units of `x`.
+        Line width in points; for bars, width in units of `x`.
     level
-        What lies higher covers what lies lower.
+        Drawing order; higher levels cover lower ones.
     labels
-        Words over bars or beside points.
+        Text above bars or beside points.
     """
 
     x: NDArray[np.float64]
@@ -62,36 +62,36 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A line across a chart at some height, or up at some place.
+    """A horizontal or vertical reference line.
 
     Parameters
     ----------
     value
-        Where.
+        Coordinate.
     name
-        In the legend.
+        Legend entry.
     colour
-        As matplotlib reads it.
-    upright
-        Whether it stands at a place across instead.
+        Colour in a form that matplotlib accepts.
+    vertical
+        Whether the line is vertical.
     """
 
     value: float
     name: str = ""
     colour: str = style.HUMAN
-    upright: bool = False
+    vertical: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Density:
-    """How many points lie in each of the squares of a grid.
+    """Numbers of points in the cells of a square grid.
 
     Parameters
     ----------
     count : (b, b)
-        First index up, second across.
+        First index along y, second along x.
     low, high
-        Ends of both axes.
+        Limits of both axes.
     """
 
     count: NDArray[np.float64]
@@ -101,33 +101,33 @@ class Density:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chart:
-    """What one pair of axes shows.
+    """The content of one pair of axes.
 
     Parameters
     ----------
     title
-        Over it.
-    across, up
-        What the axes are.
+        Title.
+    x_label, y_label
+        Axis labels.
     series, levels
-        What is drawn.
+        Data series and reference lines.
     log_x, log_y
-        Whether axes are logarithmic.
+        Whether the axes are logarithmic.
     limits_x, limits_y
-        Ends of axes; None where they follow from what is drawn.
+        Limits of the axes; None for automatic limits.
     names
-        Words below the places 0, 1, 2, ... in place of numbers.
+        Tick labels at x = 0, 1, 2, ...
     density
-        Drawn below all else.
+        Density below all other elements.
     legend
-        Where the legend stands, as matplotlib says it; None for none.
+        Location of the legend as in matplotlib; None for no legend.
     note
-        Lines written into the upper left corner.
+        Lines of text in the upper left corner.
     """
 
     title: str
-    across: str
-    up: str
+    x_label: str
+    y_label: str
     series: Sequence[Series] = ()
     levels: Sequence[Level] = ()
     log_x: bool = False
@@ -141,7 +141,7 @@ class Chart:
 
 
 def add_chart(axes: Axes, chart: Chart) -> None:
-    """Draw a chart into its axes."""
+    """Draw a chart on axes."""
     if chart.log_x:
         axes.set_xscale("log")
     if chart.log_y:
@@ -151,7 +151,7 @@ def add_chart(axes: Axes, chart: Chart) -> None:
     for series in chart.series:
         _DRAWERS[series.kind](axes, series)
     for level in chart.levels:
-        draw = axes.axvline if level.upright else axes.axhline
+        draw = axes.axvline if level.vertical else axes.axhline
         draw(
             level.value, color=level.colour, linewidth=1.5, linestyle=(0, (5, 2.5)),
             label=level.name or None, zorder=4,
@@ -159,31 +159,31 @@ def add_chart(axes: Axes, chart: Chart) -> None:
     axes.set_xlim(*chart.limits_x)
     axes.set_ylim(*chart.limits_y)
     if chart.legend is not None and any(each.kind == "histogram" for each in chart.series):
-        axes.set_ylim(0.0, axes.get_ylim()[1] * (1.0 + ROOM_FOR_NAME * _named(chart)))
-    _dress(axes, chart)
+        axes.set_ylim(0.0, axes.get_ylim()[1] * (1.0 + LEGEND_ROW * _legend_rows(chart)))
+    _finish(axes, chart)
 
 
-def _named(chart: Chart) -> int:
-    """Return how many lines the legend has."""
+def _legend_rows(chart: Chart) -> int:
+    """Return the number of legend entries."""
     names = [each.name for each in chart.series] + [each.name for each in chart.levels]
     return sum(map(bool, names))
 
 
 def _add_line(axes: Axes, series: Series) -> None:
-    looks: dict[str, Any] = {"color": series.colour, "zorder": series.level}
+    options: dict[str, Any] = {"color": series.colour, "zorder": series.level}
     if series.low is not None and series.high is not None:
         axes.fill_between(
             series.x, series.low, series.high, color=series.colour, alpha=0.18, linewidth=0,
             zorder=series.level - 0.5,
         )  # fmt: skip
     if series.kind == "both":
-        looks |= {"marker": "o", "markersize": 4.2, "markeredgecolor": "white"}
-        looks |= {"markeredgewidth": 0.6}
+        options |= {"marker": "o", "markersize": 4.2, "markeredgecolor": "white"}
+        options |= {"markeredgewidth": 0.6}
     axes.plot(
         series.x, series.y, linewidth=series.width, label=series.name or None,
         linestyle=(0, (4, 2)) if series.dashed else "-",
         drawstyle="steps-post" if series.kind == "steps" else "default",
-        solid_joinstyle="round", **looks,
+        solid_joinstyle="round", **options,
     )  # fmt: skip
 
 
@@ -199,8 +199,8 @@ def _add_points(axes: Axes, series: Series) -> None:
         color=series.colour, markeredgecolor="white", markeredgewidth=0.5,
         label=series.name or None, zorder=series.level, clip_on=False,
     )  # fmt: skip
-    for x, y, words in zip(series.x, series.y, series.labels, strict=False):
-        _write(axes, words, (float(x), float(y)), offset=(6.0, 0.0), ha="left", va="center")
+    for x, y, text in zip(series.x, series.y, series.labels, strict=False):
+        _annotate(axes, text, (float(x), float(y)), offset=(6.0, 0.0), ha="left", va="center")
 
 
 def _add_bars(axes: Axes, series: Series) -> None:
@@ -208,17 +208,17 @@ def _add_bars(axes: Axes, series: Series) -> None:
         series.x, series.y, width=series.width, color=series.colour, label=series.name or None,
         zorder=series.level, linewidth=0,
     )  # fmt: skip
-    for x, y, words in zip(series.x, series.y, series.labels, strict=False):
+    for x, y, text in zip(series.x, series.y, series.labels, strict=False):
         up = float(y) if np.isfinite(y) else 0.0
-        _write(axes, words, (float(x), up), offset=(0.0, 3.0), ha="center", va="bottom")
+        _annotate(axes, text, (float(x), up), offset=(0.0, 3.0), ha="center", va="bottom")
 
 
 def _add_histogram(axes: Axes, series: Series) -> None:
     share = np.full(len(series.y), 100.0 / max(len(series.y), 1))
-    looks: dict[str, Any] = {"bins": series.x, "weights": share, "color": series.colour}
-    axes.hist(series.y, **looks, alpha=0.18, zorder=series.level)
+    options: dict[str, Any] = {"bins": series.x, "weights": share, "color": series.colour}
+    axes.hist(series.y, **options, alpha=0.18, zorder=series.level)
     axes.hist(
-        series.y, **looks, histtype="step", linewidth=1.6, label=series.name or None,
+        series.y, **options, histtype="step", linewidth=1.6, label=series.name or None,
         zorder=series.level + 0.1,
     )  # fmt: skip
 
@@ -234,7 +234,7 @@ _DRAWERS = {
 
 
 def _add_density(axes: Axes, density: Density) -> None:
-    """Draw counts in a logarithmic scale of blues."""
+    """Draw counts with a logarithmic colour scale."""
     from matplotlib.colors import LinearSegmentedColormap, LogNorm
 
     colours = LinearSegmentedColormap.from_list("count", ["#d6e6f2", style.BEST, "#0b2239"])
@@ -247,21 +247,21 @@ def _add_density(axes: Axes, density: Density) -> None:
     axes.grid(axis="x", color=style.IDLE_REST, linewidth=0.8)
 
 
-def _write(axes: Axes, words: str, place: tuple[float, float], **looks: Any) -> None:
+def _annotate(axes: Axes, text: str, place: tuple[float, float], **options: Any) -> None:
     axes.annotate(
-        words, place, xytext=looks.pop("offset"), textcoords="offset points",
+        text, place, xytext=options.pop("offset"), textcoords="offset points",
         size=style.SMALL_SIZE - 1.0, color=style.INK, family=style.FONT, zorder=7,
-        annotation_clip=False, **looks,
+        annotation_clip=False, **options,
     )  # fmt: skip
 
 
-def _dress(axes: Axes, chart: Chart) -> None:
-    """Write titles, axes and legend."""
+def _finish(axes: Axes, chart: Chart) -> None:
+    """Add title, axis labels and legend."""
     axes.set_title(
         chart.title, size=style.LABEL_SIZE, weight="bold", loc="left", pad=9.0,
         family=style.FONT, color=style.INK,
     )  # fmt: skip
-    style.label_axes(axes, chart.across, chart.up, style.LABEL_SIZE - 0.5)
+    style.label_axes(axes, chart.x_label, chart.y_label, style.LABEL_SIZE - 0.5)
     style.style_axes(axes)
     for axis, logarithmic in ((axes.xaxis, chart.log_x), (axes.yaxis, chart.log_y)):
         if logarithmic:
@@ -288,11 +288,11 @@ def _dress(axes: Axes, chart: Chart) -> None:
 
 
 MANY = 1.0e5
-"""From here on numbers on an axis are written as powers of ten."""
+"""Number from which tick labels are powers of ten."""
 
 
 def plain_number(value: float, _place: int = 0) -> str:
-    r"""Write a number as it stands on an axis.
+    r"""Format a tick label.
 
     Examples
     --------
@@ -307,7 +307,7 @@ def plain_number(value: float, _place: int = 0) -> str:
 
 
 def add_decimal_ticks(axes: Axes) -> None:
-    """Put numbers at 1, 2 and 5 times powers of ten where an axis spans less than 1.5 decades."""
+    """Set ticks at 1, 2 and 5 times powers of ten if the x axis spans less than 1.5 decades."""
     low, high = axes.get_xlim()
     if high > 32.0 * low:
         return

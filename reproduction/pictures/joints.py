@@ -1,4 +1,4 @@
-"""Sketches of one node: its beams, and the angular springs between them."""
+"""Sketches of a node with its beams and the angular springs between them."""
 
 from __future__ import annotations
 
@@ -18,38 +18,38 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SIDE = 2.55
-"""Inches of a sketch."""
-MARGIN, GAP, WORDS = 0.25, 0.2, 0.62
-FLAT = 0.22
-"""Cut off the upper side of a sketch, in lengths of a beam."""
-NEAR, STEP = 0.34, 0.075
-"""Radius of arcs, in lengths of a beam, and how much neighbours differ."""
+"""Width of a sketch, inches."""
+MARGIN, GAP, HEADING = 0.25, 0.2, 0.62
+CUT = 0.22
+"""Reduction of the height of a sketch, beam lengths."""
+RADIUS, STEP = 0.34, 0.075
+"""Radius of arcs and difference between neighbours, beam lengths."""
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A node with beams.
+    """A node with its beams.
 
     Parameters
     ----------
     title, note
-        What stands over it.
+        Heading.
     angles
         Directions of the beams, degrees.
     dead
-        Which of them end without carrying anything, by place.
-    gone
-        Directions of beams that were removed.
-    fresh
-        Springs that are new, by the place of the first of their two beams, anticlockwise.
+        Indices of the beams that are dead ends.
+    removed
+        Directions of removed beams, degrees.
+    merged
+        Merged springs, by the index of the first of their two beams, counter-clockwise.
     """
 
     title: str
     note: str
     angles: Sequence[float]
     dead: frozenset[int] = frozenset()
-    gone: Sequence[float] = ()
-    fresh: frozenset[int] = frozenset()
+    removed: Sequence[float] = ()
+    merged: frozenset[int] = frozenset()
 
 
 def draw_joints(
@@ -60,12 +60,12 @@ def draw_joints(
     note: str = "",
     overwrite: bool = False,
 ) -> None:
-    """Draw sketches in a row.
+    """Draw sketches of joints in a row.
 
     Parameters
     ----------
     path
-        Where to; the suffix png, svg or pdf chooses the format.
+        Output file; the suffix png, svg or pdf selects the format.
 
     Raises
     ------
@@ -76,24 +76,24 @@ def draw_joints(
     count = len(joints)
     width = 2 * MARGIN + count * SIDE + (count - 1) * GAP
     top = MARGIN + style.heading_height(title, note) + 0.16
-    height = top + WORDS + SIDE * (1.0 - FLAT / 2.56) + 0.1
+    height = top + HEADING + SIDE * (1.0 - CUT / 2.56) + 0.1
     figure = style.new_figure(width, height)
     style.add_heading(figure, title, note, MARGIN, MARGIN)
     for place, joint in enumerate(joints):
         left = MARGIN + place * (SIDE + GAP)
         style.add_heading(figure, joint.title, joint.note, left, top)
         axes = figure.add_axes(
-            (left / width, 0.08 / height, SIDE / width, SIDE * (1.0 - FLAT / 2.56) / height)
+            (left / width, 0.08 / height, SIDE / width, SIDE * (1.0 - CUT / 2.56) / height)
         )
         axes.set_xlim(-1.28, 1.28)
-        axes.set_ylim(-1.28, 1.28 - FLAT)
+        axes.set_ylim(-1.28, 1.28 - CUT)
         axes.set_axis_off()
         _add_joint(axes, joint)
     save_figure(figure, path, overwrite=overwrite)
 
 
 def _add_joint(axes: Axes, joint: Joint) -> None:
-    for angle in joint.gone:
+    for angle in joint.removed:
         _add_beam(axes, angle, style.REST, 2.2, dashed=True)
     for place, angle in enumerate(joint.angles):
         dead = place in joint.dead
@@ -109,8 +109,8 @@ def _add_joint(axes: Axes, joint: Joint) -> None:
         return
     for place, start in enumerate(joint.angles):
         end = joint.angles[(place + 1) % count]
-        wide = (end - start) % 360.0
-        _add_spring(axes, start, wide, NEAR + STEP * (place % 2), new=place in joint.fresh)
+        opening = (end - start) % 360.0
+        _add_spring(axes, start, opening, RADIUS + STEP * (place % 2), merged=place in joint.merged)
 
 
 def _at(angle: float, radius: float) -> tuple[float, float]:
@@ -126,19 +126,19 @@ def _add_beam(axes: Axes, angle: float, colour: str, width: float, *, dashed: bo
     )  # fmt: skip
 
 
-def _add_spring(axes: Axes, start: float, wide: float, radius: float, *, new: bool) -> None:
-    """Draw an arc from beam to beam, with its rest angle."""
-    colour = style.INPUT if new else style.BEST
-    room = min(7.0, 0.14 * wide)
+def _add_spring(axes: Axes, start: float, opening: float, radius: float, *, merged: bool) -> None:
+    """Draw an arc between two beams with its rest angle."""
+    colour = style.INPUT if merged else style.BEST
+    room = min(7.0, 0.14 * opening)
     axes.add_patch(
         Arc(
-            (0.0, 0.0), 2 * radius, 2 * radius, theta1=start + room, theta2=start + wide - room,
+            (0.0, 0.0), 2 * radius, 2 * radius, theta1=start + room, theta2=start + opening - room,
             color=colour, linewidth=2.4, zorder=4, capstyle="round",
         )
     )  # fmt: skip
-    x, y = _at(start + 0.5 * wide, radius + 0.2)
+    x, y = _at(start + 0.5 * opening, radius + 0.2)
     axes.text(
-        x, y, f"{wide:.0f}°", ha="center", va="center", size=style.SMALL_SIZE - 0.5,
+        x, y, f"{opening:.0f}°", ha="center", va="center", size=style.SMALL_SIZE - 0.5,
         color=colour, family=style.FONT, zorder=7,
         bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none"},
     )  # fmt: skip

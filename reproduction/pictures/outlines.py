@@ -1,4 +1,4 @@
-"""Shapes of any origin at rest and moved, in panels to one scale."""
+"""Outlines of parts at rest and displaced, at one scale."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-WIDTH, MARGIN, GAP, WORDS, FOOT = 11.0, 0.25, 0.3, 0.78, 0.55
-IN_A_ROW = 4
+WIDTH, MARGIN, GAP, HEADING, FOOT = 11.0, 0.25, 0.3, 0.78, 0.55
+COLUMNS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """A shape and where it goes.
+    """An outline and its displacement.
 
     Parameters
     ----------
     title, notes
-        What stands over it; at most two lines of notes.
+        Heading; at most two lines of notes.
     curves
-        Closed curves, (n, 4) each: x and y at rest, x and y moved; outer ones
-        counterclockwise, holes clockwise.
+        Closed curves, (n, 4) each: x and y at rest, x and y displaced. Outer curves are
+        counter-clockwise, holes clockwise.
     inputs, outputs
         (x, y, direction x, direction y) of each port.
-    held
-        (x, y) of each place that is held.
+    fixed
+        (x, y) of each support.
     """
 
     title: str
@@ -46,7 +46,7 @@ class Shape:
     curves: Sequence[NDArray[np.float64]]
     inputs: Sequence[tuple[float, float, float, float]]
     outputs: Sequence[tuple[float, float, float, float]]
-    held: Sequence[tuple[float, float]]
+    fixed: Sequence[tuple[float, float]]
 
 
 def draw_shapes(
@@ -57,7 +57,7 @@ def draw_shapes(
     note: str = "",
     overwrite: bool = False,
 ) -> None:
-    """Draw shapes in rows of four, all to one scale.
+    """Draw outlines in rows of four at one scale.
 
     Raises
     ------
@@ -72,21 +72,21 @@ def draw_shapes(
     arrow = 0.13 * float((high - low)[0])
     room = np.array([arrow, 2.0])
     low, high = low - room, high + room
-    count = min(len(shapes), IN_A_ROW)
-    rows = -(-len(shapes) // IN_A_ROW)
+    count = min(len(shapes), COLUMNS)
+    rows = -(-len(shapes) // COLUMNS)
     scale = (WIDTH - 2 * MARGIN - GAP * (count - 1)) / count / float((high - low)[0])
     across, up = scale * (high - low)
     top = MARGIN + style.heading_height(title, note) + 0.14
-    tall = WORDS + up + GAP
+    tall = HEADING + up + GAP
     figure = style.new_figure(WIDTH, top + rows * tall - GAP + FOOT)
     height = float(figure.get_size_inches()[1])
     style.add_heading(figure, title, note, MARGIN, MARGIN)
     for place, shape in enumerate(shapes):
-        row, column = divmod(place, IN_A_ROW)
+        row, column = divmod(place, COLUMNS)
         left, above = MARGIN + column * (across + GAP), top + row * tall
         style.add_heading(figure, shape.title, shape.notes[0], left, above)
-        for line, words in enumerate(shape.notes[1:], start=1):
-            style.add_heading(figure, "", words, left, above + 0.27 + 0.2 * line)
+        for line, text in enumerate(shape.notes[1:], start=1):
+            style.add_heading(figure, "", text, left, above + 0.27 + 0.2 * line)
         below = FOOT + (rows - 1 - row) * tall
         axes = figure.add_axes((left / WIDTH, below / height, across / WIDTH, up / height))
         axes.set_xlim(low[0], high[0])
@@ -94,9 +94,9 @@ def draw_shapes(
         axes.set_axis_off()
         _add_shape(axes, shape, arrow)
     entries = [
-        ("at rest", strut_entry(style.REST)), ("moved", strut_entry(style.INK)),
-        ("held", strut_entry(style.GROUND, 6.0)), ("input", arrow_entry(style.INPUT)),
-        ("output, wanted", arrow_entry(style.WANTED)),
+        ("at rest", strut_entry(style.REST)), ("displaced", strut_entry(style.INK)),
+        ("support", strut_entry(style.GROUND, 6.0)), ("input", arrow_entry(style.INPUT)),
+        ("output, wanted direction", arrow_entry(style.WANTED)),
     ]  # fmt: skip
     add_legend(figure, entries, 0.2, len(entries))
     save_figure(figure, path, overwrite=overwrite)
@@ -111,7 +111,7 @@ def _add_shape(axes: Axes, shape: Shape, arrow: float) -> None:
             codes += [Curve.MOVETO, *[Curve.LINETO] * (len(ring) - 1), Curve.CLOSEPOLY]
         whole = Curve(np.concatenate(corners), codes)
         axes.add_patch(PathPatch(whole, facecolor=colour, edgecolor="none", zorder=level))
-    for x, y in shape.held:
+    for x, y in shape.fixed:
         axes.plot(
             [x], [y], marker="s", markersize=7.0, color=style.GROUND, markeredgecolor="white",
             zorder=4,
@@ -124,11 +124,15 @@ def _add_shape(axes: Axes, shape: Shape, arrow: float) -> None:
 
 
 def _add_arrow(
-    axes: Axes, tail: tuple[float, float], way: tuple[float, float], length: float, colour: str
+    axes: Axes,
+    tail: tuple[float, float],
+    direction: tuple[float, float],
+    length: float,
+    colour: str,
 ) -> None:
     axes.add_patch(
         FancyArrow(
-            *tail, length * way[0], length * way[1], width=0.14 * length,
+            *tail, length * direction[0], length * direction[1], width=0.14 * length,
             head_width=0.42 * length, head_length=0.4 * length, length_includes_head=True,
             facecolor=colour, edgecolor="white", linewidth=0.6, zorder=6,
         )

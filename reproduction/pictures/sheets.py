@@ -1,4 +1,4 @@
-"""Sheets: drawings of designs in a row, and charts below."""
+"""Sheets: a row of drawings of designs above a row of charts."""
 
 from __future__ import annotations
 
@@ -33,38 +33,38 @@ if TYPE_CHECKING:
     from bellcrank.plots.scene import Motion
     from reproduction.pictures.charts import Chart
 
-TALLEST = 4.4
-"""Inches of the largest drawing."""
+MAX_HEIGHT = 4.4
+"""Height of the largest drawing, inches."""
 LEFT, BETWEEN, BELOW, ABOVE = 0.66, 0.78, 0.56, 0.34
-"""Inches around charts: for numbers and words at their left, below and over them."""
+"""Margins of charts, inches."""
 COLUMNS = 8
 LONG_NOTE = 78
-"""Letters of a note from which on a sheet must be wide."""
+"""Number of characters of a note from which the sheet is wide."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sheet:
-    """What one picture shows.
+    """The content of one picture.
 
     Parameters
     ----------
     title, note
-        What stands over it.
+        Heading.
     motions
-        Designs in a row, to one scale; their `name` stands over each.
+        Designs in a row at one scale; the `name` of each is its title.
     charts
-        In a row below.
-    still
-        Which of the designs are drawn as they are, without motion, by place.
+        Charts in a row below.
+    at_rest
+        Indices of the designs that are drawn at rest.
     height
-        Of the charts, inches.
+        Height of the charts, inches.
     """
 
     title: str
     note: str
     motions: Sequence[Motion] = ()
     charts: Sequence[Chart] = ()
-    still: frozenset[int] = frozenset()
+    at_rest: frozenset[int] = frozenset()
     height: float = 2.9
 
 
@@ -74,9 +74,9 @@ def draw_sheet(sheet: Sheet, path: str | os.PathLike[str], *, overwrite: bool = 
     Parameters
     ----------
     path
-        Where to; the suffix png, svg or pdf chooses the format.
+        Output file; the suffix png, svg or pdf selects the format.
     overwrite
-        Whether to replace what is there.
+        Whether an existing file is replaced.
 
     Raises
     ------
@@ -88,12 +88,12 @@ def draw_sheet(sheet: Sheet, path: str | os.PathLike[str], *, overwrite: bool = 
 
 
 def _caption(motion: Motion) -> str:
-    """Return what stands over a drawing, in few words."""
+    """Return a short caption of a drawing."""
     known = motion.efficiency is not None and np.isfinite(motion.efficiency)
     efficiency = f"efficiency {motion.efficiency:.2f}" if known else "no efficiency"
     magnified = "" if motion.magnify == 1.0 else f"motion × {motion.magnify:g}"
-    words = [efficiency, motion.note, magnified or f"{motion.design.beam_count} beams"]
-    return " · ".join(word for word in words if word)
+    texts = [efficiency, motion.note, magnified or f"{motion.design.beam_count} beams"]
+    return " · ".join(text for text in texts if text)
 
 
 def _figure(sheet: Sheet) -> Figure:
@@ -105,7 +105,7 @@ def _figure(sheet: Sheet) -> Figure:
     figure = style.new_figure(width, heading + drawings.height + charts + MARGIN)
     style.add_heading(figure, sheet.title, sheet.note, MARGIN, MARGIN)
     if sheet.motions:
-        drawings.put(figure, heading)
+        drawings.add_to(figure, heading)
     if sheet.charts:
         _add_charts(figure, sheet)
     return figure
@@ -113,7 +113,7 @@ def _figure(sheet: Sheet) -> Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Drawings:
-    """The row of drawings: what, which part of the plane, how large."""
+    """The row of drawings with their frames and scale."""
 
     parts: list[Drawing]
     frames: list[tuple[np.ndarray, np.ndarray]]
@@ -122,38 +122,38 @@ class _Drawings:
     @classmethod
     def of(cls, sheet: Sheet, width: float) -> _Drawings:
         parts = [
-            Drawing(motion.name, _caption(motion) if k not in sheet.still else motion.note, motion,
-                    displaced=k not in sheet.still)
+            Drawing(motion.name, motion.note if at_rest else _caption(motion), motion, not at_rest)
             for k, motion in enumerate(sheet.motions)
-        ]  # fmt: skip
+            for at_rest in (k in sheet.at_rest,)
+        ]
         if not parts:
             return cls([], [], 1.0)
         frames = drawing_frames(parts)
         sizes = np.array([high - low for low, high in frames])
         room = width - 2 * MARGIN - GAP * (len(parts) - 1)
-        scale = float(min(room / sizes[:, 0].sum(), TALLEST / sizes[:, 1].max()))
+        scale = float(min(room / sizes[:, 0].sum(), MAX_HEIGHT / sizes[:, 1].max()))
         return cls(parts, frames, scale)
 
     @property
-    def words(self) -> float:
-        """Inches over the drawings for their headings."""
+    def heading(self) -> float:
+        """Height of the headings, inches."""
         return max(style.heading_height(part.title, part.note) for part in self.parts) + 0.1
 
     @property
     def tallest(self) -> float:
-        """Inches of the drawings."""
+        """Height of the highest drawing, inches."""
         return self.scale * max(float((high - low)[1]) for low, high in self.frames)
 
     @property
     def height(self) -> float:
-        """Inches of the whole row with its legend."""
+        """Height of the row with its legend, inches."""
         if not self.parts:
             return 0.0
         rows = math.ceil(len(self.entries()) / COLUMNS)
-        return self.words + self.tallest + 0.12 + ROW_HEIGHT * rows + 0.12
+        return self.heading + self.tallest + 0.12 + ROW_HEIGHT * rows + 0.12
 
     def entries(self) -> list[tuple[str, object]]:
-        """Legend entries of displaced and of still drawings, each once."""
+        """Return the legend entries of all drawings without duplicates."""
         found: dict[str, object] = {}
         for displaced in (False, True):
             chosen = [part for part in self.parts if part.displaced is displaced]
@@ -161,13 +161,13 @@ class _Drawings:
                 found |= dict(legend_entries(chosen))
         return list(found.items())
 
-    def put(self, figure: Figure, top: float) -> None:
-        """Draw the row, `top` inches below the upper edge."""
+    def add_to(self, figure: Figure, top: float) -> None:
+        """Draw the row `top` inches below the upper edge."""
         width, height = figure.get_size_inches()
         across = [self.scale * float((high - low)[0]) for low, high in self.frames]
         gap = min((width - 2 * MARGIN - sum(across)) / max(len(across), 1), 1.2)
         left = 0.5 * (width - sum(across) - gap * (len(across) - 1))
-        bottom = height - top - self.words - self.tallest
+        bottom = height - top - self.heading - self.tallest
         for part, (low, high), size in zip(self.parts, self.frames, across, strict=True):
             style.add_heading(figure, part.title, part.note, left, top)
             corner = (left, bottom)

@@ -7,7 +7,7 @@ import pytest
 
 from bellcrank.errors import InvalidSettings
 from reproduction.boxes import TASKS, box_of
-from reproduction.outline_analysis import contour_of, drawing, judge, polygon_of
+from reproduction.outline_analysis import analyse_outline, contour_of, drawing, polygon_of
 from reproduction.topology import optimise, pymoto
 
 
@@ -70,7 +70,7 @@ def test_the_judge_moves_a_lattice_as_its_own_level_does() -> None:
 
     box = box_of("inverter", 4, 3, 0.05, 0.01)
     part = box.spec.of(box.problem.full_design())
-    told = judge(box, part, polygon_of(part), 2.0, "neo-hookean")
+    told = analyse_outline(box, part, polygon_of(part), 2.0, "neo-hookean")
     known = levels["plane"](part, FemSettings(size=2.0))
     assert told["status"] == "converged"
     assert told["efficiency"] == pytest.approx(known.efficiency, abs=0.02)

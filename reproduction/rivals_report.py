@@ -1,4 +1,4 @@
-"""What the study of rivals shows and says: both sides' designs, and who is ahead in what."""
+"""Picture and comparison table of the study of topology optimisation."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-SIDES = {"ours": "bellcrank", "rival": "pyMOTO"}
+METHODS = {"ours": "bellcrank", "rival": "pyMOTO"}
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
-    """Draw all designs at rest and moved."""
+    """Draw all designs at rest and displaced."""
     shapes = []
-    for name, told in figures["tasks"].items():
-        for side, words in SIDES.items():
-            row, ports = told[side], told["ports"]
+    for name, task in figures["tasks"].items():
+        for side, method in METHODS.items():
+            row, ports = task[side], task["ports"]
             score = number(row["efficiency"]) if row["efficiency"] else row["status"]
             shapes.append(
                 Shape(
-                    title=f"{name.capitalize()}, {words}",
+                    title=f"{name.capitalize()}, {method}",
                     notes=[
                         f"efficiency {score}",
                         (
@@ -40,40 +40,41 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
                     ],
                     inputs=[tuple(port) for port in ports["input"]],
                     outputs=[tuple(port) for port in ports["output"]],
-                    held=[tuple(place) for place in ports["held"]],
+                    fixed=[tuple(place) for place in ports["held"]],
                 )
             )
     draw_shapes(
         [shape for shape in shapes if shape.curves],
         path,
-        title="Force inverter and gripper, by bellcrank and by topology optimisation",
-        note="the same box, mass, material, stroke and output spring; one judge: "
-        "the outlines in nonlinear plane stress",
+        title="Force inverter and gripper by bellcrank and by topology optimisation",
+        note="same box, mass, material, stroke and output spring; "
+        "efficiencies of the outlines in nonlinear plane stress",
         overwrite=True,
     )
 
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
-    """Compare both sides; the paper has no such figures."""
+    """Compare both methods; the paper has no such values."""
     found = []
-    for name, told in figures["tasks"].items():
-        ours, rival = told["ours"], told["rival"]
+    for name, task in figures["tasks"].items():
+        ours, rival = task["ours"], task["rival"]
         found.append(
             Claim(
-                f"{name}: bellcrank against pyMOTO, judged alike",
+                f"{name}: bellcrank and pyMOTO",
                 "",
                 f"efficiency {_score(ours)} and {_score(rival)}; largest stress "
                 f"{number(ours['von_mises_MPa'], 1)} and {number(rival.get('von_mises_MPa'), 1)} "
                 f"MPa; input force {number(ours['input_force_N'])} and "
-                f"{number(rival.get('input_force_N'))} N; designed in "
-                f"{ours['design_seconds']:.0f} s and {rival['design_seconds']:.0f} s of one core; "
+                f"{number(rival.get('input_force_N'))} N; design time on one core "
+                f"{ours['design_seconds']:.0f} and {rival['design_seconds']:.0f} s; "
                 f"area {number(ours['area_mm2'], 0)} and {number(rival.get('area_mm2'), 0)} mm²; "
-                f"narrowest place {number(ours['narrowest_mm'], 1)} and "
+                f"smallest width {number(ours['narrowest_mm'], 1)} and "
                 f"{number(rival.get('narrowest_mm'), 1)} mm",
-                f"{_verdict(ours, rival)}; with {figures['triangles_mm'][1]:g} mm triangles "
-                f"{number(ours['efficiency_finer'])} and {number(rival['efficiency_finer'])}; "
-                f"bellcrank {_free_and_kept(ours)}; "
-                f"pyMOTO by springs at input and output: {_tried(rival)}",
+                f"{_better_method(ours, rival)}; efficiency with "
+                f"{figures['triangles_mm'][1]:g} mm triangles {number(ours['efficiency_finer'])} and "
+                f"{number(rival['efficiency_finer'])}; "
+                f"bellcrank by goals: {_by_goals(ours)}; "
+                f"pyMOTO by springs at input and output: {_by_springs(rival)}",
             )
         )
     return found
@@ -85,51 +86,51 @@ def _score(row: Mapping[str, Any]) -> str:
     return str(row["status"])
 
 
-def _free_and_kept(ours: Mapping[str, Any]) -> str:
-    """Return what came of each set of goals, in words."""
+def _by_goals(ours: Mapping[str, Any]) -> str:
+    """Return the efficiency for each set of goals as text."""
     return ", ".join(
-        f"{' and '.join(row['goals']) or 'without goals'}: {number(row['efficiency'])}"
+        f"{' and '.join(row['goals']) or 'none'}: {number(row['efficiency'])}"
         for row in ours["tried"]
     )
 
 
-def _tried(rival: Mapping[str, Any]) -> str:
-    """Return what came of each setting, in words."""
-    told = []
+def _by_springs(rival: Mapping[str, Any]) -> str:
+    """Return the efficiency for each setting as text."""
+    texts = []
     for (stiff, radius), rows in itertools.groupby(
         rival["tried"], key=lambda row: (row["springs"][0], row["radius"])
     ):
         values = ", ".join(f"{row['springs'][1]:g}: {number(row['efficiency'])}" for row in rows)
-        told.append(f"{stiff:g} and {values} (filter {radius:g})")
-    return "; ".join(told)
+        texts.append(f"{stiff:g} and {values} (filter {radius:g})")
+    return "; ".join(texts)
 
 
-def _verdict(ours: Mapping[str, Any], rival: Mapping[str, Any]) -> str:
-    """Say who is ahead in what; nothing that the figures do not show."""
-    ahead: dict[str, list[str]] = {"bellcrank": [], "pyMOTO": []}
-    for words, key, more in (
+def _better_method(ours: Mapping[str, Any], rival: Mapping[str, Any]) -> str:
+    """Return the better method in each quantity as text."""
+    better: dict[str, list[str]] = {"bellcrank": [], "pyMOTO": []}
+    for quantity, key, larger in (
         ("efficiency", "efficiency", True),
         ("stress", "von_mises_MPa", False),
-        ("input force (less)", "input_force_N", False),
-        ("width of the narrowest place", "narrowest_mm", True),
-        ("time", "design_seconds", False),
+        ("input force", "input_force_N", False),
+        ("smallest width", "narrowest_mm", True),
+        ("design time", "design_seconds", False),
     ):
         mine, other = ours.get(key), rival.get(key)
         if mine is None and other is None:
             continue
-        if other is None or (mine is not None and (mine > other) == more):
-            ahead["bellcrank"].append(words)
+        if other is None or (mine is not None and (mine > other) == larger):
+            better["bellcrank"].append(quantity)
         else:
-            ahead["pyMOTO"].append(words)
-    told = [f"{side} is ahead in {', '.join(what)}" for side, what in ahead.items() if what]
-    return "; ".join(told)
+            better["pyMOTO"].append(quantity)
+    texts = [f"{side} is better in {', '.join(what)}" for side, what in better.items() if what]
+    return "; ".join(texts)
 
 
 def runs(figures: Mapping[str, Any]) -> str:
-    """Say how hard both sides tried."""
+    """Return the effort of both methods as text."""
     return (
-        f"bellcrank: the best of {count(len(figures['goals']), 'setting')}, "
+        f"bellcrank: best of {count(len(figures['goals']), 'setting')}, "
         f"{count(figures['chains'], 'chain')} of {count(figures['steps'], 'proposal')} each; "
-        f"pyMOTO: the best of {count(figures['tried'], 'setting')}, "
+        f"pyMOTO: best of {count(figures['tried'], 'setting')}, "
         f"{count(figures['iterations'], 'iteration')} each"
     )

@@ -1,4 +1,4 @@
-"""Designs as parts, by finite elements, as plain records."""
+"""Finite element analyses of designs as plain records."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ if TYPE_CHECKING:
     from bellcrank.part import PartSpec
     from reproduction.result_store import ResultStore
 
-KEPT = ("status", "reached", "efficiency", "von_mises_MPa", "principal_strain")
+KEYS = ("status", "reached", "efficiency", "von_mises_MPa", "principal_strain", "theory")
+"""Entries of an analysis that are stored unchanged."""
 
 
 def analyse(design: Design, spec: PartSpec, level: str) -> dict[str, Any]:
-    """Return what finite elements say of a design as a part, and its way along the stroke."""
+    """Return the result of one analysis, and the efficiency along the stroke."""
     found = validate(design, spec, [(level, FemSettings())]).analyses[0].to_dict()
-    told = {key: found[key] for key in KEPT}
-    told["theory"] = found["theory"]
-    told["touching"] = len(found["contacts"])
-    told["lost"] = found["loss_of_stability"]
-    told["seconds"] = round(found["cost"]["seconds"], 2)
-    told["stroke"] = [[point["load"], point["efficiency"]] for point in found["stroke"]]
-    return told
+    return {
+        **{key: found[key] for key in KEYS},
+        "touching": len(found["contacts"]),
+        "lost": found["loss_of_stability"],
+        "seconds": round(found["cost"]["seconds"], 2),
+        "stroke": [[point["load"], point["efficiency"]] for point in found["stroke"]],
+    }
 
 
 def analyse_all(
@@ -36,8 +37,8 @@ def analyse_all(
 ) -> dict[str, dict[str, Any]]:
     """Analyse designs at several levels.
 
-    What needs a library that is missing is left out, and so is what snaps as a frame already at
-    finer levels, where it would take long to find out.
+    Levels that need a missing library are omitted. Designs that snap as frames are not analysed
+    at finer levels, where the analysis would be expensive.
     """
     found: dict[str, dict[str, Any]] = {name: {} for name in designs}
     for level in levels:
@@ -48,8 +49,8 @@ def analyse_all(
             for name, design in designs.items()
             if found[name].get("frame", {}).get("status", "converged") == "converged"
         }
-        # NGSolve has one heap for all threads.
+        # All threads share one heap of NGSolve.
         workers = None if level == "frame" else 1
-        for name, told in store.compute_all(level, work, workers=workers).items():
-            found[name][level] = told
+        for name, result in store.compute_all(level, work, workers=workers).items():
+            found[name][level] = result
     return found
