@@ -1,4 +1,4 @@
-"""How the documentation is built: ``sphinx-build -W docs site``."""
+"""Configuration of the documentation, built by ``sphinx-build -W docs site``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from made_pictures import MadePictures  # noqa: E402
 logging.getLogger("ezdxf").setLevel(logging.WARNING)  # tutorials show what they log
 
 RUN = HERE / "run"
-"""Where the tutorials run, and leave what they make."""
+"""Folder in which the tutorials run and write their files."""
 
 project = "bellcrank"
 author = "The bellcrank authors"

@@ -165,8 +165,8 @@ def draw(figures: Mapping[str, Any], path: Path, title: str, reported: tuple[flo
         )
         for k, model in enumerate(models)
     ]
-    places = np.array([len(order), len(order) + 1.0])
-    series.append(_bars(places, list(reported), ("the paper", style.HUMAN), 0.55))
+    centres = np.array([len(order), len(order) + 1.0])
+    series.append(_bars(centres, list(reported), ("the paper", style.HUMAN), 0.55))
     highest = max(float(np.max(each.y)) for each in series)
     searches = figures["searches"]
     chart = Chart(
@@ -186,7 +186,7 @@ def draw(figures: Mapping[str, Any], path: Path, title: str, reported: tuple[flo
 
 
 def _bars(
-    places: Any,
+    centres: Any,
     values: list[float | None],
     look: tuple[str, str],
     width: float,
@@ -198,7 +198,7 @@ def _bars(
     labels = [("snaps" if k in analysed else "") if value is None else number(value)
               for k, value in enumerate(values)]  # fmt: skip
     return Series(
-        places, heights, name=name, kind="bars", colour=colour, width=width, labels=labels
+        centres, heights, name=name, kind="bars", colour=colour, width=width, labels=labels
     )
 
 

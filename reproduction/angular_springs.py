@@ -56,17 +56,17 @@ def star(angles: list[int], dead: list[int], turn: float) -> Problem:
 
     Dead ends are free. The output is the free end of an additional, unloaded beam.
     """
-    places = [(0.0, 0.0)]
-    places += [(math.cos(math.radians(a)), math.sin(math.radians(a))) for a in angles]
+    points = [(0.0, 0.0)]
+    points += [(math.cos(math.radians(a)), math.sin(math.radians(a))) for a in angles]
     held = next(k for k in range(len(angles) - 1, 0, -1) if k not in dead) + 1
-    places.append((2.0 * places[held][0], 2.0 * places[held][1]))
-    last = len(places) - 1
+    points.append((2.0 * points[held][0], 2.0 * points[held][1]))
+    last = len(points) - 1
     beams = [(0, k + 1) for k in range(len(angles))] + [(held, last)]
     free = {k + 1 for k in dead}
     fixed = [0, *(k + 1 for k in range(1, len(angles)) if k + 1 not in free)]
     return Problem(
         name="star",
-        lattice=Lattice(np.array(places), np.array(beams)),
+        lattice=Lattice(np.array(points), np.array(beams)),
         supports=Supports(fixed=np.array(fixed)),
         input=Input(nodes=np.array([1]), direction=UP, drive="displacement", amount=turn),
         output=Output(nodes=np.array([last]), direction=UP),

@@ -74,12 +74,12 @@ def box_of(
     """
     lattice = lattices["triangular-rectangle"](columns=columns, rows=rows)
     spec = PartSpec(width=width)
-    places = lattice.positions
-    middle = 0.5 * float(places[:, 1].max())
-    top, right = float(places[:, 1].max()), float(places[:, 0].max())
+    positions = lattice.positions
+    middle = 0.5 * float(positions[:, 1].max())
+    top, right = float(positions[:, 1].max()), float(positions[:, 0].max())
 
     def nearest(*points: tuple[float, float]) -> NDArray[np.int64]:
-        return np.array([int(np.argmin(np.hypot(*(places - point).T))) for point in points])
+        return np.array([int(np.argmin(np.hypot(*(positions - point).T))) for point in points])
 
     fixed = nearest((0.5, 0.0), (1.5, 0.0), (0.5, top), (1.5, top))
     drive = Input(
@@ -96,7 +96,7 @@ def box_of(
     else:
         outputs = nearest((right - 0.5, middle + rise), (right - 0.5, middle - rise))
         direction = np.array([[0.0, -1.0], [0.0, 1.0]])
-        centre = places[lattice.beams].mean(axis=1)
+        centre = positions[lattice.beams].mean(axis=1)
         inside = (np.abs(centre[:, 1] - middle) < rise - 1e-6) & (centre[:, 0] > right - GAP)
         initial &= ~inside
         half = rise - 0.5 * spec.width / spec.scale

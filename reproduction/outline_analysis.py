@@ -78,8 +78,8 @@ def _at_level(box: Box, density: NDArray[np.float64], level: float) -> shapely.P
     points, offsets = filled
     pieces = []
     for corners, starts in zip(points, offsets, strict=True):
-        rings = [corners[a:b] for a, b in itertools.pairwise(starts)]
-        pieces.append(shapely.Polygon(rings[0], rings[1:]).buffer(0))
+        boundaries = [corners[a:b] for a, b in itertools.pairwise(starts)]
+        pieces.append(shapely.Polygon(boundaries[0], boundaries[1:]).buffer(0))
     frame = shapely.box(*box.low, *box.high)
     return _around_ports(box, _rounded(shapely.union_all(pieces) & frame, SMOOTH))
 
@@ -202,7 +202,7 @@ def _simplified(
 ) -> list[list[float]]:
     """Remove nearly collinear points (Douglas and Peucker, 1973)."""
     both = np.column_stack([rest[ring], rest[ring] + displacement[ring]])
-    kept = {0, len(ring) - 1}
+    selected = {0, len(ring) - 1}
     open_ = [(0, len(ring) - 1)]
     while open_:
         first, last = open_.pop()
@@ -214,7 +214,7 @@ def _simplified(
         away = np.linalg.norm(offset - along[:, None] * chord, axis=1)
         farthest = first + 1 + int(away.argmax())
         if away.max() > PICTURE_TOLERANCE:
-            kept.add(farthest)
+            selected.add(farthest)
             open_ += [(first, farthest), (farthest, last)]
-    found: list[list[float]] = both[sorted(kept)].round(1).tolist()
+    found: list[list[float]] = both[sorted(selected)].round(1).tolist()
     return found

@@ -71,16 +71,16 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
     order = np.argsort([each["efficiency"][-1] for each in figures["paths"]])
     total = len(order)
     series = []
-    for place, k in enumerate(order):
-        best = place == total - 1
+    for index, k in enumerate(order):
+        best = index == total - 1
         series.append(
             Series(
                 np.array(figures["paths"][k]["accepted"], dtype=float),
                 np.array(figures["paths"][k]["efficiency"], dtype=float),
-                colour=style.BEST if best else _grey(place / max(total - 1, 1)),
+                colour=style.BEST if best else _grey(index / max(total - 1, 1)),
                 width=1.7 if best else 0.8,
                 level=3.0 if best else 2.0,
-                name="largest final value" if best else "other seeds" * (place == 0),
+                name="largest final value" if best else "other seeds" * (index == 0),
             )
         )
     levels = [Level(figures["human"], "human design")] if figures["human"] else []
@@ -109,11 +109,11 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
     draw_sheet(sheet, path, overwrite=True)
 
 
-def _grey(place: float) -> str:
+def _grey(fraction: float) -> str:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    return to_hex(colormaps["bone"](0.42 + 0.4 * (1.0 - place)))
+    return to_hex(colormaps["bone"](0.42 + 0.4 * (1.0 - fraction)))
 
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:

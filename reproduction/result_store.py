@@ -44,8 +44,8 @@ class ResultStore:
     --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as place:
-    ...     store = ResultStore.for_study(Path(place), "doubling", {"times": 2})
+    >>> with TemporaryDirectory() as root:
+    ...     store = ResultStore.for_study(Path(root), "doubling", {"times": 2})
     ...     store.compute_all("double", {str(k): lambda k=k: 2 * k for k in range(3)})
     ...     store.compute("double-1", lambda: "not computed again")
     {'0': 0, '1': 2, '2': 4}
@@ -59,7 +59,7 @@ class ResultStore:
     @classmethod
     def for_study(
         cls,
-        place: Path,
+        root: Path,
         name: str,
         settings: Any,
         workers: int | None = None,
@@ -69,7 +69,7 @@ class ResultStore:
 
         Parameters
         ----------
-        place
+        root
             Folder of all studies.
         name
             Name of the study.
@@ -77,7 +77,7 @@ class ResultStore:
             A dataclass, or plain data.
         """
         key = digest(settings if isinstance(settings, dict) else asdict(settings))
-        folder = place / RAW / f"{name}-{key}"
+        folder = root / RAW / f"{name}-{key}"
         make_folder(folder)
         return cls(folder, workers or default_workers(), progress)
 

@@ -241,21 +241,21 @@ def _analysed(box: Box, shape: Polygon | None, triangle: float) -> dict[str, Any
 
 
 def _ports(box: Box) -> dict[str, Any]:
-    problem, places = box.problem, box.positions
+    problem, points = box.problem, box.positions
     return {
         "input": [
-            [*places[node].tolist(), *way]
+            [*points[node].tolist(), *way]
             for node, way in zip(
                 problem.input.nodes.tolist(), problem.input.direction.tolist(), strict=True
             )
         ],
         "output": [
-            [*places[node].tolist(), *way]
+            [*points[node].tolist(), *way]
             for node, way in zip(
                 problem.output.nodes.tolist(), problem.output.direction.tolist(), strict=True
             )
         ],
-        "held": places[problem.supports.fixed].tolist(),
+        "held": points[problem.supports.fixed].tolist(),
     }
 
 

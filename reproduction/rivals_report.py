@@ -40,7 +40,7 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
                     ],
                     inputs=[tuple(port) for port in ports["input"]],
                     outputs=[tuple(port) for port in ports["output"]],
-                    fixed=[tuple(place) for place in ports["held"]],
+                    fixed=[tuple(point) for point in ports["held"]],
                 )
             )
     draw_shapes(
@@ -71,8 +71,8 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
                 f"smallest width {number(ours['narrowest_mm'], 1)} and "
                 f"{number(rival.get('narrowest_mm'), 1)} mm",
                 f"{_better_method(ours, rival)}; efficiency with "
-                f"{figures['triangles_mm'][1]:g} mm triangles {number(ours['efficiency_finer'])} and "
-                f"{number(rival['efficiency_finer'])}; "
+                f"{figures['triangles_mm'][1]:g} mm triangles "
+                f"{number(ours['efficiency_finer'])} and {number(rival['efficiency_finer'])}; "
                 f"bellcrank by goals: {_by_goals(ours)}; "
                 f"pyMOTO by springs at input and output: {_by_springs(rival)}",
             )

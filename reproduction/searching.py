@@ -96,10 +96,10 @@ def downsampled_path(value: NDArray[np.float64]) -> dict[str, list[float]]:
     if not len(value):
         return {"accepted": [], "efficiency": []}
     accepted = np.arange(1.0, len(value) + 1.0)
-    kept = downsample(np.log(accepted), value, POINTS // 4)
+    selected = downsample(np.log(accepted), value, POINTS // 4)
     return {
-        "accepted": accepted[kept].astype(int).tolist(),
-        "efficiency": np.round(value[kept], 4).tolist(),
+        "accepted": accepted[selected].astype(int).tolist(),
+        "efficiency": np.round(value[selected], 4).tolist(),
     }
 
 

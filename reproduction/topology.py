@@ -145,12 +145,12 @@ def _ports(
     """Return the unit load at the input, the mean output, and the fixed degrees of freedom."""
     problem = box.problem
     corners = np.arange(domain.nnodes)
-    places = box.low + step * np.column_stack(
+    points = box.low + step * np.column_stack(
         [corners % (domain.nelx + 1), corners // (domain.nelx + 1)]
     )
 
     def nearest(node: int) -> int:
-        return int(np.argmin(np.hypot(*(places - box.positions[node]).T)))
+        return int(np.argmin(np.hypot(*(points - box.positions[node]).T)))
 
     load, output = np.zeros(2 * domain.nnodes), np.zeros(2 * domain.nnodes)
     for vector, region in ((load, problem.input), (output, problem.output)):
@@ -160,7 +160,7 @@ def _ports(
     held = [
         2 * corner + axis
         for node in problem.supports.fixed
-        for corner in np.flatnonzero(np.hypot(*(places - box.positions[node]).T) < 0.8 * PAD)
+        for corner in np.flatnonzero(np.hypot(*(points - box.positions[node]).T) < 0.8 * PAD)
         for axis in (0, 1)
     ]
     return load, output, np.array(sorted(set(held)), dtype=np.int64)

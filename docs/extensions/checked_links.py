@@ -1,8 +1,8 @@
-"""Links within the built site, whoever wrote them: files and anchors must be there.
+"""A check that the targets of all links within the built site exist.
 
-Sphinx checks what it resolves itself; this looks at the pages as they are, with raw HTML and what
-was copied. A link that leads nowhere is a warning, which CI takes for an error. Links to elsewhere
-are left to ``sphinx-build -b linkcheck``.
+Sphinx checks the links that it resolves. This extension checks the written pages, including raw
+HTML and copied files. A link without a target is a warning, which CI treats as an error. External
+links are checked by ``sphinx-build -b linkcheck``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Page(HTMLParser):
-    """What a page refers to, and the anchors it has."""
+    """The links and the anchors of a page."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
@@ -30,14 +30,14 @@ class Page(HTMLParser):
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, _tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note a link or an anchor."""
-        told = {name: value for name, value in attrs if value}
-        self.links |= {told[name] for name in ("href", "src") if name in told}
-        self.anchors |= {told[name] for name in ("id", "name") if name in told}
+        """Record a link or an anchor."""
+        values = {name: value for name, value in attrs if value}
+        self.links |= {values[name] for name in ("href", "src") if name in values}
+        self.anchors |= {values[name] for name in ("id", "name") if name in values}
 
 
 def broken(site: Path) -> Iterator[tuple[str, str]]:
-    """Yield page and link of what leads nowhere."""
+    """Yield page and link for each link without a target."""
     pages = {path.resolve(): Page(path) for path in sorted(site.rglob("*.html"))}
     for path, page in pages.items():
         for link in sorted(page.links):
@@ -51,14 +51,16 @@ def broken(site: Path) -> Iterator[tuple[str, str]]:
 
 
 def check(app: Sphinx, failed: Exception | None) -> None:
-    """Warn of what leads nowhere."""
+    """Warn about links without a target."""
     if failed or app.builder.format != "html":
         return
     for page, link in broken(Path(app.outdir)):
-        logging.getLogger(__name__).warning("%s: %r leads nowhere", page, link, type="links")
+        logging.getLogger(__name__).warning(
+            "%s: the target of %r does not exist", page, link, type="links"
+        )
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Look when all is written."""
+    """Connect the check to the end of the build."""
     app.connect("build-finished", check, priority=900)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

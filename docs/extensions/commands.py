@@ -1,4 +1,4 @@
-"""The commands of a typer program, as reference: ``.. commands:: MODULE:APP``."""
+"""The directive ``.. commands:: MODULE:APP``: a reference of the commands of a typer program."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ def entries(command: Any, name: str) -> Iterator[tuple[str, Any]]:
 
 
 def usage(name: str, command: Any) -> str:
-    """Return the line to type."""
+    """Return the usage line of a command."""
     arguments = [each for each in command.params if each.param_type_name == "argument"]
-    words = [called(each) if each.required else f"[{called(each)}]" for each in arguments]
-    return " ".join([name, *words, "[OPTIONS]"])
+    texts = [called(each) if each.required else f"[{called(each)}]" for each in arguments]
+    return " ".join([name, *texts, "[OPTIONS]"])
 
 
 def called(argument: Any) -> str:
-    """Return how an argument is called."""
+    """Return the displayed name of an argument."""
     return str(argument.metavar or argument.name.upper())
 
 
 def described(command: Any) -> Iterator[str]:
-    """Yield an entry of a list for each option and argument."""
+    """Yield a definition list entry for each option and argument."""
     for each in command.params:
         if getattr(each, "hidden", False) or each.name == "help":
             continue
-        words = [*each.opts, *each.secondary_opts]
+        names = [*each.opts, *each.secondary_opts]
         if each.param_type_name == "argument":
-            words = [called(each)]
-        told = " ".join((getattr(each, "help", None) or "").split()).replace("*", r"\*")
-        yield f"{', '.join(f'``{word}``' for word in words)}\n    {told or '-'}\n"
+            names = [called(each)]
+        text = " ".join((getattr(each, "help", None) or "").split()).replace("*", r"\*")
+        yield f"{', '.join(f'``{name}``' for name in names)}\n    {text or '-'}\n"
 
 
 class Commands(SphinxDirective):
-    """Describes each command in a section of its own."""
+    """A directive that adds a section for each command."""
 
     required_arguments = 1
 
@@ -74,6 +74,6 @@ class Commands(SphinxDirective):
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Offer the directive."""
+    """Register the directive."""
     app.add_directive("commands", Commands)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

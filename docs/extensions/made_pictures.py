@@ -1,4 +1,4 @@
-"""Pictures that tutorials write, for sphinx-gallery."""
+"""A scraper of sphinx-gallery for the picture files that tutorials write."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from sphinx_gallery.scrapers import figure_rst
 
 @dataclass
 class MadePictures:
-    """Shows the pictures that a block of a tutorial has left in a folder."""
+    """A scraper that shows the pictures that a block of a tutorial wrote to a folder."""
 
     folder: Path
     shown: set[Path] = field(default_factory=set, repr=False)
 
     def __call__(self, _block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:
-        """Copy what is new to where the page looks for it."""
+        """Copy new pictures to the paths that the page expects."""
         made = [path for kind in ("png", "gif") for path in sorted(self.folder.glob(f"*.{kind}"))]
         new = [path for path in made if path not in self.shown]
         copies = []

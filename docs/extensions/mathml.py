@@ -1,4 +1,4 @@
-"""Equations as MathML, which browsers draw themselves: no script, nothing from elsewhere."""
+"""Equations as MathML, which browsers render without scripts or external files."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
 
 def inline(writer: Any, node: nodes.Element) -> None:
-    """Write an equation within a line."""
+    """Write an inline equation."""
     writer.body.append(convert(node.astext()))
     raise nodes.SkipNode
 
 
 def block(writer: Any, node: nodes.Element) -> None:
-    """Write an equation that stands by itself, and scrolls where it is wider than the page."""
+    """Write a display equation, which scrolls if it is wider than the page."""
     equation = convert(node.astext(), display="block")
     writer.body.append(f'<div class="equation">{equation}</div>\n')
     raise nodes.SkipNode
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Offer the renderer under the name ``mathml``."""
+    """Register the renderer ``mathml``."""
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

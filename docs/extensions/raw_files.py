@@ -1,4 +1,4 @@
-"""Files that pages name in raw HTML, which Sphinx does not look into."""
+"""Copying of files that are referenced in raw HTML, which Sphinx does not parse."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FILES = ("library/*.svg", "library/index.html")
 
 
 def copy(app: Sphinx, failed: Exception | None) -> None:
-    """Put them where the pages look for them."""
+    """Copy the files to the built site."""
     if failed or app.builder.format != "html":
         return
     for path in (each for pattern in FILES for each in Path(app.srcdir).glob(pattern)):
@@ -23,6 +23,6 @@ def copy(app: Sphinx, failed: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Copy at the end, before links are checked."""
+    """Connect the copying to the end of the build, before links are checked."""
     app.connect("build-finished", copy, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -247,9 +247,9 @@ def _add_density(axes: Axes, density: Density) -> None:
     axes.grid(axis="x", color=style.IDLE_REST, linewidth=0.8)
 
 
-def _annotate(axes: Axes, text: str, place: tuple[float, float], **options: Any) -> None:
+def _annotate(axes: Axes, text: str, position: tuple[float, float], **options: Any) -> None:
     axes.annotate(
-        text, place, xytext=options.pop("offset"), textcoords="offset points",
+        text, position, xytext=options.pop("offset"), textcoords="offset points",
         size=style.SMALL_SIZE - 1.0, color=style.INK, family=style.FONT, zorder=7,
         annotation_clip=False, **options,
     )  # fmt: skip
@@ -274,9 +274,9 @@ def _finish(axes: Axes, chart: Chart) -> None:
     if chart.names:
         axes.set_xticks(range(len(chart.names)), chart.names, family=style.FONT)
         axes.tick_params(axis="x", length=0.0, labelcolor=style.INK)
-    for place, line in enumerate(chart.note):
+    for index, line in enumerate(chart.note):
         axes.text(
-            0.035, 0.955 - 0.075 * place, line, transform=axes.transAxes, va="top", ha="left",
+            0.035, 0.955 - 0.075 * index, line, transform=axes.transAxes, va="top", ha="left",
             size=style.SMALL_SIZE, color=style.INK, family=style.FONT, zorder=8,
         )  # fmt: skip
     if chart.legend is not None and axes.get_legend_handles_labels()[1]:
@@ -291,7 +291,7 @@ MANY = 1.0e5
 """Number from which tick labels are powers of ten."""
 
 
-def plain_number(value: float, _place: int = 0) -> str:
+def plain_number(value: float, _position: int = 0) -> str:
     r"""Format a tick label.
 
     Examples
@@ -312,6 +312,6 @@ def add_decimal_ticks(axes: Axes) -> None:
     if high > 32.0 * low:
         return
     powers = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
-    places = [k * 10.0**p for p in powers for k in (1, 2, 5) if low <= k * 10.0**p <= high]
-    axes.set_xticks(places, [plain_number(place) for place in places])
+    ticks = [k * 10.0**p for p in powers for k in (1, 2, 5) if low <= k * 10.0**p <= high]
+    axes.set_xticks(ticks, [plain_number(tick) for tick in ticks])
     axes.xaxis.set_minor_locator(NullLocator())

@@ -79,8 +79,8 @@ def draw_joints(
     height = top + HEADING + SIDE * (1.0 - CUT / 2.56) + 0.1
     figure = style.new_figure(width, height)
     style.add_heading(figure, title, note, MARGIN, MARGIN)
-    for place, joint in enumerate(joints):
-        left = MARGIN + place * (SIDE + GAP)
+    for index, joint in enumerate(joints):
+        left = MARGIN + index * (SIDE + GAP)
         style.add_heading(figure, joint.title, joint.note, left, top)
         axes = figure.add_axes(
             (left / width, 0.08 / height, SIDE / width, SIDE * (1.0 - CUT / 2.56) / height)
@@ -95,8 +95,8 @@ def draw_joints(
 def _add_joint(axes: Axes, joint: Joint) -> None:
     for angle in joint.removed:
         _add_beam(axes, angle, style.REST, 2.2, dashed=True)
-    for place, angle in enumerate(joint.angles):
-        dead = place in joint.dead
+    for index, angle in enumerate(joint.angles):
+        dead = index in joint.dead
         _add_beam(axes, angle, style.IDLE if dead else style.INK, 3.0 if dead else 5.0)
         x, y = _at(angle, 1.0)
         axes.plot(
@@ -107,10 +107,10 @@ def _add_joint(axes: Axes, joint: Joint) -> None:
     count = len(joint.angles)
     if count < 2:
         return
-    for place, start in enumerate(joint.angles):
-        end = joint.angles[(place + 1) % count]
+    for index, start in enumerate(joint.angles):
+        end = joint.angles[(index + 1) % count]
         opening = (end - start) % 360.0
-        _add_spring(axes, start, opening, RADIUS + STEP * (place % 2), merged=place in joint.merged)
+        _add_spring(axes, start, opening, RADIUS + STEP * (index % 2), merged=index in joint.merged)
 
 
 def _at(angle: float, radius: float) -> tuple[float, float]:

@@ -65,10 +65,10 @@ def draw_shapes(
         As `save_figure`.
     """
     check_target(path, overwrite=overwrite)
-    places = np.concatenate(
+    points = np.concatenate(
         [np.concatenate([c[:, :2], c[:, 2:]]) for shape in shapes for c in shape.curves]
     )
-    low, high = places.min(axis=0), places.max(axis=0)
+    low, high = points.min(axis=0), points.max(axis=0)
     arrow = 0.13 * float((high - low)[0])
     room = np.array([arrow, 2.0])
     low, high = low - room, high + room
@@ -81,8 +81,8 @@ def draw_shapes(
     figure = style.new_figure(WIDTH, top + rows * tall - GAP + FOOT)
     height = float(figure.get_size_inches()[1])
     style.add_heading(figure, title, note, MARGIN, MARGIN)
-    for place, shape in enumerate(shapes):
-        row, column = divmod(place, COLUMNS)
+    for index, shape in enumerate(shapes):
+        row, column = divmod(index, COLUMNS)
         left, above = MARGIN + column * (across + GAP), top + row * tall
         style.add_heading(figure, shape.title, shape.notes[0], left, above)
         for line, text in enumerate(shape.notes[1:], start=1):

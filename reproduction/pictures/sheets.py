@@ -185,8 +185,8 @@ def _add_charts(figure: Figure, sheet: Sheet) -> None:
     width, height = figure.get_size_inches()
     count = len(sheet.charts)
     room = (width - 2 * MARGIN - LEFT - BETWEEN * (count - 1)) / count
-    for place, chart in enumerate(sheet.charts):
-        left = MARGIN + LEFT - 0.06 + place * (room + BETWEEN)
+    for index, chart in enumerate(sheet.charts):
+        left = MARGIN + LEFT - 0.06 + index * (room + BETWEEN)
         axes = figure.add_axes(
             (left / width, (MARGIN + BELOW) / height, room / width, sheet.height / height)
         )

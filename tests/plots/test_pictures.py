@@ -33,7 +33,7 @@ def motion():
 
 @pytest.fixture(scope="module")
 def draw(motion):
-    """Every picture there is, by the name of its function."""
+    """Drawing functions by name."""
     chains = [ChainPath(np.linspace(0.0, top, 40)) for top in (1.0, 2.0)]
     return {
         "motion": lambda path, **more: draw_motion(motion, path, **more),
@@ -49,7 +49,7 @@ NAMES = ["motion", "comparison", "design", "paths"]
 
 @pytest.fixture(scope="module")
 def drawn(draw, tmp_path_factory):
-    """A file of every picture, drawn once."""
+    """A folder with one file of each picture."""
     folder = tmp_path_factory.mktemp("drawn")
     for name in NAMES:
         draw[name](folder / f"{name}.png")
@@ -93,14 +93,14 @@ def test_the_same_picture_is_the_same_file(draw, tmp_path, suffix):
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("file", ["picture.jpg", "picture", "picture.png.txt"])
-def test_an_unknown_suffix_is_refused(draw, tmp_path, name, file):
+def test_an_unknown_suffix_is_rejected(draw, tmp_path, name, file):
     with pytest.raises(InvalidSettings, match=r"ending in \.png, \.svg, \.pdf"):
         draw[name](tmp_path / file)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_existing_file_is_kept_unless_told_otherwise(draw, tmp_path, name):
+def test_an_existing_file_is_kept_by_default(draw, tmp_path, name):
     path = tmp_path / "picture.png"
     path.write_text("precious")
     with pytest.raises(OutputExists, match="exists"):
@@ -164,7 +164,7 @@ def test_the_package_does_not_import_the_pictures():
     assert done.stdout.strip() == "False"
 
 
-def test_loose_pieces_and_dead_ends_are_told_from_the_rest(motion, tmp_path):
+def test_loose_pieces_and_dead_ends_are_unloaded(motion, tmp_path):
     problem = motion.design.problem
     mask = motion.design.mask.copy()
     absent = problem.designable[~mask[problem.designable]]
@@ -194,7 +194,7 @@ def test_a_design_without_a_response_is_drawn_at_rest(motion, tmp_path):
     draw_motion(lost, tmp_path / "lost.png", title="costs $5, or $6")
 
 
-def test_designs_of_shifted_lattices_stand_on_one_level(motion, tmp_path):
+def test_lower_edges_of_shifted_lattices_are_aligned(motion, tmp_path):
     problem = motion.design.problem
     lattice = Lattice(problem.lattice.positions + np.array([3.0, -40.0]), problem.lattice.beams)
     shifted = replace(motion, design=Design(replace(problem, lattice=lattice), motion.design.mask))
@@ -208,7 +208,7 @@ def test_an_empty_design_can_be_drawn(motion, tmp_path):
     draw_motion(Motion(nothing, np.zeros_like(motion.displacement)), tmp_path / "none.png")
 
 
-def test_magnified_motion_is_said_to_be(motion):
+def test_magnified_motion_is_noted(motion):
     large = replace(motion, magnify=2.5)
     rest = motion.design.problem.lattice.positions
     assert np.allclose(large.moved - rest, 2.5 * (motion.moved - rest))
@@ -216,17 +216,17 @@ def test_magnified_motion_is_said_to_be(motion):
 
 
 @pytest.mark.parametrize("magnify", [0.0, -1.0, float("nan"), float("inf")])
-def test_motion_cannot_be_magnified_by_nonsense(motion, magnify):
+def test_magnification_must_be_positive_and_finite(motion, magnify):
     with pytest.raises(InvalidSettings, match="magnify"):
         replace(motion, magnify=magnify)
 
 
-def test_a_displacement_for_other_nodes_is_refused(motion):
+def test_a_displacement_of_the_wrong_shape_is_rejected(motion):
     with pytest.raises(InvalidProblem, match=r"expected shape \(133, 2\).*got \(7, 2\)"):
         Motion(motion.design, np.zeros((7, 2)))
 
 
-def test_arrows_point_the_way_they_name(motion):
+def test_arrows_point_in_the_direction_of_their_region(motion):
     problem = motion.design.problem
     (push,) = input_arrows(problem)
     (wanted,) = output_arrows(problem, motion.moved)
@@ -237,7 +237,7 @@ def test_arrows_point_the_way_they_name(motion):
     assert len(displacement_arrows(motion)) == len(problem.output.nodes)
 
 
-def test_nodes_with_directions_of_their_own_get_arrows_of_their_own(motion, tmp_path):
+def test_nodes_with_different_directions_have_their_own_arrows(motion, tmp_path):
     problem = motion.design.problem
     nodes = problem.output.nodes
     angle = np.linspace(0.0, 3.0, len(nodes))
@@ -252,7 +252,7 @@ def test_chains_without_any_efficiency_can_be_drawn(tmp_path):
     draw_paths(chains, tmp_path / "nothing.png", PathOptions(annealing_steps=100))
 
 
-def test_gaps_and_infinities_in_a_path_do_not_hide_its_best():
+def test_values_that_are_not_finite_do_not_hide_the_peak_of_a_path():
     path = ChainPath(np.array([0.1, np.nan, 0.7, np.inf, 0.2]))
     assert path.peak == 2
 
@@ -266,7 +266,7 @@ def test_few_and_many_chains_can_be_drawn(tmp_path, chains, axis):
         for _ in range(chains)
     ]
     shown = PathOptions(
-        title="crane", annealing_steps=100, human_efficiency=1.0, built_efficiency=2.0,
+        title="crane", annealing_steps=100, human_efficiency=1.0, final_efficiency=2.0,
         best=(chains - 1, 17), axis=axis,
     )  # fmt: skip
     draw_paths(paths, tmp_path / "paths.png", shown)
@@ -276,12 +276,16 @@ def test_few_and_many_chains_can_be_drawn(tmp_path, chains, axis):
     ("chains", "shown", "message"),
     [
         ([], PathOptions(), "at least one"),
-        ([ChainPath(np.zeros(3))], PathOptions(best=(0, 3)), "no design number 3 in chain 0"),
+        (
+            [ChainPath(np.zeros(3))],
+            PathOptions(best=(0, 3)),
+            "best: no design with index 3 in chain 0",
+        ),
         ([ChainPath(np.zeros(3))], PathOptions(axis="time"), "accepted, proposals, got 'time'"),
-        ([ChainPath(np.zeros(3))], PathOptions(axis="proposals"), "step: needed"),
+        ([ChainPath(np.zeros(3))], PathOptions(axis="proposals"), "step: required"),
     ],
 )
-def test_impossible_paths_are_refused(tmp_path, chains, shown, message):
+def test_invalid_paths_are_rejected(tmp_path, chains, shown, message):
     with pytest.raises(InvalidSettings, match=message):
         draw_paths(chains, tmp_path / "paths.png", shown)
     assert list(tmp_path.iterdir()) == []

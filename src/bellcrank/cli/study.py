@@ -1,4 +1,4 @@
-"""`bellcrank study`: the figures and tables of the paper, computed again."""
+"""`bellcrank study`: reproduction of the figures and tables of the paper."""
 
 from __future__ import annotations
 
@@ -31,18 +31,21 @@ def study(
     name: Annotated[
         str,
         typer.Argument(
-            help="Name of a study; [b]list[/] for all names, [b]all[/] for all studies, one after "
-            "the other; [b]page[/] for a page beside --out, made of its records."
+            help="Name of a study; [b]list[/] prints the names, [b]all[/] runs all studies, "
+            "[b]page[/] writes the comparison page from the records in --out."
         ),
     ],
-    quick: Annotated[bool, typer.Option("--quick", help="Less of everything, for a look.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Run with reduced settings.")] = False,
     out: Annotated[
-        Path, typer.Option(help="Folder for NAME.json, NAME.png and raw records.")
+        Path, typer.Option(help="Folder for NAME.json, NAME.png and raw results.")
     ] = FOLDER,
-    workers: Annotated[int | None, typer.Option(help="Chains at a time. \\[all cores]")] = None,
+    workers: Annotated[int | None, typer.Option(help="Number of threads. \\[all cores]")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the records.")] = False,
 ) -> None:
-    """Remake figures and tables of the paper; what was computed once is not computed again."""
+    """Reproduce figures and tables of the paper. Needs a checkout of the source repository.
+
+    Rerun the same command to resume an interrupted study.
+    """
     require_reproduction()
     from reproduction import run_study, studies
 
@@ -72,7 +75,7 @@ def study(
 
 @contextmanager
 def _progress(name: str) -> Iterator[Callable[[str, int, int], None]]:
-    """Show how a study gets on, on the error output."""
+    """Show the progress of a study on standard error."""
     columns = (
         TextColumn("{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(),
         TimeElapsedColumn(),
@@ -80,41 +83,41 @@ def _progress(name: str) -> Iterator[Callable[[str, int, int], None]]:
     with Progress(*columns, console=notes, transient=True) as shown:
         tasks: dict[str, Any] = {}
 
-        def tell(what: str, done: int, total: int) -> None:
-            if what not in tasks:
-                tasks[what] = shown.add_task(f"{name}: {what}", total=total)
-            shown.update(tasks[what], completed=done)
+        def report(activity: str, done: int, total: int) -> None:
+            if activity not in tasks:
+                tasks[activity] = shown.add_task(f"{name}: {activity}", total=total)
+            shown.update(tasks[activity], completed=done)
 
-        yield tell
+        yield report
 
 
 def _print_list(*, as_json: bool) -> None:
     from reproduction import studies
 
     if as_json:
-        told = [
+        rows = [
             {"name": each.name, "title": each.title, "after": each.after}
             for each in studies.values()
         ]
-        print_json(json.dumps(told, indent=1))
+        print_json(json.dumps(rows, indent=1))
         return
-    table = Table("name", "what it remakes", "of the paper", box=SIMPLE)
+    table = Table("name", "study", "part of the paper", box=SIMPLE)
     for each in studies.values():
         table.add_row(each.name, each.title, each.after)
     results.print(table)
 
 
 def _print(record: Mapping[str, Any]) -> None:
-    """Print the rows of the comparison with the paper."""
+    """Print the comparison with the paper."""
     results.print(f"[b]{plain(record['title'])}[/] ({record['mode']}; {plain(record['runs'])})")
-    table = Table("", "the paper", "bellcrank", box=SIMPLE)
+    table = Table("quantity", "paper", "bellcrank", box=SIMPLE)
     for row in record["comparison"]:
         table.add_row(plain(row["what"]), plain(row["paper"] or "–"), plain(row["ours"]))
     results.print(table)
 
 
 def _write_page(out: Path) -> None:
-    """Write the page that compares the records in a folder with the paper; draw them anew."""
+    """Write the comparison page from the records in a folder, and update their pictures."""
     from bellcrank.model.storage import write_text
     from reproduction.page import page_of
     from reproduction.records import read_records, refresh
@@ -122,7 +125,7 @@ def _write_page(out: Path) -> None:
     names = read_records(out)
     if not names:
         raise InvalidSettings(
-            f"{out}: no records of studies there; bellcrank study all --out {out}"
+            f"{out}: no records of studies in this folder; run bellcrank study all --out {out}"
         )
     records = {name: refresh(out / f"{name}.json") for name in names}
     page = out.parent / PAGE_FILE

@@ -107,8 +107,8 @@ def _add_curves(figure: Figure, card: Card) -> None:
     """Add efficiency and force along the stroke, upper right."""
     left = WIDTH - MARGIN - CURVES[0]
     pair: list[Axes] = []
-    for place in range(2):
-        bottom = HEIGHT - MARGIN - 0.75 - CURVES[1] - place * (CURVES[1] + 0.7)
+    for index in range(2):
+        bottom = HEIGHT - MARGIN - 0.75 - CURVES[1] - index * (CURVES[1] + 0.7)
         place_of = (left / WIDTH, bottom / HEIGHT, CURVES[0] / WIDTH, CURVES[1] / HEIGHT)
         pair.append(figure.add_axes(place_of))
     draw_strokes((pair[0], pair[1]), [card.curve], card.labels)
@@ -117,8 +117,8 @@ def _add_curves(figure: Figure, card: Card) -> None:
 def _add_tables(figure: Figure, tables: list[Table]) -> None:
     """Add the tables at the bottom, in columns of equal width."""
     wide = (WIDTH - 2.0 * MARGIN) / max(len(tables), 1)
-    for place, (heading, rows) in enumerate(tables):
-        left, top = MARGIN + place * wide, 2.05
+    for index, (heading, rows) in enumerate(tables):
+        left, top = MARGIN + index * wide, 2.05
         options: dict[str, Any] = {"family": style.FONT, "parse_math": False, "va": "top"}
         figure.text(
             left / WIDTH, top / HEIGHT, heading,

@@ -222,8 +222,8 @@ def _fill(
     if annealing > 0.0:
         axes.axvspan(axes.get_xlim()[0], annealing, color=style.SHADE, linewidth=0, zorder=0)
     others = [k for k in range(len(chains)) if best is None or k != best[0]]
-    for place, k in enumerate(others):
-        line_style: LineStyle = {"color": _grey(place, len(others)), "linewidth": 0.9}
+    for index, k in enumerate(others):
+        line_style: LineStyle = {"color": _grey(index, len(others)), "linewidth": 0.9}
         _add_curve(axes, chains[k], options.axis, line_style, level=2.0)
     if best is not None:
         chain, index = chains[best[0]], best[1]
@@ -288,7 +288,7 @@ def _style(axes: Axes, options: PathOptions, longest: float, *, logarithmic: boo
         axes.set_xlim(0.0, max(longest, 1.0) * 1.02)
     if not logarithmic or longest < 1e6:
         axes.xaxis.set_major_formatter(
-            FuncFormatter(lambda x, _place: f"{x:,.0f}".replace(",", "\u202f"))
+            FuncFormatter(lambda x, _position: f"{x:,.0f}".replace(",", "\u202f"))
         )
     labels = {"accepted": "accepted changes", "proposals": "proposals"}
     style.label_axes(axes, labels[options.axis], options.measure)
@@ -300,9 +300,9 @@ def _add_curve(
 ) -> None:
     """Draw one chain, downsampled to the resolution of the picture."""
     x = chain.along(axis)
-    kept = downsample(np.log(x) if axes.get_xscale() == "log" else x, chain.efficiency)
+    selected = downsample(np.log(x) if axes.get_xscale() == "log" else x, chain.efficiency)
     axes.plot(
-        x[kept], chain.efficiency[kept], drawstyle="steps-post",
+        x[selected], chain.efficiency[selected], drawstyle="steps-post",
         solid_joinstyle="round", zorder=level, **line_style,
     )  # fmt: skip
 
@@ -323,7 +323,7 @@ def _marker_at(x: float, y: float) -> Line2D:
     )
 
 
-def _grey(place: int, count: int) -> str:
+def _grey(index: int, count: int) -> str:
     """Return one of `count` bluish greys, so that neighbouring chains can be distinguished."""
-    fraction = place / max(count - 1, 1)
+    fraction = index / max(count - 1, 1)
     return to_hex(colormaps["bone"](0.45 + 0.35 * fraction))

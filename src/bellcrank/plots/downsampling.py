@@ -16,8 +16,8 @@ def downsample(
     """Select the points of a curve that determine its picture.
 
     The width is divided into columns, about as fine as the resolution of the picture. In each
-    column the first and last point and those with the smallest and largest y are kept. At gaps,
-    the points beside a run of values that are not finite are kept, with one point of the run.
+    column the first and last point and those with the smallest and largest y are selected. At gaps,
+    the points beside a run of values that are not finite are selected, with one point of the run.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ def downsample(
     --------
     >>> y = np.zeros(100_000)
     >>> y[31_415] = 1.0
-    >>> kept = downsample(np.arange(100_000.0), y, columns=100)
-    >>> len(kept) <= 400, 31_415 in kept
+    >>> selected = downsample(np.arange(100_000.0), y, columns=100)
+    >>> len(selected) <= 400, 31_415 in selected
     (True, True)
     """
     count = len(x)
@@ -48,17 +48,17 @@ def downsample(
         ((x - x[0]) / ((x[-1] - x[0]) or 1.0) * columns).astype(np.int64), columns - 1
     )
     starts = np.flatnonzero(np.r_[True, column[1:] != column[:-1]])
-    kept = [starts, np.r_[starts[1:], count] - 1]
+    selected = [starts, np.r_[starts[1:], count] - 1]
     finite = np.isfinite(y)
-    kept += [
+    selected += [
         _first_extreme(np.where(finite, y, fill), starts, smallest=fill > 0)
         for fill in (np.inf, -np.inf)
     ]
     gaps = np.flatnonzero(finite[1:] != finite[:-1])
-    # Alternating values can have as many gaps as points; then they are not kept.
+    # Alternating values can have as many gaps as points; then they are not selected.
     if len(gaps) <= 4 * columns:
-        kept += [gaps, gaps + 1]
-    return np.unique(np.concatenate(kept))
+        selected += [gaps, gaps + 1]
+    return np.unique(np.concatenate(selected))
 
 
 def _first_extreme(

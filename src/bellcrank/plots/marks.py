@@ -112,12 +112,12 @@ def add_struts(
 
 
 def add_nodes(
-    panel: Panel, places: NDArray[np.float64], colour: str, *, hollow: bool = False
+    panel: Panel, points: NDArray[np.float64], colour: str, *, hollow: bool = False
 ) -> None:
     """Mark nodes by dots."""
     panel.axes.plot(
-        places[:, 0],
-        places[:, 1],
+        points[:, 0],
+        points[:, 1],
         linestyle="none",
         marker="o",
         markersize=float(np.clip(1.75 * panel.strut, 3.0, 9.0)),
@@ -151,12 +151,12 @@ def add_supports(panel: Panel) -> None:
         _add_wheels(panel, positions[nodes], offset * step)
 
 
-def _add_wheels(panel: Panel, places: NDArray[np.float64], offset: NDArray[np.float64]) -> None:
+def _add_wheels(panel: Panel, points: NDArray[np.float64], offset: NDArray[np.float64]) -> None:
     """Draw wheels beside nodes, with their rails."""
-    if len(places) == 0:
+    if len(points) == 0:
         return
     radius = float(np.hypot(*offset)) / 2.0
-    centres = places + offset
+    centres = points + offset
     panel.axes.plot(
         *centres.T,
         linestyle="none",

@@ -180,11 +180,11 @@ def _frame(part: Drawing) -> Frame:
     """Return the lower left and upper right corner of a drawing, lattice units."""
     problem = part.motion.design.problem
     positions, step = problem.lattice.positions, spacing(problem)
-    places = [positions, part.motion.moved]
+    points = [positions, part.motion.moved]
     held = problem.supports.nodes
     if len(held):
-        places.append(outline_around(positions[held], 0.35 * step))
-    return extent(places, part.arrows, 0.15 * step)
+        points.append(outline_around(positions[held], 0.35 * step))
+    return extent(points, part.arrows, 0.15 * step)
 
 
 def drawing_frames(
@@ -241,7 +241,7 @@ def _add_struts_at_rest(panel: Panel, design: Design) -> None:
     free = np.isin(kinds.load_bearing, panel.problem.designable)
     add_struts(panel, rest, kinds.ground, style.GROUND, width=0.6, level=1.0)
     add_struts(panel, rest, kinds.unloaded, style.IDLE, width=0.55, level=2.0)
-    add_struts(panel, rest, kinds.load_bearing[~free], style.KEPT, level=2.1)
+    add_struts(panel, rest, kinds.load_bearing[~free], style.NOT_DESIGNABLE, level=2.1)
     add_struts(panel, rest, kinds.load_bearing[free], style.INK, level=2.2)
 
 
@@ -255,7 +255,7 @@ def legend_entries(parts: list[Drawing]) -> list[tuple[str, Any]]:
     else:
         entries = [
             ("designable", strut_entry(style.INK)),
-            ("not designable", strut_entry(style.KEPT)),
+            ("not designable", strut_entry(style.NOT_DESIGNABLE)),
         ]
     if any(len(beam_kinds(motion.design).unloaded) for motion in motions):
         entries.append(("unloaded", strut_entry(style.IDLE, 2.2)))

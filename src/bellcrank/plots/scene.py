@@ -134,10 +134,10 @@ def arrow_length(problem: Problem) -> float:
 def input_arrows(problem: Problem) -> list[Arrow]:
     """Return arrows along the input direction that end at each connected part of the input."""
     region = problem.input
-    places = problem.lattice.positions[region.nodes]
+    points = problem.lattice.positions[region.nodes]
     length, gap = arrow_length(problem), 0.45 * spacing(problem)
     arrows = []
-    for own, directions in _parts(problem, region, places):
+    for own, directions in _parts(problem, region, points):
         if _is_uniform(directions):
             tip = _edge(own, directions[0], side=-1.0) - gap * directions[0]
             arrows.append(Arrow(_pair(tip - length * directions[0]), _pair(tip)))
@@ -159,15 +159,15 @@ def output_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
         Positions of the displaced nodes, which the arrows do not overlap.
     """
     region = problem.output
-    places = np.concatenate([problem.lattice.positions, moved], axis=1)[region.nodes]
+    points = np.concatenate([problem.lattice.positions, moved], axis=1)[region.nodes]
     length, gap = arrow_length(problem), 0.45 * spacing(problem)
     arrows = []
-    for own, directions in _parts(problem, region, places):
+    for own, directions in _parts(problem, region, points):
         at_rest, gone = own[:, :2], own[:, 2:]
         if not _is_uniform(directions):
             arrows += [
-                Arrow(_pair(place), _pair(place + 0.6 * length * t))
-                for place, t in zip(at_rest, directions, strict=True)
+                Arrow(_pair(point), _pair(point + 0.6 * length * t))
+                for point, t in zip(at_rest, directions, strict=True)
             ]
             continue
         direction = directions[0]
@@ -250,12 +250,12 @@ def _parts(
 
 
 def extent(
-    places: list[NDArray[np.float64]], arrows: list[Arrow], margin: float
+    points: list[NDArray[np.float64]], arrows: list[Arrow], margin: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the lower left and upper right corner, (2,) each, of points and arrows."""
     ends = [np.array([arrow.tail, arrow.tip]) for arrow in arrows]
-    points = np.concatenate([*places, *ends])
-    return points.min(axis=0) - margin, points.max(axis=0) + margin
+    corners = np.concatenate([*points, *ends])
+    return corners.min(axis=0) - margin, corners.max(axis=0) + margin
 
 
 def aligned_frames(
@@ -282,12 +282,12 @@ def _is_uniform(direction: NDArray[np.float64]) -> bool:
 
 
 def _edge(
-    places: NDArray[np.float64], direction: NDArray[np.float64], side: float
+    points: NDArray[np.float64], direction: NDArray[np.float64], side: float
 ) -> NDArray[np.float64]:
     """Return the middle of the side of a region that is farthest along ``side * direction``."""
     across = np.array([-direction[1], direction[0]])
-    sideways = places @ across
-    along = side * (side * places @ direction).max()
+    sideways = points @ across
+    along = side * (side * points @ direction).max()
     middle: NDArray[np.float64] = (
         0.5 * (sideways.min() + sideways.max()) * across + along * direction
     )

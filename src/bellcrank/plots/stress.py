@@ -165,11 +165,11 @@ def _add_stressed(
     """Draw the displaced part, coloured by its stress."""
     problem = panel.problem
     add_supports(panel)
-    places = part.rest + drawing.motion.magnify * part.displacement
+    points = part.rest + drawing.motion.magnify * part.displacement
     options: dict[str, Any] = {"cmap": colours.cmap, "norm": colours.norm, "zorder": 3.0}
     if part.cells.shape[1] == 2:
         lines = LineCollection(
-            list(places[part.cells]),
+            list(points[part.cells]),
             linewidths=part.width * panel.points,
             capstyle="round",
             **options,
@@ -178,7 +178,7 @@ def _add_stressed(
         panel.axes.add_collection(lines, autolim=False)
     else:
         window = panel.axes.axis()
-        mesh = Triangulation(places[:, 0], places[:, 1], part.cells)
+        mesh = Triangulation(points[:, 0], points[:, 1], part.cells)
         panel.axes.tripcolor(mesh, part.stress, shading="gouraud", rasterized=True, **options)
         panel.axes.axis(window)
     add_arrows(panel, input_arrows(problem), style.INPUT, bold=True)
@@ -209,8 +209,8 @@ def _add_curves(
     across, up = figure.get_size_inches()
     wide = (across - 2 * MARGIN - 1.5) / 2.0
     pair: list[Axes] = []
-    for place in range(2):
-        left = MARGIN + 0.5 + place * (wide + 0.9)
+    for index in range(2):
+        left = MARGIN + 0.5 + index * (wide + 0.9)
         place_of = (left / across, (at + 0.35) / up, wide / across, (CURVES - 0.35) / up)
         pair.append(figure.add_axes(place_of))
     names = [drawing.title for drawing in drawings]

@@ -30,7 +30,7 @@ IDLE = "#8f98a1"
 IDLE_REST = "#e6e9ec"
 GROUND = "#b4bac1"
 GROUND_FILL = "#f1f3f5"
-KEPT = "#9db4c8"
+NOT_DESIGNABLE = "#9db4c8"
 INPUT = "#d55e00"
 OUTPUT = "#0072b2"
 WANTED = "#7fc0ea"
@@ -113,13 +113,13 @@ def row_of_axes(
     return [
         figure.add_axes(
             (
-                (left + place * (across + gap)) / width,
+                (left + index * (across + gap)) / width,
                 bottom / height,
                 across / width,
                 (height - top - bottom) / height,
             )
         )
-        for place in range(count)
+        for index in range(count)
     ]
 
 

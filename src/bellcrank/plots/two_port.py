@@ -116,8 +116,8 @@ def draw_two_port(
         ("input displacement", "input force"),
         ("output displacement", "output force on the load"),
     )
-    for axes, (below, beside) in zip(panels, labels, strict=True):
-        style.label_axes(axes, below, beside, style.SMALL_SIZE)
+    for axes, (x_label, y_label) in zip(panels, labels, strict=True):
+        style.label_axes(axes, x_label, y_label, style.SMALL_SIZE)
         style.style_axes(axes)
         axes.axhline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)
     panels[2].axvline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)

@@ -81,7 +81,7 @@ class Curves:
             )
         self.artists: list[Line2D] = [one for both in self._grown for one in both]
 
-    def place(self, state: int) -> None:
+    def update(self, state: int) -> None:
         """Update the curves and markers to a state."""
         for line, (grown, dot) in zip(self._lines, self._grown, strict=True):
             end = int(line.at[state]) + 1
@@ -100,13 +100,13 @@ def _style(axes: Axes, graph: Graph, height: float) -> None:
         axis.set_label_text(
             text + unit_label(unit), family=style.FONT, size=style.SMALL_SIZE, color=style.INK
         )
-        axis.set_major_formatter(FuncFormatter(lambda x, _place, u=unit: _number(x / u)))
+        axis.set_major_formatter(FuncFormatter(lambda x, _position, u=unit: _number(x / u)))
     axes.xaxis.labelpad = 2.0
     axes.set_ylim(*y_limits)
     axes.yaxis.set_major_locator(MaxNLocator(max(2, min(5, int(height / 0.3)))))
     if graph.logarithmic:
         axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _place: _number(x)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _position: _number(x)))
         axes.xaxis.set_minor_locator(NullLocator())
     else:
         axes.xaxis.set_major_locator(MaxNLocator(5))

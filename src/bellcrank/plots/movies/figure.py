@@ -167,7 +167,7 @@ class MovieFigure:
         self._canvas.restore_region(self._background)
         renderer = self._canvas.get_renderer()
         for part in self._parts:
-            part.place(state)
+            part.update(state)
             for artist in part.artists:
                 artist.draw(renderer)
         for sequence, (note, alarm) in zip(self._sequences, self._texts, strict=True):
@@ -193,7 +193,7 @@ def _layout(
 ) -> Layout:
     """Place graphs beside or below the lattices, whichever makes the lattices larger."""
     wide, tall = inches[0] - 2 * MARGIN, inches[1] - heading - foot
-    beside = (MARGIN, foot, wide - COLUMN - GAP, tall)
+    right_column = (MARGIN, foot, wide - COLUMN - GAP, tall)
     each = (inches[1] - MARGIN - foot - GAP * (graphs - 1)) / graphs
     stacked = [
         (inches[0] - MARGIN - COLUMN, foot + k * (each + GAP), COLUMN, each)
@@ -206,7 +206,7 @@ def _layout(
     across = sum(float(high[0] - low[0]) for low, high in frames)
     up = float(frames[0][1][1] - frames[0][0][1])
     found = []
-    for room, boxes in ((beside, stacked), (above, abreast)):
+    for room, boxes in ((right_column, stacked), (above, abreast)):
         scale = min((room[2] - GAP * (len(frames) - 1)) / across, room[3] / up)
         found.append(Layout(scale, room, tuple(boxes)))
     return max(found, key=lambda layout: layout.scale)

@@ -57,10 +57,10 @@ def frame_of(sequence: StateSequence) -> tuple[NDArray[np.float64], NDArray[np.f
             [problem.lattice.beams[seen].ravel(), problem.input.nodes, problem.output.nodes]
         )
     )
-    places = [positions, sequence.moved[:, nodes].reshape(-1, 2)]
+    points = [positions, sequence.moved[:, nodes].reshape(-1, 2)]
     if len(problem.supports.nodes):
-        places.append(outline_around(positions[problem.supports.nodes], 0.35 * step))
-    return extent(places, [*input_arrows(problem), *_output_arrows(sequence)], 0.2 * step)
+        points.append(outline_around(positions[problem.supports.nodes], 0.35 * step))
+    return extent(points, [*input_arrows(problem), *_output_arrows(sequence)], 0.2 * step)
 
 
 class LatticeArtist:
@@ -151,7 +151,7 @@ class LatticeArtist:
         draw()
         return [one for one in self._panel.axes.get_children() if one not in before]
 
-    def place(self, state: int) -> None:
+    def update(self, state: int) -> None:
         """Update all artists to a state."""
         sequence, moved = self._sequence, self._moved[state]
         present = sequence.present[state] & ~self._held

@@ -81,8 +81,8 @@ class StateSequence:
         """(K, N, 2) drawn positions of the nodes, lattice units."""
         known = np.isfinite(self.displacement).all(axis=2, keepdims=True)
         shift = np.where(known, self.displacement, 0.0)
-        places: NDArray[np.float64] = self.problem.lattice.positions + self.magnify * shift
-        return places
+        points: NDArray[np.float64] = self.problem.lattice.positions + self.magnify * shift
+        return points
 
     @property
     def is_one_design(self) -> bool:
