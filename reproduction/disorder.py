@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import InvalidProblem, InvalidSettings
+from bellcrank.errors import InvalidProblem, NoDesignFound
 from bellcrank.model import Problem, find_problem
 from bellcrank.model.builtin.discs import discs
 from bellcrank.plots import Motion, style
@@ -95,7 +95,7 @@ def _searched(problem: Problem, values: Mapping[str, Any], seed: int) -> dict[st
     settings = read_settings({**values, "chains": 1, "seed": seed})
     try:
         chosen = best_design(problem, [run_chain(problem, settings)])
-    except InvalidSettings:  # no design is stable and connected
+    except NoDesignFound:  # no design is stable and connected
         return {"efficiency": None, "mask": None}
     return {"efficiency": chosen.efficiency_after, "mask": chosen.design.mask_hex}
 

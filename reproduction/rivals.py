@@ -13,7 +13,7 @@ import numpy as np
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.search import read_settings
 from bellcrank.workflows.choosing import PartChoice
-from bellcrank.workflows.design import judge_for
+from bellcrank.workflows.design import verification_evaluator
 from reproduction.boxes import Box, box_of
 from reproduction.outline_analysis import analyse_outline, contour_of, narrowest, polygon_of
 from reproduction.registry import Figures, Study, register
@@ -163,7 +163,7 @@ def _chosen(box: Box, chains: Sequence[Mapping[str, Any]], values: Mapping[str, 
     """Return the best candidate of the chains by frame analysis."""
     settings = read_settings(dict(values))
     began = time.thread_time()
-    evaluator = judge_for(box.problem, settings)
+    evaluator = verification_evaluator(box.problem, settings)
     found = best_design(box.problem, chains, evaluator, PartChoice(box.spec, settings))
     return {
         "mask": found.design.mask_hex,

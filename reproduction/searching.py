@@ -69,7 +69,9 @@ def run_chain(problem: Problem, settings: SearchSettings, chain: int = 0) -> dic
         values.append(rows.efficiency[taken])
     seconds = time.thread_time() - began
     step, mask, value = np.concatenate(steps), np.concatenate(masks), np.concatenate(values)
-    offers = candidates_of(chain, step, mask, value, searches[settings.name].offers, OFFERED)
+    offers = candidates_of(
+        chain, step, mask, value, searches[settings.name].candidate_rule, OFFERED
+    )
     return {
         "steps": state.step,
         "accepted": len(value),

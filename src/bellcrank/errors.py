@@ -24,6 +24,10 @@ class InvalidSettings(BellcrankError, ValueError):
     """A search, run or command was given settings that make no sense."""
 
 
+class NoDesignFound(BellcrankError, RuntimeError):
+    """A search found no design that can be built and satisfies its goals."""
+
+
 class UnknownName(BellcrankError, KeyError):
     """A registry has no entry of that name."""
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-SEARCHES = "paper, informed, basin-hopping, tempering"
+SEARCHES = "paper, tempering, basin-hopping"
 
 pytestmark = pytest.mark.usefixtures("here")
 
@@ -194,11 +194,14 @@ def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: 
         (("--set", "radius"), "--set radius: expected KEY=VALUE"),
         (("--set", "radius=-1"), "radius: expected a number above 0, got -1"),
         (("--set", "radius=wide"), "radius: expected a number above 0, got 'wide'"),
-        (("--set", "thinnest=[1]"), "thinnest: expected a part from 0 to 1, got (1,)"),
-        (("--set", "depth=2.5"), "depth: expected a whole number of at least 1, got 2.5"),
+        (("--set", "min_density=[1]"), "min_density: expected a fraction from 0 to 1, got (1,)"),
+        (
+            ("--set", "max_failures=2.5"),
+            "max_failures: expected a whole number of at least 1, got 2.5",
+        ),
         (("--set", "colour=3"), "search 'basin-hopping' has no setting 'colour'; it has: "),
-        (("--search", "informed", "--set", 'moves=["jump"]'), "unknown move 'jump'; known: "),
-        (("--search", "informed", "--set", "moves=flip"), "moves: expected names of moves, got"),
+        (("--search", "tempering", "--set", 'moves=["jump"]'), "unknown move 'jump'; known: "),
+        (("--search", "tempering", "--set", "moves=flip"), "moves: expected names of moves, got"),
         (("--search", "tempering", "--set", "cold=1"), "cold: expected at most hot = 0.2, got 1"),
         (("--objective", "directional:1"), "objective directional:1: the part after the colon"),
         (("--objective", "force"), "objective 'force' needs a problem with drive = 'force'"),

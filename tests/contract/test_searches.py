@@ -1,4 +1,4 @@
-"""What every registered search promises: it can be stopped, kept as plain data and gone on with."""
+"""Contract of every registered search: it can be stopped, stored as plain data and resumed."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_settings_survive_json(settings: SearchSettings) -> None:
     assert settings.to_dict()["search"] == settings.name
 
 
-def test_only_the_paper_s_search_feeds_on_what_carries_no_load(settings: SearchSettings) -> None:
+def test_only_the_search_of_the_paper_keeps_unloaded_beams(settings: SearchSettings) -> None:
     assert settings.unloaded_beams == ("keep" if settings.name == "paper" else "prune_all")
 
 
@@ -142,9 +142,7 @@ def test_designs_that_snap_are_never_accepted(small: Problem, settings: SearchSe
     assert proposals.accepted.any()
 
 
-def test_a_search_that_can_foresee_nothing_goes_on(
-    small: Problem, settings: SearchSettings
-) -> None:
+def test_a_search_continues_without_predictions(small: Problem, settings: SearchSettings) -> None:
     class Blind(Snapping):
         def predict_flips(self, mask: np.ndarray) -> FlipPrediction | None:  # noqa: ARG002
             return None
@@ -169,22 +167,24 @@ def test_a_search_cannot_start_from_a_design_without_response(
         start_chain(Broken(small, 3), settings, 0)
 
 
-def test_a_state_between_blocks_is_the_only_one_to_go_on_from(
+def test_a_chain_resumes_only_from_a_state_between_blocks(
     small: Problem, settings: SearchSettings
 ) -> None:
     evaluator = make_evaluator(small, settings)
     state = replace(start_chain(evaluator, settings, 0), step=7)
-    with pytest.raises(InvalidSettings, match="a state at step 7 is not between blocks"):
+    with pytest.raises(InvalidSettings, match="multiple of 250 steps, got step 7"):
         advance_chain(evaluator, settings, 0, state)
 
 
-def test_what_a_search_offers_stands_up_to_a_closer_look(
+def test_the_best_candidate_of_a_search_is_verified(
     small: Problem, settings: SearchSettings
 ) -> None:
     _, proposals = whole(small, settings)
     taken = np.flatnonzero(proposals.accepted)
-    offered = searches[settings.name].offers(proposals.efficiency[taken], proposals.mask[taken])
-    best = max(offered, key=lambda index: proposals.efficiency[taken][index])
+    candidates = searches[settings.name].candidate_rule(
+        proposals.efficiency[taken], proposals.mask[taken]
+    )
+    best = max(candidates, key=lambda index: proposals.efficiency[taken][index])
     mask = np.unpackbits(proposals.mask[taken[best]])[: small.lattice.beam_count].astype(bool)
     response = SpringEvaluator(small, unloaded_beams=settings.unloaded_beams).evaluate(
         mask, VERIFICATION_INCREMENT

@@ -23,7 +23,7 @@ from bellcrank.machines.library.catalogue import SORTS
 from bellcrank.machines.library.measuring import LEAST_STIFFNESS, lever_check
 from bellcrank.machines.library.summary import INDEX, entry_files, read_summary, write_index
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Conditions, SpringEvaluator, Status
-from bellcrank.search.goals import Case, GoalEvaluator
+from bellcrank.search.constraints import ConstrainedEvaluator, LoadCase
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,7 +63,9 @@ def test_an_entry_that_comes_along_is_sound(name: str) -> None:
     entry = SHIPPED.find(name)
     problem, mask = entry.design.problem, entry.design.mask
     kind = kinds[entry.kind]
-    response = GoalEvaluator([Case(problem)], kind.goals).evaluate(mask, VERIFICATION_INCREMENT)
+    response = ConstrainedEvaluator([LoadCase(problem)], kind.goals).evaluate(
+        mask, VERIFICATION_INCREMENT
+    )
     assert response.status is Status.CONVERGED, "stable, and keeps the goals of its kind"
     assert entry.efficiency == pytest.approx(response.efficiency, abs=1e-8)
     assert problem.output.spring == kind.spring

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.search import MetropolisSettings, metropolis, start_chain
+from bellcrank.search import MetropolisSettings, start_chain
+from bellcrank.search.markov import metropolis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""A evaluator that lies now and then."""
+"""An evaluator that reports some designs as snapping."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ if TYPE_CHECKING:
 
 
 class Snapping:
-    """Finds the first neighbour of each few to snap.
+    """Reports the first of every few warm starts as snapping.
 
     Parameters
     ----------
     every
-        How many.
+        Number of warm starts per reported snap.
     """
 
     def __init__(self, problem: Problem, every: int) -> None:
         self.problem = problem
         self._inner = SpringEvaluator(problem)
         self._every = every
-        self._asked = 0
+        self._count = 0
 
     def evaluate(self, mask: np.ndarray, largest_increment: float = 1.0, **start: Any) -> Response:
         response = self._inner.evaluate(mask, largest_increment, **start)
         if not start:
             return response
-        self._asked += 1
-        snaps = self._asked % self._every == 1
+        self._count += 1
+        snaps = self._count % self._every == 1
         return replace(response, status=Status.SNAPPED) if snaps else response
 
     def predict_flips(self, mask: np.ndarray) -> FlipPrediction | None:

@@ -24,7 +24,7 @@ from bellcrank.search import (
     start_chain,
 )
 from bellcrank.search.blocks import random_numbers
-from bellcrank.search.metropolis import advance_in_python
+from bellcrank.search.markov.metropolis import advance_in_python
 from bellcrank.storage import Proposals
 from tests.search.snapping import Snapping
 
@@ -57,7 +57,7 @@ def degrees(problem: Problem, mask: np.ndarray) -> np.ndarray:
 
 VARIANTS = [
     {},
-    {"cost": "negative", "schedule": "geometric"},
+    {"cost": "negative", "schedule": "constant"},
     {"minimum_degree": 3},
     {"unloaded_beams": "prune_dead_ends"},
     {"patience": 7},
@@ -178,7 +178,7 @@ def test_a_search_cannot_start_from_a_design_without_response(small: Problem) ->
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"steps": 0}, "steps: expected a whole number of at least 1, got 0"),
+        ({"steps": 0}, "steps: .*at least 1, got 0"),
         ({"chains": 0}, "chains"),
         ({"seed": -1}, "seed"),
         ({"hot": float("nan")}, "hot"),
@@ -221,7 +221,7 @@ def test_every_schedule_is_positive_and_never_rises(name: str) -> None:
     assert table[-1] == pytest.approx(1e-3)
 
 
-def test_a_hopeless_flip_is_foreseen_without_a_warning() -> None:
-    rise = costs["exponential"].rise(0.5, np.array([-1e6, 1e6]))
-    assert rise[0] > 1e200
-    assert rise[1] == pytest.approx(-math.exp(-0.5))
+def test_the_change_of_the_exponential_cost_does_not_overflow() -> None:
+    change = costs["exponential"].change(0.5, np.array([-1e6, 1e6]))
+    assert change[0] > 1e200
+    assert change[1] == pytest.approx(-math.exp(-0.5))

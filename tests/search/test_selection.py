@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import NoDesignFound
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem
 from bellcrank.search import (
@@ -54,7 +54,7 @@ def test_candidates_are_the_ends_of_the_best_plateaus_best_first() -> None:
     ]
 
 
-def test_what_a_search_did_not_keep_does_not_crowd_out_what_it_kept() -> None:
+def test_verified_designs_are_candidates_and_better_unverified_ones_are_not() -> None:
     efficiency = np.array([0.1, 0.5, 0.5, 0.4, 9.0, 0.3, 8.0, 0.2, 0.45])
     masks = np.arange(9, dtype=np.uint8)[:, None]
     assert confirmed(efficiency, masks) == [2, 4, 6, 8]
@@ -63,7 +63,7 @@ def test_what_a_search_did_not_keep_does_not_crowd_out_what_it_kept() -> None:
     assert confirmed(np.empty(0), np.empty((0, 1), np.uint8)) == []
 
 
-def test_a_chain_without_plateaus_offers_its_best() -> None:
+def test_the_candidates_of_a_chain_without_plateaus_are_its_best() -> None:
     efficiency = np.array([0.1, 0.4, 0.2])
     chosen = candidates_of(0, np.arange(3), np.zeros((3, 1), np.uint8), efficiency, count=1)
     assert [c.step for c in chosen] == [1]
@@ -86,7 +86,7 @@ def test_the_selected_design_is_cleaned_and_reported_before_and_after(small: Pro
     assert pieces(small, selection.design.mask) == 1
 
 
-def test_the_best_after_cleaning_wins_whatever_was_claimed(small: Problem) -> None:
+def test_the_best_after_cleaning_is_selected_whatever_was_recorded(small: Problem) -> None:
     evaluator = SpringEvaluator(small)
     masks = []
     for beam in small.designable[:6]:
@@ -99,7 +99,7 @@ def test_the_best_after_cleaning_wins_whatever_was_claimed(small: Problem) -> No
 
 
 def test_no_acceptable_candidate_is_an_error(small: Problem) -> None:
-    with pytest.raises(InvalidSettings, match="accepted no design, so that there is none to build"):
+    with pytest.raises(NoDesignFound, match="accepted no design"):
         select(small, [])
 
 

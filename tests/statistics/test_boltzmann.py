@@ -19,14 +19,9 @@ from bellcrank.search import (
     MetropolisSettings,
     TemperingSettings,
     chain_blocks,
-    metropolis,
     moves,
-    tempering,
-    walking,
 )
-from bellcrank.search.moves.balanced import Balanced
-from bellcrank.search.moves.delayed import Delayed
-from bellcrank.search.moves.node import Node
+from bellcrank.search.markov import metropolis, steps, tempering
 
 from .lattice import (
     CHAINS,
@@ -93,27 +88,25 @@ def test_visits_match_the_enumerated_distribution(exact: Exact) -> None:
 
 
 def test_visits_of_the_python_loop_match_too(exact: Exact, monkeypatch: pytest.MonkeyPatch) -> None:
-    plain_loop(monkeypatch)
+    python_loop(monkeypatch)
     assert deviation_of_the_paper(exact, steps=1500) < LARGEST_DEVIATION
 
 
 @pytest.mark.parametrize("name", list(moves))
 def test_visits_by_every_move_match_the_enumerated_distribution(exact: Exact, name: str) -> None:
-    # A swap alone keeps the number of beams.
-    names = (name, name, "flip") if name == "swap" else (name,)
-    assert deviation_of_moves(exact, *names) < LARGEST_DEVIATION
+    assert deviation_of_moves(exact, name) < LARGEST_DEVIATION
 
 
 def test_visits_by_a_mixture_of_moves_match_too(exact: Exact) -> None:
     assert deviation_of_moves(exact, *moves) < LARGEST_DEVIATION
 
 
-def plain_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let chains of flips run in Python."""
+def python_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run chains of flips in Python."""
 
     def advance(evaluator, settings, chain, state):
         rng = metropolis.random_numbers(settings.seed, chain, state.step // metropolis.BLOCK)
-        count = metropolis.steps_ahead(settings, state.step)
+        count = metropolis.steps_in_block(settings, state.step)
         return metropolis.advance_in_python(evaluator, settings, state, rng, count)
 
     monkeypatch.setattr(metropolis, "_advance_compiled", None)
@@ -141,18 +134,16 @@ def heat_bath_of_a_third(log_ratio: float, uniform: float) -> bool:
 def test_a_wrong_acceptance_rule_is_noticed(
     exact: Exact, monkeypatch: pytest.MonkeyPatch, rule: Callable[[float, float], bool]
 ) -> None:
-    plain_loop(monkeypatch)
-    monkeypatch.setattr(walking, "accepts", rule)
+    python_loop(monkeypatch)
+    monkeypatch.setattr(steps, "metropolis_accepts", rule)
     assert deviation_of_the_paper(exact, steps=1500) > LARGEST_DEVIATION
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"), [("balanced", Balanced), ("delayed", Delayed), ("node", Node)]
-)
-def test_a_move_that_hides_its_preferences_is_noticed(
-    exact: Exact, monkeypatch: pytest.MonkeyPatch, name: str, kind: type
+@pytest.mark.parametrize("name", [name for name in moves if name != "flip"])
+def test_a_move_without_its_proposal_probabilities_is_noticed(
+    exact: Exact, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    monkeypatch.setattr(kind, "log_chance", lambda _self, _here, _beams: 0.0)
+    monkeypatch.setattr(type(moves[name]), "log_probability", lambda _self, _design, _beams: 0.0)
     assert deviation_of_moves(exact, name) > LARGEST_DEVIATION
 
 
@@ -193,5 +184,5 @@ def test_every_replica_keeps_its_distribution(
 def test_exchanging_whatever_the_cost_is_noticed(
     exact: Exact, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tempering, "accepts", lambda _log_ratio, _uniform: True)
+    monkeypatch.setattr(tempering, "metropolis_accepts", lambda _log_ratio, _uniform: True)
     assert deviation_of_tempering(exact, monkeypatch, 1) > LARGEST_DEVIATION

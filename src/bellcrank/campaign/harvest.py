@@ -133,7 +133,7 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
         If a file that has to be read is damaged.
     """
     from bellcrank.search import read_settings, select
-    from bellcrank.workflows.design import judge_for
+    from bellcrank.workflows.design import verification_evaluator
 
     settings = read_settings(task.settings)
     problem = problem_from_dict(task.problem, f"task {task.name!r}")
@@ -141,7 +141,9 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
     chosen = heapq.nlargest(PER_TASK, offered, key=lambda candidate: candidate.efficiency)
     if not chosen:
         raise InvalidSettings(f"task {task.name!r}: no accepted design is stored yet")
-    selection = select(problem, chosen, settings.objective, judge_for(problem, settings))
+    selection = select(
+        problem, chosen, settings.objective, verification_evaluator(problem, settings)
+    )
     found = selection.found
     origin = provenance(
         kind="machine",
@@ -162,7 +164,7 @@ def _candidates(store: Store, task: Task, settings: SearchSettings) -> Iterator[
     """Yield what the runs of a task offer, called by their seeds."""
     from bellcrank.search import candidates_of, searches
 
-    offers = searches[settings.name].offers
+    offers = searches[settings.name].candidate_rule
     for seed, rows in _accepted(store, task):
         masks = rows["mask"][:, : task.mask_bytes]
         yield from candidates_of(seed, rows["step"], masks, rows["efficiency"], offers, PER_RUN)

@@ -8,8 +8,10 @@ import typer
 
 from bellcrank import __version__
 
-BAD_INPUT = 2
 FAILED = 1
+BAD_INPUT = 2
+NOT_MET = 3
+"""No design works: the search ended, but its result does not meet what was specified."""
 INTERRUPTED = 130
 
 app = typer.Typer(

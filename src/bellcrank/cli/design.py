@@ -78,10 +78,6 @@ def design(
     strokes: Annotated[
         str | None, typer.Option(help="Average over these parts of the stroke, like 0.25,0.5,1.")
     ] = None,
-    pareto: Annotated[
-        str | None,
-        typer.Option(help="Write the front of these, like efficiency,stiffness,mass."),
-    ] = None,
     strut_width: Annotated[
         str | None, typer.Option(help="Search with the stiffness of struts this wide, like 1.6mm.")
     ] = None,
@@ -115,7 +111,6 @@ def design(
         raise InvalidSettings(
             "give one of these: a problem to design for, --from DESIGN, or --resume DIR"
         )
-    measures = _measures(pareto)
     part = _part(strut_width, scale, material)
     if resume is not None and part is not None:
         raise InvalidSettings("--strut-width, --scale and --material are kept from the run's start")
@@ -151,7 +146,6 @@ def design(
     with stopping_on_interrupt() as stop, progress:
         report = complete_design(
             folder, workers=workers, tell=progress, trying=progress.trying, stop=stop,
-            pareto=measures,
         )  # fmt: skip
     if report is None:
         notes.print(
@@ -185,13 +179,6 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
         return tuple(map(float, text.split(",")))
     except ValueError:
         raise InvalidSettings(f"{option} {text}: expected numbers with commas between") from None
-
-
-def _measures(text: str | None) -> tuple[str, ...]:
-    """Read the measures of a Pareto front, before hours are spent on a search."""
-    from bellcrank.search.goals import ParetoArchive
-
-    return () if text is None else ParetoArchive(tuple(text.split(","))).measures
 
 
 @contextmanager

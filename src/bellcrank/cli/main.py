@@ -31,9 +31,9 @@ from bellcrank.cli import (
     train,
     validate,
 )
-from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, app
+from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, NOT_MET, app
 from bellcrank.cli.console import notes, plain
-from bellcrank.errors import BellcrankError, CorruptRun, RunFailed, StorageError
+from bellcrank.errors import BellcrankError, CorruptRun, NoDesignFound, RunFailed, StorageError
 
 COMMANDS = (
     design,
@@ -76,6 +76,8 @@ def main() -> None:
         sys.exit(code or 0)
     except UsageError as error:
         _refuse(f"{error.format_message().rstrip('.')}; see bellcrank --help", BAD_INPUT)
+    except NoDesignFound as error:
+        _refuse(str(error), NOT_MET)
     except BellcrankError as error:
         _refuse(str(error), FAILED if isinstance(error, FAILURES) else BAD_INPUT)
     except KeyboardInterrupt:

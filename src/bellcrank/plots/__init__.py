@@ -6,7 +6,6 @@ suffix of a path (png, svg, pdf) selects the format.
 
 - `draw_motion`, `draw_comparison` and `draw_design` draw designs, given as `Motion` or `Design`;
 - `draw_paths` draws the efficiency along chains, given as `ChainPath`;
-- `draw_front` draws a Pareto front;
 - `draw_stress` draws parts coloured by their stress, given as `StressedPart`;
 - `draw_two_port` draws the response of an actuator to loads, given as `LoadedCurve`;
 - `draw_foretold` draws what a machine is foretold to do beside what it does, given as
@@ -15,7 +14,6 @@ suffix of a path (png, svg, pdf) selects the format.
 
 from bellcrank.plots.chain_paths import ChainPath, PathOptions, draw_paths
 from bellcrank.plots.foretold import StrokeOfMachine, draw_foretold
-from bellcrank.plots.front import draw_front
 from bellcrank.plots.motion import draw_comparison, draw_design, draw_motion
 from bellcrank.plots.scene import Motion
 from bellcrank.plots.stress import StressedPart, draw_stress
@@ -35,7 +33,6 @@ __all__ = [
     "draw_comparison",
     "draw_design",
     "draw_foretold",
-    "draw_front",
     "draw_motion",
     "draw_paths",
     "draw_stress",

@@ -1,8 +1,12 @@
-"""Search: which beams to keep.
+"""Search: which beams of a lattice to keep.
 
-Searches, moves, costs and schedules are registries. A chain is a pure function from one
-state to the next (`advance_chain`) and a generator around it (`chain_blocks`); `run_chains`
-keeps many of them in a run folder; `select` makes of what they found one design to build.
+Searches, moves, costs and schedules are registries. A chain is a pure function from one state to
+the next (`advance_chain`) with a generator around it (`chain_blocks`); `run_chains` stores many
+chains in a run folder; `select` chooses one design from the results.
+
+Modules: `registry` (searches), `settings`, `evaluator` (interface to the models), `blocks`,
+`parallel`, `selection`, `cleaning`; `markov` (Metropolis chains, tempering), `hopping` (the
+default search), `constraints` (goals and load cases), `kernels` (compiled loops).
 
 Examples
 --------
@@ -16,14 +20,21 @@ Examples
 
 from bellcrank.search.blocks import BLOCK
 from bellcrank.search.cleaning import clean, loaded_beams, pieces
-from bellcrank.search.costs import Cost, costs
 from bellcrank.search.evaluator import Evaluator, make_evaluator
 from bellcrank.search.hopping import HoppingSettings, HoppingState
-from bellcrank.search.metropolis import ChainState, InformedSettings, MetropolisSettings
-from bellcrank.search.moves import Move, moves
+from bellcrank.search.markov import (
+    ChainState,
+    Cost,
+    MetropolisSettings,
+    Move,
+    TemperingSettings,
+    TemperingState,
+    costs,
+    moves,
+    schedules,
+)
 from bellcrank.search.parallel import Progress, default_workers, run_chain, run_chains
-from bellcrank.search.schedules import schedules
-from bellcrank.search.searches import (
+from bellcrank.search.registry import (
     DEFAULT_SEARCH,
     Search,
     State,
@@ -50,7 +61,6 @@ from bellcrank.search.selection import (
     select,
 )
 from bellcrank.search.settings import SearchSettings
-from bellcrank.search.tempering import TemperingSettings, TemperingState
 from bellcrank.search.verdict import Verdict
 
 __all__ = [
@@ -64,7 +74,6 @@ __all__ = [
     "Finalist",
     "HoppingSettings",
     "HoppingState",
-    "InformedSettings",
     "MetropolisSettings",
     "Move",
     "Progress",

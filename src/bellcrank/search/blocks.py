@@ -1,4 +1,4 @@
-"""Blocks: the fixed numbers of proposals between two states at which a chain can be stopped."""
+"""Blocks: fixed numbers of proposals, between which a chain can be stopped and resumed."""
 
 from __future__ import annotations
 
@@ -23,25 +23,30 @@ BLOCK = 250
 
 
 def random_numbers(seed: int, chain: int, block: int) -> np.random.Generator:
-    """Return the random numbers of one block of one chain, the same whenever asked for."""
+    """Return the random number generator of one block of one chain."""
     sequence = np.random.SeedSequence(seed, spawn_key=(chain, block))
     return np.random.Generator(np.random.Philox(sequence))
 
 
-def steps_ahead(settings: SearchSettings, step: int) -> int:
-    """Return the number of steps of the block that begins at `step`."""
+def steps_in_block(settings: SearchSettings, step: int) -> int:
+    """Return the number of steps of the block that starts at `step`."""
     return min(BLOCK, settings.steps - step)
 
 
 def initial_response(evaluator: Evaluator) -> Response:
-    """Return the response of a problem's initial design, which a search starts from.
+    """Return the response of the initial design, from which a search starts.
 
     Raises
     ------
     InvalidSettings
-        If it has none, so that there is nothing to compare with.
+        If the problem has no support, or its initial design no unique, stable response.
     """
     problem = evaluator.problem
+    if not len(problem.supports.nodes):
+        raise InvalidSettings(
+            f"problem {problem.name!r}: supports: expected at least one supported node, got none; "
+            "without a support nothing resists the input, and no design can be compared"
+        )
     response = evaluator.evaluate(problem.initial)
     if not response.is_admissible:
         raise InvalidSettings(
@@ -52,8 +57,8 @@ def initial_response(evaluator: Evaluator) -> Response:
 
 
 @dataclass(slots=True)
-class Rows:
-    """The rows of a block as they come."""
+class ProposalRows:
+    """Proposals of a block, one row for each."""
 
     mask: list[NDArray[np.uint8]] = field(default_factory=list)
     efficiency: list[float] = field(default_factory=list)
@@ -71,7 +76,7 @@ class Rows:
         accepted: bool,
         status: int,
     ) -> None:
-        """Add the row of one proposal."""
+        """Append one proposal."""
         self.mask.append(np.packbits(mask))
         self.efficiency.append(efficiency)
         self.cost.append(cost)
@@ -80,7 +85,7 @@ class Rows:
         self.status.append(status)
 
     def extend(self, proposals: Proposals) -> None:
-        """Add the rows of proposals that were made elsewhere."""
+        """Append the rows of other proposals."""
         self.mask.extend(proposals.mask)
         self.efficiency.extend(proposals.efficiency.tolist())
         self.cost.extend(proposals.cost.tolist())
@@ -92,7 +97,7 @@ class Rows:
         return len(self.status)
 
     def proposals(self, problem: Problem) -> Proposals:
-        """Return the rows as columns."""
+        """Return the proposals as columns."""
         width = (problem.lattice.beam_count + 7) // 8
         return Proposals(
             np.array(self.mask, dtype=np.uint8).reshape(-1, width),

@@ -1,4 +1,4 @@
-"""What a real part can do without: loose pieces, dead ends, whatever no force goes through."""
+"""Removal of beams that carry no load: loose pieces, dead ends, parts held at a single node."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 
 
 def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the beams on some way between two nodes that are driven, watched or held.
+    """Return the beams on a path between two nodes that are input, output or supported.
 
-    A part that hangs by a single node is in equilibrium without any force in that node,
-    whatever its shape: it carries nothing. Nor does what stands on fixed supports alone.
-    With all fixed supports as one node, to which driven, watched and rolling nodes are
-    tied, what carries load is the biconnected components of that node that hold a tie.
-    Beams between two fixed supports stay: they make one piece of the part.
+    A part connected by a single node is in equilibrium without any force at that node, and so
+    carries no load. The same holds for a part that touches fixed supports only. Merge all fixed
+    supports into one root node and add a virtual edge from it to each input, output and roller
+    node: the load-bearing beams are those of the biconnected components at the root that
+    contain a virtual edge. Beams between two fixed supports are kept, since they join the part
+    to one piece.
 
     Parameters
     ----------
@@ -30,7 +31,7 @@ def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]
     Returns
     -------
     (M,) bool
-        A part of `mask`.
+        Subset of `mask`.
     """
     root = problem.lattice.node_count
     place = np.arange(root)
@@ -56,10 +57,10 @@ def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]
 
 
 def _components_at(links: list[list[tuple[int, int]]], root: int) -> list[list[int]]:
-    """Biconnected components that contain the root, as lists of edges.
+    """Return the biconnected components that contain the root, as lists of edges.
 
     Depth-first search with low points (Hopcroft and Tarjan, Commun. ACM 16, 372, 1973):
-    a component is complete when a branch below a node reaches no higher than the node.
+    a component is complete when the subtree below a node reaches no node above it.
     """
     depth = {root: 0}
     low = {root: 0}
@@ -91,7 +92,7 @@ def _components_at(links: list[list[tuple[int, int]]], root: int) -> list[list[i
 
 
 def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:
-    """Count the separate pieces a design would print as."""
+    """Return the number of connected pieces of a design."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -103,16 +104,16 @@ def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:
 
 
 def clean(design: Design, evaluator: SpringEvaluator | None = None) -> Design:
-    """Leave out of a design what no load can reach.
+    """Return a design without the beams that carry no load.
 
-    First the load-bearing core (no loose pieces, no dead ends), then what hangs by a
-    single node or stands on supports alone. In the model the former soften the joint they
-    hang at; in a real part all are idle mass.
+    Loose pieces and dead ends are removed first, then parts connected by a single node or to
+    supports only. In the spring model dead ends soften the joint that they are attached to; in a
+    real part all of these are unloaded mass.
 
     Parameters
     ----------
     evaluator
-        One of the design's problem, to save building it for each of many designs.
+        An evaluator of the design's problem; pass one when many designs are cleaned.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What a search asks about designs, and who answers."""
+"""Interface between searches and the models that evaluate designs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Protocol
 
 from bellcrank.mechanics import FlipPrediction, Response, SpringEvaluator, check_memory
-from bellcrank.search.goals import GoalEvaluator, at_strokes
+from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Evaluator(Protocol):
-    """Whatever can tell the efficiency of a design: mechanics, a network, finite elements."""
+    """A model that computes the efficiency of designs: springs, a network, finite elements."""
 
     problem: Problem
 
@@ -31,33 +31,33 @@ class Evaluator(Protocol):
     ) -> Response:
         """Return the response of a design.
 
-        With a warm start it may be computed from the reference, a similar design, and need not
-        be right where the score is at most `lower_bound`.
+        With a warm start the computation may begin at the reference, a similar design, and the
+        result need not be exact where the score is at most `lower_bound`.
         """
 
     def set_reference(self) -> None:
-        """Keep the design evaluated last as the reference of warm starts."""
+        """Make the design evaluated last the reference of warm starts."""
 
     def predict_flips(self, mask: NDArray[np.bool_]) -> FlipPrediction | None:
-        """Predict what each flip of a designable beam would do to the design evaluated last.
+        """Predict the effect of flipping each designable beam of the design evaluated last.
 
-        None where nothing can be predicted.
+        None if no prediction is available.
         """
 
 
 def make_evaluator(problem: Problem, settings: SearchSettings) -> Evaluator:
-    """Return what answers the questions of a search, as its settings want it answered.
+    """Return the evaluator of a search.
 
-    Plain mechanics where there are neither goals nor several strokes: searches are faster then.
+    Without goals and with a single stroke it is a plain `SpringEvaluator`, which is faster.
 
     Raises
     ------
     InvalidSettings, UnknownName
-        If the problem needs more memory than is available, has not got the objective, or a goal
-        makes no sense for it.
+        If the problem needs more memory than is available, or the objective or a goal does not
+        apply to it.
     """
     check_memory(problem, evaluators=len(settings.strokes), predict_flips=settings.predicts_flips)
-    told = settings.objective, settings.unloaded_beams
+    options = settings.objective, settings.unloaded_beams
     if not settings.goals and settings.strokes == (1.0,):
-        return SpringEvaluator(problem, *told)
-    return GoalEvaluator(at_strokes(problem, settings.strokes), settings.goals, *told)
+        return SpringEvaluator(problem, *options)
+    return ConstrainedEvaluator(at_strokes(problem, settings.strokes), settings.goals, *options)

@@ -16,7 +16,7 @@ import numpy as np
 
 from bellcrank.mechanics import evaluators_that_fit
 from bellcrank.search.evaluator import make_evaluator
-from bellcrank.search.searches import (
+from bellcrank.search.registry import (
     State,
     advance_chain,
     is_done,

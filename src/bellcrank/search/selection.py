@@ -1,8 +1,8 @@
-"""After the search: from what the chains saw to one design that can be built.
+"""Selection of one design from the accepted designs of all chains.
 
-The paper takes the design from a plateau of the efficiency. What looks best in the
-model is not always best in the hand: dead-end beams soften joints there and nowhere
-else. So candidates from all chains are cleaned first and compared after.
+The paper takes the design from a plateau of the efficiency. Dead-end beams soften joints in the
+spring model but not in a real part, so candidates from all chains are cleaned before they are
+compared.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import NoDesignFound
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
 from bellcrank.model import Design, Problem
 from bellcrank.search.cleaning import clean, pieces
-from bellcrank.search.goals import GoalEvaluator
+from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 
     from bellcrank.search.evaluator import Evaluator
 
-Offers: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.uint8]], list[int]]"
+CandidateRule: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.uint8]], list[int]]"
 """From efficiencies (n,) and packed masks (n, bytes) of the accepted designs, in order, to the
-indices of those worth building."""
+indices of candidates for the final design."""
 PLATEAU_TOLERANCE = 0.005
-"""Relative change of the efficiency up to which an accepted step leaves it unmoved."""
+"""Relative change of the efficiency up to which an accepted step stays on a plateau."""
 PLATEAU_LENGTH = 4
-"""Accepted changes that make a plateau."""
+"""Smallest number of accepted changes in a plateau."""
 CANDIDATES = 60
-"""Of each chain, cleaned and compared."""
+"""Largest number of candidates of each chain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Candidate:
     efficiency
         As recorded by the chain.
     chain, step
-        Where it was found.
+        Chain and step at which it was found.
     mask
         Its packed mask.
     """
@@ -61,14 +61,14 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finalist:
-    """A candidate that can be built once it is cleaned.
+    """A cleaned candidate that can be built.
 
     Parameters
     ----------
     found
-        The candidate, as the chain left it.
+        The candidate before cleaning.
     design
-        Cleaned: one piece, nothing loose, no dead ends.
+        The cleaned design: one piece, all beams carry load.
     response
         Its response from rest.
     """
@@ -79,27 +79,27 @@ class Finalist:
 
 
 Refusals: TypeAlias = "list[tuple[float, str]]"
-"""Efficiencies of designs that were refused, and why."""
+"""Efficiencies of rejected designs, with the reasons."""
 Choice: TypeAlias = "Callable[[Sequence[Finalist]], tuple[Finalist, Refusals]]"
-"""From finalists, the most efficient first, to one of them and what speaks against others."""
+"""From finalists, the most efficient first, to one of them and the reasons against others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Selection:
-    """The design to build, and how it came about.
+    """The selected design and its origin.
 
     Parameters
     ----------
     design
-        Cleaned: one piece, nothing loose, no dead ends.
+        The cleaned design: one piece, all beams carry load.
     response
         Its response from rest.
     found
-        The candidate it was cleaned from, as the chain left it.
+        The candidate before cleaning.
     efficiency_before, efficiency_after
-        Before and after cleaning, both from rest in the literal model.
+        Efficiency before and after cleaning, both from rest in the literal model.
     refused
-        Candidates that looked better, by the reason they were refused for.
+        Number of rejected candidates of higher efficiency, by reason.
     """
 
     design: Design
@@ -115,16 +115,16 @@ def plateaus(
     tolerance: float = PLATEAU_TOLERANCE,
     length: int = PLATEAU_LENGTH,
 ) -> list[tuple[int, int]]:
-    """Find the stretches over which accepted changes leave the efficiency unmoved.
+    """Find the ranges over which accepted changes leave the efficiency nearly constant.
 
     Parameters
     ----------
     efficiency : (n,)
-        Of the accepted designs, in order.
+        Efficiencies of the accepted designs, in order.
     tolerance
-        Largest relative departure from the first efficiency of the stretch.
+        Largest relative deviation from the first efficiency of a plateau.
     length
-        Least number of accepted changes in it.
+        Smallest number of accepted changes in a plateau.
 
     Returns
     -------
@@ -150,9 +150,9 @@ def plateaus(
 
 
 def plateau_ends(efficiency: NDArray[np.float64], _masks: NDArray[np.uint8]) -> list[int]:
-    """Return where the plateaus end, what their changes have shed by then having done no work.
+    """Return the last index of each plateau; all indices if there is no plateau.
 
-    A chain without plateaus offers all its designs.
+    The changes along a plateau remove beams that do no work.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def plateau_ends(efficiency: NDArray[np.float64], _masks: NDArray[np.uint8]) -> 
 
 
 def peaks(efficiency: NDArray[np.float64], _masks: NDArray[np.uint8]) -> list[int]:
-    """Return where the efficiency falls next, or is at its end.
+    """Return the indices after which the efficiency decreases, and the last index.
 
     Examples
     --------
@@ -175,10 +175,10 @@ def peaks(efficiency: NDArray[np.float64], _masks: NDArray[np.uint8]) -> list[in
 
 
 def confirmed(efficiency: NDArray[np.float64], masks: NDArray[np.uint8]) -> list[int]:
-    """Return the peaks, less those above the best design that was accepted twice in a row.
+    """Return verified designs, and the peaks that are no better than the best of them.
 
-    That is how a search shows that it has looked closely at a design and kept it. What seems
-    better, and was not kept, is of no use, and may be there in any number.
+    Basin hopping records a verified design twice in a row. Designs with a higher efficiency
+    failed the verification, and there may be many of them.
 
     Examples
     --------
@@ -197,21 +197,21 @@ def candidates_of(
     step: NDArray[np.int64],
     mask: NDArray[np.uint8],
     efficiency: NDArray[np.float64],
-    offers: Offers = plateau_ends,
+    rule: CandidateRule = plateau_ends,
     count: int = CANDIDATES,
 ) -> list[Candidate]:
-    """Pick the most efficient of the designs that a chain offers, best first.
+    """Return the most efficient candidates of a chain, best first.
 
     Parameters
     ----------
     step, mask, efficiency
         (n,), (n, bytes) and (n,) of the accepted proposals, in order.
-    offers
-        From efficiencies and masks to the indices of the designs worth building.
+    rule
+        From efficiencies and masks to the indices of candidates.
     count
-        How many at most.
+        Largest number of candidates.
     """
-    ranked = [(float(efficiency[index]), index) for index in offers(efficiency, mask)]
+    ranked = [(float(efficiency[index]), index) for index in rule(efficiency, mask)]
     return [
         Candidate(value, chain, int(step[index]), mask[index].tobytes())
         for value, index in heapq.nlargest(count, ranked)
@@ -219,14 +219,17 @@ def candidates_of(
 
 
 def _cleaned(
-    problem: Problem, candidates: Iterable[Candidate], evaluator: SpringEvaluator, judge: Evaluator
+    problem: Problem,
+    candidates: Iterable[Candidate],
+    springs: SpringEvaluator,
+    evaluator: Evaluator,
 ) -> Iterator[tuple[Candidate, Design]]:
-    """Yield each candidate cleaned, each cleaned design once."""
+    """Yield each candidate with its cleaned design, each cleaned design once."""
     seen: set[bytes] = set()
     for candidate in candidates:
-        cleaned = clean(Design(problem, _bits(problem, candidate)), evaluator)
-        if isinstance(judge, GoalEvaluator):
-            cleaned = cleaned.with_mask(judge.closed(cleaned.mask))
+        cleaned = clean(Design(problem, _bits(problem, candidate)), springs)
+        if isinstance(evaluator, ConstrainedEvaluator):
+            cleaned = cleaned.with_mask(evaluator.with_mirror_images(cleaned.mask))
         key = np.packbits(cleaned.mask).tobytes()
         if key not in seen:
             seen.add(key)
@@ -238,17 +241,17 @@ def _bits(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
     return bits[: problem.lattice.beam_count].astype(bool)
 
 
-def _why_not(judge: Evaluator, design: Design, response: Response) -> str | None:
-    """Return the reason to refuse a cleaned design, if there is one."""
-    if response.status is Verdict.UNMET and isinstance(judge, GoalEvaluator):
-        return f"breaks {', '.join(judge.broken(design.mask))}"
+def _reason_against(evaluator: Evaluator, design: Design, response: Response) -> str | None:
+    """Return the reason to reject a cleaned design, if there is one."""
+    if response.status is Verdict.UNMET and isinstance(evaluator, ConstrainedEvaluator):
+        return f"violates {', '.join(evaluator.violated(design.mask))}"
     if response.status is not Status.CONVERGED:
         return response.status.label
     return "in several pieces" if pieces(design.problem, design.mask) > 1 else None
 
 
 def most_efficient(finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals]:
-    """Choose the first."""
+    """Return the first finalist."""
     return finalists[0], []
 
 
@@ -256,42 +259,43 @@ def select(
     problem: Problem,
     candidates: Iterable[Candidate],
     objective: str | None = None,
-    judge: Evaluator | None = None,
+    evaluator: Evaluator | None = None,
     choose: Choice = most_efficient,
 ) -> Selection:
-    """Clean the candidates and choose the one that is most efficient afterwards.
+    """Clean the candidates and select the most efficient one.
 
-    Only designs in one piece with a unique, stable response from rest are considered, and
-    only those that keep all goals. Where mirror images are to be alike, those of what is left
-    by cleaning stay.
+    Only designs in one piece with a unique, stable response from rest that satisfy all
+    constraints qualify. With the constraint ``mirror``, the mirror images of the cleaned design
+    are kept.
 
     Parameters
     ----------
-    judge
-        Who knows the goals and strokes of the search, in the literal model; none by default.
+    evaluator
+        Evaluator with the constraints and strokes of the search, in the literal model; a plain
+        `SpringEvaluator` by default.
     choose
-        Who has the last word among those that qualify.
+        Selects one of the qualified designs; the most efficient by default.
 
     Raises
     ------
-    InvalidSettings
+    NoDesignFound
         If no candidate qualifies.
     """
     candidates = list(candidates)
-    # The design keeps the objective of its search: whatever reads it computes the same figure.
+    # The design keeps the objective of its search, so that any reader computes the same figure.
     problem = replace(problem, objective=objective or problem.objective)
-    evaluator = SpringEvaluator(problem)
-    judge = judge or evaluator
+    springs = SpringEvaluator(problem)
+    evaluator = evaluator or springs
     finalists: list[Finalist] = []
     refused: Refusals = []
-    for candidate, design in _cleaned(problem, candidates, evaluator, judge):
-        response = judge.evaluate(design.mask, largest_increment=VERIFICATION_INCREMENT)
-        if (reason := _why_not(judge, design, response)) is not None:
+    for candidate, design in _cleaned(problem, candidates, springs, evaluator):
+        response = evaluator.evaluate(design.mask, largest_increment=VERIFICATION_INCREMENT)
+        if (reason := _reason_against(evaluator, design, response)) is not None:
             refused.append((response.efficiency, reason))
         else:
             finalists.append(Finalist(candidate, design, response))
     if not finalists:
-        raise InvalidSettings(_none_left(problem, len(candidates), refused, judge))
+        raise NoDesignFound(_no_candidate(problem, len(candidates), refused, evaluator))
     finalists.sort(key=lambda each: each.response.efficiency, reverse=True)
     chosen, passed_over = choose(finalists)
     best = chosen.response.efficiency
@@ -300,29 +304,29 @@ def select(
         design=chosen.design,
         response=chosen.response,
         found=chosen.found,
-        efficiency_before=judge.evaluate(_bits(problem, chosen.found)).efficiency,
+        efficiency_before=evaluator.evaluate(_bits(problem, chosen.found)).efficiency,
         efficiency_after=best,
         refused={reason: reasons.count(reason) for reason in sorted(set(reasons))},
     )
 
 
-def _none_left(problem: Problem, count: int, refused: Refusals, judge: Evaluator) -> str:
-    """Say why no candidate qualifies."""
-    goals = judge.goals if isinstance(judge, GoalEvaluator) else ()
+def _no_candidate(problem: Problem, count: int, refused: Refusals, evaluator: Evaluator) -> str:
+    """Return the message that explains why no candidate qualifies."""
+    goals = evaluator.goals if isinstance(evaluator, ConstrainedEvaluator) else ()
     if goals and not count:
         return (
-            f"problem {problem.name!r}: the search accepted no design that keeps its goals "
-            f"({', '.join(goals)}); relax them, or search longer (--steps)"
+            f"problem {problem.name!r}: the search accepted no design that satisfies its "
+            f"goals ({', '.join(goals)}); relax them, or use more steps (--steps)"
         )
     if not count:
         return (
-            f"problem {problem.name!r}: the search accepted no design, so that there is none to "
-            "build; search longer (--steps), or begin with another design (--from)"
+            f"problem {problem.name!r}: the search accepted no design; use more steps "
+            "(--steps), or start from another design (--from)"
         )
     reasons = Counter(reason for _, reason in refused)
     listed = ", ".join(f"{number} {reason}" for reason, number in reasons.most_common(3))
     return (
         f"problem {problem.name!r}: none of {count} accepted designs is one stable "
-        f"piece{' that keeps the goals' if goals else ''} ({listed}); "
-        "search longer (--steps) or with more chains (--chains)"
+        f"piece{' that satisfies the goals' if goals else ''} ({listed}); "
+        "use more steps (--steps) or more chains (--chains)"
     )

@@ -1,4 +1,4 @@
-"""What every search is told."""
+"""Settings that all searches share."""
 
 from __future__ import annotations
 
@@ -7,37 +7,39 @@ from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeGuard
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.search.goals.terms import read_goal
+from bellcrank.search.constraints.constraint import parse_goal
 
 if TYPE_CHECKING:
     from bellcrank.mechanics import UnloadedBeams
+    from bellcrank.registry import Registry
 
 NO_LIMIT = 2**62
-MOST_CHAINS = 2**15
-"""What the column of a run's history holds."""
+MAX_CHAINS = 2**15
+"""Bound set by the integer type of the column in a run's history."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchSettings:
-    """What every search is told; each search adds its own.
+    """Settings that all searches share; each search adds its own.
 
     Parameters
     ----------
     steps
-        Proposals of each chain.
+        Number of proposals of each chain.
     chains
-        Independent chains, each with its own random numbers.
+        Number of independent chains.
     seed
-        Together with the chain's number it determines everything.
+        Seed of the random numbers; with the number of a chain it determines the chain.
     objective
-        Name of an efficiency, or None for the problem's own.
+        Name of an objective, or None for the problem's default.
     unloaded_beams
-        Whether dead-end beams count (the literal model), are ignored, or stripped together
-        with all else that no load can reach.
+        Treatment of beams that carry no load: ``"keep"`` (the literal model),
+        ``"prune_dead_ends"`` or ``"prune_all"``.
     goals
-        What a design must keep, each a text like ``"mass <= 0.6"`` (`bellcrank.search.goals`).
+        Constraints on the design, each a text such as ``"mass <= 0.6"``
+        (`bellcrank.search.constraints`).
     strokes
-        Parts of the full input over which the efficiency is averaged.
+        Fractions of the full input over which the efficiency is averaged.
 
     Raises
     ------
@@ -45,7 +47,7 @@ class SearchSettings:
     """
 
     name: ClassVar[str]
-    """In the registry of searches."""
+    """Name in the registry of searches."""
     predicts_flips: ClassVar[bool] = False
     """Whether the search predicts all flips, which needs a dense inverse of the stiffness."""
 
@@ -60,12 +62,12 @@ class SearchSettings:
     def __post_init__(self) -> None:
         check_whole("steps", self.steps, 1)
         check_whole("seed", self.seed, 0)
-        check_whole("chains", self.chains, 1, MOST_CHAINS)
+        check_whole("chains", self.chains, 1, MAX_CHAINS)
         check_goals(self.goals)
         check_strokes(self.strokes)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the settings as plain data, as `run.json` keeps them."""
+        """Return the settings as plain data, the form stored in `run.json`."""
         return {"search": self.name, **asdict(self)}
 
     @classmethod
@@ -92,12 +94,12 @@ class SearchSettings:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether something is a whole or a real number; true and false are none."""
+    """Whether a value is an integer or a real number, and not a Boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def check_whole(name: str, value: object, least: int, most: int = NO_LIMIT) -> None:
-    """Refuse what is not a whole number between two bounds.
+    """Raise an error unless a value is an integer between two bounds.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def check_whole(name: str, value: object, least: int, most: int = NO_LIMIT) -> N
 
 
 def check_positive(name: str, value: object, what: str = "a number") -> None:
-    """Refuse what is not a finite number above zero.
+    """Raise an error unless a value is a finite number above zero.
 
     Raises
     ------
@@ -121,7 +123,7 @@ def check_positive(name: str, value: object, what: str = "a number") -> None:
 
 
 def check_goals(goals: object) -> None:
-    """Refuse what is not a tuple of texts that each name a goal.
+    """Raise an error unless a value is a tuple of valid goals.
 
     Raises
     ------
@@ -130,11 +132,11 @@ def check_goals(goals: object) -> None:
     if not isinstance(goals, tuple):
         raise InvalidSettings(f"goals: expected texts like 'mass <= 0.6', got {goals!r}")
     for goal in goals:
-        read_goal(goal)
+        parse_goal(goal)
 
 
 def check_strokes(strokes: object) -> None:
-    """Refuse what is not a tuple of different parts of the full input.
+    """Raise an error unless a value is a tuple of different fractions of the full input.
 
     Raises
     ------
@@ -142,19 +144,34 @@ def check_strokes(strokes: object) -> None:
     """
     if not isinstance(strokes, tuple) or not strokes or len(set(strokes)) < len(strokes):
         raise InvalidSettings(
-            f"strokes: expected different parts of the full input, got {strokes!r}"
+            f"strokes: expected different fractions of the full input, got {strokes!r}"
         )
     for stroke in strokes:
-        check_positive("strokes", stroke, "parts of the full input")
-        check_part("strokes", stroke)
+        check_positive("strokes", stroke, "fractions of the full input")
+        check_fraction("strokes", stroke)
 
 
-def check_part(name: str, value: object) -> None:
-    """Refuse what is not a number from 0 to 1.
+def check_fraction(name: str, value: object) -> None:
+    """Raise an error unless a value is a number from 0 to 1.
 
     Raises
     ------
     InvalidSettings
     """
     if not is_number(value) or not 0.0 <= value <= 1.0:
-        raise InvalidSettings(f"{name}: expected a part from 0 to 1, got {value!r}")
+        raise InvalidSettings(f"{name}: expected a fraction from 0 to 1, got {value!r}")
+
+
+def check_names(name: str, values: object, registry: Registry[Any]) -> None:
+    """Raise an error unless a value is a non-empty tuple of names in a registry.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+    """
+    if not isinstance(values, tuple) or not values:
+        raise InvalidSettings(
+            f"{name}: expected names of {name}, such as [{registry.names()[0]!r}], got {values!r}"
+        )
+    for value in values:
+        registry[value]  # raises UnknownName

@@ -57,7 +57,7 @@ def _prepared(body: RunBody) -> tuple[Problem, Record]:
     from bellcrank.model import unpack_mask
     from bellcrank.part import PartSpec
     from bellcrank.search import read_settings
-    from bellcrank.search.goals import read_goal
+    from bellcrank.search.constraints import parse_goal
 
     problem = problem_of(body.problem)
     settings = read_settings(
@@ -70,7 +70,7 @@ def _prepared(body: RunBody) -> tuple[Problem, Record]:
         }
     )
     for goal in body.goals:
-        read_goal(goal).term(problem)
+        parse_goal(goal).constraint(problem)
     part = None
     if body.part is not None:
         spec = PartSpec.from_dict(body.part)

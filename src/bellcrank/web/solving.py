@@ -88,12 +88,12 @@ def respond(text: str, mask: str) -> dict[str, Any]:
 
 def check(text: str, goals: tuple[str, ...]) -> dict[str, Any]:
     """Look whether a task can be searched, and say what it is."""
-    from bellcrank.search.goals import read_goal
+    from bellcrank.search.constraints import parse_goal
 
     at_hand = known(text)
     problem = at_hand.problem
     for goal in goals:
-        read_goal(goal).term(problem)
+        parse_goal(goal).constraint(problem)
     answer = respond(text, np.packbits(problem.initial).tobytes().hex())
     return {
         "hash": problem.hash,

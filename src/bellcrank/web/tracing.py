@@ -58,7 +58,7 @@ def tidy(value: float) -> float | None:
 def read_curves(folder: RunFolder) -> dict[int, list[Point]]:
     """Make the curves of a run from its records."""
     settings = read_settings(folder.settings)
-    leaps = searches[settings.name].leaps
+    running_best = searches[settings.name].plot_running_best
     curves: dict[int, list[Point]] = {}
     for chain in folder.chains:
         rows = folder.read(chain, ["step", "efficiency", "temperature", "accepted", "status"])
@@ -73,7 +73,7 @@ def read_curves(folder: RunFolder) -> dict[int, list[Point]]:
         places = np.append(np.arange(stride - 1, count, stride), [0, count - 1])
         if settings.name == "paper":  # the annealing is over within a few hundred steps
             places = np.append(places, np.arange(0, min(count, 2 * BLOCK), 10))
-        shown = best if leaps else current
+        shown = best if running_best else current
         curves[chain] = [
             (k + 1, tidy(shown[k]), tidy(best[k]), round(float(rows["temperature"][k]), 6))
             for k in np.unique(places).tolist()

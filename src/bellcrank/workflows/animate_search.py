@@ -154,7 +154,7 @@ def read_history(folder: RunFolder, settings: SearchSettings) -> ChainHistory:
     problem = folder.problem
     first = _evaluator(problem, settings).evaluate(problem.initial).efficiency
     efficiency = records["efficiency"][taken]
-    if searches[settings.name].leaps:
+    if searches[settings.name].plot_running_best:
         # Designs with a larger efficiency than the selected one failed the verification.
         seen = np.where(efficiency <= efficiency[-1], efficiency, -np.inf)
         better = seen > np.maximum.accumulate(np.append(first, seen[:-1]))

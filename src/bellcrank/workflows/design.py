@@ -32,7 +32,6 @@ from bellcrank.storage.layout import LOCK
 from bellcrank.storage.locking import locked
 from bellcrank.workflows.choosing import FINE, LEVEL, PartChoice, stands
 from bellcrank.workflows.outcome import DesignReport
-from bellcrank.workflows.pareto import write_front
 from bellcrank.workflows.record import begin_record
 from bellcrank.workflows.report import RESULTS, write_report
 from bellcrank.workflows.validate import Validation, validate
@@ -106,7 +105,6 @@ def complete_design(
     tell: Callable[[Progress], None] = lambda _progress: None,
     trying: Callable[[int, int], None] = lambda _done, _total: None,
     stop: threading.Event | None = None,
-    pareto: tuple[str, ...] = (),
 ) -> DesignReport | None:
     """Make what is left of a design job, and leave the results in its folder.
 
@@ -122,8 +120,6 @@ def complete_design(
         the design is for a part.
     stop
         Set it to end the search after the steps at hand; what is done is kept.
-    pareto
-        Measures to trade for each other: the designs that no other beats in all are kept too.
 
     Returns
     -------
@@ -143,8 +139,6 @@ def complete_design(
             done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
             if done:
                 report = conclude(folder, settings, trying)
-                if pareto:
-                    write_front(folder, settings, pareto)
                 folder.finish()
                 return report
         except BaseException:
@@ -180,12 +174,12 @@ def accepted_candidates(
         best.append(float(efficiency.max(initial=-np.inf)))
         candidates += candidates_of(
             chain, records["step"][taken], records["mask"][taken], efficiency,
-            searches[settings.name].offers,
+            searches[settings.name].candidate_rule,
         )  # fmt: skip
     return candidates, proposals, best
 
 
-def judge_for(problem: Problem, settings: SearchSettings, **changes: Any) -> Evaluator:
+def verification_evaluator(problem: Problem, settings: SearchSettings, **changes: Any) -> Evaluator:
     """Return who judges finished designs: in the literal model, with the goals of the search."""
     told = {"unloaded_beams": "keep", **changes}
     return make_evaluator(problem, replace(settings, **told))
@@ -193,7 +187,7 @@ def judge_for(problem: Problem, settings: SearchSettings, **changes: Any) -> Eva
 
 def verify(design: Design, settings: SearchSettings, response: Response) -> dict[str, float]:
     """Return the efficiency of a design from rest, in fine and in adaptive load increments."""
-    second = judge_for(design.problem, settings, goals=()).evaluate(design.mask)
+    second = verification_evaluator(design.problem, settings, goals=()).evaluate(design.mask)
     return {"increments of 1/32": response.efficiency, "adaptive increments": second.efficiency}
 
 
@@ -217,10 +211,10 @@ def conclude(
     problem = folder.problem
     spec = _part_of(folder)
     candidates, proposals, best = accepted_candidates(folder, settings)
-    judge = judge_for(problem, settings)
+    judge = verification_evaluator(problem, settings)
     choose = most_efficient if spec is None else PartChoice(spec, settings, trying)
     selection = select(problem, candidates, settings.objective, judge, choose)
-    literal = judge_for(problem, settings, goals=())
+    literal = verification_evaluator(problem, settings, goals=())
     human = human_design(problem.name)
     human_response = None
     if human is not None:

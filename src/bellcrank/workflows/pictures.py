@@ -47,7 +47,7 @@ def chain_paths(folder: RunFolder, settings: SearchSettings) -> list[ChainPath]:
         columns = folder.read(chain, ["step", "efficiency", "accepted", "status"])
         taken = columns["accepted"] & (columns["status"] == Status.CONVERGED)
         efficiency = columns["efficiency"][taken]
-        if searches[settings.name].leaps:
+        if searches[settings.name].plot_running_best:
             efficiency = np.fmax.accumulate(efficiency)
         paths.append(ChainPath(efficiency, columns["step"][taken]))
     return paths
@@ -55,7 +55,7 @@ def chain_paths(folder: RunFolder, settings: SearchSettings) -> list[ChainPath]:
 
 def path_options(folder: RunFolder, settings: SearchSettings) -> PathOptions:
     """Return options for drawing the chains of a run."""
-    if searches[settings.name].leaps:
+    if searches[settings.name].plot_running_best:
         return PathOptions(
             title=folder.problem.name, axis="proposals", measure="best efficiency so far"
         )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 RESULTS = re.compile(
-    r"(design|validation)\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png|pareto\.(json|png)"
+    r"(design|validation)\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png"
 )
 """Names of the files that conclude a design job."""
 

@@ -28,7 +28,7 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Status
 from bellcrank.model import Design
-from bellcrank.search.goals import Case, GoalEvaluator
+from bellcrank.search.constraints import ConstrainedEvaluator, LoadCase
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -111,7 +111,7 @@ def plain_lever(problem: Problem, goals: Sequence[str] = ()) -> Design:
     >>> lever.provenance["pivot"] in range(7), lever.efficiency > 1.0
     (True, True)
     """
-    judge = GoalEvaluator([Case(problem)], goals)
+    judge = ConstrainedEvaluator([LoadCase(problem)], goals)
     best: Design | None = None
     for shape in shapes(problem):
         lever = lever_of(problem, shape)

@@ -24,7 +24,7 @@ from bellcrank.storage.files import make_folder
 from bellcrank.storage.layout import LOCK
 from bellcrank.storage.locking import locked
 from bellcrank.workflows import reopen_design, start_design
-from bellcrank.workflows.design import accepted_candidates, judge_for
+from bellcrank.workflows.design import accepted_candidates, verification_evaluator
 
 if TYPE_CHECKING:
     import threading
@@ -221,7 +221,7 @@ def _best(
             {"begun_with": run.path.name, "best": value if math.isfinite(value) else None}
             for value in best
         ]
-    judge = Resisting(judge_for(problem, settings))
+    judge = Resisting(verification_evaluator(problem, settings))
     try:
         chosen = select(problem, candidates, settings.objective, judge)
     except InvalidSettings as error:

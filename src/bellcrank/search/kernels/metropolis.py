@@ -1,4 +1,4 @@
-"""The Metropolis chain over designs, a block of steps at a time."""
+"""Compiled Metropolis chain over designs: one block of single flips."""
 
 from __future__ import annotations
 
@@ -21,35 +21,43 @@ from bellcrank.mechanics.kernels.response import (
     find_response,
     remember,
 )
+from bellcrank.search.kernels.acceptance import (
+    exponential_cost,
+    metropolis_accepts,
+    negative_cost,
+)
 from bellcrank.search.verdict import Verdict
 
 FORBIDDEN = int(Verdict.FORBIDDEN)
-
 EXPONENTIAL = 0
-"""Of the codes of `bellcrank.search.costs`; the other is the efficiency with its sign changed."""
+"""Code of `exponential_cost` in `bellcrank.search.markov.costs`; 1 is `negative_cost`."""
+
+accepts = kernel(metropolis_accepts)
+exponential = kernel(exponential_cost)
+negative = kernel(negative_cost)
 
 
 class Rules(NamedTuple):
-    """What the search is told, as plain numbers."""
+    """Settings of the search, as plain numbers."""
 
     cost: int
     core: int
     minimum_degree: int
     patience: int
-    """Rejections in a row after which the chain ends."""
+    """Consecutive rejections after which the chain ends."""
 
 
 class Chain(NamedTuple):
-    """Where a chain stands; updated in place."""
+    """State of a chain, updated in place."""
 
     mask: Bytes
     """(M,) the current design."""
     packed: Bytes
-    """The same as bits."""
+    """The current design as packed bits."""
     value: Floats
     """(3,) efficiency and cost of the current design, best efficiency so far."""
     counts: Ints
-    """(2,) accepted steps, rejections in a row."""
+    """(2,) accepted steps, consecutive rejections."""
 
 
 class Records(NamedTuple):
@@ -67,28 +75,22 @@ class Records(NamedTuple):
 
 @kernel
 def cost_of(code: int, efficiency: float) -> float:
-    """Cost that the search lowers: exp(-efficiency) or -efficiency."""
+    """Return the cost of an efficiency."""
     if code == EXPONENTIAL:
-        return math.exp(-efficiency)
-    return -efficiency
-
-
-@kernel
-def accepts(old_cost: float, new_cost: float, temperature: float, uniform: float) -> bool:
-    """Metropolis' rule: always downhill, uphill with probability exp(-rise / T)."""
-    return new_cost <= old_cost or uniform < math.exp((old_cost - new_cost) / temperature)
+        return exponential(efficiency)
+    return negative(efficiency)
 
 
 @kernel
 def flip(chain: Chain, beam: int) -> None:
-    """Remove a present beam, add an absent one."""
+    """Remove a present beam or add an absent one."""
     chain.mask[beam] ^= 1
     chain.packed[beam >> 3] ^= 128 >> (beam & 7)
 
 
 @kernel
 def is_forbidden(system: System, minimum_degree: int, mask: Bytes, beam: int) -> bool:
-    """Whether removing `beam` has left a free end with too few beams."""
+    """Whether the removal of `beam` leaves a free node with fewer beams than the minimum."""
     if minimum_degree > 0 and not mask[beam]:
         for end in range(2):
             node = system.beams[beam, end]
@@ -114,17 +116,16 @@ def advance(
     scratch: Scratch,
     records: Records,
 ) -> int:
-    """Make one proposal for each row of `uniforms`; return how many were made.
+    """Make one proposal for each row of `uniforms`; return the number of proposals made.
 
-    Only a design with a unique, stable response can be accepted: one that snaps along its
-    stroke, or is a mechanism, is refused whatever the temperature.
+    A design without a unique, stable response is rejected at any temperature.
 
     Parameters
     ----------
     temperatures
-        Temperature after 0, 1, 2, ... accepted steps; the last one holds for ever.
+        Temperature after 0, 1, 2, ... accepted steps; the last entry holds afterwards.
     uniforms
-        (n, 2) random numbers in [0, 1): which beam, and whether uphill.
+        (n, 2) random numbers in [0, 1) that select the beam and decide on acceptance.
     known
         Equilibrium of the current design; updated.
     """
@@ -141,9 +142,8 @@ def advance(
                 structure, u, scratch,
             )  # fmt: skip
         cost = cost_of(rules.cost, efficiency)
-        accepted = status == CONVERGED and accepts(
-            chain.value[1], cost, temperature, uniforms[step, 1]
-        )
+        log_ratio = (chain.value[1] - cost) / temperature
+        accepted = status == CONVERGED and accepts(log_ratio, uniforms[step, 1])
         for byte in range(len(chain.packed)):
             records.mask[step, byte] = chain.packed[byte]
         records.efficiency[step] = efficiency

@@ -1,9 +1,9 @@
 """Parallel tempering: chains at several temperatures that exchange their designs.
 
-Hot chains cross barriers, cold ones refine; neighbours exchange what they hold with
-probability min(1, exp((1/T_i - 1/T_j) (C_i - C_j))), which leaves each chain's distribution
-as it is (Hukushima and Nemoto, J. Phys. Soc. Jpn. 65, 1604, 1996). The chains take turns of
-a fixed number of steps.
+Chains at high temperature cross barriers, chains at low temperature refine. Neighbouring chains
+exchange their designs with probability min(1, exp((1/T_i - 1/T_j) (C_i - C_j))), which leaves the
+distribution of each chain unchanged (Hukushima and Nemoto, J. Phys. Soc. Jpn. 65, 1604, 1996).
+The chains (replicas) advance in turns of a fixed number of steps.
 """
 
 from __future__ import annotations
@@ -15,14 +15,20 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.model import pack_mask
-from bellcrank.search.blocks import BLOCK, Rows, initial_response, random_numbers, steps_ahead
-from bellcrank.search.costs import costs
-from bellcrank.search.moves import moves
-from bellcrank.search.place import accepts
-from bellcrank.search.searches import Search, searches
+from bellcrank.search.blocks import (
+    BLOCK,
+    ProposalRows,
+    initial_response,
+    random_numbers,
+    steps_in_block,
+)
+from bellcrank.search.kernels.acceptance import metropolis_accepts
+from bellcrank.search.markov.costs import costs
+from bellcrank.search.markov.moves import moves
+from bellcrank.search.markov.steps import evaluated_design, metropolis_step
+from bellcrank.search.registry import Search, searches
 from bellcrank.search.selection import peaks
-from bellcrank.search.settings import SearchSettings, check_positive, check_whole
-from bellcrank.search.walking import place_of, step
+from bellcrank.search.settings import SearchSettings, check_names, check_positive, check_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,7 +39,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 TURN = 25
-"""Steps of one replica before the next; a block is a whole number of turns."""
+"""Steps of one replica per turn; a block is a whole number of turns."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +51,7 @@ class TemperingSettings(SearchSettings):
     steps
         Proposals of all replicas together.
     replicas
-        Temperatures, from `hot` to `cold`, each lower than the last by the same factor.
+        Number of temperatures, in geometric progression from `hot` to `cold`.
     moves, cost
         As in `MetropolisSettings`.
 
@@ -71,11 +77,8 @@ class TemperingSettings(SearchSettings):
             check_positive(name, getattr(self, name), "a temperature")
         if self.cold > self.hot:
             raise InvalidSettings(f"cold: expected at most hot = {self.hot!r}, got {self.cold!r}")
-        if not self.moves or isinstance(self.moves, str):
-            raise InvalidSettings(f"moves: expected names of moves, got {self.moves!r}")
-        costs[self.cost]  # an unknown name explains itself
-        for name in self.moves:
-            moves[name]
+        check_names("moves", self.moves, moves)
+        costs[self.cost]  # raises UnknownName
 
     @property
     def temperatures(self) -> NDArray[np.float64]:
@@ -85,18 +88,18 @@ class TemperingSettings(SearchSettings):
 
 @dataclass(frozen=True, slots=True)
 class TemperingState:
-    """Where the replicas stand between two blocks.
+    """State of the replicas between two blocks.
 
     Parameters
     ----------
     step
-        Proposals made so far, by all.
+        Proposals made so far by all replicas.
     mask
-        The design of each replica in hexadecimal, hottest first.
+        The design of each replica in hexadecimal, in the order of falling temperature.
     efficiencies
-        Of these designs.
+        Scores of these designs.
     best
-        Highest efficiency of an accepted design so far.
+        Highest score of an accepted design so far.
     accepted, exchanges
         Accepted proposals and exchanges so far.
     """
@@ -110,7 +113,7 @@ class TemperingState:
 
     @property
     def efficiency(self) -> float:
-        """Of the coldest replica."""
+        """Score of the replica at the lowest temperature."""
         return self.efficiencies[-1]
 
     def to_dict(self) -> dict[str, Any]:
@@ -140,10 +143,10 @@ def is_done(state: TemperingState, settings: TemperingSettings) -> bool:
 def advance(
     evaluator: Evaluator, settings: TemperingSettings, chain: int, state: TemperingState
 ) -> tuple[TemperingState, Proposals]:
-    """Let the replicas take turns for a block, with exchanges after each round."""
+    """Advance the replicas in turns for one block, with exchanges after each round."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
-    rows = Rows()
-    last = state.step + steps_ahead(settings, state.step)
+    rows = ProposalRows()
+    last = state.step + steps_in_block(settings, state.step)
     while state.step < last:
         count = min(TURN, last - state.step)
         replica = state.step // TURN % settings.replicas
@@ -160,22 +163,22 @@ def _take_turn(
     replica: int,
     count: int,
     rng: np.random.Generator,
-    rows: Rows,
+    rows: ProposalRows,
 ) -> TemperingState:
     temperature = float(settings.temperatures[replica])
-    here = place_of(evaluator, settings.cost, temperature, state.mask[replica])
+    current = evaluated_design(evaluator, settings.cost, temperature, state.mask[replica])
     accepted, best = state.accepted, state.best
     for _ in range(count):
         name = settings.moves[int(rng.random() * len(settings.moves))]
-        after = step(here, moves[name], rng, rows)
-        accepted += after is not here
+        after = metropolis_step(current, moves[name], rng, rows)
+        accepted += after is not current
         best = max(best, after.response.score)
-        here = after
+        current = after
     return replace(
         state,
         step=state.step + count,
-        mask=_with(state.mask, replica, pack_mask(here.mask)),
-        efficiencies=_with(state.efficiencies, replica, here.response.score),
+        mask=_with(state.mask, replica, pack_mask(current.mask)),
+        efficiencies=_with(state.efficiencies, replica, current.response.score),
         best=best,
         accepted=accepted,
     )
@@ -184,7 +187,7 @@ def _take_turn(
 def _exchange(
     settings: TemperingSettings, state: TemperingState, rng: np.random.Generator
 ) -> TemperingState:
-    """Offer an exchange to every other pair of neighbours, the others the next time."""
+    """Propose an exchange to every second pair of neighbours, alternating between rounds."""
     temperatures = settings.temperatures
     first = state.step // (TURN * settings.replicas) % 2
     for hot in range(first, settings.replicas - 1, 2):
@@ -193,7 +196,7 @@ def _exchange(
             state.efficiencies[cold]
         )
         log_ratio = (1.0 / temperatures[hot] - 1.0 / temperatures[cold]) * rise
-        if accepts(float(log_ratio), rng.random()):
+        if metropolis_accepts(float(log_ratio), rng.random()):
             masks, values = state.mask, state.efficiencies
             state = replace(
                 state,
@@ -209,5 +212,7 @@ def _with(values: tuple[T, ...], index: int, value: T) -> tuple[T, ...]:
 
 
 searches.register("tempering")(
-    Search(TemperingSettings, TemperingState, start, advance, is_done, peaks, leaps=True)
+    Search(
+        TemperingSettings, TemperingState, start, advance, is_done, peaks, plot_running_best=True
+    )
 )

@@ -1,4 +1,4 @@
-"""Load cases: what one design is to do under several loads, or at several strokes."""
+"""Load cases: several loads, or several strokes, under which one design is evaluated."""
 
 from __future__ import annotations
 
@@ -19,64 +19,64 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Case:
-    """One thing asked of a design.
+class LoadCase:
+    """A load case.
 
     Parameters
     ----------
     problem
-        The load, the output and what is held.
+        Problem that defines supports, input and output.
     weight
-        Of its value among those of all cases.
-    wanted
-        The efficiency to come near; None for as much as possible.
+        Weight of the case in the mean over all cases.
+    target
+        Wanted efficiency; None to maximise the efficiency.
 
     Raises
     ------
     InvalidSettings
-        If the weight is not above 0, or the wanted efficiency no number.
+        If the weight is not above 0, or the target is not finite.
     """
 
     problem: Problem
     weight: float = 1.0
-    wanted: float | None = None
+    target: float | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.weight < math.inf:
             raise InvalidSettings(f"weight of a case: expected one above 0, got {self.weight!r}")
-        if self.wanted is not None and not math.isfinite(self.wanted):
-            raise InvalidSettings(f"wanted efficiency: expected a number, got {self.wanted!r}")
+        if self.target is not None and not math.isfinite(self.target):
+            raise InvalidSettings(f"target efficiency: expected a number, got {self.target!r}")
 
     def value(self, efficiency: float) -> float:
-        """Return what is raised: the efficiency, or minus its distance from the wanted one."""
-        return efficiency if self.wanted is None else -abs(efficiency - self.wanted)
+        """Return the value to maximise: the efficiency, or minus its distance from the target."""
+        return efficiency if self.target is None else -abs(efficiency - self.target)
 
     def change(self, efficiency: float, change: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the change of the value by changes of the efficiency."""
-        if self.wanted is None:
+        """Return the changes of the value for changes of the efficiency."""
+        if self.target is None:
             return change
-        values: NDArray[np.float64] = -np.abs(efficiency + change - self.wanted)
-        # Flips that no load can feel must stay at exactly zero.
+        values: NDArray[np.float64] = -np.abs(efficiency + change - self.target)
+        # The change of a flip that affects no load-bearing beam must stay exactly zero.
         return np.where(change == 0.0, 0.0, values - self.value(efficiency))
 
 
 def at_strokes(
-    problem: Problem, strokes: Sequence[float], wanted: Sequence[float] | None = None
-) -> list[Case]:
-    """Return a case for each of some parts of the full input, the longest first.
+    problem: Problem, strokes: Sequence[float], targets: Sequence[float] | None = None
+) -> list[LoadCase]:
+    """Return a load case for each of several fractions of the full input, the largest first.
 
     Parameters
     ----------
     strokes
-        From 0 to 1.
-    wanted
-        Output motion at each, in the length unit of the lattice: a trajectory to follow, along
-        the wanted direction. None for as much as possible.
+        Fractions from 0 to 1.
+    targets
+        Wanted output displacement at each stroke, along the wanted direction, in lattice units;
+        None to maximise it.
 
     Raises
     ------
     InvalidSettings
-        If there are not as many wanted motions as strokes, or the input is a force.
+        If the numbers of targets and strokes differ, or the input is a force.
 
     Examples
     --------
@@ -85,24 +85,24 @@ def at_strokes(
     >>> [round(case.problem.input.amount, 3) for case in at_strokes(crane, [0.5, 1.0])]
     [0.433, 0.217]
     """
-    if wanted is not None and len(wanted) != len(strokes):
+    if targets is not None and len(targets) != len(strokes):
         raise InvalidSettings(
-            f"wanted: expected one motion for each of {len(strokes)} strokes, got {len(wanted)}"
+            f"targets: expected one for each of {len(strokes)} strokes, got {len(targets)}"
         )
-    if wanted is not None and problem.input.drive == "force":
-        raise InvalidSettings("wanted: a trajectory needs an input that is driven by displacement")
+    if targets is not None and problem.input.drive == "force":
+        raise InvalidSettings("targets: a path needs an input that is driven by displacement")
     cases = []
     for index in sorted(range(len(strokes)), key=lambda index: -strokes[index]):
         amount = strokes[index] * problem.input.amount
         part = problem
         if strokes[index] != 1.0:
             part = replace(problem, input=replace(problem.input, amount=amount))
-        cases.append(Case(part, wanted=None if wanted is None else wanted[index] / amount))
+        cases.append(LoadCase(part, target=None if targets is None else targets[index] / amount))
     return cases
 
 
-def check_alike(cases: Sequence[Case]) -> None:
-    """Refuse cases that are not about the same designs.
+def check_compatible(cases: Sequence[LoadCase]) -> None:
+    """Raise an error unless all cases have the same lattice, designable beams and initial design.
 
     Raises
     ------

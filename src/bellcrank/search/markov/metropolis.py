@@ -1,9 +1,9 @@
-"""Metropolis chains: the paper's search, and the same with better moves.
+"""Metropolis chains: the search of the paper.
 
-A chain advances in blocks of a fixed number of steps. At the start of each block the
-equilibrium of the current design is computed afresh from rest and the random numbers
-are drawn from a stream named by seed, chain and block: the state between two blocks is
-a handful of plain numbers, and a chain resumed from it is the same to the last bit.
+A chain advances in blocks of a fixed number of steps. At the start of each block the equilibrium
+of the current design is computed afresh from rest, and the random numbers come from a stream
+identified by seed, chain and block. The state between two blocks is therefore a few plain
+numbers, and a chain resumed from it is identical to the last bit.
 """
 
 from __future__ import annotations
@@ -13,22 +13,26 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import SpringEvaluator, UnloadedBeams
 from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.search.blocks import (
     BLOCK,
-    Rows,
+    ProposalRows,
     initial_response,
     random_numbers,
-    steps_ahead,
+    steps_in_block,
 )
-from bellcrank.search.costs import costs
-from bellcrank.search.moves import moves
-from bellcrank.search.schedules import schedules
-from bellcrank.search.searches import Search, searches
-from bellcrank.search.settings import NO_LIMIT, SearchSettings, check_positive, check_whole
-from bellcrank.search.walking import place_of, step
+from bellcrank.search.markov.costs import costs, schedules
+from bellcrank.search.markov.moves import moves
+from bellcrank.search.markov.steps import evaluated_design, metropolis_step
+from bellcrank.search.registry import Search, searches
+from bellcrank.search.settings import (
+    NO_LIMIT,
+    SearchSettings,
+    check_names,
+    check_positive,
+    check_whole,
+)
 from bellcrank.storage import Proposals
 
 if TYPE_CHECKING:
@@ -39,23 +43,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetropolisSettings(SearchSettings):
-    """Settings of the paper's search; the defaults are the paper's.
+    """Settings of the paper's search; the defaults are those of the paper.
 
     Parameters
     ----------
     moves
-        Names in the registry of moves, drawn with equal chances; one named twice is drawn
+        Names in the registry of moves, drawn with equal probability; a name given twice is drawn
         twice as often.
     cost, schedule
-        Names in the registries of costs and schedules.
+        Names in the registries of costs and temperature schedules.
     hot, cold
         Temperatures at the start and after annealing.
     annealing
-        Accepted steps over which the temperature falls.
+        Accepted steps over which the temperature decreases.
     minimum_degree
-        Least number of beams that a removal may leave at a free node; 0 for no rule.
+        Minimum number of beams that a removal may leave at a free node; 0 for no minimum.
     patience
-        Rejections in a row after which a chain ends; None for never.
+        Consecutive rejections after which a chain ends; None for no limit.
 
     Raises
     ------
@@ -87,15 +91,9 @@ class MetropolisSettings(SearchSettings):
             check_whole("patience", self.patience, 1)
         for name in ("hot", "cold"):
             check_positive(name, getattr(self, name), "a temperature")
-        if not self.moves or isinstance(self.moves, str):
-            raise InvalidSettings(f"moves: expected names of moves, got {self.moves!r}")
-        for registry, names in (
-            (costs, [self.cost]),
-            (schedules, [self.schedule]),
-            (moves, self.moves),
-        ):
-            for name in names:
-                registry[name]  # an unknown name explains itself
+        check_names("moves", self.moves, moves)
+        costs[self.cost]  # raises UnknownName
+        schedules[self.schedule]
 
     @property
     def temperatures(self) -> NDArray[np.float64]:
@@ -103,30 +101,9 @@ class MetropolisSettings(SearchSettings):
         return schedules[self.schedule](self.hot, self.cold, self.annealing)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InformedSettings(MetropolisSettings):
-    """Settings of a Metropolis chain that looks before it leaps.
-
-    Beams are flipped by what their flip is predicted to do, nodes are cleared and filled,
-    and the temperature falls in units of the efficiency. For the rest, see
-    `MetropolisSettings`.
-    """
-
-    name: ClassVar[str] = "informed"
-    predicts_flips: ClassVar[bool] = True
-
-    unloaded_beams: UnloadedBeams = "prune_all"
-    moves: tuple[str, ...] = ("balanced", "balanced", "delayed", "node")
-    cost: str = "negative"
-    schedule: str = "geometric"
-    hot: float = 0.1
-    cold: float = 0.005
-    annealing: int = 4000
-
-
 @dataclass(frozen=True, slots=True)
 class ChainState:
-    """Where a chain stands between two blocks.
+    """State of a Metropolis chain between two blocks.
 
     Parameters
     ----------
@@ -135,9 +112,9 @@ class ChainState:
     mask
         The current design in hexadecimal.
     efficiency, cost
-        Of the current design.
+        Score and cost of the current design.
     best
-        Highest efficiency of an accepted design so far.
+        Highest score of an accepted design so far.
     accepted
         Accepted proposals so far.
     rejections
@@ -175,26 +152,29 @@ def start(evaluator: Evaluator, settings: MetropolisSettings, _chain: int) -> Ch
 
 
 def is_done(state: ChainState, settings: MetropolisSettings) -> bool:
-    """Whether a chain has made all its steps or lost its patience."""
+    """Whether a chain has made all its steps or reached its limit of rejections."""
     return state.step >= settings.steps or state.rejections >= (settings.patience or NO_LIMIT)
 
 
 def advance(
     evaluator: Evaluator, settings: MetropolisSettings, chain: int, state: ChainState
 ) -> tuple[ChainState, Proposals]:
-    """Advance a chain by one block, or less if its steps or its patience end first."""
+    """Advance a chain by one block, or less if it ends within the block."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
-    return make_steps(evaluator, settings, state, rng, steps_ahead(settings, state.step))
+    return metropolis_phase(evaluator, settings, state, rng, steps_in_block(settings, state.step))
 
 
-def make_steps(
+def metropolis_phase(
     evaluator: Evaluator,
     settings: MetropolisSettings,
     state: ChainState,
     rng: np.random.Generator,
     count: int,
 ) -> tuple[ChainState, Proposals]:
-    """Make so many steps, at most a block of them, or less if the patience ends first."""
+    """Make `count` steps, at most one block, or less if the limit of rejections is reached.
+
+    Single flips with the spring model run in a compiled loop.
+    """
     flips_only = set(settings.moves) == {"flip"}
     if isinstance(evaluator, SpringEvaluator) and flips_only:
         return _advance_compiled(evaluator, settings, state, rng.random((BLOCK, 2))[:count])
@@ -263,28 +243,26 @@ def advance_in_python(
 ) -> tuple[ChainState, Proposals]:
     """Make steps with any evaluator and any moves.
 
-    The compiled loop in `bellcrank.search.kernels.metropolis` does the same, faster, where
-    single beams are flipped.
+    For single flips the results equal those of `bellcrank.search.kernels.metropolis`.
     """
     chosen = [moves[name] for name in settings.moves]
     temperatures = settings.temperatures
-    here = place_of(evaluator, settings.cost, temperatures[0], state.mask)
-    rows = Rows()
+    current = evaluated_design(evaluator, settings.cost, temperatures[0], state.mask)
+    rows = ProposalRows()
     last = state.step + count
     while state.step < last and not is_done(state, settings):
-        here.temperature = float(temperatures[min(state.accepted, len(temperatures) - 1)])
+        current.temperature = float(temperatures[min(state.accepted, len(temperatures) - 1)])
         move = chosen[0] if len(chosen) == 1 else chosen[int(rng.random() * len(chosen))]
-        after = step(here, move, rng, rows, settings.minimum_degree)
+        after = metropolis_step(current, move, rng, rows, settings.minimum_degree)
         state = replace(state, step=state.step + 1, rejections=state.rejections + 1)
-        if after is not here:
+        if after is not current:
             efficiency = after.response.score
             state = replace(
                 state, efficiency=efficiency, cost=after.cost, best=max(state.best, efficiency),
                 accepted=state.accepted + 1, rejections=0,
             )  # fmt: skip
-        here = after
-    return replace(state, mask=pack_mask(here.mask)), rows.proposals(evaluator.problem)
+        current = after
+    return replace(state, mask=pack_mask(current.mask)), rows.proposals(evaluator.problem)
 
 
 searches.register("paper")(Search(MetropolisSettings, ChainState, start, advance, is_done))
-searches.register("informed")(Search(InformedSettings, ChainState, start, advance, is_done))

@@ -1,9 +1,9 @@
-"""The registry of searches, and what can be done with any of them.
+"""Registry of searches, and the functions that apply to any of them.
 
-A search is four functions around a state of plain numbers: `start` gives the state before
-the first proposal, `advance` makes a block of proposals, `is_done` tells when to stop, and
-settings and state go to plain data and back. A chain can thus be stopped between any two
-blocks, kept in a file, and gone on with elsewhere to the same last bit.
+A search consists of four functions and a state of plain numbers: `start` returns the state
+before the first proposal, `advance` makes one block of proposals, `is_done` decides when the
+chain ends, and settings and state convert to plain data and back. A chain can therefore be
+stopped between any two blocks, stored, and resumed on another machine to the same last bit.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from bellcrank.errors import InvalidSettings
 from bellcrank.registry import Registry
 from bellcrank.search.blocks import BLOCK
-from bellcrank.search.goals import GoalEvaluator
-from bellcrank.search.selection import Offers, plateau_ends
+from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
+from bellcrank.search.selection import CandidateRule, plateau_ends
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -28,7 +28,7 @@ DEFAULT_SEARCH = "basin-hopping"
 
 
 class State(Protocol):
-    """Where a chain stands between two blocks."""
+    """State of a chain between two blocks."""
 
     @property
     def step(self) -> int:
@@ -36,11 +36,11 @@ class State(Protocol):
 
     @property
     def efficiency(self) -> float:
-        """Of the current design."""
+        """Score of the current design."""
 
     @property
     def best(self) -> float:
-        """Highest efficiency of an accepted design so far."""
+        """Highest score of an accepted design so far."""
 
     @property
     def accepted(self) -> int:
@@ -56,23 +56,25 @@ class State(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """One way to search.
+    """Entry of the registry of searches.
 
     Parameters
     ----------
     settings, state
-        Classes of what it is told and of where it stands.
+        Classes of the settings and of the state.
     start
-        ``(evaluator, settings, chain)`` to the state before the first proposal.
+        Function of ``(evaluator, settings, chain)`` that returns the state before the first
+        proposal.
     advance
-        ``(evaluator, settings, chain, state)`` to the state after a block, which ends at a
-        multiple of `BLOCK` steps or with the chain, and one row for each proposal in it.
+        Function of ``(evaluator, settings, chain, state)`` that returns the state after a block,
+        which ends at a multiple of `BLOCK` steps or with the chain, and one row per proposal.
     is_done
-        ``(state, settings)``: whether the chain has ended.
-    offers
-        Which of the accepted designs are worth building.
-    leaps
-        Whether the path goes up and down so much that a picture should show the best so far.
+        Function of ``(state, settings)``: whether the chain has ended.
+    candidate_rule
+        Selects candidates for the final design from the accepted designs.
+    plot_running_best
+        Whether plots show the best efficiency so far in place of the current one, which varies
+        too much to be read.
     """
 
     settings: type[SearchSettings]
@@ -80,8 +82,8 @@ class Search:
     start: Callable[[Evaluator, Any, int], State]
     advance: Callable[[Evaluator, Any, int, Any], tuple[State, Proposals]]
     is_done: Callable[[Any, Any], bool]
-    offers: Offers = plateau_ends
-    leaps: bool = False
+    candidate_rule: CandidateRule = plateau_ends
+    plot_running_best: bool = False
 
 
 searches: Registry[Search] = Registry("search")
@@ -114,7 +116,7 @@ def start_chain(evaluator: Evaluator, settings: SearchSettings, chain: int = 0) 
     Raises
     ------
     InvalidSettings
-        If the initial design has no response, so that there is nothing to compare with.
+        If the problem has no support, or its initial design no unique, stable response.
     """
     return searches[settings.name].start(evaluator, settings, chain)
 
@@ -129,18 +131,20 @@ def advance_chain(
     state
         After the block.
     proposals
-        One row for each step made.
+        One row per step.
     """
     if state.step % BLOCK:
-        raise InvalidSettings(f"chain {chain}: a state at step {state.step} is not between blocks")
+        raise InvalidSettings(
+            f"chain {chain}: expected a state at a multiple of {BLOCK} steps, got step {state.step}"
+        )
     after, proposals = searches[settings.name].advance(evaluator, settings, chain, state)
-    if isinstance(evaluator, GoalEvaluator):
-        proposals = evaluator.as_meant(proposals)
+    if isinstance(evaluator, ConstrainedEvaluator):
+        proposals = evaluator.expand_proposals(proposals)
     return after, proposals
 
 
 def is_done(state: State, settings: SearchSettings) -> bool:
-    """Whether a chain has made all its steps, or ended for another reason."""
+    """Whether a chain has ended."""
     return searches[settings.name].is_done(state, settings)
 
 

@@ -1,4 +1,4 @@
-"""Each goal against designs made by hand, with the value it must measure."""
+"""Each constraint on designs made by hand, with the violation it must measure."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.machines import mean_ports, two_port_at
 from bellcrank.mechanics import Core, SpringEvaluator, Status, foresee_stiffness, output_stiffness
 from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem
-from bellcrank.search.goals import (
-    Case,
-    GoalEvaluator,
-    Moved,
+from bellcrank.search.constraints import (
+    ConstrainedEvaluator,
+    DeformedDesign,
+    LoadCase,
+    constraints,
     largest_strain,
     mass_of,
     mirror_images,
     near_pairs,
-    read_goal,
+    parse_goal,
     segment_distances,
-    terms,
 )
 
 EVERY_GOAL = {
@@ -64,39 +64,41 @@ def without(problem: Problem, *pairs: tuple[int, int]) -> np.ndarray:
     return mask
 
 
-def excess_of_beams(problem: Problem, text: str, mask: np.ndarray) -> float:
-    measure = read_goal(text).term(problem).of_beams
+def structure_violation(problem: Problem, text: str, mask: np.ndarray) -> float:
+    measure = parse_goal(text).constraint(problem).structure_violation
     assert measure is not None
     return measure(mask, Core(SpringEvaluator(problem)).of(mask))
 
 
-def moved(problem: Problem, mask: np.ndarray) -> Moved:
+def moved(problem: Problem, mask: np.ndarray) -> DeformedDesign:
     evaluator = SpringEvaluator(problem)
     response = evaluator.evaluate(mask)
     assert response.status is Status.CONVERGED
-    return Moved(evaluator, mask, Core(evaluator).of(mask), response)
+    return DeformedDesign(evaluator, mask, Core(evaluator).of(mask), response)
 
 
-def excess_of_response(text: str, state: Moved) -> float:
-    measure = read_goal(text).term(state.evaluator.problem).of_response
+def response_violation(text: str, state: DeformedDesign) -> float:
+    measure = parse_goal(text).constraint(state.evaluator.problem).response_violation
     assert measure is not None
     return measure(state)
 
 
-def random_designs(problem: Problem, count: int, thinnest: float = 0.6) -> list[np.ndarray]:
+def random_designs(problem: Problem, count: int, min_density: float = 0.6) -> list[np.ndarray]:
     rng = np.random.default_rng(5)
     designs = []
     for _ in range(count):
         mask = problem.initial.copy()
-        mask[problem.designable] &= rng.random(len(problem.designable)) < rng.uniform(thinnest, 1)
+        mask[problem.designable] &= rng.random(len(problem.designable)) < rng.uniform(
+            min_density, 1
+        )
         designs.append(mask)
     return designs
 
 
 def test_every_goal_is_tested_here() -> None:
-    assert set(EVERY_GOAL) == set(terms)
+    assert set(EVERY_GOAL) == set(constraints)
     for name, text in EVERY_GOAL.items():
-        assert read_goal(text).name == name
+        assert parse_goal(text).name == name
 
 
 @pytest.mark.parametrize(
@@ -110,27 +112,27 @@ def test_every_goal_is_tested_here() -> None:
 def test_bad_syntax_names_the_goal_and_says_what_was_expected(text: str) -> None:
     name = text.split(maxsplit=1)[0]
     with pytest.raises(InvalidSettings, match=f"goal '{text}': expected '{name}"):
-        read_goal(text)
+        parse_goal(text)
 
 
 def test_an_unknown_goal_lists_the_known_ones() -> None:
     with pytest.raises(UnknownName, match=r"unknown goal 'weight'; known: mass, .*no-contact"):
-        read_goal("weight <= 3")
+        parse_goal("weight <= 3")
     with pytest.raises(InvalidSettings, match="expected a text"):
-        read_goal(3)
+        parse_goal(3)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("mass <= 1", "expected a part below 1"),
+        ("mass <= 1", "expected a fraction below 1"),
         ("degree >= 7", "no node of problem 'crane' has more than 6 beams"),
         ("mirror x", "not symmetric in x: 9 of 203 designable beams have no designable mirror"),
     ],
 )
 def test_goals_that_make_no_sense_for_a_problem_say_why(text: str, message: str) -> None:
     with pytest.raises(InvalidSettings, match=f"goal '{text}': .*{message}"):
-        GoalEvaluator([Case(find_problem("crane"))], [text])
+        ConstrainedEvaluator([LoadCase(find_problem("crane"))], [text])
 
 
 def test_mass_is_the_length_that_carries_load() -> None:
@@ -140,14 +142,14 @@ def test_mass_is_the_length_that_carries_load() -> None:
     assert mass_of(problem, Core(SpringEvaluator(problem)).of(mask)) == pytest.approx(
         (full - 2) / full
     )
-    assert excess_of_beams(problem, "mass <= 0.5", problem.initial) == pytest.approx(0.5)
-    assert excess_of_beams(problem, "mass <= 0.5", mask) == pytest.approx(
+    assert structure_violation(problem, "mass <= 0.5", problem.initial) == pytest.approx(0.5)
+    assert structure_violation(problem, "mass <= 0.5", mask) == pytest.approx(
         1 - 0.5 / ((full - 2) / full)
     )
-    assert excess_of_beams(problem, "mass <= 0.95", mask) == 0.0
+    assert structure_violation(problem, "mass <= 0.95", mask) == 0.0
 
 
-def test_dead_ends_have_no_mass_for_they_are_not_built() -> None:
+def test_dead_ends_have_no_mass() -> None:
     problem = ladder()
     # Node 5 keeps a single beam, down to node 1.
     cut = without(problem, (4, 5), (5, 6), (0, 5), (2, 5))
@@ -156,37 +158,37 @@ def test_dead_ends_have_no_mass_for_they_are_not_built() -> None:
     assert (core.of(cut) == core.of(gone)).all()
 
 
-def test_the_foreseen_change_of_mass_is_exact_for_beams_that_leave_no_dead_end() -> None:
+def test_the_predicted_change_of_mass_is_exact_for_beams_that_leave_no_dead_end() -> None:
     problem = ladder()
-    term = read_goal("mass <= 0.5").term(problem)
+    constraint = parse_goal("mass <= 0.5").constraint(problem)
     core = Core(SpringEvaluator(problem))
-    assert term.by_flip is not None
-    foreseen = term.by_flip(core.of(problem.initial))
+    assert constraint.flip_change is not None
+    predicted = constraint.flip_change(core.of(problem.initial))
     for beam in problem.designable:
         mask = problem.initial.copy()
         mask[beam] = False
-        gained = excess_of_beams(problem, "mass <= 0.5", mask) - 0.5
-        assert foreseen[beam] == pytest.approx(gained)
+        gained = structure_violation(problem, "mass <= 0.5", mask) - 0.5
+        assert predicted[beam] == pytest.approx(gained)
 
 
 def test_degree_counts_the_beams_that_free_nodes_lack() -> None:
     problem = ladder()
     # Free: 1, 2, 5, 6, 7. In the full ladder 1, 2, 5, 6 have five beams, the corner 7 three.
-    assert excess_of_beams(problem, "degree >= 3", problem.initial) == 0.0
-    assert excess_of_beams(problem, "degree >= 4", problem.initial) == pytest.approx(1 / 11)
+    assert structure_violation(problem, "degree >= 3", problem.initial) == 0.0
+    assert structure_violation(problem, "degree >= 4", problem.initial) == pytest.approx(1 / 11)
     fewer = without(problem, (6, 7))
-    assert excess_of_beams(problem, "degree >= 4", fewer) == pytest.approx(2 / 12)
-    assert excess_of_beams(problem, "degree >= 2", fewer) == 0.0
+    assert structure_violation(problem, "degree >= 4", fewer) == pytest.approx(2 / 12)
+    assert structure_violation(problem, "degree >= 2", fewer) == 0.0
 
 
 def test_connected_counts_pieces_and_missing_regions() -> None:
     problem = ladder()
-    assert excess_of_beams(problem, "connected", problem.initial) == 0.0
+    assert structure_violation(problem, "connected", problem.initial) == 0.0
     # The output hangs on three beams: 0-4, 4-5, 1-4.
     cut = without(problem, (0, 4), (4, 5), (1, 4))
-    assert excess_of_beams(problem, "connected", cut) == pytest.approx(1 / 2)
+    assert structure_violation(problem, "connected", cut) == pytest.approx(1 / 2)
     nothing = np.zeros_like(problem.initial)
-    assert excess_of_beams(problem, "connected", nothing) == pytest.approx(3 / 4)
+    assert structure_violation(problem, "connected", nothing) == pytest.approx(3 / 4)
 
 
 def test_two_pieces_are_one_too_many() -> None:
@@ -199,8 +201,8 @@ def test_two_pieces_are_one_too_many() -> None:
     )  # fmt: skip
     apart = problem.initial.copy()
     apart[8] = False
-    assert excess_of_beams(problem, "connected", problem.initial) == 0.0
-    assert excess_of_beams(problem, "connected", apart) == pytest.approx(1 / 2)
+    assert structure_violation(problem, "connected", problem.initial) == 0.0
+    assert structure_violation(problem, "connected", apart) == pytest.approx(1 / 2)
 
 
 def test_mirror_counts_the_beams_whose_image_differs() -> None:
@@ -215,9 +217,9 @@ def test_mirror_counts_the_beams_whose_image_differs() -> None:
     alone = next(i for i, image in enumerate(images) if image == i)
     mask = problem.initial.copy()
     mask[problem.designable[alone]] = False
-    assert excess_of_beams(problem, "mirror x", mask) == 0.0
+    assert structure_violation(problem, "mirror x", mask) == 0.0
     mask[problem.designable[pair]] = False
-    assert excess_of_beams(problem, "mirror x", mask) == pytest.approx(2 / len(images))
+    assert structure_violation(problem, "mirror x", mask) == pytest.approx(2 / len(images))
 
 
 def test_images_tell_crossing_diagonals_apart() -> None:
@@ -254,19 +256,19 @@ def test_output_stiffness_is_what_a_small_force_meets(name: str) -> None:
     assert 2 * force / (output(force) - output(-force)) == pytest.approx(stiffness, rel=1e-5)
 
 
-def test_an_output_that_hangs_loose_has_no_stiffness() -> None:
+def test_a_loose_output_has_no_stiffness() -> None:
     problem = ladder()
     state = moved(problem, without(problem, (0, 4), (4, 5), (1, 4)))
     assert output_stiffness(state.evaluator) == 0.0
-    assert excess_of_response("stiffness >= 0.1", state) == 1.0
+    assert response_violation("stiffness >= 0.1", state) == 1.0
 
 
 def test_stiffness_falls_short_by_the_part_that_is_missing() -> None:
     problem = ladder()
     state = moved(problem, problem.initial)
     stiffness = output_stiffness(state.evaluator)
-    assert excess_of_response(f"stiffness >= {4 * stiffness}", state) == pytest.approx(0.75)
-    assert excess_of_response(f"stiffness >= {stiffness / 2}", state) == 0.0
+    assert response_violation(f"stiffness >= {4 * stiffness}", state) == pytest.approx(0.75)
+    assert response_violation(f"stiffness >= {stiffness / 2}", state) == 0.0
 
 
 def test_input_stiffness_is_that_of_the_condensed_structure() -> None:
@@ -275,18 +277,18 @@ def test_input_stiffness_is_that_of_the_condensed_structure() -> None:
     element = mean_ports(small.full_design())
     condensed = two_port_at(element, element.rest()).input_stiffness
     state = moved(small, small.initial)
-    excess = excess_of_response(f"input-stiffness <= {condensed / 4}", state)
-    assert excess == pytest.approx(0.75, rel=1e-4)
-    assert excess_of_response(f"input-stiffness <= {condensed * 1.01}", state) == 0.0
-    assert excess_of_response(f"input-stiffness >= {condensed / 1.01}", state) == 0.0
-    assert excess_of_response(f"input-stiffness >= {condensed * 4}", state) == pytest.approx(
+    violation = response_violation(f"input-stiffness <= {condensed / 4}", state)
+    assert violation == pytest.approx(0.75, rel=1e-4)
+    assert response_violation(f"input-stiffness <= {condensed * 1.01}", state) == 0.0
+    assert response_violation(f"input-stiffness >= {condensed / 1.01}", state) == 0.0
+    assert response_violation(f"input-stiffness >= {condensed * 4}", state) == pytest.approx(
         0.75, rel=1e-4
     )
 
 
 def test_input_stiffness_is_none_of_a_force() -> None:
     with pytest.raises(InvalidSettings, match="'input-stiffness <= 1': the input is driven by"):
-        GoalEvaluator([Case(find_problem("pliers"))], ["input-stiffness <= 1"])
+        ConstrainedEvaluator([LoadCase(find_problem("pliers"))], ["input-stiffness <= 1"])
 
 
 def test_strain_is_that_of_the_most_stretched_beam() -> None:
@@ -298,8 +300,8 @@ def test_strain_is_that_of_the_most_stretched_beam() -> None:
         for (a, b), r in zip(problem.lattice.beams, problem.lattice.rest_length, strict=True)
     )
     assert largest_strain(state) == pytest.approx(worst, rel=1e-12)
-    assert excess_of_response(f"strain <= {worst / 4}", state) == pytest.approx(0.75)
-    assert excess_of_response(f"strain <= {worst * 1.01}", state) == 0.0
+    assert response_violation(f"strain <= {worst / 4}", state) == pytest.approx(0.75)
+    assert response_violation(f"strain <= {worst * 1.01}", state) == 0.0
 
 
 def sampled_distance(first: np.ndarray, second: np.ndarray, count: int = 400) -> float:
@@ -351,27 +353,27 @@ def test_contact_counts_crossings_and_what_is_missing_of_the_width() -> None:
     displacement[[0, 1], 1] = 0.8
     response = replace(evaluator.evaluate(problem.initial), displacement=displacement)
     mask = np.array([True, True, False, False, False])
-    state = Moved(evaluator, mask, np.zeros(5, bool), response)
-    assert excess_of_response("no-contact", state) == 0.0
-    assert excess_of_response("no-contact 0.19", state) == 0.0
-    assert excess_of_response("no-contact 0.4", state) == pytest.approx(0.5 / 1.5)
+    state = DeformedDesign(evaluator, mask, np.zeros(5, bool), response)
+    assert response_violation("no-contact", state) == 0.0
+    assert response_violation("no-contact 0.19", state) == 0.0
+    assert response_violation("no-contact 0.4", state) == pytest.approx(0.5 / 1.5)
     # Held beams count although they carry nothing; absent ones do not.
     gone = replace(state, mask=np.zeros(5, bool))
-    assert excess_of_response("no-contact 0.4", gone) == 0.0
+    assert response_violation("no-contact 0.4", gone) == 0.0
     displacement[1, 1] = 1.2
     crossed = replace(state, response=replace(response, displacement=displacement))
-    assert excess_of_response("no-contact", crossed) == pytest.approx(0.5)
+    assert response_violation("no-contact", crossed) == pytest.approx(0.5)
 
 
 def test_snapping_is_what_a_careful_path_finds() -> None:
     problem = find_problem("crane")
     careful = SpringEvaluator(problem)
-    for mask in random_designs(problem, 15, thinnest=0.4):
+    for mask in random_designs(problem, 15, min_density=0.4):
         evaluator = SpringEvaluator(problem)
         response = evaluator.evaluate(mask)
-        state = Moved(evaluator, mask, Core(evaluator).of(mask), response)
+        state = DeformedDesign(evaluator, mask, Core(evaluator).of(mask), response)
         expected = careful.evaluate(mask, 1 / 32).status is not Status.CONVERGED
-        assert excess_of_response("no-snapping", state) == expected
+        assert response_violation("no-snapping", state) == expected
 
 
 def test_the_core_is_that_of_the_evaluator() -> None:
@@ -379,12 +381,12 @@ def test_the_core_is_that_of_the_evaluator() -> None:
         problem = find_problem(name)
         evaluator = SpringEvaluator(problem)
         core = Core(evaluator)
-        for mask in random_designs(problem, 20, thinnest=0.2):
+        for mask in random_designs(problem, 20, min_density=0.2):
             assert (core.of(mask) == evaluator.load_bearing(mask)).all()
 
 
 @pytest.mark.parametrize("name", ["crane", "scaling-8", "pliers"])
-def test_the_foreseen_stiffness_ranks_flips_as_the_true_one_does(name: str) -> None:
+def test_the_predicted_stiffness_ranks_flips_like_the_true_one(name: str) -> None:
     problem = find_problem(name)
     rng = np.random.default_rng(1)
     mask = problem.initial.copy()
@@ -394,12 +396,12 @@ def test_the_foreseen_stiffness_ranks_flips_as_the_true_one_does(name: str) -> N
     before = output_stiffness(evaluator)
     evaluator.predict_flips(mask)
     beams = problem.designable[:: max(1, len(problem.designable) // 120)]
-    foreseen = foresee_stiffness(evaluator, beams, mask[beams])
+    predicted = foresee_stiffness(evaluator, beams, mask[beams])
     real = []
     for beam in beams:
         flipped = mask.copy()
         flipped[beam] ^= True
         evaluator.evaluate(flipped)
         real.append(output_stiffness(evaluator))
-    changes = np.array(real) - before, foreseen - before
+    changes = np.array(real) - before, predicted - before
     assert spearmanr(*changes).statistic > 0.75

@@ -1,0 +1,260 @@
+"""Constraints on the response: output and input stiffness, strain, stability, contact."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
+
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    SpringEvaluator,
+    Status,
+    StrokeEvaluator,
+    UnloadedBeams,
+    foresee_stiffness,
+    output_stiffness,
+)
+from bellcrank.search.constraints.constraint import (
+    Constraint,
+    ConstraintType,
+    DeformedDesign,
+    above,
+    at_least,
+    at_most,
+    below,
+    bounded,
+    constraints,
+    counted,
+    no_value,
+    positive,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+
+MIN_PREDICTED_VIOLATION = 0.02
+"""Smaller predicted violations are within the error of the prediction."""
+
+
+def stiffness(_problem: Problem, bound: float) -> Constraint:
+    """Bound the output stiffness at full load from below (`mechanics.output_stiffness`)."""
+
+    def predicted(deformed: DeformedDesign, beams: NDArray[np.int64]) -> NDArray[np.float64]:
+        after = foresee_stiffness(deformed.evaluator, beams, deformed.mask[beams])
+        violation: NDArray[np.float64] = np.maximum(0.0, 1.0 - after / bound)
+        return np.where(violation < MIN_PREDICTED_VIOLATION, 0.0, violation)
+
+    return Constraint(
+        response_violation=lambda deformed: below(output_stiffness(deformed.evaluator), bound),
+        predicted_violation=predicted,
+        evaluation_cost=2,
+    )
+
+
+def largest_strain(deformed: DeformedDesign) -> float:
+    """Return the largest |r - r0| / r0 of a load-bearing beam."""
+    lattice = deformed.evaluator.problem.lattice
+    beams, rest = lattice.beams[deformed.core], lattice.rest_length[deformed.core]
+    if not len(beams):
+        return 0.0
+    ends = deformed.positions[beams]
+    return float((np.abs(np.hypot(*(ends[:, 1] - ends[:, 0]).T) - rest) / rest).max())
+
+
+def strain(_problem: Problem, bound: float) -> Constraint:
+    """Bound the strain of every beam at full load from above."""
+    return Constraint(
+        response_violation=lambda deformed: above(largest_strain(deformed), bound),
+        evaluation_cost=1,
+    )
+
+
+def input_stiffness(problem: Problem, bound: tuple[str, float]) -> Constraint:
+    """Bound the input stiffness 2 E / u^2, with stored energy E and input displacement u.
+
+    A lower bound excludes designs that are nearly mechanisms.
+
+    Raises
+    ------
+    ValueError
+        If the input is driven by a force.
+    """
+    if problem.input.drive != "displacement":
+        raise ValueError("the input is driven by a force; expected a displacement")
+    squared = problem.input.amount**2
+    violation = above if bound[0] == "<=" else below
+    return Constraint(
+        response_violation=lambda deformed: violation(
+            2.0 * deformed.response.energy / squared, bound[1]
+        ),
+        evaluation_cost=1,
+    )
+
+
+def no_snapping(_problem: Problem, _value: None) -> Constraint:
+    """Require stability along the whole stroke, followed in small increments.
+
+    All searches reject designs that snap, but they follow the stroke in larger increments and
+    miss about one design in a hundred among those near a loss of stability.
+    """
+    # Separate evaluators: the one that holds the response must keep its equilibrium.
+    verifiers: dict[tuple[float, int], SpringEvaluator] = {}
+
+    def violation(deformed: DeformedDesign) -> float:
+        evaluator = deformed.evaluator
+        key = (evaluator.problem.input.amount, evaluator.core)
+        if key not in verifiers:
+            verifiers[key] = SpringEvaluator(
+                evaluator.problem, "displacement", get_args(UnloadedBeams)[evaluator.core]
+            )
+        verified = verifiers[key].evaluate(deformed.mask, VERIFICATION_INCREMENT)
+        return float(verified.status is not Status.CONVERGED)
+
+    return Constraint(response_violation=violation, evaluation_cost=4)
+
+
+def optional_width(rest: str) -> float:
+    """Parse an optional number above 0."""
+    return positive(rest) if rest else 0.0
+
+
+def no_contact(_problem: Problem, width: float) -> Constraint:
+    """Require that no two struts cross or, with a width, come nearer to each other than it.
+
+    Each crossing is a fault; a pair at distance d < width counts 1 - d / width. Designs that are
+    verified are checked along the whole stroke, where the state with most faults counts; others
+    at full load only.
+    """
+    # Separate evaluators: the one that holds the response must keep its equilibrium.
+    strokes: dict[tuple[float, int], StrokeEvaluator] = {}
+
+    def faults(positions: NDArray[np.float64], struts: NDArray[np.int64]) -> float:
+        _, distance = near_pairs(positions, struts, width)
+        return float(np.sum(1.0 - distance / width)) if width else float(len(distance))
+
+    def violation(deformed: DeformedDesign) -> float:
+        struts = printed_struts(deformed)
+        worst = faults(deformed.positions, struts)
+        if deformed.verified:
+            evaluator = deformed.evaluator
+            key = (evaluator.problem.input.amount, evaluator.core)
+            if key not in strokes:
+                unloaded_beams = get_args(UnloadedBeams)[evaluator.core]
+                strokes[key] = StrokeEvaluator(evaluator.problem, unloaded_beams)
+            rest = evaluator.problem.lattice.positions
+            for _, response in strokes[key].evaluate(deformed.mask):
+                worst = max(worst, faults(rest + response.displacement, struts))
+        return counted(worst)
+
+    return Constraint(response_violation=violation, evaluation_cost=3)
+
+
+def printed_struts(deformed: DeformedDesign) -> NDArray[np.int64]:
+    """Return (n, 2) the nodes of beams that carry load or join two held nodes."""
+    problem = deformed.evaluator.problem
+    held = np.zeros(problem.lattice.node_count, dtype=bool)
+    held[problem.supports.fixed] = True
+    if problem.input.drive == "displacement":
+        held[problem.input.nodes] = True
+    between = deformed.mask & held[problem.lattice.beams].all(axis=1)
+    struts: NDArray[np.int64] = problem.lattice.beams[deformed.core | between]
+    return struts
+
+
+def near_pairs(
+    positions: NDArray[np.float64], beams: NDArray[np.int64], width: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Find the pairs of struts without a common node that cross or are nearer than a width.
+
+    Parameters
+    ----------
+    positions : (N, 2)
+    beams : (n, 2)
+    width
+        0 for crossings only.
+
+    Returns
+    -------
+    pairs : (p, 2) int64
+        Indices into `beams`.
+    distance : (p,)
+    """
+    from scipy.spatial import cKDTree
+
+    if len(beams) < 2:
+        return np.empty((0, 2), np.int64), np.empty(0)
+    ends = positions[beams]
+    longest = float(np.hypot(*(ends[:, 1] - ends[:, 0]).T).max())
+    pairs = cKDTree(ends.mean(axis=1)).query_pairs(longest + width, output_type="ndarray")
+    one, other = beams[pairs[:, 0]], beams[pairs[:, 1]]
+    pairs = pairs[~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2))]
+    distance = segment_distances(ends[pairs[:, 0]], ends[pairs[:, 1]])
+    near = (distance < width) | (distance == 0.0)
+    return np.asarray(pairs[near], dtype=np.int64), distance[near]
+
+
+def segment_distances(
+    first: NDArray[np.float64], second: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (n,) the distances between pairs of segments, 0 where they cross.
+
+    Parameters
+    ----------
+    first, second : (n, 2, 2)
+        End points of the segments.
+
+    Examples
+    --------
+    >>> bar = np.array([[[0.0, 0.0], [2.0, 0.0]]])
+    >>> segment_distances(bar, bar + [0.0, 0.5]), segment_distances(bar, bar[:, :, ::-1] + [1, -1])
+    (array([0.5]), array([0.]))
+    """
+    a, b, c, d = first[:, 0], first[:, 1], second[:, 0], second[:, 1]
+    apart = np.minimum.reduce(
+        [
+            _distance_to_segment(a, c, d),
+            _distance_to_segment(b, c, d),
+            _distance_to_segment(c, a, b),
+            _distance_to_segment(d, a, b),
+        ]
+    )
+    sides = _cross(b - a, c - a) * _cross(b - a, d - a)
+    others = _cross(d - c, a - c) * _cross(d - c, b - c)
+    distance: NDArray[np.float64] = np.where((sides < 0.0) & (others < 0.0), 0.0, apart)
+    return distance
+
+
+def _cross(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    product: NDArray[np.float64] = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    return product
+
+
+def _distance_to_segment(
+    point: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (n,) the distances of (n, 2) points from segments."""
+    along, offset = end - start, point - start
+    square = np.maximum((along * along).sum(axis=1), 1e-300)
+    part = np.clip((offset * along).sum(axis=1) / square, 0.0, 1.0)
+    rest = offset - part[:, None] * along
+    distance: NDArray[np.float64] = np.hypot(rest[:, 0], rest[:, 1])
+    return distance
+
+
+for _name, _usage, _parse, _make in (
+    ("stiffness", "'stiffness >= NUMBER', the number above 0", at_least, stiffness),
+    (
+        "input-stiffness", "'input-stiffness <= NUMBER' or '>= NUMBER', above 0",
+        bounded, input_stiffness,
+    ),
+    ("strain", "'strain <= NUMBER', the number above 0", at_most, strain),
+    ("no-snapping", "'no-snapping' alone", no_value, no_snapping),
+    (
+        "no-contact", "'no-contact', or 'no-contact NUMBER' with a width above 0",
+        optional_width, no_contact,
+    ),
+):  # fmt: skip
+    constraints.register(_name)(ConstraintType(_usage, _parse, _make))

@@ -1,0 +1,152 @@
+"""One step of a Markov chain over designs, with any move and any evaluator."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import FlipPrediction
+from bellcrank.model import unpack_mask
+from bellcrank.search.kernels.acceptance import metropolis_accepts
+from bellcrank.search.markov.costs import costs
+from bellcrank.search.verdict import Verdict
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics import Response
+    from bellcrank.model import Problem
+    from bellcrank.search.blocks import ProposalRows
+    from bellcrank.search.evaluator import Evaluator
+    from bellcrank.search.markov.costs import Cost
+    from bellcrank.search.markov.moves import Move
+
+
+@dataclass(slots=True, eq=False)
+class EvaluatedDesign:
+    """A current or proposed design of a chain, with its response.
+
+    Parameters
+    ----------
+    evaluator
+        The evaluator that computed the response.
+    cost_function
+        The cost that the chain minimises.
+    temperature
+        Temperature of the chain.
+    mask : (M,) bool
+    response
+        Response of the design.
+    """
+
+    evaluator: Evaluator
+    cost_function: Cost
+    temperature: float
+    mask: NDArray[np.bool_]
+    response: Response
+    is_last: bool = True
+    """Whether the evaluator evaluated this design last, as predictions require."""
+    _prediction: FlipPrediction | None = field(default=None, repr=False)
+
+    @property
+    def problem(self) -> Problem:
+        """The problem of the evaluator."""
+        return self.evaluator.problem
+
+    @property
+    def cost(self) -> float:
+        """Cost of the design."""
+        return self.cost_function.of(self.response.score)
+
+    def flip_prediction(self) -> FlipPrediction:
+        """Predict the effect of each flip, once; zero where no prediction is available."""
+        if self._prediction is None:
+            if not self.is_last:
+                self.evaluator.evaluate(self.mask, warm_start=True)
+            beams = self.problem.designable
+            unknown = FlipPrediction(beams, np.zeros(len(beams)), np.zeros(len(beams)))
+            self._prediction = self.evaluator.predict_flips(self.mask) or unknown
+        return self._prediction
+
+    def predicted_log_ratio(self, index: int | slice) -> NDArray[np.float64]:
+        """Return the predicted logarithm of the ratio of probabilities of flips.
+
+        Parameters
+        ----------
+        index
+            Index or indices into the designable beams.
+        """
+        change = np.atleast_1d(self.flip_prediction().change[index])
+        increase = self.cost_function.change(self.response.score, change)
+        ratio: NDArray[np.float64] = np.clip(-increase / self.temperature, -1e3, 1e3)
+        return ratio
+
+
+def evaluated_design(
+    evaluator: Evaluator, cost: str, temperature: float, mask: str
+) -> EvaluatedDesign:
+    """Evaluate a packed design from rest and make it the reference of warm starts."""
+    bits = unpack_mask(mask, evaluator.problem.lattice.beam_count).copy()
+    response = evaluator.evaluate(bits)
+    evaluator.set_reference()
+    return EvaluatedDesign(evaluator, costs[cost], temperature, bits, response)
+
+
+def metropolis_step(
+    current: EvaluatedDesign,
+    move: Move,
+    rng: np.random.Generator,
+    rows: ProposalRows,
+    minimum_degree: int = 0,
+) -> EvaluatedDesign:
+    """Make one proposal, record it, and return the current design afterwards.
+
+    A design without a unique, stable response is rejected at any temperature.
+    """
+    beams = move.propose(current, rng)
+    uniform = rng.random()
+    if beams is None:
+        rows.add(
+            current.mask, math.nan, math.nan, current.temperature, False, Verdict.REJECTED_EARLY
+        )
+        return current
+    mask = current.mask.copy()
+    mask[beams] ^= True
+    if minimum_degree and _violates_minimum_degree(current.problem, minimum_degree, mask, beams):
+        rows.add(mask, math.nan, math.nan, current.temperature, False, Verdict.FORBIDDEN)
+        return current
+    response = current.evaluator.evaluate(mask, warm_start=True)
+    current.is_last = False
+    proposed = EvaluatedDesign(
+        current.evaluator, current.cost_function, current.temperature, mask, response
+    )
+    accepted = False
+    if response.is_admissible:
+        log_ratio = (current.cost - proposed.cost) / current.temperature
+        log_ratio += move.log_probability(proposed, beams) - move.log_probability(current, beams)
+        accepted = metropolis_accepts(log_ratio, uniform)
+    rows.add(
+        mask, response.efficiency, proposed.cost, current.temperature, accepted, response.status
+    )
+    if accepted:
+        current.evaluator.set_reference()
+        return proposed
+    return current
+
+
+def _violates_minimum_degree(
+    problem: Problem, minimum_degree: int, mask: NDArray[np.bool_], beams: NDArray[np.int64]
+) -> bool:
+    """Whether a removal leaves a free node with fewer beams than the minimum."""
+    removed = beams[~mask[beams]]
+    if not len(removed):
+        return False
+    held = set(problem.supports.fixed.tolist())
+    if problem.input.drive == "displacement":
+        held.update(problem.input.nodes.tolist())
+    degree = np.bincount(problem.lattice.beams[mask].ravel(), minlength=problem.lattice.node_count)
+    ends = problem.lattice.beams[removed].ravel().tolist()
+    return any(degree[node] < minimum_degree and node not in held for node in ends)
