@@ -62,7 +62,6 @@ export class RunPage {
   private shadingNote(): string {
     return {
       paper: "Shaded: the annealing, darker where it is hot.",
-      informed: "Shaded: the annealing, darker where it is hot.",
       "basin-hopping": "The best design of each chain. Shaded: where a chain wanders instead of climbing.",
       tempering: "The coldest replica of each chain.",
     }[this.run.method] ?? "";

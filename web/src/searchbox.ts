@@ -7,7 +7,6 @@ import { sentence } from "./words";
 
 const METHODS: [string, string, string][] = [
   ["basin-hopping", "Basin hopping", "Climbs, disturbs a part, climbs again. The best in most cases."],
-  ["informed", "Informed", "A Metropolis chain that foresees what each flip does."],
   ["tempering", "Tempering", "Chains at several temperatures that exchange designs."],
   ["paper", "The paper", "Single random flips, as Bonfanti et al. (2020) published it."],
 ];

@@ -50,7 +50,7 @@ def design(
     search: Annotated[
         str,
         typer.Option(
-            help="basin-hopping, informed, tempering, or paper (Bonfanti et al. 2020).",
+            help="basin-hopping, tempering or paper (Bonfanti et al. 2020).",
         ),
     ] = "basin-hopping",
     unloaded_beams: Annotated[

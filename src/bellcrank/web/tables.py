@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from bellcrank.web.limits import CHAINS, STEPS
 
-Method = Literal["basin-hopping", "informed", "tempering", "paper"]
+Method = Literal["basin-hopping", "tempering", "paper"]
 FileSuffix = Literal["stl", "3mf", "svg", "dxf", "step", "mp4", "gif", "pdf", "json"]
 Level = Literal["frame", "plane", "solid"]
 Mask = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=4000)]
