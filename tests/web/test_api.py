@@ -12,7 +12,7 @@ import trimesh
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model import find_problem, human_design, problem_to_dict
 from bellcrank.part import calibrated
-from bellcrank.web.texts import read_task, write_task
+from bellcrank.web.task_files import read_task, write_task
 
 if TYPE_CHECKING:
     from starlette.testclient import TestClient

@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from bellcrank.model import find_problem, read_design
+from bellcrank.web.curves import MOST, Trace
 from bellcrank.web.jobs import Jobs, Record
-from bellcrank.web.scheduling import Scheduler
-from bellcrank.web.tracing import MOST, Trace
+from bellcrank.web.scheduler import Scheduler
 
 from .conftest import wait_for
 
@@ -187,7 +187,7 @@ def test_a_search_that_is_stopped_gives_the_best_it_has_found(
     found = pq.read_table(io.BytesIO(history.content))
     assert found.num_rows == run["done"]
     assert set(found["chain"].to_pylist()) == {0, 1}
-    path = client.app.state.workshop.jobs[name].path  # type: ignore[attr-defined]
+    path = client.app.state.state.jobs[name].path  # type: ignore[attr-defined]
     assert read_design(path / "run" / "design.json").mask_hex == run["mask"]
     assert client.delete(f"/api/runs/{name}").status_code == 200
     assert not path.exists()

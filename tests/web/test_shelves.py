@@ -11,8 +11,8 @@ import pytest
 from bellcrank.machines.library import kinds, library
 from bellcrank.machines.showcases import showcase, showcases
 from bellcrank.model import unpack_mask
-from bellcrank.web.actuators import LOADS, Actuators, Machines, Struts
-from bellcrank.web.gallery import BuiltIn
+from bellcrank.web.gallery import BundledDesigns
+from bellcrank.web.machine_gallery import LOADS, Actuators, Machines, Struts
 
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
@@ -94,7 +94,7 @@ def _count(source: Any) -> int:
 
 
 def test_who_looks_at_the_same_time_sees_all_of_a_shelf() -> None:
-    for source in (BuiltIn(), Actuators(), Machines()):
+    for source in (BundledDesigns(), Actuators(), Machines()):
         with ThreadPoolExecutor(8) as visitors:
             looks = [visitors.submit(_count, source) for _ in range(16)]
         assert {look.result() for look in looks} == {_count(source)}

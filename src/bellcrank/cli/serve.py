@@ -15,37 +15,40 @@ from bellcrank.errors import InvalidSettings
 @app.command()
 def serve(
     host: Annotated[
-        str, typer.Option(help="Address; any but this machine's own asks for a token.")
+        str, typer.Option(help="Address; addresses other than loopback require a token.")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port; 0 for any that is free.")] = 8642,
+    port: Annotated[int, typer.Option(help="Port; 0 for any free port.")] = 8642,
     folder: Annotated[
-        Path | None, typer.Option(help="Where runs are kept; default: with your other data.")
+        Path | None,
+        typer.Option(help="Folder of the runs; default: in the data folder of the user."),
     ] = None,
-    token: Annotated[str | None, typer.Option(help="That visitors must know.")] = None,
+    token: Annotated[str | None, typer.Option(help="Token required from clients.")] = None,
     searches: Annotated[
-        int | None, typer.Option(help="At the same time; default: one for each processor.")
+        int | None, typer.Option(help="Searches at the same time; default: one for each processor.")
     ] = None,
     show: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
-    """Open a page on which to draw a task, watch it being designed, and take the part."""
+    """Serve a page on which to define a task, follow its search and download the part."""
     try:
         from bellcrank.web.serving import ServerSettings, default_folder
         from bellcrank.web.serving import serve as run
-    except ModuleNotFoundError as error:  # pragma: no cover - where the extra is missing
+    except ModuleNotFoundError as error:  # pragma: no cover - without the extra
         raise _missing(error) from None
 
     settings = ServerSettings(
         folder=folder or default_folder(), host=host, port=port, token=token, searches=searches
     )
 
-    def tell(address: str) -> None:
+    def announce(address: str) -> None:
         notes.print(f"bellcrank is at [bold]{plain(address)}[/]")
-        notes.print(f"runs are kept in {plain(settings.folder)}; Ctrl-C ends the server, not them")
+        notes.print(
+            f"runs are stored in {plain(settings.folder)}; Ctrl-C ends the server and pauses them"
+        )
         if show:
             typer.launch(address)
 
     try:
-        run(settings, tell)
+        run(settings, announce)
     except ModuleNotFoundError as error:
         raise _missing(error) from None
 

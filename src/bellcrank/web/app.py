@@ -1,4 +1,4 @@
-"""The server: pages, routes, and what happens when something is wrong."""
+"""The application: pages, routes and error responses."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownNa
 from bellcrank.part import materials
 from bellcrank.search import default_workers
 from bellcrank.web import design_routes, run_routes, task_routes
-from bellcrank.web.actuators import Actuators, Machines, Struts
-from bellcrank.web.gallery import BuiltIn, Gallery, Kept, OwnRuns
+from bellcrank.web.gallery import BundledDesigns, Gallery, RunDesigns, SavedDesigns
 from bellcrank.web.jobs import Jobs
-from bellcrank.web.pools import Busy, TookTooLong, make_pools, plain_error
-from bellcrank.web.scheduling import Scheduler
-from bellcrank.web.security import Guard
-from bellcrank.web.state import Shop, Workshop
-from bellcrank.web.tables import Complaint
+from bellcrank.web.machine_gallery import Actuators, Machines, Struts
+from bellcrank.web.pools import Busy, TimeLimitExceeded, make_pools, plain_error
+from bellcrank.web.requests import ErrorResponse
+from bellcrank.web.scheduler import Scheduler
+from bellcrank.web.security import AccessControl
+from bellcrank.web.state import AppState, State
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Coroutine
@@ -39,8 +39,8 @@ PAGES = {
     "/app.css": ("app.css", "text/css; charset=utf-8"),
     "/icon.svg": ("icon.svg", "image/svg+xml"),
 }
-COMPLAINTS: dict[int | str, dict[str, Any]] = {
-    code: {"model": Complaint} for code in (400, 401, 403, 404, 413, 415, 422, 503, 507)
+ERROR_RESPONSES: dict[int | str, dict[str, Any]] = {
+    code: {"model": ErrorResponse} for code in (400, 401, 403, 404, 413, 415, 422, 503, 507)
 }
 
 
@@ -50,26 +50,26 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
     Parameters
     ----------
     folder
-        Where runs and kept designs are.
+        Folder of runs and saved designs.
     token
-        That everybody must know; None where only this machine can ask.
+        Required from every client; None for a server that only this machine can reach.
     searches
-        At the same time; as many as there are processors by default.
+        Searches that run at the same time; the number of processors by default.
     """
     jobs = Jobs(folder / "runs")
-    kept = Kept(folder / "designs")
+    saved = SavedDesigns(folder / "designs")
     machines = Machines()
-    gallery = Gallery(OwnRuns(jobs), kept, machines, BuiltIn(), Actuators(), Struts())
-    workshop = Workshop(jobs, Scheduler(jobs, searches), make_pools(), gallery, kept, machines)
+    gallery = Gallery(RunDesigns(jobs), saved, machines, BundledDesigns(), Actuators(), Struts())
+    state = AppState(jobs, Scheduler(jobs, searches), make_pools(), gallery, saved, machines)
 
     @contextlib.asynccontextmanager
-    async def alive(_app: FastAPI) -> AsyncIterator[None]:
-        workshop.scheduler.open()
-        warming = asyncio.create_task(_warm(workshop))
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        state.scheduler.open()
+        preparation = asyncio.create_task(_prepare(state))
         yield
-        warming.cancel()
-        await workshop.scheduler.close()
-        workshop.pools.close()
+        preparation.cancel()
+        await state.scheduler.close()
+        state.pools.close()
 
     app = FastAPI(
         title="bellcrank",
@@ -77,28 +77,28 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
         openapi_url="/api/openapi.json",
         docs_url=None,  # these pages would load scripts from elsewhere
         redoc_url=None,
-        lifespan=alive,
-        responses=COMPLAINTS,
+        lifespan=lifespan,
+        responses=ERROR_RESPONSES,
     )
-    app.state.workshop = workshop
+    app.state.bellcrank = state
     app.add_middleware(GZipMiddleware, minimum_size=1000, compresslevel=4)
-    app.add_middleware(Guard, token=token)
+    app.add_middleware(AccessControl, token=token)
     for routes in (task_routes, design_routes, run_routes):
         app.include_router(routes.router)
     _add_pages(app)
-    _add_complaints(app)
+    _add_error_handlers(app)
 
     @app.get("/api/about", tags=["server"])
-    def about(shop: Shop) -> dict[str, Any]:
-        """Say what server this is, and whether it is ready to compute."""
+    def about(state: State) -> dict[str, Any]:
+        """Return version, state and load of the server."""
         return {
             "version": __version__,
-            "ready": shop.ready,
-            "trouble": shop.trouble,
+            "ready": state.ready,
+            "trouble": state.trouble,
             "processors": default_workers(),
-            "searches": shop.scheduler.slots,
-            "running": len(shop.scheduler.running),
-            "queued": len(shop.scheduler.queue),
+            "searches": state.scheduler.slots,
+            "running": len(state.scheduler.running),
+            "queued": len(state.scheduler.queue),
             "materials": {
                 name: {"young": each.young, "poisson": each.poisson}
                 for name, each in materials.items()
@@ -108,18 +108,18 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
     return app
 
 
-async def _warm(workshop: Workshop) -> None:
-    """Make ready what takes seconds the first time: kernels, and machines of the gallery."""
+async def _prepare(state: AppState) -> None:
+    """Load the kernels and build the machines of the gallery, which takes seconds."""
     try:
-        await asyncio.gather(workshop.pools.warm(), run_in_threadpool(workshop.gallery.listing))
+        await asyncio.gather(state.pools.prepare(), run_in_threadpool(state.gallery.listing))
     except BellcrankError as error:
-        workshop.trouble = first_line(error)
+        state.trouble = first_line(error)
     else:
-        workshop.ready = True
+        state.ready = True
 
 
 def _add_pages(app: FastAPI) -> None:
-    """Serve the files of the page, by name and from memory: no address becomes a path."""
+    """Serve the files of the page by name, from memory: no address is used as a path."""
     for address, (name, media) in PAGES.items():
         app.add_api_route(
             address, _page((STATIC / name).read_bytes(), media), include_in_schema=False
@@ -127,7 +127,7 @@ def _add_pages(app: FastAPI) -> None:
 
 
 def _page(content: bytes, media: str) -> Callable[..., Coroutine[Any, Any, Response]]:
-    """Return what answers with some content, or says that it has not changed."""
+    """Return a handler that serves fixed content with an entity tag."""
     headers = {
         "etag": f'"{hashlib.sha256(content).hexdigest()[:16]}"',
         "cache-control": "no-cache",
@@ -141,35 +141,37 @@ def _page(content: bytes, media: str) -> Callable[..., Coroutine[Any, Any, Respo
     return page
 
 
-def _add_complaints(app: FastAPI) -> None:
-    """Turn errors into one sentence and what it is about."""
+def _add_error_handlers(app: FastAPI) -> None:
+    """Convert errors to a message and the key that it concerns."""
 
-    async def refuse(_request: Request, error: Exception) -> JSONResponse:
+    async def bellcrank_error(_request: Request, error: Exception) -> JSONResponse:
         return JSONResponse(plain_error(error), _status(error))
 
-    async def invalid(_request: Request, error: Exception) -> JSONResponse:
+    async def invalid_request(_request: Request, error: Exception) -> JSONResponse:
         assert isinstance(error, RequestValidationError)
         first = error.errors()[0]
-        place = [str(part) for part in first["loc"] if part not in {"body", "path", "query"}]
-        key = ".".join(place)
+        path = [str(part) for part in first["loc"] if part not in {"body", "path", "query"}]
+        key = ".".join(path)
         expected = str(first["msg"]).removeprefix("Input should be ")
-        said = f"{key}: expected {expected}" if expected != first["msg"] else f"{key}: {expected}"
-        return JSONResponse({"message": said.removeprefix(": "), "key": key}, 422)
+        message = (
+            f"{key}: expected {expected}" if expected != first["msg"] else f"{key}: {expected}"
+        )
+        return JSONResponse({"message": message.removeprefix(": "), "key": key}, 422)
 
-    async def missing(_request: Request, error: Exception) -> JSONResponse:
+    async def http_error(_request: Request, error: Exception) -> JSONResponse:
         assert isinstance(error, HTTPException)
         headers = getattr(error, "headers", None)
         return JSONResponse({"message": str(error.detail), "key": ""}, error.status_code, headers)
 
-    app.add_exception_handler(BellcrankError, refuse)
-    app.add_exception_handler(RequestValidationError, invalid)
-    app.add_exception_handler(HTTPException, missing)
+    app.add_exception_handler(BellcrankError, bellcrank_error)
+    app.add_exception_handler(RequestValidationError, invalid_request)
+    app.add_exception_handler(HTTPException, http_error)
 
 
 def _status(error: Exception) -> int:
     kinds: tuple[tuple[type[Exception], int], ...] = (
         (Busy, 503),
-        (TookTooLong, 503),
+        (TimeLimitExceeded, 503),
         (UnknownName, 404),
         (StorageError, 507),
         (CorruptRun, 422),

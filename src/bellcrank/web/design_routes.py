@@ -1,4 +1,4 @@
-"""Designs: how they move, what each beam does, what they become."""
+"""Routes of designs: motion, sensitivity, parts, files, gallery, machines, live editing."""
 
 from __future__ import annotations
 
@@ -11,114 +11,118 @@ from starlette.concurrency import run_in_threadpool
 
 from bellcrank.errors import BellcrankError, InvalidFile
 from bellcrank.model import Design, unpack_mask
-from bellcrank.web import making, solving
-from bellcrank.web.gallery import entry_named, whole
+from bellcrank.web import quick_calls, slow_calls
+from bellcrank.web.gallery import design_data, entry_named
 from bellcrank.web.limits import MESSAGE
 from bellcrank.web.pools import plain_error
-from bellcrank.web.state import Shop
-from bellcrank.web.tables import (
+from bellcrank.web.requests import (
     MEDIA,
-    SWIFT,
+    QUICK_FILES,
     DesignBody,
     FemBody,
     FileBody,
     FileSuffix,
-    KeepBody,
     PartBody,
     PlanBody,
+    SaveDesignBody,
 )
-from bellcrank.web.texts import problem_of
+from bellcrank.web.state import State
+from bellcrank.web.task_files import problem_of
 
 router = APIRouter(prefix="/api", tags=["designs"])
 
 
 @router.post("/motion")
-async def get_motion(body: DesignBody, shop: Shop) -> dict[str, Any]:
+async def get_motion(body: DesignBody, state: State) -> dict[str, Any]:
     """Return the states of a design along its path, from rest to the full stroke."""
     text = json.dumps(body.problem)
-    return await shop.pools.thorough.call(solving.motion, text, body.mask)
+    return await state.pools.thorough.call(quick_calls.motion, text, body.mask)
 
 
 @router.post("/sensitivity")
-async def get_sensitivity(body: DesignBody, shop: Shop) -> dict[str, Any]:
-    """Return what flipping each beam changes, computed beam by beam."""
+async def get_sensitivity(body: DesignBody, state: State) -> dict[str, Any]:
+    """Return the change of the efficiency by flipping each beam, evaluated beam by beam."""
     text = json.dumps(body.problem)
-    return await shop.pools.thorough.call(solving.sensitivity, text, body.mask)
+    return await state.pools.thorough.call(quick_calls.sensitivity, text, body.mask)
 
 
 @router.post("/part")
-async def describe_part(body: PartBody, shop: Shop) -> dict[str, Any]:
-    """Return size, mass and remarks of the part that a design becomes."""
+async def describe_part(body: PartBody, state: State) -> dict[str, Any]:
+    """Return size, mass and printability remarks of the part of a design."""
     text = json.dumps(body.problem)
-    return await shop.pools.thorough.call(making.remarks, text, body.mask, body.part)
+    return await state.pools.thorough.call(slow_calls.part_summary, text, body.mask, body.part)
 
 
 @router.post("/validation")
-async def get_validation(body: FemBody, shop: Shop) -> dict[str, Any]:
-    """Return what finite elements say of the part."""
+async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
+    """Return the finite-element analysis of the part of a design."""
     text = json.dumps(body.problem)
-    return await shop.pools.slow.call(making.validation, text, body.mask, body.part, body.level)
+    return await state.pools.slow.call(
+        slow_calls.validation, text, body.mask, body.part, body.level
+    )
 
 
 @router.post("/files/{suffix}", response_class=Response)
-async def make_file(suffix: FileSuffix, body: FileBody, shop: Shop) -> Response:
-    """Return a file of a design: to print, to cut, to look at, to compute with."""
+async def make_file(suffix: FileSuffix, body: FileBody, state: State) -> Response:
+    """Return a file of a design for printing, cutting, viewing or simulation."""
     about = {"efficiency": body.efficiency, "provenance": body.provenance}
     text = json.dumps(body.problem)
-    pool = shop.pools.thorough if suffix in SWIFT else shop.pools.slow
-    content = await pool.call(making.design_file, text, body.mask, f".{suffix}", body.part, about)
+    pool = state.pools.thorough if suffix in QUICK_FILES else state.pools.slow
+    content = await pool.call(
+        slow_calls.design_file, text, body.mask, f".{suffix}", body.part, about
+    )
     return Response(content, media_type=MEDIA[suffix])
 
 
 @router.get("/gallery")
-async def list_gallery(shop: Shop) -> list[dict[str, Any]]:
-    """All designs with small pictures, by source."""
-    return await run_in_threadpool(shop.gallery.listing)
+async def list_gallery(state: State) -> list[dict[str, Any]]:
+    """Return all designs with small pictures, by source."""
+    return await run_in_threadpool(state.gallery.listing)
 
 
 @router.get("/gallery/{source}/{key}")
-async def get_design(source: str, key: str, shop: Shop) -> dict[str, Any]:
+async def get_design(source: str, key: str, state: State) -> dict[str, Any]:
     """Return one design."""
-    return whole(await run_in_threadpool(shop.gallery.find, source, key))
+    return design_data(await run_in_threadpool(state.gallery.find, source, key))
 
 
 @router.post("/gallery", status_code=201)
-async def keep_design(body: KeepBody, shop: Shop) -> dict[str, str]:
-    """Keep a design that was drawn by hand or put together."""
+async def save_design(body: SaveDesignBody, state: State) -> dict[str, str]:
+    """Store a design that was drawn by hand or assembled."""
 
-    def keep() -> str:
+    def save() -> str:
         problem = problem_of(body.problem)
         mask = unpack_mask(body.mask, problem.lattice.beam_count)
-        return shop.kept.add(Design(problem, mask, provenance=body.provenance), body.title)
+        return state.saved.add(Design(problem, mask, provenance=body.provenance), body.title)
 
-    return {"source": shop.kept.name, "key": await run_in_threadpool(keep)}
+    return {"source": state.saved.name, "key": await run_in_threadpool(save)}
 
 
 @router.get("/machines/{name}")
-async def get_plan(name: str, shop: Shop) -> dict[str, Any]:
-    """Return the plan of a machine that comes along, to go on from."""
-    return shop.machines.plan(name)
+async def get_plan(name: str, state: State) -> dict[str, Any]:
+    """Return the plan of a bundled machine."""
+    return state.machines.plan(name)
 
 
 @router.post("/machines")
-async def build_machine(body: PlanBody, shop: Shop) -> dict[str, Any]:
-    """Make one design of several parts."""
+async def build_machine(body: PlanBody, state: State) -> dict[str, Any]:
+    """Assemble one design of several parts."""
     designs: dict[str, str] = {}
     parts = body.plan.get("parts")
     for part in parts.values() if isinstance(parts, dict) else ():
         name = part.get("entry") if isinstance(part, dict) else None
         if isinstance(name, str) and name not in designs:
-            found = whole(await run_in_threadpool(entry_named, shop.gallery, name))
+            found = design_data(await run_in_threadpool(entry_named, state.gallery, name))
             designs[name] = json.dumps({"problem": found["problem"], "mask": found["mask"]})
-    return await shop.pools.thorough.call(making.machine, body.plan, designs)
+    return await state.pools.thorough.call(slow_calls.machine, body.plan, designs)
 
 
 @router.websocket("/edit")
-async def edit(socket: WebSocket, shop: Shop) -> None:
-    """Answer each design with its response.
+async def edit(socket: WebSocket, state: State) -> None:
+    """Return the response of each design that a client sends.
 
-    A message is ``{"id": number, "problem": ..., "mask": hex}``; the problem may be left out
-    where it is that of the message before.
+    A message is ``{"id": number, "problem": ..., "mask": hex}``; without ``problem``, the problem
+    of the previous message is used.
     """
     await socket.accept()
     text = ""
@@ -134,14 +138,14 @@ async def edit(socket: WebSocket, shop: Shop) -> None:
                 text = json.dumps(problem)
             if not text:
                 raise InvalidFile("problem: is missing")
-            answer = await shop.pools.quick.call(solving.respond, text, mask)
+            result = await state.pools.quick.call(quick_calls.evaluate, text, mask)
         except BellcrankError as error:
-            answer = {"error": plain_error(error)}
-        await socket.send_text(json.dumps({"id": number, **answer}, separators=(",", ":")))
+            result = {"error": plain_error(error)}
+        await socket.send_text(json.dumps({"id": number, **result}, separators=(",", ":")))
 
 
 def _read_edit(raw: str) -> tuple[Any, dict[str, Any] | None, str]:
-    """Read a message of a person who draws.
+    """Read a message of the editor.
 
     Raises
     ------

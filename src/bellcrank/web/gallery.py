@@ -1,7 +1,6 @@
-"""Designs to open, from several sources.
+"""Gallery of designs from several sources.
 
-A source lists entries and gives the design of each. A further one, such as a library, is a class
-with two methods and a line in `app.py`.
+A source is a class with `entries` and `find`; `app.py` lists the sources.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from bellcrank.model import (
     write_design,
 )
 from bellcrank.model.gallery import Kind
-from bellcrank.web.solving import finite
+from bellcrank.web.quick_calls import finite
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -34,8 +33,8 @@ if TYPE_CHECKING:
     from bellcrank.web.jobs import Jobs
 
 NAME = re.compile(r"[a-z0-9]{12}")
-AT_HAND = 200
-"""Designs of runs that are not read again for every look at the gallery."""
+CACHED = 200
+"""Number of designs of runs that are cached."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,13 +44,13 @@ class Entry:
     Parameters
     ----------
     key
-        Its name within the source.
+        Name within the source.
     title, note
-        What to call it, and a few words more.
+        Title and a short description.
     design
-        With efficiency and provenance, as far as they are known.
+        Design, with efficiency and provenance if known.
     facets
-        By which it can be picked from among many, such as ``{"Size": "9 wide"}``.
+        Properties for filtering, such as ``{"Size": "9 wide"}``.
     """
 
     key: str
@@ -62,30 +61,30 @@ class Entry:
 
 
 class Source(Protocol):
-    """Where designs come from."""
+    """A source of designs."""
 
     @property
     def name(self) -> str:
-        """For addresses: small letters."""
+        """Name in addresses, in lower case."""
 
     @property
     def title(self) -> str:
-        """For people."""
+        """Title on the page."""
 
     def entries(self) -> Iterable[Entry]:
-        """Return all designs, the most interesting first."""
+        """Return all entries in the order of display."""
 
     def find(self, key: str) -> Entry | None:
-        """Return the entry of that name, if there is one."""
+        """Return the entry with a key, or None."""
 
 
-class Once:
-    """Entries that are read when somebody first looks, once, whoever looks at the same time.
+class LazyEntries:
+    """Entries that are read once, at the first access; safe for threads.
 
     Parameters
     ----------
     read
-        That reads them.
+        Function that reads the entries.
     """
 
     def __init__(self, read: Callable[[], Iterable[Entry]]) -> None:
@@ -94,28 +93,28 @@ class Once:
         self._entries: dict[str, Entry] | None = None
 
     def __call__(self) -> dict[str, Entry]:
-        """Return all, by their keys."""
+        """Return all entries by key."""
         with self._lock:
             if self._entries is None:
                 self._entries = {entry.key: entry for entry in self._read()}
         return self._entries
 
 
-class BuiltIn:
-    """Designs that come with the package."""
+class BundledDesigns:
+    """Bundled designs."""
 
     name = "builtin"
-    title = "Comes with bellcrank"
+    title = "Bundled designs"
 
     def __init__(self) -> None:
-        self._known = Once(_built_in)
+        self._known = LazyEntries(_built_in)
 
     def entries(self) -> Iterable[Entry]:
-        """Return those of all built-in problems."""
+        """Return the designs of all bundled problems."""
         return self._known().values()
 
     def find(self, key: str) -> Entry | None:
-        """Return the one of that name."""
+        """Return the entry with a key, or None."""
         return self._known().get(key)
 
 
@@ -128,8 +127,8 @@ def _built_in() -> Iterator[Entry]:
                 yield Entry(f"{kind}-{problem}", problem, note, design)
 
 
-class OwnRuns:
-    """What own searches have found."""
+class RunDesigns:
+    """Results of the user's searches."""
 
     name = "runs"
     title = "Your searches"
@@ -149,40 +148,40 @@ class OwnRuns:
         """Return the design of a job."""
         try:
             job = self._jobs[key]
-            made = (job.path / "run" / "design.json").stat().st_mtime
-            at_hand = self._read.get(key)
-            if at_hand is not None and at_hand[0] == made:
-                return at_hand[1]
+            modified = (job.path / "run" / "design.json").stat().st_mtime
+            cached = self._read.get(key)
+            if cached is not None and cached[0] == modified:
+                return cached[1]
             design = job.design()
         except (BellcrankError, OSError):
             return None
         if design is None:
             return None
         entry = Entry(key, job.record.title, job.record.settings["search"], design)
-        if len(self._read) >= AT_HAND:
+        if len(self._read) >= CACHED:
             self._read.clear()
-        self._read[key] = (made, entry)
+        self._read[key] = (modified, entry)
         return entry
 
 
-class Kept:
-    """Designs that were drawn by hand or put together here.
+class SavedDesigns:
+    """Designs that were drawn by hand or assembled on the page.
 
     Parameters
     ----------
     folder
-        Of their files.
+        Folder of the files.
     """
 
     name = "kept"
-    title = "Kept designs"
+    title = "Saved designs"
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
 
     def entries(self) -> Iterable[Entry]:
-        """Return all, the latest first."""
+        """Return all designs, the latest first."""
         paths = sorted(self._folder.glob("*.json"), key=lambda path: -path.stat().st_mtime)
         for path in paths:
             entry = self.find(path.stem)
@@ -190,7 +189,7 @@ class Kept:
                 yield entry
 
     def find(self, key: str) -> Entry | None:
-        """Return the one of that name."""
+        """Return the entry with a key, or None."""
         path = self._folder / f"{key}.json"
         if not NAME.fullmatch(key) or not path.is_file():
             return None
@@ -200,24 +199,24 @@ class Kept:
             return None
         kind = {"drawn": "drawn by hand", "assembled": "a machine"}
         return Entry(
-            key, design.problem.name, kind.get(str(design.provenance.get("kind")), "kept"), design
+            key, design.problem.name, kind.get(str(design.provenance.get("kind")), "saved"), design
         )
 
     def add(self, design: Design, title: str) -> str:
-        """Keep a design under a new name, and return that."""
+        """Store a design and return its key."""
         key = secrets.token_hex(6)
-        named = replace(design, problem=replace(design.problem, name=title))
-        write_design(named, self._folder / f"{key}.json")
+        titled = replace(design, problem=replace(design.problem, name=title))
+        write_design(titled, self._folder / f"{key}.json")
         return key
 
 
 class Gallery:
-    """All sources together.
+    """All sources.
 
     Parameters
     ----------
     sources
-        In the order in which they are shown.
+        Sources in the order of display.
     """
 
     def __init__(self, *sources: Source) -> None:
@@ -229,7 +228,7 @@ class Gallery:
         Raises
         ------
         UnknownName
-            If there is none.
+            If there is no such entry.
         """
         for each in self.sources:
             if each.name == source:
@@ -239,19 +238,19 @@ class Gallery:
         raise UnknownName(f"there is no design {source}/{key} in the gallery")
 
     def listing(self) -> list[dict[str, Any]]:
-        """Return all entries with what a small picture of each needs."""
+        """Return all entries with the data of a small picture of each."""
         return [
             {
                 "source": source.name,
                 "title": source.title,
-                "entries": [small(source.name, entry) for entry in source.entries()],
+                "entries": [thumbnail_data(source.name, entry) for entry in source.entries()],
             }
             for source in self.sources
         ]
 
 
-def small(source: str, entry: Entry) -> dict[str, Any]:
-    """Return an entry with a small picture: where present beams lie."""
+def thumbnail_data(source: str, entry: Entry) -> dict[str, Any]:
+    """Return an entry with the coordinates of its present beams."""
     design = entry.design
     problem, lattice = design.problem, design.problem.lattice
     ends = lattice.positions[lattice.beams[design.mask]]
@@ -279,8 +278,8 @@ def small(source: str, entry: Entry) -> dict[str, Any]:
     }
 
 
-def whole(entry: Entry) -> dict[str, Any]:
-    """Return all of a design, ready for JSON."""
+def design_data(entry: Entry) -> dict[str, Any]:
+    """Return a design as plain data."""
     design = entry.design
     return {
         "title": entry.title,

@@ -1,7 +1,7 @@
-"""Searches as folders on disk, found again by every server that looks there.
+"""Searches stored as folders, which a restarted server reads again.
 
-Each has ``job.json`` (what was asked for, and how it stands), ``problem.json`` and, once it has
-begun, the folder ``run`` of `bellcrank.workflows.start_design`.
+Each folder has ``job.json`` (request and status), ``problem.json`` and, once the search has
+started, the folder ``run`` of `bellcrank.workflows.start_design`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.errors import BellcrankError, InvalidFile, UnknownName
 from bellcrank.model import read_design, read_problem, write_problem
 from bellcrank.model.storage import read_text, write_text
-from bellcrank.web.tracing import Trace
+from bellcrank.web.curves import Curves
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,36 +27,36 @@ if TYPE_CHECKING:
 
 SCHEMA = "bellcrank/job/1"
 NAME = re.compile(r"[a-z0-9]{12}")
-ALIVE = ("queued", "running")
-"""What a server that starts takes up again."""
+UNFINISHED = ("queued", "running")
+"""Statuses of the jobs that a starting server resumes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """What is kept of a job.
+    """Stored data of a job.
 
     Parameters
     ----------
     title
-        As a person called it.
+        Name given by the user.
     session
-        Of whom; searches of different sessions take turns.
+        Browser session that started the job; the scheduler alternates between sessions.
     settings
-        Of the search, as plain data.
+        Settings of the search, as plain data.
     part
-        What the design will be made as, if that was said.
+        Dimensions and material of the part, if given.
     reference
-        Mask of a design drawn by hand, to compare with.
+        Mask of a design drawn by hand, for comparison.
     created
         Seconds since 1970.
     status
         ``queued``, ``running``, ``paused``, ``stopped``, ``finished`` or ``failed``.
     message
-        Why it failed.
+        Reason of a failure.
     efficiency
-        Of the design that came out, or of the best so far.
+        Efficiency of the result, or of the best design so far.
     done
-        Proposals made, by all chains, when it last ended.
+        Proposals of all chains when the search last ended.
     """
 
     title: str
@@ -73,47 +73,47 @@ class Record:
 
 @dataclass(slots=True, eq=False)
 class Job:
-    """A search: its record, and while it runs what it last told.
+    """A search: its record and, while it runs, its latest progress.
 
     Attributes
     ----------
-    told
-        The last progress.
+    progress
+        Latest progress message of the process.
     changed
-        Counts what has happened, so that followers see when there is news.
+        Number of changes, by which clients detect that there is a new state.
     """
 
     name: str
     path: Path
     record: Record
-    trace: Trace = field(default_factory=Trace)
-    told: dict[str, Any] = field(default_factory=dict)
+    curves: Curves = field(default_factory=Curves)
+    progress: dict[str, Any] = field(default_factory=dict)
     moved: dict[str, Any] | None = None
     changed: int = 0
-    known_trace: bool = False
+    curves_loaded: bool = False
 
     def update(self, **changes: Any) -> None:
-        """Change the record, and keep it."""
+        """Change the record and store it."""
         self.record = replace(self.record, **changes)
         self.changed += 1
         data = {"schema": SCHEMA, **asdict(self.record)}
         write_text(self.path / "job.json", json.dumps(data), overwrite=True)
 
-    def hear(self, message: dict[str, Any]) -> None:
-        """Take in the progress of its process."""
+    def receive(self, message: dict[str, Any]) -> None:
+        """Store a progress message of the process."""
         for chain, points in message.pop("points").items():
-            self.trace.add(chain, points)
+            self.curves.add(chain, points)
         self.moved = message.pop("moved", self.moved)
-        self.told = message
+        self.progress = message
         self.changed += 1
 
     def best(self) -> float | None:
-        """Return the best efficiency that its process has told of."""
-        told = [each["best"] for each in self.told.get("chains", {}).values()]
-        return max((value for value in told if value is not None), default=None)
+        """Return the best efficiency that the process has reported."""
+        reported = [each["best"] for each in self.progress.get("chains", {}).values()]
+        return max((value for value in reported if value is not None), default=None)
 
     def summary(self) -> dict[str, Any]:
-        """Return what a list of jobs shows."""
+        """Return the entry of a job in the list of jobs."""
         record = self.record
         best = self.best()
         settings = record.settings
@@ -124,28 +124,28 @@ class Job:
             "status": record.status,
             "message": record.message,
             "efficiency": best
-            if best is not None and record.status in ALIVE
+            if best is not None and record.status in UNFINISHED
             else record.efficiency,
             "method": settings["search"],
             "settings": settings,
             "part": record.part,
             "reference": record.reference,
-            "done": self.told.get("done", record.done),
+            "done": self.progress.get("done", record.done),
             "total": settings["steps"] * settings["chains"],
             "has_design": (self.path / "run" / "design.json").exists(),
         }
 
     def problem(self) -> Problem:
-        """Read its task; with the stiffness of struts where it is for a part."""
-        begun = self.path / "run" / "run.json"
-        if begun.exists():
+        """Read the task, with the stiffness of struts if it is for a part."""
+        started = self.path / "run" / "run.json"
+        if started.exists():
             from bellcrank.storage import RunFolder
 
-            return RunFolder.open(begun.parent).problem
+            return RunFolder.open(started.parent).problem
         return read_problem(self.path / "problem.json")
 
     def design(self) -> Design | None:
-        """Read the design that came out, if there is one."""
+        """Read the resulting design, if there is one."""
         path = self.path / "run" / "design.json"
         return read_design(path) if path.exists() else None
 
@@ -156,7 +156,7 @@ class Jobs:
     Parameters
     ----------
     folder
-        Where they are kept; made if need be.
+        Folder of the jobs; created if missing.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -168,7 +168,7 @@ class Jobs:
                 try:
                     self._jobs[path.name] = _read(path)
                 except BellcrankError:
-                    continue  # what is damaged is left for a person to look at
+                    continue  # a damaged folder is left in place
 
     def __iter__(self) -> Iterator[Job]:
         return iter(sorted(self._jobs.values(), key=lambda job: -job.record.created))
@@ -182,12 +182,12 @@ class Jobs:
         return self._jobs[name]
 
     def add(self, problem: Problem, record: Record) -> Job:
-        """Keep a new job."""
+        """Store a new job."""
         name = secrets.token_hex(6)
         path = self.folder / name
         path.mkdir()
         write_problem(problem, path / "problem.json")
-        job = Job(name, path, replace(record, created=time.time()), known_trace=True)
+        job = Job(name, path, replace(record, created=time.time()), curves_loaded=True)
         job.update()
         self._jobs[name] = job
         return job

@@ -1,4 +1,4 @@
-"""How much one page may ask of the server."""
+"""Limits on the size of requests."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 BODY = 2_000_000
-"""Bytes of a request."""
+"""Largest size of a request, in bytes."""
 MESSAGE = 2_000_000
-"""Bytes of a message over a websocket."""
+"""Largest size of a websocket message, in bytes."""
 NODES = 3000
 BEAMS = 9000
 STEPS = 2_000_000
 CHAINS = 64
 WAITING = 200
-"""Searches that are queued or running."""
+"""Largest number of queued and running searches."""
 
 
 def _grid(given: Mapping[str, Any]) -> int:
@@ -38,7 +38,7 @@ _SIZES: dict[str, Callable[[Mapping[str, Any]], int]] = {
     "triangular-rows": _rows,
     "jammed-discs": lambda given: _whole(given.get("discs")),
 }
-"""About how many nodes a lattice will have, before it is made."""
+"""Estimates of the number of nodes of a lattice, by kind."""
 
 
 def _whole(value: object) -> int:
@@ -46,7 +46,7 @@ def _whole(value: object) -> int:
 
 
 def check_lattice(given: object) -> None:
-    """Refuse a description of a lattice that is too large, or that would read a file.
+    """Refuse a lattice table that is too large or names a file.
 
     Raises
     ------
@@ -60,18 +60,19 @@ def check_lattice(given: object) -> None:
     signature = inspect.signature(lattices[kind])
     if any(each.annotation == "Path" for each in signature.parameters.values()):
         raise InvalidFile(
-            f"lattice.kind: {kind!r} names a file, which a page cannot; "
-            "load that file as a lattice instead"
+            f"lattice.kind: {kind!r} reads a file of the server; upload the file instead"
         )
     if kind not in _SIZES:
-        raise InvalidFile(f"lattice.kind: {kind!r} is not offered here; known: {', '.join(_SIZES)}")
+        raise InvalidFile(
+            f"lattice.kind: {kind!r} is not available on the page; known: {', '.join(_SIZES)}"
+        )
     nodes = _SIZES[kind](given)
     if nodes > NODES:
-        raise InvalidFile(f"lattice: about {nodes} nodes; the page takes up to {NODES}")
+        raise InvalidFile(f"lattice: about {nodes} nodes; the limit of the page is {NODES}")
 
 
 def check_size(nodes: int, beams: int) -> None:
-    """Refuse a lattice that is too large to draw and search on a page.
+    """Refuse a lattice that is too large for the page.
 
     Raises
     ------
@@ -79,5 +80,6 @@ def check_size(nodes: int, beams: int) -> None:
     """
     if nodes > NODES or beams > BEAMS:
         raise InvalidFile(
-            f"lattice: {nodes} nodes and {beams} beams; the page takes up to {NODES} and {BEAMS}"
+            f"lattice: {nodes} nodes and {beams} beams; "
+            f"the limits of the page are {NODES} and {BEAMS}"
         )

@@ -1,4 +1,4 @@
-"""Warm processes that compute for the page, with a limit on time and on what waits."""
+"""Worker processes for the page, with limits on time and on the number of waiting calls."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from bellcrank.errors import RunFailed
-from bellcrank.web import solving
+from bellcrank.web import quick_calls
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,17 +26,17 @@ T = TypeVar("T")
 
 
 class Busy(RunFailed):
-    """So much is waiting already that no more is taken."""
+    """The limit of waiting calls is reached."""
 
 
-class TookTooLong(RunFailed):
-    """A computation was ended, by its limit or by the system."""
+class TimeLimitExceeded(RunFailed):
+    """A computation was ended by its time limit or by the operating system."""
 
 
 def limited(seconds: int, function: Callable[[], T]) -> T:
-    """Call a function; where the system knows alarms, end the process if it takes longer.
+    """Call a function and end the process if it takes longer, on systems with alarm signals.
 
-    Compiled code listens to nothing gentler.
+    Compiled code cannot be interrupted in another way.
     """
     if not hasattr(signal, "alarm"):
         return function()
@@ -47,39 +47,39 @@ def limited(seconds: int, function: Callable[[], T]) -> T:
         signal.alarm(0)
 
 
-def _begin(niceness: int, leash: Connection) -> None:
+def _initialize(niceness: int, lifeline: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server stops its processes itself
     if hasattr(os, "nice"):
         os.nice(niceness)
-    threading.Thread(target=_end_with, args=(leash,), daemon=True).start()
+    threading.Thread(target=_exit_on_close, args=(lifeline,), daemon=True).start()
 
 
-def _end_with(leash: Connection) -> None:
-    """End this process when the server lets go of its end of a pipe, or dies in whatever way.
+def _exit_on_close(lifeline: Connection) -> None:
+    """End this process when the server closes its end of a pipe or ends in any way.
 
-    An executor tells its processes to end from a thread, which a signal may cut short; the
-    system closes a pipe always.
+    An executor ends its processes from a thread, which a signal may interrupt; the operating
+    system always closes the pipe.
     """
     with contextlib.suppress(EOFError, OSError):
-        leash.recv_bytes()
+        lifeline.recv_bytes()
     os._exit(0)
 
 
 class Pool:
-    """Processes that are started when first needed and replaced when they die.
+    """Processes that are started at the first call and replaced when they die.
 
     Parameters
     ----------
     processes
-        How many.
+        Number of processes.
     seconds
-        That a call may take; 0 for as long as it wants.
+        Time limit of a call; 0 for none.
     waiting
-        Calls that are taken at once, running ones included.
+        Largest number of accepted calls, including running ones.
     niceness
-        How far behind others they stand for the processor.
+        Niceness of the processes.
     recycle
-        Calls after which a process is replaced, so that what it has gathered is given back.
+        Number of calls after which a process is replaced to release its memory.
     """
 
     def __init__(
@@ -94,17 +94,17 @@ class Pool:
         self._niceness, self._recycle = niceness, recycle
         self._taken = 0
         self._executor: ProcessPoolExecutor | None = None
-        self._leash: Connection | None = None
+        self._lifeline: Connection | None = None
 
-    async def warm(self) -> None:
-        """Start the processes, and compile or load what they need.
+    async def prepare(self) -> None:
+        """Start the processes and load or compile the kernels.
 
-        Compiling may take minutes on a slow machine. A process that dies over it is replaced
-        once: what it had compiled is kept.
+        Compilation may take minutes on a slow machine. A process that dies meanwhile is replaced
+        once; kernels that it had compiled stay in the cache.
         """
         for _ in range(2):
             executor = self._started()
-            tasks = [executor.submit(solving.warm) for _ in range(self.processes)]
+            tasks = [executor.submit(quick_calls.load_kernels) for _ in range(self.processes)]
             with contextlib.suppress(BrokenProcessPool):
                 await asyncio.gather(*map(asyncio.wrap_future, tasks))
                 return
@@ -117,9 +117,9 @@ class Pool:
         Raises
         ------
         Busy
-            If too much is waiting.
-        TookTooLong
-            If it had to be ended.
+            If too many calls are waiting.
+        TimeLimitExceeded
+            If the call was ended.
         """
         if self._taken >= self.most:
             raise Busy("the server is busy with other requests; try again in a moment")
@@ -130,7 +130,7 @@ class Pool:
             return await asyncio.wrap_future(submitted)
         except BrokenProcessPool:
             self._drop(executor)
-            raise TookTooLong(
+            raise TimeLimitExceeded(
                 f"this took more than {self.seconds} s or too much memory and was ended; "
                 "try something smaller"
             ) from None
@@ -140,26 +140,26 @@ class Pool:
     def _started(self) -> ProcessPoolExecutor:
         if self._executor is None:
             context = multiprocessing.get_context("spawn")
-            theirs, self._leash = context.Pipe(duplex=False)
+            theirs, self._lifeline = context.Pipe(duplex=False)
             self._executor = ProcessPoolExecutor(
                 self.processes,
                 mp_context=context,
-                initializer=_begin,
+                initializer=_initialize,
                 initargs=(self._niceness, theirs),
                 max_tasks_per_child=self._recycle,
             )
         return self._executor
 
     def _drop(self, executor: ProcessPoolExecutor) -> None:
-        """Forget processes of which one has died, so that the next call starts others."""
+        """Discard processes of which one has died; the next call starts new ones."""
         if self._executor is executor:
             self.close()
 
     def close(self) -> None:
-        """End the processes, also those that are at work; what waits is dropped."""
-        if self._leash is not None:
-            self._leash.close()
-            self._leash = None
+        """End the processes, including running calls; waiting calls are dropped."""
+        if self._lifeline is not None:
+            self._lifeline.close()
+            self._lifeline = None
         if self._executor is not None:
             self._executor.shutdown(wait=False, cancel_futures=True)
             self._executor = None
@@ -172,21 +172,21 @@ class Pools:
     Parameters
     ----------
     quick
-        For what a person waits for with the hand on the mouse.
+        Calls for live editing.
     thorough
-        For motions and sensitivities, a fraction of a second each.
+        Calls for motions and sensitivities, a fraction of a second each.
     slow
-        For files, movies and finite elements.
+        Calls for files, movies and finite elements.
     """
 
     quick: Pool
     thorough: Pool
     slow: Pool
 
-    async def warm(self) -> None:
-        """Start what must answer at once, and compile or load the kernels."""
-        await self.quick.warm()
-        await self.thorough.warm()
+    async def prepare(self) -> None:
+        """Start the pools of fast calls and load or compile the kernels."""
+        await self.quick.prepare()
+        await self.thorough.prepare()
 
     def close(self) -> None:
         """End all processes."""
@@ -195,7 +195,7 @@ class Pools:
 
 
 def make_pools() -> Pools:
-    """Return the pools of a server; nothing is started yet."""
+    """Return the pools of a server, without starting processes."""
     return Pools(
         quick=Pool(1, seconds=120, waiting=64),
         thorough=Pool(1, seconds=120, waiting=32, niceness=2),
@@ -204,7 +204,7 @@ def make_pools() -> Pools:
 
 
 def plain_error(error: BaseException) -> dict[str, Any]:
-    """Return what a page is told about an error: the sentence, and what it is about.
+    """Return message and key of an error, as the page receives them.
 
     Examples
     --------

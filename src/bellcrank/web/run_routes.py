@@ -1,4 +1,4 @@
-"""Searches: begun, followed, paused, ended."""
+"""Routes of searches: start, follow, pause, resume, stop, delete."""
 
 from __future__ import annotations
 
@@ -17,43 +17,43 @@ from starlette.concurrency import run_in_threadpool
 
 from bellcrank.errors import BellcrankError, InvalidSettings, UnknownName
 from bellcrank.model import human_design, problem_to_dict
-from bellcrank.web import solving, tracing
+from bellcrank.web import curves, quick_calls
 from bellcrank.web.jobs import Record
 from bellcrank.web.pools import plain_error
-from bellcrank.web.state import Shop
-from bellcrank.web.tables import RunBody
-from bellcrank.web.texts import problem_of
+from bellcrank.web.requests import RunBody
+from bellcrank.web.state import State
+from bellcrank.web.task_files import problem_of
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
     from bellcrank.web.jobs import Job
-    from bellcrank.web.state import Workshop
+    from bellcrank.web.state import AppState
 
 HISTORY = "history.parquet"
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
 RunName = Annotated[str, Field(pattern=r"^[a-z0-9]{12}$")]
 INTERVAL = 0.1
-"""Seconds between two messages to a page."""
+"""Seconds between two messages to a client."""
 
 
 @router.get("")
-def list_runs(shop: Shop) -> list[dict[str, Any]]:
-    """All searches, the latest first."""
-    return [{**job.summary(), "place": shop.scheduler.place(job)} for job in shop.jobs]
+def list_runs(state: State) -> list[dict[str, Any]]:
+    """Return all searches, the latest first."""
+    return [{**job.summary(), "place": state.scheduler.position(job)} for job in state.jobs]
 
 
 @router.post("", status_code=201)
-async def begin_run(body: RunBody, shop: Shop) -> dict[str, str]:
+async def start_run(body: RunBody, state: State) -> dict[str, str]:
     """Queue a search."""
-    problem, record = await run_in_threadpool(_prepared, body)
-    job = shop.jobs.add(problem, record)
-    shop.scheduler.add(job)
+    problem, record = await run_in_threadpool(_validated, body)
+    job = state.jobs.add(problem, record)
+    state.scheduler.add(job)
     return {"id": job.name}
 
 
-def _prepared(body: RunBody) -> tuple[Problem, Record]:
-    """Refuse what could not be searched, before it is queued."""
+def _validated(body: RunBody) -> tuple[Problem, Record]:
+    """Return problem and record of a request; an invalid one is refused before it is queued."""
     from bellcrank.model import unpack_mask
     from bellcrank.part import PartSpec
     from bellcrank.search import read_settings
@@ -89,25 +89,25 @@ def _prepared(body: RunBody) -> tuple[Problem, Record]:
 
 
 @router.get("/{name}")
-async def get_run(name: RunName, shop: Shop) -> dict[str, Any]:
-    """Return a search with its task, what it is compared with, and its design if there is one."""
-    job = shop.jobs[name]
+async def get_run(name: RunName, state: State) -> dict[str, Any]:
+    """Return a search with its task, its comparison and, if there is one, its design."""
+    job = state.jobs[name]
     problem, design = await run_in_threadpool(lambda: (job.problem(), job.design()))
     text = json.dumps(problem_to_dict(problem))
     return {
         **job.summary(),
-        "place": shop.scheduler.place(job),
+        "place": state.scheduler.position(job),
         "problem": problem_to_dict(problem),
         "mask": None if design is None else design.mask_hex,
         "provenance": {} if design is None else json.loads(json.dumps(dict(design.provenance))),
-        "comparison": await _comparison(shop, job, problem, text),
+        "comparison": await _comparison(state, job, problem, text),
     }
 
 
 async def _comparison(
-    shop: Workshop, job: Job, problem: Problem, text: str
+    state: AppState, job: Job, problem: Problem, text: str
 ) -> dict[str, Any] | None:
-    """Return a design by hand for the same task: the person's own, or the one that comes along."""
+    """Return a design by hand for the same task: the user's own, or else the bundled one."""
     if job.record.reference is not None:
         title, mask = "yours", job.record.reference
     else:
@@ -120,59 +120,59 @@ async def _comparison(
         ):
             return None
         title, mask = "by hand", human.mask_hex
-    response = await shop.pools.quick.call(solving.respond, text, mask)
+    response = await state.pools.quick.call(quick_calls.evaluate, text, mask)
     return {"title": title, "mask": mask, "efficiency": response["efficiency"]}
 
 
 @router.post("/{name}/pause")
-def pause_run(name: RunName, shop: Shop) -> dict[str, str]:
-    """Let a search rest."""
-    shop.scheduler.pause(shop.jobs[name])
+def pause_run(name: RunName, state: State) -> dict[str, str]:
+    """Pause a search."""
+    state.scheduler.pause(state.jobs[name])
     return {"id": name}
 
 
 @router.post("/{name}/resume")
-async def resume_run(name: RunName, shop: Shop) -> dict[str, str]:
-    """Go on with a search."""
-    shop.scheduler.add(shop.jobs[name])
+async def resume_run(name: RunName, state: State) -> dict[str, str]:
+    """Resume a search."""
+    state.scheduler.add(state.jobs[name])
     return {"id": name}
 
 
 @router.post("/{name}/stop")
-async def stop_run(name: RunName, shop: Shop) -> dict[str, str]:
-    """End a search and take the best it has found."""
-    shop.scheduler.stop(shop.jobs[name])
+async def stop_run(name: RunName, state: State) -> dict[str, str]:
+    """Stop a search and choose its best design."""
+    state.scheduler.stop(state.jobs[name])
     return {"id": name}
 
 
 @router.delete("/{name}")
-async def delete_run(name: RunName, shop: Shop) -> dict[str, str]:
-    """Delete a search that does not run."""
-    if name in shop.scheduler.running:
+async def delete_run(name: RunName, state: State) -> dict[str, str]:
+    """Delete a search that is not running."""
+    if name in state.scheduler.running:
         raise InvalidSettings("this search is running; stop it first")
-    job = shop.jobs[name]
-    if job in shop.scheduler.queue:
-        shop.scheduler.queue.remove(job)
-    await run_in_threadpool(shop.jobs.remove, name)
+    job = state.jobs[name]
+    if job in state.scheduler.queue:
+        state.scheduler.queue.remove(job)
+    await run_in_threadpool(state.jobs.remove, name)
     return {"id": name}
 
 
 @router.get("/{name}/history.parquet", response_class=FileResponse)
-async def get_history(name: RunName, shop: Shop) -> FileResponse:
-    """Return every proposal of a search that has ended, or rests."""
-    job = shop.jobs[name]
-    if name in shop.scheduler.running:
-        raise InvalidSettings("this search is running; stop it first, or let it rest")
+async def get_history(name: RunName, state: State) -> FileResponse:
+    """Return all proposals of a search that has ended or is paused."""
+    job = state.jobs[name]
+    if name in state.scheduler.running:
+        raise InvalidSettings("this search is running; stop or pause it first")
     run = job.path / "run"
     media = "application/vnd.apache.parquet"
     if (run / HISTORY).is_file():
         return FileResponse(run / HISTORY, media_type=media)
     if not (run / "run.json").is_file():
-        raise UnknownName("this search has not begun, and has no history")
+        raise UnknownName("this search has not started and has no history")
     folder = Path(await run_in_threadpool(mkdtemp, prefix="bellcrank-"))
     clean = BackgroundTask(shutil.rmtree, folder, ignore_errors=True)
     try:
-        await shop.pools.slow.call(tracing.copy_history, run, folder)
+        await state.pools.slow.call(curves.copy_history, run, folder)
     except BaseException:
         await clean()
         raise
@@ -180,76 +180,76 @@ async def get_history(name: RunName, shop: Shop) -> FileResponse:
 
 
 @router.websocket("/{name}/live")
-async def follow(socket: WebSocket, name: str, shop: Shop) -> None:
-    """Tell how a search goes, ten times a second while there is news."""
+async def follow(socket: WebSocket, name: str, state: State) -> None:
+    """Send the state of a search, at most ten times a second, whenever it has changed."""
     await socket.accept()
     try:
-        job = shop.jobs[name]
+        job = state.jobs[name]
     except BellcrankError as error:
         await socket.send_text(json.dumps({"error": plain_error(error)}))
         await socket.close()
         return
-    listening = asyncio.create_task(_until_left(socket))
-    loading = asyncio.create_task(_load_curves(shop, job))
+    closed = asyncio.create_task(_until_closed(socket))
+    loading = asyncio.create_task(_load_curves(state, job))
     try:
         seen: dict[int, int] = {}
         epoch, changed = -1, -1
-        while not listening.done():
+        while not closed.done():
             if job.changed != changed:
                 changed = job.changed
-                reset = job.trace.epoch != epoch
+                reset = job.curves.epoch != epoch
                 if reset:
-                    epoch, seen = job.trace.epoch, {}
-                news = _news(shop, job, job.trace.since(seen), reset=reset)
-                await socket.send_text(json.dumps(news, separators=(",", ":")))
-            await asyncio.wait([listening], timeout=INTERVAL)
+                    epoch, seen = job.curves.epoch, {}
+                message = _live_state(state, job, job.curves.since(seen), reset=reset)
+                await socket.send_text(json.dumps(message, separators=(",", ":")))
+            await asyncio.wait([closed], timeout=INTERVAL)
     except (WebSocketDisconnect, RuntimeError):
         pass
     finally:
-        listening.cancel()
+        closed.cancel()
         loading.cancel()
 
 
-async def _until_left(socket: WebSocket) -> None:
-    """Return when the page is gone."""
+async def _until_closed(socket: WebSocket) -> None:
+    """Return when the client has closed the connection."""
     while (await socket.receive())["type"] != "websocket.disconnect":
         pass
 
 
-async def _load_curves(shop: Workshop, job: Job) -> None:
-    """Read what a search did under an earlier server, once."""
-    if job.known_trace:
+async def _load_curves(state: AppState, job: Job) -> None:
+    """Read the curves of a search that ran under an earlier server, once."""
+    if job.curves_loaded:
         return
-    job.known_trace = True
+    job.curves_loaded = True
     try:
-        read = await shop.pools.thorough.call(tracing.read_run_curves, job.path / "run")
+        read = await state.pools.thorough.call(curves.read_run_curves, job.path / "run")
     except BellcrankError:
-        job.known_trace = False
+        job.curves_loaded = False
         return
     except asyncio.CancelledError:
-        job.known_trace = False
+        job.curves_loaded = False
         raise
-    later = job.trace.chains
+    later = job.curves.chains
     for chain, points in read["curves"].items():
         known = points[-1][0] if points else 0
         fresh = [point for point in later.get(chain, []) if point[0] > known]
         later[chain] = [*points, *fresh]
-    job.trace.epoch += 1
+    job.curves.epoch += 1
     job.changed += 1
 
 
-def _news(
-    shop: Workshop, job: Job, points: dict[int, list[tracing.Point]], *, reset: bool
+def _live_state(
+    state: AppState, job: Job, points: dict[int, list[curves.Point]], *, reset: bool
 ) -> dict[str, Any]:
     summary = job.summary()
-    told = job.told if job.record.status == "running" else {}
+    progress = job.progress if job.record.status == "running" else {}
     return {
-        "run": {**summary, "place": shop.scheduler.place(job)},
+        "run": {**summary, "place": state.scheduler.position(job)},
         "reset": reset,
         "points": points,
-        "chains": job.told.get("chains", {}),
-        "speed": told.get("speed"),
-        "left": told.get("left"),
-        "tried": told.get("tried"),
+        "chains": job.progress.get("chains", {}),
+        "speed": progress.get("speed"),
+        "left": progress.get("left"),
+        "tried": progress.get("tried"),
         "moved": job.moved,
     }

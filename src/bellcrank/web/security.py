@@ -1,4 +1,4 @@
-"""Who may ask: from this machine or with the token, from our own page, and not too much at once."""
+"""Access control: loopback or token, same origin, size limits."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ HEADERS = {
     "cross-origin-opener-policy": "same-origin",
     "cross-origin-resource-policy": "same-origin",
 }
-TOO_LARGE = f"more than {BODY // 1_000_000} MB cannot be taken"
+TOO_LARGE = f"the request is larger than {BODY // 1_000_000} MB"
 UNSAFE = ("POST", "PUT", "PATCH", "DELETE")
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address leads to this machine only.
+    """Return whether an address is reachable from this machine only.
 
     Examples
     --------
@@ -45,22 +45,22 @@ def is_loopback(host: str) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Guard:
-    """Lets through what may pass.
+class AccessControl:
+    """Middleware that refuses requests without permission.
 
     Parameters
     ----------
     app
-        What answers.
+        Application behind it.
     token
-        That must be known; None for a server that only this machine can reach.
+        Required token; None for a server that only this machine can reach.
     """
 
     app: ASGIApp
     token: str | None = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse, or pass on."""
+        """Refuse a request or pass it to the application."""
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return
@@ -68,45 +68,45 @@ class Guard:
             key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]
         }
         refusal = self._refusal(scope, headers)
-        if refusal is None and self._has_login(scope):
+        if refusal is None and self._has_token_in_address(scope):
             await _redirect(send, self.token or "")
         elif refusal is None:
-            await self._pass(scope, receive, send)
+            await self._forward(scope, receive, send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008, "reason": refusal[1][:120]})
         else:
-            await _answer(send, *refusal)
+            await _respond(send, *refusal)
 
     def _refusal(self, scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
-        """Return status and sentence for what may not pass."""
-        if refusal := self._stranger(scope, headers):
+        """Return status and message for a request to be refused, else None."""
+        if refusal := self._foreign_origin(scope, headers):
             return refusal
-        if self.token is not None and not self._knows_token(scope, headers):
+        if self.token is not None and not self._has_token(scope, headers):
             return 401, "open the address with the token that bellcrank serve has printed"
         length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > BODY:
             return 413, TOO_LARGE
         if scope["type"] == "http" and scope["method"] in UNSAFE and int(length) > 0:
             kind = headers.get("content-type", "").partition(";")[0].strip()
-            if kind != "application/json":  # what a form elsewhere could send is not this
+            if kind != "application/json":  # an HTML form of another site cannot send this type
                 return 415, "expected application/json"
         return None
 
-    def _stranger(self, scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
-        """Refuse what a page from elsewhere has made a browser send."""
+    def _foreign_origin(self, scope: Scope, headers: dict[str, str]) -> tuple[int, str] | None:
+        """Refuse requests that a page of another site makes a browser send."""
         host = headers.get("host", "")
         if self.token is None and not is_loopback(_hostname(host)):
-            # A page elsewhere can give its own name the address of this machine.
+            # Another site can point its own name to the address of this machine.
             return 403, "this server answers only to localhost"
         origin = headers.get("origin")
         foreign = origin is not None and _netloc(origin) != host
         if headers.get("sec-fetch-site") in {"cross-site", "same-site"}:
-            # A link elsewhere may lead to the page, and to nothing else.
+            # A link on another site may open the page and nothing else.
             followed = scope["type"] == "http" and scope["path"] == "/" and scope["method"] == "GET"
             foreign = foreign or not followed
         return (403, "requests from other pages are refused") if foreign else None
 
-    def _knows_token(self, scope: Scope, headers: dict[str, str]) -> bool:
+    def _has_token(self, scope: Scope, headers: dict[str, str]) -> bool:
         given = [headers.get("authorization", "").removeprefix("Bearer "), _query_token(scope)]
         try:
             cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
@@ -116,8 +116,8 @@ class Guard:
         token = (self.token or "").encode()
         return any(secrets.compare_digest(each.encode(), token) for each in given if each)
 
-    def _has_login(self, scope: Scope) -> bool:
-        """Whether the token is in the address, from where it should vanish."""
+    def _has_token_in_address(self, scope: Scope) -> bool:
+        """Return whether the token is in the address, from where a redirect removes it."""
         return (
             self.token is not None
             and scope["type"] == "http"
@@ -126,8 +126,8 @@ class Guard:
             and bool(_query_token(scope))
         )
 
-    async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on what comes as long as it is not too much, and dress what goes."""
+    async def _forward(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward messages up to the size limit and add headers to the response."""
         read = 0
 
         async def counted() -> Message:
@@ -139,19 +139,19 @@ class Guard:
                     return {"type": "http.disconnect"}
             return message
 
-        async def dressed(message: Message) -> None:
+        async def with_headers(message: Message) -> None:
             if read > BODY:
-                return  # whatever is made of half a request, the answer is another
+                return  # the response to a truncated request is replaced below
             if message["type"] == "http.response.start":
                 extra = [(key.encode(), value.encode()) for key, value in HEADERS.items()]
                 message = {**message, "headers": [*message["headers"], *extra]}
             await send(message)
 
         try:
-            await self.app(scope, counted, dressed)
+            await self.app(scope, counted, with_headers)
         finally:
             if read > BODY:
-                await _answer(send, 413, TOO_LARGE)
+                await _respond(send, 413, TOO_LARGE)
 
 
 def _hostname(host: str) -> str:
@@ -180,7 +180,7 @@ async def _redirect(send: Send, token: str) -> None:
     await send({"type": "http.response.body", "body": b""})
 
 
-async def _answer(send: Send, status: int, message: str) -> None:
+async def _respond(send: Send, status: int, message: str) -> None:
     body = json.dumps({"message": message, "key": ""}).encode()
     headers = [
         (b"content-type", b"application/json"),

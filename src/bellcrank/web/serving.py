@@ -1,4 +1,4 @@
-"""From a command to a server that runs."""
+"""Start of the server."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServerSettings:
-    """Where a server listens and what it serves.
+    """Address and data of a server.
 
     Parameters
     ----------
     folder
-        Of runs and kept designs.
+        Folder of runs and saved designs.
     host, port
-        Its address; port 0 for any that is free.
+        Address; port 0 for any free port.
     token
-        That everybody must know. Made up where the address is not that of this machine alone.
+        Required from every client. Generated if the address is reachable from other machines.
     searches
-        At the same time; None for as many as there are processors.
+        Number of searches at the same time; None for the number of processors.
     """
 
     folder: Path
@@ -56,25 +56,25 @@ class ServerSettings:
 
     @property
     def needed_token(self) -> str | None:
-        """The token, or a new one where none was given but one is needed."""
+        """The given token, or a new one if the address needs one."""
         if self.token is None and not is_loopback(self.host):
             return secrets.token_urlsafe(18)
         return self.token
 
 
 def default_folder() -> Path:
-    """Return where runs are kept if nobody says: with the other data of this person."""
+    """Return the default folder, in the data folder of the user."""
     base = os.environ.get("XDG_DATA_HOME")
     return (Path(base) if base else Path.home() / ".local" / "share") / "bellcrank" / "web"
 
 
-def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
-    """Serve until interrupted or told to end; all processes that were started end with it.
+def serve(settings: ServerSettings, announce: Callable[[str], None]) -> None:
+    """Run the server until it is interrupted or terminated; its processes end with it.
 
     Parameters
     ----------
-    tell
-        Called with the address, once it is open.
+    announce
+        Called with the address once it is open.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
     make_folder(settings.folder)
     busy = f"{settings.folder}: another server uses it; close that first"
     lock = locked(settings.folder / "server.lock", busy)
-    with _ended_by_hand(), lock, _listening(settings) as listener:
+    with _exit_on_sigterm(), lock, _listening(settings) as listener:
         app = make_app(settings.folder, token=token, searches=settings.searches)
         config = uvicorn.Config(
             app, log_level="warning", ws_max_size=MESSAGE, ws="websockets-sansio",
@@ -101,24 +101,24 @@ def serve(settings: ServerSettings, tell: Callable[[str], None]) -> None:
         server = uvicorn.Server(config)
         port = listener.getsockname()[1]
         host = f"[{settings.host}]" if ":" in settings.host else settings.host
-        tell(f"http://{host}:{port}/" + (f"?token={token}" if token else ""))
+        announce(f"http://{host}:{port}/" + (f"?token={token}" if token else ""))
         try:
             server.run(sockets=[listener])
-        finally:  # who presses Ctrl-C twice has the server skip its own end
-            app.state.workshop.pools.close()
+        finally:  # after a second Ctrl-C the server skips its own shutdown
+            app.state.bellcrank.pools.close()
 
 
 @contextlib.contextmanager
-def _ended_by_hand() -> Iterator[None]:
-    """Make SIGTERM an exit like others: uvicorn sends it again, and it would cut all short."""
+def _exit_on_sigterm() -> Iterator[None]:
+    """Make SIGTERM a regular exit: uvicorn raises it again, which would skip the cleanup."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
-    def leave(_number: int, _frame: FrameType | None) -> None:
+    def exit_process(_number: int, _frame: FrameType | None) -> None:
         raise SystemExit(0)
 
-    before = signal.signal(signal.SIGTERM, leave)
+    before = signal.signal(signal.SIGTERM, exit_process)
     try:
         yield
     finally:
@@ -127,14 +127,14 @@ def _ended_by_hand() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _listening(settings: ServerSettings) -> Iterator[socket.socket]:
-    """Take the address before anything else is done."""
+    """Open the address before anything else."""
     try:
         found = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)
         family, kind, protocol, _, address = found[0]
         listener = socket.socket(family, kind, protocol)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
-        listener.listen(128)  # who comes before the server is up waits
+        listener.listen(128)  # clients that connect early wait
     except OSError as error:
         raise InvalidSettings(
             f"{settings.host}:{settings.port} cannot be opened ({error.strerror}); "

@@ -1,4 +1,4 @@
-"""What the routes of a server share."""
+"""State that the routes of a server share."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 if TYPE_CHECKING:
-    from bellcrank.web.actuators import Machines
-    from bellcrank.web.gallery import Gallery, Kept
+    from bellcrank.web.gallery import Gallery, SavedDesigns
     from bellcrank.web.jobs import Jobs
+    from bellcrank.web.machine_gallery import Machines
     from bellcrank.web.pools import Pools
-    from bellcrank.web.scheduling import Scheduler
+    from bellcrank.web.scheduler import Scheduler
 
 
 @dataclass(slots=True, eq=False)
-class Workshop:
+class AppState:
     """Jobs, processes and designs of a server.
 
     Attributes
@@ -25,22 +25,22 @@ class Workshop:
     ready
         Whether the kernels are compiled and loaded.
     trouble
-        Why they are not, and never will be.
+        Why they cannot be loaded; empty if they can.
     """
 
     jobs: Jobs
     scheduler: Scheduler
     pools: Pools
     gallery: Gallery
-    kept: Kept
+    saved: SavedDesigns
     machines: Machines
     ready: bool = False
     trouble: str = ""
 
 
-def _workshop(connection: HTTPConnection) -> Workshop:
-    workshop: Workshop = connection.app.state.workshop
-    return workshop
+def _state(connection: HTTPConnection) -> AppState:
+    state: AppState = connection.app.state.bellcrank
+    return state
 
 
-Shop = Annotated[Workshop, Depends(_workshop)]
+State = Annotated[AppState, Depends(_state)]

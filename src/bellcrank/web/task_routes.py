@@ -1,4 +1,4 @@
-"""Lattices and tasks: made, checked, read and written."""
+"""Routes of lattices and tasks: generate, check, read and write."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.model import builtin, lattices, problem_to_dict
 from bellcrank.model.calls import call_with_keys
 from bellcrank.part import PartSpec, calibrated
-from bellcrank.web import solving
+from bellcrank.web import quick_calls
 from bellcrank.web.limits import check_lattice, check_size
-from bellcrank.web.state import Shop
-from bellcrank.web.tables import LatticeBody, SaveBody, TaskBody, TextBody
-from bellcrank.web.texts import problem_of, read_lattice, read_task, write_task
+from bellcrank.web.requests import LatticeBody, SaveBody, TaskBody, TextBody
+from bellcrank.web.state import State
+from bellcrank.web.task_files import problem_of, read_lattice, read_task, write_task
 
 router = APIRouter(prefix="/api", tags=["tasks"])
 
 ELEMENTARY_COLUMNS = 7
-"""Nodes across of the elementary tasks that are offered."""
+"""Number of columns of the elementary tasks offered by the page."""
 
 
 @router.get("/problems")
 def list_problems() -> list[dict[str, str]]:
-    """Tasks to start from, in groups."""
+    """Return the bundled tasks, in groups."""
     named = [
         {"name": name, "group": "Built in", "about": (make.__doc__ or "").strip().split("\n")[0]}
         for name, make in builtin.items()
@@ -45,7 +45,7 @@ def list_problems() -> list[dict[str, str]]:
 
 @router.get("/problems/{name}")
 def get_problem(name: str) -> dict[str, Any]:
-    """Return one of the tasks to start from."""
+    """Return a bundled task."""
     if name in builtin:
         return problem_to_dict(builtin[name]())
     direction = name.removeprefix("elementary-")
@@ -56,7 +56,7 @@ def get_problem(name: str) -> dict[str, Any]:
 
 @router.post("/lattices")
 def make_lattice(body: LatticeBody) -> dict[str, Any]:
-    """Make the lattice that a table describes."""
+    """Generate the lattice that a table describes."""
     given = dict(body.lattice)
     check_lattice(given)
     kind = given.pop("kind", "")
@@ -67,7 +67,7 @@ def make_lattice(body: LatticeBody) -> dict[str, Any]:
 
 @router.post("/lattices/read")
 async def import_lattice(body: TextBody) -> dict[str, Any]:
-    """Read a lattice from a file of another program."""
+    """Read a lattice from a file in an exchange format."""
     lattice = await run_in_threadpool(read_lattice, body.text, body.suffix)
     plane = lattice.positions[:, :2]
     return {"positions": plane.tolist(), "beams": lattice.beams.tolist()}
@@ -86,7 +86,7 @@ async def load_task(body: TextBody) -> dict[str, Any]:
 
 @router.post("/tasks/write")
 async def save_task(body: SaveBody) -> dict[str, str]:
-    """Write a task as text, to be saved or passed on."""
+    """Return a task as text of a file."""
 
     def write() -> str:
         return write_task(problem_of(body.problem), body.lattice, body.suffix)
@@ -95,13 +95,13 @@ async def save_task(body: SaveBody) -> dict[str, str]:
 
 
 @router.post("/tasks/check")
-async def check_task(body: TaskBody, shop: Shop) -> dict[str, Any]:
-    """Say what is wrong with a task, or else how its initial design moves.
+async def check_task(body: TaskBody, state: State) -> dict[str, Any]:
+    """Check a task and return the response of its initial design.
 
-    For a part, also with which stiffness its designs will move.
+    For a part, the result contains the calibrated stiffness of its springs.
     """
 
-    def meant() -> dict[str, Any]:
+    def with_part_stiffness() -> dict[str, Any]:
         problem = problem_of(body.problem)
         if body.part is None:
             return body.problem
@@ -109,8 +109,11 @@ async def check_task(body: TaskBody, shop: Shop) -> dict[str, Any]:
         stiffness = calibrated(problem, spec.width, spec.scale).stiffness
         return {**body.problem, "stiffness": {"bond": stiffness.bond, "angle": stiffness.angle}}
 
-    problem = await run_in_threadpool(meant)
-    known = {"stiffness": problem.get("stiffness"), "response": None}
-    if not shop.ready:
-        return known
-    return {**known, **await shop.pools.quick.call(solving.check, json.dumps(problem), body.goals)}
+    problem = await run_in_threadpool(with_part_stiffness)
+    result = {"stiffness": problem.get("stiffness"), "response": None}
+    if not state.ready:
+        return result
+    return {
+        **result,
+        **await state.pools.quick.call(quick_calls.check, json.dumps(problem), body.goals),
+    }

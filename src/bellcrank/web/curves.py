@@ -1,4 +1,4 @@
-"""Efficiency against step, one curve for each chain, as short as a picture needs it."""
+"""Efficiency against step, one curve for each chain, reduced for drawing."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 Point = tuple[int, float | None, float | None, float]
 """Step; efficiency of the current and of the best design; temperature."""
 
-MOST = 600
-"""Points of a chain; beyond, every other one is dropped."""
+MAX_POINTS = 600
+"""Largest number of points of a chain; beyond, every other point is dropped."""
 
 
-class Trace:
-    """Curves that grow, and are thinned out when they get long.
+class Curves:
+    """Growing curves that are thinned out beyond a number of points.
 
     Attributes
     ----------
     epoch
-        Changes when earlier points do, so that who follows the curves starts again.
+        Increases when earlier points change, so that clients reload the curves.
     """
 
     def __init__(self) -> None:
@@ -38,25 +38,25 @@ class Trace:
         """Append points to the curve of a chain."""
         curve = self.chains.setdefault(chain, [])
         curve += points
-        if len(curve) > MOST:
+        if len(curve) > MAX_POINTS:
             self.chains[chain] = [*curve[:-1:2], curve[-1]]
             self.epoch += 1
 
     def since(self, seen: dict[int, int]) -> dict[int, list[Point]]:
-        """Return what was added after so many points of each chain, and note it as seen."""
+        """Return the points after the number in `seen` for each chain, and update `seen`."""
         fresh = {chain: curve[seen.get(chain, 0) :] for chain, curve in self.chains.items()}
         for chain, curve in self.chains.items():
             seen[chain] = len(curve)
         return {chain: points for chain, points in fresh.items() if points}
 
 
-def tidy(value: float) -> float | None:
-    """Return a number as precise as a picture needs it; None for none."""
+def rounded(value: float) -> float | None:
+    """Return a number rounded for drawing; None for NaN and infinities."""
     return round(float(value), 5) if np.isfinite(value) else None
 
 
 def read_curves(folder: RunFolder) -> dict[int, list[Point]]:
-    """Make the curves of a run from its records."""
+    """Return the curves of a run from its records."""
     settings = read_settings(folder.settings)
     running_best = searches[settings.name].plot_running_best
     curves: dict[int, list[Point]] = {}
@@ -65,31 +65,31 @@ def read_curves(folder: RunFolder) -> dict[int, list[Point]]:
         count = len(rows["step"])
         if not count:
             continue
-        taken = rows["accepted"] & (rows["status"] == Status.CONVERGED)
-        best = np.fmax.accumulate(np.where(taken, rows["efficiency"], np.nan))
-        last = np.maximum.accumulate(np.where(taken, np.arange(count), -1))
+        accepted = rows["accepted"] & (rows["status"] == Status.CONVERGED)
+        best = np.fmax.accumulate(np.where(accepted, rows["efficiency"], np.nan))
+        last = np.maximum.accumulate(np.where(accepted, np.arange(count), -1))
         current = np.where(last >= 0, rows["efficiency"][last], np.nan)
-        stride = max(BLOCK, -(-count // (MOST // 2)))
-        places = np.append(np.arange(stride - 1, count, stride), [0, count - 1])
-        if settings.name == "paper":  # the annealing is over within a few hundred steps
-            places = np.append(places, np.arange(0, min(count, 2 * BLOCK), 10))
+        stride = max(BLOCK, -(-count // (MAX_POINTS // 2)))
+        rows_shown = np.append(np.arange(stride - 1, count, stride), [0, count - 1])
+        if settings.name == "paper":  # annealing ends within a few hundred steps
+            rows_shown = np.append(rows_shown, np.arange(0, min(count, 2 * BLOCK), 10))
         shown = best if running_best else current
         curves[chain] = [
-            (k + 1, tidy(shown[k]), tidy(best[k]), round(float(rows["temperature"][k]), 6))
-            for k in np.unique(places).tolist()
+            (k + 1, rounded(shown[k]), rounded(best[k]), round(float(rows["temperature"][k]), 6))
+            for k in np.unique(rows_shown).tolist()
         ]
     return curves
 
 
 def read_run_curves(path: Path) -> dict[str, Any]:
-    """Read the curves of the run in a folder; none if it has not begun."""
+    """Return the curves of the run in a folder; none if it has not started."""
     from bellcrank.storage import RunFolder
 
     return {"curves": read_curves(RunFolder.open(path)) if (path / "run.json").exists() else {}}
 
 
 def copy_history(path: Path, target: Path) -> None:
-    """Write what the run in a folder has proposed so far into another folder."""
+    """Write all proposals of a run so far into another folder."""
     from bellcrank.storage import RunFolder
 
     RunFolder.open(path).copy_history(target)

@@ -1,4 +1,4 @@
-"""What a page may send, checked once."""
+"""Requests of the page and their validation."""
 
 from __future__ import annotations
 
@@ -27,38 +27,38 @@ MEDIA = {
     "json": "application/json",
 }
 
-SWIFT = ("stl", "3mf", "svg", "dxf", "json")
-"""Files that take a moment, and need not wait behind movies and finite elements."""
+QUICK_FILES = ("stl", "3mf", "svg", "dxf", "json")
+"""Files that are written quickly and do not wait behind movies and finite elements."""
 
 
 class Body(BaseModel):
-    """A request: no unknown keys, no NaN."""
+    """Base of all requests: unknown keys and NaN are refused."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
 
-class Complaint(BaseModel):
-    """What is wrong, in a sentence, and which part of the request it is about."""
+class ErrorResponse(BaseModel):
+    """Error message and the key of the request that it concerns."""
 
     message: str
     key: str = ""
 
 
 class LatticeBody(Body):
-    """A lattice by its kind and parameters."""
+    """Kind and parameters of a lattice."""
 
     lattice: dict[str, Any]
 
 
 class TextBody(Body):
-    """A file that a person picked."""
+    """An uploaded file."""
 
     text: str = Field(max_length=1_900_000)
     suffix: str = Field(pattern=r"^\.[a-z0-9.]{1,12}$")
 
 
 class TaskBody(Body):
-    """A task, with what its design must keep and the part that it is for."""
+    """A task with its constraints and its part."""
 
     problem: dict[str, Any]
     goals: Goals = ()
@@ -66,7 +66,7 @@ class TaskBody(Body):
 
 
 class SaveBody(Body):
-    """A task to be written as text."""
+    """A task to be written as a file."""
 
     problem: dict[str, Any]
     lattice: dict[str, Any] | None = None
@@ -87,7 +87,7 @@ class PartBody(DesignBody):
 
 
 class FileBody(PartBody):
-    """A design of which a file is wanted."""
+    """A design to be written as a file."""
 
     efficiency: float | None = None
     provenance: dict[str, Any] = Field(default_factory=dict)
@@ -99,15 +99,15 @@ class FemBody(PartBody):
     level: Level = "frame"
 
 
-class KeepBody(DesignBody):
-    """A design to be kept in the gallery."""
+class SaveDesignBody(DesignBody):
+    """A design to be stored in the gallery."""
 
     title: str = Field(min_length=1, max_length=120)
     provenance: dict[str, Any] = Field(default_factory=dict)
 
 
 class RunBody(Body):
-    """A search to be made."""
+    """A search to be started."""
 
     title: str = Field(min_length=1, max_length=120)
     session: Session
@@ -122,6 +122,6 @@ class RunBody(Body):
 
 
 class PlanBody(Body):
-    """A machine: the plan, whose entries are names in the gallery."""
+    """The plan of a machine; its entries are names of gallery designs."""
 
     plan: dict[str, Any]

@@ -1,4 +1,4 @@
-"""Tasks as text: what a page uploads and saves."""
+"""Tasks as text: uploads and downloads of the page."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 UPLOAD = "the file"
-"""What an upload is called in errors, in place of where it was put."""
+"""Name of an upload in error messages, instead of its temporary path."""
 
 
 def problem_of(data: Mapping[str, Any], source: str = "task") -> Problem:
-    """Return the problem that a page sent.
+    """Return the problem of a request.
 
     Raises
     ------
@@ -45,15 +45,15 @@ def problem_of(data: Mapping[str, Any], source: str = "task") -> Problem:
 
 
 def read_task(text: str, suffix: str) -> tuple[Problem, dict[str, Any] | None, Design | None]:
-    """Read an uploaded task or design by the readers of files.
+    """Read an uploaded task or design.
 
     Returns
     -------
     problem
     lattice
-        The table that describes its lattice, if it has one.
+        Table that describes the lattice, if the file has one.
     design
-        If the file holds one.
+        Design, if the file holds one.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def write_task(problem: Problem, lattice: Mapping[str, Any] | None, suffix: str)
     Parameters
     ----------
     lattice
-        The table that its lattice was made from, to be named instead of written out.
+        Table that generates the lattice; written instead of nodes and beams if given.
     suffix
         ``.json`` or ``.toml``.
 
@@ -135,7 +135,7 @@ def _without_lattice(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def to_toml(data: Mapping[str, Any]) -> str:
-    """Write tables of numbers, texts and lists as TOML; what is None is left out.
+    """Write tables of numbers, strings and lists as TOML, without the keys that are None.
 
     Examples
     --------

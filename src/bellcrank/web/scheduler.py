@@ -1,4 +1,4 @@
-"""Who searches when: sessions take turns, and a long search makes room for those that wait."""
+"""Scheduling of searches: sessions alternate, and a long search is suspended while others wait."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.search import default_workers
-from bellcrank.web.jobs import ALIVE
+from bellcrank.web.jobs import UNFINISHED
 from bellcrank.web.limits import WAITING
-from bellcrank.web.searching import run_search
+from bellcrank.web.search_process import run_search
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -23,40 +23,40 @@ if TYPE_CHECKING:
     from bellcrank.web.jobs import Job, Jobs
 
 SLICE = 45.0
-"""Seconds after which a search makes room, if others wait."""
+"""Seconds after which a search is suspended if others wait."""
 PATIENCE = 20.0
-"""Seconds that a search is given to keep what it has done when the server ends."""
+"""Seconds that a search has to store its state when the server ends."""
 
 
 @dataclass(slots=True, eq=False)
 class Running:
-    """A search in its process."""
+    """A search and its process."""
 
     job: Job
     process: BaseProcess
     pipe: Connection
     since: float
-    wanted: str = ""
-    """``pause``, ``stop`` or, to be taken up again later, ``yield``."""
+    request: str = ""
+    """``pause``, ``stop`` or ``yield`` (suspend and queue again)."""
 
-    def ask(self, wanted: str) -> None:
-        """Ask it to end."""
-        if self.wanted in {"pause", "stop"} and wanted == "yield":
+    def send(self, request: str) -> None:
+        """Send a request to end."""
+        if self.request in {"pause", "stop"} and request == "yield":
             return
-        self.wanted = wanted
+        self.request = request
         with contextlib.suppress(OSError, BrokenPipeError):
-            self.pipe.send("stop" if wanted == "stop" else "pause")
+            self.pipe.send("stop" if request == "stop" else "pause")
 
 
 class Scheduler:
-    """Runs jobs in processes, as many at once as there is room.
+    """Runs jobs in processes, up to a number at the same time.
 
     Parameters
     ----------
     jobs
-        All there are; those that were queued or running when a server ended go on.
+        All jobs; those that were queued or running when a server ended are resumed.
     slots
-        Searches at the same time.
+        Number of searches at the same time.
     """
 
     def __init__(self, jobs: Jobs, slots: int | None = None) -> None:
@@ -64,24 +64,25 @@ class Scheduler:
         self.slots = slots or default_workers()
         self.running: dict[str, Running] = {}
         self.queue: list[Job] = sorted(
-            (job for job in jobs if job.record.status in ALIVE), key=lambda job: job.record.created
+            (job for job in jobs if job.record.status in UNFINISHED),
+            key=lambda job: job.record.created,
         )
-        self._served: dict[str, float] = {}
+        self._started_at: dict[str, float] = {}
         self._closing = False
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def open(self) -> None:
-        """Begin to run what is queued; call it from the event loop."""
+        """Start the queued jobs; call this in the event loop."""
         self._loop = asyncio.get_running_loop()
         for job in self.queue:
             job.update(status="queued")
         self._fill()
 
     async def close(self) -> None:
-        """Let running searches keep what is done; the next server goes on with them."""
+        """Suspend the running searches; the next server resumes them."""
         self._closing = True
         for each in self.running.values():
-            each.ask("yield")
+            each.send("yield")
         deadline = time.monotonic() + PATIENCE
         while self.running and time.monotonic() < deadline:
             await asyncio.sleep(0.05)
@@ -94,7 +95,7 @@ class Scheduler:
         Raises
         ------
         InvalidSettings
-            If it is there already, is done, or too many wait.
+            If the job is queued, running or finished, or too many jobs wait.
         """
         if job.name in self.running or job in self.queue:
             raise InvalidSettings("this search is queued or running already")
@@ -107,21 +108,21 @@ class Scheduler:
         self._fill()
 
     def pause(self, job: Job) -> None:
-        """Let a search rest, or take it out of the queue."""
+        """Pause a search, or remove it from the queue."""
         if job in self.queue:
             self.queue.remove(job)
             job.update(status="paused")
         elif job.name in self.running:
-            self.running[job.name].ask("pause")
+            self.running[job.name].send("pause")
         else:
             raise InvalidSettings("this search is not running")
 
     def stop(self, job: Job) -> None:
-        """End a search, and take the best it has found."""
+        """Stop a search and choose its best design."""
         if job.name in self.running:
-            self.running[job.name].ask("stop")
+            self.running[job.name].send("stop")
         elif (job.path / "run" / "run.json").exists():
-            # A resting search has a design to choose too: it is begun again for that alone.
+            # A paused search is started again only to choose its best design.
             if job in self.queue:
                 self.queue.remove(job)
             self._start(job, "stop")
@@ -129,40 +130,40 @@ class Scheduler:
             self.queue.remove(job)
             job.update(status="paused")
         else:
-            raise InvalidSettings("this search has not begun")
+            raise InvalidSettings("this search has not started")
 
-    def place(self, job: Job) -> int:
-        """Return how many searches go before one that waits."""
+    def position(self, job: Job) -> int:
+        """Return the number of searches that start before a waiting one."""
         return self._order().index(job) if job in self.queue else 0
 
     def _order(self) -> list[Job]:
-        """Return the queue in the order in which it will be served if nothing else comes."""
-        waiting, served = list(self.queue), dict(self._served)
+        """Return the queue in the order in which its jobs will start."""
+        waiting, started_at = list(self.queue), dict(self._started_at)
         order: list[Job] = []
         for turn in range(len(waiting)):
             job = min(
                 waiting,
-                key=lambda each: (served.get(each.record.session, 0.0), self.queue.index(each)),
+                key=lambda each: (started_at.get(each.record.session, 0.0), self.queue.index(each)),
             )
             waiting.remove(job)
-            served[job.record.session] = time.monotonic() + turn
+            started_at[job.record.session] = time.monotonic() + turn
             order.append(job)
         return order
 
     def _fill(self) -> None:
-        """Start what there is room for; ask long searches for room."""
+        """Start jobs while there are free slots."""
         while self.queue and len(self.running) < self.slots and not self._closing:
             job = self._order()[0]
             self.queue.remove(job)
             self._start(job)
         for job in self.queue:
-            job.changed += 1  # its place may be another now
+            job.changed += 1  # its position may have changed
 
-    def _start(self, job: Job, wanted: str = "") -> None:
+    def _start(self, job: Job, request: str = "") -> None:
         context = multiprocessing.get_context("spawn")
         here, there = context.Pipe()
-        rivals = len(self.running) + len(self.queue)
-        workers = max(1, default_workers() // (1 + min(rivals, self.slots - 1)))
+        others = len(self.running) + len(self.queue)
+        workers = max(1, default_workers() // (1 + min(others, self.slots - 1)))
         process = context.Process(
             target=run_search, args=(str(job.path), workers, there), daemon=True
         )
@@ -170,33 +171,36 @@ class Scheduler:
         there.close()
         each = Running(job, process, here, time.monotonic())
         self.running[job.name] = each
-        self._served[job.record.session] = time.monotonic()
+        self._started_at[job.record.session] = time.monotonic()
         job.update(status="running")
-        if wanted:
-            each.ask(wanted)
+        if request:
+            each.send(request)
         threading.Thread(target=self._listen, args=(each,), daemon=True).start()
 
     def _listen(self, each: Running) -> None:
-        """Pass on what a process tells, from a thread of its own, until it ends."""
+        """Forward the messages of a process until it ends; runs in a thread."""
         assert self._loop is not None
-        last: dict[str, Any] = {"kind": "failed", "message": "the search ended without a word"}
+        last: dict[str, Any] = {
+            "kind": "failed",
+            "message": "the process of the search ended unexpectedly",
+        }
         while True:
             try:
                 message = each.pipe.recv()
             except (EOFError, OSError):
                 break
             if message["kind"] == "progress":
-                self._loop.call_soon_threadsafe(self._hear, each, message)
+                self._loop.call_soon_threadsafe(self._receive, each, message)
             else:
                 last = message
         each.process.join()
         with contextlib.suppress(RuntimeError):  # the server has ended meanwhile
             self._loop.call_soon_threadsafe(self._ended, each, last)
 
-    def _hear(self, each: Running, message: dict[str, Any]) -> None:
-        each.job.hear(message)
-        if self.queue and time.monotonic() - each.since > SLICE and not each.wanted:
-            each.ask("yield")
+    def _receive(self, each: Running, message: dict[str, Any]) -> None:
+        each.job.receive(message)
+        if self.queue and time.monotonic() - each.since > SLICE and not each.request:
+            each.send("yield")
 
     def _ended(self, each: Running, last: dict[str, Any]) -> None:
         job = each.job
@@ -205,11 +209,11 @@ class Scheduler:
         if not job.path.exists():
             self._fill()
             return
-        done = job.told.get("done", job.record.done)
+        done = job.progress.get("done", job.record.done)
         if last["kind"] == "failed":
             job.update(status="failed", message=last["message"], done=done)
         elif last["kind"] == "paused":
-            resumes = each.wanted == "yield"
+            resumes = each.request == "yield"
             best = job.best()
             job.update(
                 status="queued" if resumes else "paused",

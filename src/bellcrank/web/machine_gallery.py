@@ -1,4 +1,4 @@
-"""Elementary actuators, struts and machines that come along, as sources of the gallery."""
+"""Elementary actuators, struts and bundled machines as sources of the gallery."""
 
 from __future__ import annotations
 
@@ -9,35 +9,35 @@ from bellcrank.errors import BellcrankError, UnknownName
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.library import library
 from bellcrank.machines.showcases import find_plan, showcase, showcases
-from bellcrank.web.gallery import Entry, Once
+from bellcrank.web.gallery import Entry, LazyEntries
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 STRUT = re.compile(r"strut-([3-9]|[1-3][0-9])")
-OFFERED = ("strut-3", "strut-4", "strut-6", "strut-9")
-LOADS = {"free": "nothing in its way", "light": "easy to drive", "loaded": "pushes a load"}
-"""What a kind of actuator is good for, as short as a small picture has room for."""
+LISTED = ("strut-3", "strut-4", "strut-6", "strut-9")
+LOADS = {"free": "free stroke", "light": "low input force", "loaded": "loaded output"}
+"""Names of the kinds of entries."""
 
 
 class Actuators:
-    """Elementary actuators: those that come along, and the user's own.
+    """Elementary actuators: the bundled library and the user's own entries.
 
-    Read once, when somebody first looks: what is added meanwhile is seen after a new start.
+    They are read once; entries that are added later appear after a restart.
     """
 
     name = "library"
     title = "Elementary actuators"
 
     def __init__(self) -> None:
-        self._known = Once(_actuators)
+        self._known = LazyEntries(_actuators)
 
     def entries(self) -> Iterable[Entry]:
-        """Return all entries that can be read, by name."""
+        """Return all readable entries."""
         return self._known().values()
 
     def find(self, key: str) -> Entry | None:
-        """Return the one of that name."""
+        """Return the entry with a key, or None."""
         return self._known().get(key)
 
 
@@ -56,42 +56,42 @@ def _actuators() -> Iterator[Entry]:
 
 
 class Struts:
-    """Bars that pass a motion on as it is: fingers and spacers of machines."""
+    """Bars that transmit a motion unchanged: fingers and spacers of machines."""
 
     name = "struts"
     title = "Struts"
 
     def entries(self) -> Iterable[Entry]:
-        """Return some of usual lengths."""
-        return [entry for name in OFFERED if (entry := self.find(name)) is not None]
+        """Return struts of common lengths."""
+        return [entry for name in LISTED if (entry := self.find(name)) is not None]
 
     def find(self, key: str) -> Entry | None:
-        """Return the strut of that name and length, such as ``strut-6``."""
+        """Return the strut with a key such as ``strut-6``."""
         design = strut_named(key) if STRUT.fullmatch(key) else None
         if design is None:
             return None
-        return Entry(key, f"Strut, {key.removeprefix('strut-')} long", "passes a motion on", design)
+        return Entry(key, f"Strut, {key.removeprefix('strut-')} long", "transmits a motion", design)
 
 
 class Machines:
-    """Machines that come with the package; built when somebody first looks."""
+    """Bundled machines, built at the first access."""
 
     name = "machines"
     title = "Machines"
 
     def __init__(self) -> None:
-        self._known = Once(_machines)
+        self._known = LazyEntries(_machines)
 
     def entries(self) -> Iterable[Entry]:
-        """Return all of them, by name."""
+        """Return all machines."""
         return self._known().values()
 
     def find(self, key: str) -> Entry | None:
-        """Return the one of that name."""
+        """Return the entry with a key, or None."""
         return self._known().get(key)
 
     def plan(self, key: str) -> dict[str, Any]:
-        """Return how a machine is made, its parts named as in the gallery.
+        """Return the plan of a machine, with gallery names of its parts.
 
         Raises
         ------

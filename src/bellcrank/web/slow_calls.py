@@ -1,4 +1,7 @@
-"""What takes long: files, movies, finite elements, machines; from plain data to plain data."""
+"""Slow computations for the page: files, movies, finite elements, machines.
+
+Arguments and results are plain data.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.model import write_design
-from bellcrank.web.solving import design_of
+from bellcrank.web.quick_calls import design_of
 
 if TYPE_CHECKING:
     from bellcrank.model import Design
@@ -21,23 +24,23 @@ MOVIE_SECONDS = 4.0
 MOVIE_SIZE = (1280, 720)
 GIF_SIZE = (720, 404)
 GIF_FPS = 20
-PICTURED = 60_000
-"""Most vertices of a picture of stress."""
+MAX_VERTICES = 60_000
+"""Largest number of vertices of a picture of stress."""
 
 
 def design_file(
     text: str, mask: str, suffix: str, part: dict[str, Any], about: dict[str, Any]
 ) -> bytes:
-    """Make a file of a design.
+    """Return the content of a file of a design.
 
     Parameters
     ----------
     suffix
-        One of `bellcrank.web.tables.FileSuffix`, with a dot.
+        One of `bellcrank.web.requests.FileSuffix`, with a dot.
     part
-        Size and material, as `PartSpec.from_dict` reads them.
+        Dimensions and material, as `PartSpec.from_dict` reads them.
     about
-        Efficiency and provenance, as far as they are known.
+        Efficiency and provenance, if known.
     """
     from bellcrank.part import PartSpec
 
@@ -58,8 +61,8 @@ def design_file(
 
 
 def _json(design: Design, spec: PartSpec, path: Path) -> None:
-    noted = replace(design, provenance={**design.provenance, "part": spec.to_dict()})
-    write_design(noted, path)
+    with_part = replace(design, provenance={**design.provenance, "part": spec.to_dict()})
+    write_design(with_part, path)
 
 
 def _movie(design: Design, _spec: PartSpec, path: Path) -> None:
@@ -87,8 +90,8 @@ def _export(design: Design, spec: PartSpec, path: Path) -> None:
     export(bundle_of(design, spec, Grips(), layer=LAYER), path)
 
 
-def remarks(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
-    """Say what a part will be like: size, mass, and what is to be said about printing it."""
+def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
+    """Return size, mass and stroke of a part, and remarks on its printability."""
     from bellcrank.part import PartSpec
     from bellcrank.workflows.fabricate import Grips, bundle_of, findings_about, profile_for
 
@@ -112,32 +115,32 @@ def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[s
     Returns
     -------
     dict
-        The figures of one level, and ``picture``: struts or triangles where they have moved, mm,
-        with their stress.
+        Results of one level, and ``picture``: deformed struts or triangles, in mm, with their
+        stress.
     """
     from bellcrank.fem import FemSettings
     from bellcrank.part import PartSpec
     from bellcrank.workflows import validate
 
     spec = PartSpec.from_dict(part)
-    found = validate(design_of(text, mask), spec, [(level, FemSettings())])
-    analysis = found.analyses[0]
-    data: dict[str, Any] = found.to_dict()["results"][0]
+    validation = validate(design_of(text, mask), spec, [(level, FemSettings())])
+    analysis = validation.analyses[0]
+    data: dict[str, Any] = validation.to_dict()["results"][0]
     field = analysis.field
     picture = None
-    if len(field.rest) <= PICTURED and field.rest.shape[1] == 2:
+    if len(field.rest) <= MAX_VERTICES and field.rest.shape[1] == 2:
         picture = {
             "points": (field.rest + field.displacement).round(3).ravel().tolist(),
             "cells": field.cells.ravel().tolist(),
             "corners": int(field.cells.shape[1]),
             "stress": [float(f"{each:.4g}") for each in field.stress.tolist()],
         }
-    kept = (
+    keys = (
         "level", "theory", "status", "stable", "reached", "efficiency", "von_mises_MPa",
         "principal_strain", "input_force_N", "input_push_N", "mean_output_displacement_mm",
         "warnings", "discrete_model",
     )  # fmt: skip
-    return {**{key: data[key] for key in kept}, "doubts": found.doubts, "picture": picture}
+    return {**{key: data[key] for key in keys}, "doubts": validation.doubts, "picture": picture}
 
 
 def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:
@@ -146,9 +149,9 @@ def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:
     Parameters
     ----------
     plan
-        As in the TOML files of `bellcrank.machines.plan`.
+        Plan with the keys of the TOML files of `bellcrank.machines.plan`.
     designs
-        The design of each entry that the plan names: JSON of ``problem`` and ``mask``.
+        Design of each entry in the plan: JSON text of ``problem`` and ``mask``.
     """
     from bellcrank.machines.assembly import assemble
     from bellcrank.machines.plan import MachineTable, plan_of

@@ -1,8 +1,8 @@
-"""A search in a process of its own: told what to do, and telling how it goes.
+"""The process of one search.
 
-Talks over a pipe. It is told ``pause`` (keep what is done, and end), ``stop`` (also choose a
-design from it) and tells dictionaries with ``kind``: ``progress``, and at the end ``paused``,
-``stopped``, ``finished`` or ``failed``. If the server dies, the pipe closes and it pauses.
+It communicates over a pipe. It receives ``pause`` (store the state and end) or ``stop`` (also
+choose a design) and sends dictionaries with ``kind``: ``progress``, and at the end ``paused``,
+``stopped``, ``finished`` or ``failed``. If the server dies, the pipe closes and the search pauses.
 """
 
 from __future__ import annotations
@@ -24,46 +24,46 @@ if TYPE_CHECKING:
 
     from bellcrank.search import Progress, SearchSettings
     from bellcrank.storage import RunFolder
-    from bellcrank.web.tracing import Point
+    from bellcrank.web.curves import Point
 
-TOO_EARLY = "nothing has been found yet that could be built; search a little longer"
+NO_DESIGN_YET = "no admissible design has been found yet; search longer"
 INTERVAL = 0.1
 """Seconds between two messages."""
 MOVED_INTERVAL = 0.4
-"""Seconds between two responses of the design that is shown."""
+"""Seconds between two evaluations of the displayed design."""
 NICENESS = 5
 
 
-class Ears:
-    """Listens to the pipe from a thread.
+class CommandListener:
+    """Receives commands from the pipe in a thread.
 
     Attributes
     ----------
     stop
-        Set when the search is to end.
-    told
-        The last word.
+        Set when the search must end.
+    command
+        Latest command.
     """
 
     def __init__(self, pipe: Connection) -> None:
         self.stop = threading.Event()
-        self.told = "pause"
+        self.command = "pause"
         self._pipe = pipe
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
         while True:
             try:
-                self.told = self._pipe.recv()
+                self.command = self._pipe.recv()
             except (EOFError, OSError):
-                self.told = "pause"
+                self.command = "pause"
                 self.stop.set()
                 return
             self.stop.set()
 
 
-class Reporter:
-    """Collects what the chains tell from their threads, and passes it on ten times a second."""
+class ProgressReporter:
+    """Collects the progress of the chains and sends it ten times a second."""
 
     def __init__(self, pipe: Connection, folder: RunFolder, settings: SearchSettings) -> None:
         from bellcrank.mechanics import SpringEvaluator
@@ -80,15 +80,15 @@ class Reporter:
         self._moved_at, self._moved_mask = 0.0, ""
         self._tried: tuple[int, int] | None = None
         self._done = {chain: folder.progress(chain)[0] for chain in range(settings.chains)}
-        self._points.update(self._beginnings(settings))
+        self._points.update(self._first_points(settings))
         self._end = threading.Event()
-        self._thread = threading.Thread(target=self._pass_on, daemon=True)
+        self._thread = threading.Thread(target=self._send_regularly, daemon=True)
 
-    def _beginnings(self, settings: SearchSettings) -> dict[int, list[Point]]:
-        """Return where chains that have done nothing yet stand: annealing is soon over."""
-        from bellcrank.web.tracing import tidy
+    def _first_points(self, settings: SearchSettings) -> dict[int, list[Point]]:
+        """Return the first point of the curve of each chain that has not started."""
+        from bellcrank.web.curves import rounded
 
-        efficiency = tidy(self._evaluator.evaluate(self._problem.initial).efficiency)
+        efficiency = rounded(self._evaluator.evaluate(self._problem.initial).efficiency)
         temperature = float(getattr(settings, "temperatures", [0.0])[0])
         point = (0, efficiency, efficiency, temperature)
         return {chain: [point] for chain, done in self._done.items() if not done}
@@ -102,11 +102,11 @@ class Reporter:
         self._thread.join()
 
     def __call__(self, progress: Progress) -> None:
-        """Take in the news of one chain."""
-        from bellcrank.web.tracing import tidy
+        """Record the progress of one chain."""
+        from bellcrank.web.curves import rounded
 
         state = progress.state
-        now, best = tidy(state.efficiency), tidy(state.best)
+        now, best = rounded(state.efficiency), rounded(state.best)
         with self._lock:
             self._made += progress.steps
             self._done[progress.chain] = state.step
@@ -116,18 +116,18 @@ class Reporter:
                 "best": best,
                 "temperature": progress.temperature,
                 "accepted": state.accepted,
-                "mask": _at_hand(state),
-                "kept": _kept(state),
+                "mask": _current_mask(state),
+                "kept": _best_mask(state),
             }
             point = (state.step, now, best, round(progress.temperature, 6))
             self._points.setdefault(progress.chain, []).append(point)
 
     def trying(self, done: int, total: int) -> None:
-        """Take in how many of the best designs have been tried as parts, and of how many."""
+        """Record how many candidates have been analysed as parts, and their number."""
         with self._lock:
             self._tried = done, total
 
-    def _pass_on(self) -> None:
+    def _send_regularly(self) -> None:
         while not self._end.wait(INTERVAL):
             with contextlib.suppress(OSError, BrokenPipeError):
                 self._send()
@@ -158,9 +158,9 @@ class Reporter:
         self._pipe.send(message)
 
     def _move(self, mask: str) -> dict[str, Any]:
-        """Return the response of the design that is shown."""
+        """Return the response of the displayed design."""
         from bellcrank.model import unpack_mask
-        from bellcrank.web.solving import finite, flat
+        from bellcrank.web.quick_calls import finite, flat
 
         bits = unpack_mask(mask, self._problem.lattice.beam_count)
         response = self._evaluator.evaluate(bits)
@@ -177,68 +177,70 @@ def _number(value: float | None) -> float:
     return float("-inf") if value is None else value
 
 
-def _at_hand(state: Any) -> str:
-    """Return the design that a chain has just been at: while a climb lasts, the climber's."""
+def _current_mask(state: Any) -> str:
+    """Return the current design of a chain, during a climb that of the climb."""
     for name in ("climbing", "walker"):
         if getattr(state, name, None):
             return str(getattr(state, name))
-    return _kept(state)
+    return _best_mask(state)
 
 
-def _kept(state: Any) -> str:
-    """Return the best design of a chain where it knows it, or else where it stands."""
+def _best_mask(state: Any) -> str:
+    """Return the best design of a chain if its state has it, else the current one."""
     return str(state.mask if isinstance(state.mask, str) else state.mask[-1])
 
 
 def run_search(where: str, workers: int, pipe: Connection) -> None:
-    """Begin or go on with the search of a job, until it ends or is told to.
+    """Start or resume the search of a job, until it ends or a command ends it.
 
     Parameters
     ----------
     where
         Folder of the job (see `bellcrank.web.jobs`).
     workers
-        Chains at the same time.
+        Number of chains at the same time.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(NICENESS)
-    ears = Ears(pipe)
+    listener = CommandListener(pipe)
     try:
-        with locked(Path(where) / "lock"):  # one that has outlived its server may still work there
-            outcome = _search(Path(where), workers, pipe, ears)
+        with locked(Path(where) / "lock"):  # a process of an earlier server may still run
+            outcome = _search(Path(where), workers, pipe, listener)
     except BellcrankError as error:
         outcome = {"kind": "failed", "message": first_line(error)}
-    except (Exception, KeyboardInterrupt) as error:  # or nobody would hear of it
+    except (Exception, KeyboardInterrupt) as error:  # reported to the server, whatever it is
         outcome = {"kind": "failed", "message": f"{type(error).__name__}: {first_line(error)}"}
     with contextlib.suppress(OSError, BrokenPipeError):
         pipe.send(outcome)
         pipe.close()
 
 
-def _search(where: Path, workers: int, pipe: Connection, ears: Ears) -> dict[str, Any]:
+def _search(
+    where: Path, workers: int, pipe: Connection, listener: CommandListener
+) -> dict[str, Any]:
     from bellcrank.search import read_settings
     from bellcrank.workflows import complete_design
     from bellcrank.workflows.design import conclude
 
-    folder = _begin_or_reopen(where)
+    folder = _start_or_reopen(where)
     settings = read_settings(folder.settings)
-    with Reporter(pipe, folder, settings) as reporter:
+    with ProgressReporter(pipe, folder, settings) as reporter:
         report = complete_design(
-            folder, workers=workers, tell=reporter, trying=reporter.trying, stop=ears.stop
+            folder, workers=workers, tell=reporter, trying=reporter.trying, stop=listener.stop
         )
-        if report is None and ears.told == "stop":
+        if report is None and listener.command == "stop":
             try:
                 report = conclude(folder, settings, reporter.trying)
             except InvalidSettings:
-                return {"kind": "paused", "message": TOO_EARLY}
+                return {"kind": "paused", "message": NO_DESIGN_YET}
             return {"kind": "stopped", "efficiency": report.selection.efficiency_after}
     if report is None:
         return {"kind": "paused"}
     return {"kind": "finished", "efficiency": report.selection.efficiency_after}
 
 
-def _begin_or_reopen(where: Path) -> RunFolder:
+def _start_or_reopen(where: Path) -> RunFolder:
     from bellcrank.model import read_problem
     from bellcrank.part import PartSpec
     from bellcrank.search import read_settings
@@ -247,7 +249,7 @@ def _begin_or_reopen(where: Path) -> RunFolder:
     run = where / "run"
     if (run / "run.json").exists():
         return reopen_design(run)
-    asked = json.loads((where / "job.json").read_text(encoding="utf-8"))
-    part = PartSpec.from_dict(asked["part"]) if asked["part"] is not None else None
-    settings = read_settings(asked["settings"])
+    job = json.loads((where / "job.json").read_text(encoding="utf-8"))
+    part = PartSpec.from_dict(job["part"]) if job["part"] is not None else None
+    settings = read_settings(job["settings"])
     return start_design(read_problem(where / "problem.json"), settings, run, part)
