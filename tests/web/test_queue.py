@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from bellcrank.model import find_problem, read_design
-from bellcrank.web.curves import MOST, Trace
+from bellcrank.web.curves import MAX_POINTS, Curves
 from bellcrank.web.jobs import Jobs, Record
 from bellcrank.web.scheduler import Scheduler
 
@@ -35,7 +35,7 @@ class Still(Scheduler):
     def _start(self, job: Job, _wanted: str = "") -> None:
         self.started.append(job.record.title)
         self.running[job.name] = object()  # type: ignore[assignment]
-        self._served[job.record.session] = float(len(self.started))
+        self._started_at[job.record.session] = float(len(self.started))
         job.update(status="running")
 
     def end(self) -> None:
@@ -66,7 +66,7 @@ def test_sessions_take_turns_however_many_searches_one_of_them_queues(tmp_path: 
         ("b2", "b"),
     ]:
         scheduler.add(jobs.add(problem, record(title, session)))
-    places = {job.record.title: scheduler.place(job) for job in scheduler.queue}
+    places = {job.record.title: scheduler.position(job) for job in scheduler.queue}
     for _ in range(6):
         scheduler.end()
     assert scheduler.started == ["a1", "b1", "c1", "a2", "b2", "a3", "a4"]
@@ -92,11 +92,11 @@ def test_jobs_are_found_again_and_damaged_ones_are_left_alone(tmp_path: Path) ->
 
 
 def test_curves_stay_short_however_long_a_search_is() -> None:
-    trace = Trace()
+    trace = Curves()
     for step in range(5000):
         trace.add(0, [(step, 0.1, 0.1, 0.0)])
     curve = trace.chains[0]
-    assert len(curve) <= MOST
+    assert len(curve) <= MAX_POINTS
     assert curve[0][0] == 0
     assert curve[-1][0] == 4999
     assert (np.diff([point[0] for point in curve]) > 0).all()
@@ -187,7 +187,7 @@ def test_a_search_that_is_stopped_gives_the_best_it_has_found(
     found = pq.read_table(io.BytesIO(history.content))
     assert found.num_rows == run["done"]
     assert set(found["chain"].to_pylist()) == {0, 1}
-    path = client.app.state.state.jobs[name].path  # type: ignore[attr-defined]
+    path = client.app.state.bellcrank.jobs[name].path  # type: ignore[attr-defined]
     assert read_design(path / "run" / "design.json").mask_hex == run["mask"]
     assert client.delete(f"/api/runs/{name}").status_code == 200
     assert not path.exists()
