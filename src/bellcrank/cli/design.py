@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from bellcrank.cli.app import INTERRUPTED, app
+from bellcrank.cli.app import INTERRUPTED, NOT_MET, app
 from bellcrank.cli.arguments import design_named, settings_of
 from bellcrank.cli.console import (
     announce_compilation,
@@ -154,6 +154,8 @@ def design(
         )
         sys.exit(INTERRUPTED)
     _print_report(report)
+    if report.failures:
+        sys.exit(NOT_MET)
 
 
 def _task_from(design: Design) -> Problem:
@@ -224,16 +226,11 @@ def _print_report(report: DesignReport) -> None:
     table.add_row("designs looked at", f"{report.proposals}")
     table.add_row("results", plain(f"{report.folder}/"))
     results.print(table)
-    if selection.efficiency_after <= 0.0:
+    if report.failures:
         notes.print(
-            "[bold yellow]warning:[/] no design was found that moves the output the wanted way; "
-            "search longer (--steps) or from another initial design."
-        )
-    if report.validation is not None and (doubts := report.validation.analyses[0].warnings):
-        notes.print(
-            "[bold yellow]warning:[/] no design was found that works as this part: "
-            f"{plain('; '.join(doubts))}. Search longer (--steps), with more chains (--chains), or "
-            "for other struts (--strut-width)."
+            f"[bold yellow]warning:[/] no design works: {plain('; '.join(report.failures))}. "
+            "Use more steps (--steps), more chains (--chains), another initial design (--from) or, for a "
+            "part, other struts (--strut-width)."
         )
     if not report.verified:
         notes.print(

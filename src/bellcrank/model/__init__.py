@@ -37,7 +37,7 @@ from bellcrank.model.files import (
     write_problem,
 )
 from bellcrank.model.formats import formats, network_of, read_network, write_network
-from bellcrank.model.gallery import gallery_design, human_design
+from bellcrank.model.gallery import gallery_design, human_counterpart, human_design
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
 from bellcrank.model.masks import pack_mask, unpack_mask
@@ -59,6 +59,7 @@ __all__ = [
     "find_problem",
     "formats",
     "gallery_design",
+    "human_counterpart",
     "human_design",
     "lattices",
     "network_of",

@@ -16,7 +16,7 @@ from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 
 from bellcrank.errors import BellcrankError, InvalidSettings, UnknownName
-from bellcrank.model import human_design, problem_to_dict
+from bellcrank.model import human_counterpart, problem_to_dict
 from bellcrank.web import curves, quick_calls
 from bellcrank.web.jobs import Record
 from bellcrank.web.pools import plain_error
@@ -111,13 +111,8 @@ async def _comparison(
     if job.record.reference is not None:
         title, mask = "yours", job.record.reference
     else:
-        human = human_design(problem.name)
-        same = human is not None and len(human.mask) == problem.lattice.beam_count
-        if (
-            human is None
-            or not same
-            or not (human.problem.lattice.beams == problem.lattice.beams).all()
-        ):
+        human = human_counterpart(problem)
+        if human is None:
             return None
         title, mask = "by hand", human.mask_hex
     response = await state.pools.quick.call(quick_calls.evaluate, text, mask)

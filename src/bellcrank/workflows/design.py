@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import BellcrankError
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, Status
-from bellcrank.model import Design, Problem, human_design, write_design
+from bellcrank.model import Design, Problem, human_counterpart, write_design
 from bellcrank.part import PartSpec, calibrated
 from bellcrank.provenance import provenance
 from bellcrank.search import (
@@ -159,9 +159,9 @@ def _try_to_mark_stopped(folder: RunFolder) -> None:
 def accepted_candidates(
     folder: RunFolder, settings: SearchSettings
 ) -> tuple[list[Candidate], int, list[float]]:
-    """Gather candidates from all chains, the number of proposals and each chain's best.
+    """Return candidates of all chains, the number of proposals and the best of each chain.
 
-    On its way to the goals of a search a chain accepts what breaks them: that is left out.
+    Accepted designs that violate goals are no candidates.
     """
     candidates: list[Candidate] = []
     proposals = 0
@@ -180,9 +180,8 @@ def accepted_candidates(
 
 
 def verification_evaluator(problem: Problem, settings: SearchSettings, **changes: Any) -> Evaluator:
-    """Return who judges finished designs: in the literal model, with the goals of the search."""
-    told = {"unloaded_beams": "keep", **changes}
-    return make_evaluator(problem, replace(settings, **told))
+    """Return the evaluator of finished designs: the literal model, with the goals of the search."""
+    return make_evaluator(problem, replace(settings, **{"unloaded_beams": "keep", **changes}))
 
 
 def verify(design: Design, settings: SearchSettings, response: Response) -> dict[str, float]:
@@ -202,7 +201,7 @@ def conclude(
 
     Raises
     ------
-    InvalidSettings
+    NoDesignFound
         If no design qualifies.
     StorageError, CorruptRun
         If the folder cannot be written, or is damaged.
@@ -211,11 +210,11 @@ def conclude(
     problem = folder.problem
     spec = _part_of(folder)
     candidates, proposals, best = accepted_candidates(folder, settings)
-    judge = verification_evaluator(problem, settings)
+    evaluator = verification_evaluator(problem, settings)
     choose = most_efficient if spec is None else PartChoice(spec, settings, trying)
-    selection = select(problem, candidates, settings.objective, judge, choose)
+    selection = select(problem, candidates, settings.objective, evaluator, choose)
     literal = verification_evaluator(problem, settings, goals=())
-    human = human_design(problem.name)
+    human = human_counterpart(problem)
     human_response = None
     if human is not None:
         human_response = literal.evaluate(human.mask, VERIFICATION_INCREMENT)

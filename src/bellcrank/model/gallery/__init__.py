@@ -26,7 +26,7 @@ from bellcrank.model.builtin import builtin
 from bellcrank.model.conditions import Stiffness
 from bellcrank.model.masks import unpack_mask
 from bellcrank.model.parsing import Table, parse, read_json
-from bellcrank.model.problem import Design
+from bellcrank.model.problem import Design, Problem, problem_to_dict
 
 FOLDER = Path(__file__).parent
 
@@ -104,3 +104,27 @@ def human_design(name: str) -> Design | None:
     True
     """
     return gallery_design("human", name)
+
+
+def human_counterpart(problem: Problem) -> Design | None:
+    """Return the human design for the same lattice, supports, input and output, if there is one.
+
+    The name of the problem does not matter, nor do its stiffness and its initial design.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> crane = builtin["crane"]()
+    >>> human_counterpart(replace(crane, name="mine")) is None
+    False
+    """
+    for path in sorted((FOLDER / "human").glob("*.json")):
+        design = human_design(path.stem)
+        if design is not None and _task_data(design.problem) == _task_data(problem):
+            return design
+    return None
+
+
+def _task_data(problem: Problem) -> dict[str, Any]:
+    data = problem_to_dict(problem)
+    return {key: data[key] for key in ("positions", "beams", "supports", "input", "output")}
