@@ -229,8 +229,8 @@ def _print_report(report: DesignReport) -> None:
     if report.failures:
         notes.print(
             f"[bold yellow]warning:[/] no design works: {plain('; '.join(report.failures))}. "
-            "Use more steps (--steps), more chains (--chains), another initial design (--from) or, for a "
-            "part, other struts (--strut-width)."
+            "Use more steps (--steps), more chains (--chains), another initial design (--from) or, "
+            "for a part, other struts (--strut-width)."
         )
     if not report.verified:
         notes.print(
