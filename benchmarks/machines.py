@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from bellcrank.machines import Machine, compare, foretell, predict, simulate
-from bellcrank.machines.showcases import showcase, showcases
+from bellcrank.machines.bundled import bundled_machine, bundled_machines
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
@@ -103,9 +103,9 @@ def designed(machine: Machine, name: str, options: argparse.Namespace) -> float 
 
 def measure(name: str, options: argparse.Namespace) -> Row:
     """Measure one machine."""
-    predict(showcase(name))  # read and compiled
+    predict(bundled_machine(name))  # read and compiled
     start = time.perf_counter()
-    machine = showcase(name)
+    machine = bundled_machine(name)
     built = time.perf_counter()
     problem, mask = machine.design.problem, machine.design.mask
     response = SpringEvaluator(problem).evaluate(mask, VERIFICATION_INCREMENT)
@@ -174,7 +174,7 @@ def main() -> None:
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--work", type=Path, required=True, help="folder of searches and tables")
-    parser.add_argument("--machines", nargs="+", default=showcases())
+    parser.add_argument("--machines", nargs="+", default=bundled_machines())
     parser.add_argument("--points", type=int, default=20)
     parser.add_argument("--steps", type=int, default=10_000, help="0: no search")
     parser.add_argument("--chains", type=int, default=2)

@@ -67,72 +67,30 @@ def test_it_says_what_it_made(plan: Path, tmp_path: Path) -> None:
     assert (tmp_path / "made.json").exists()
 
 
-def test_its_answer_is_foretold(plan: Path) -> None:
-    told = call("machine", "predict", plan, "--json").data
+def test_linear_assembly_and_simulation_are_compared(plan: Path) -> None:
+    found = call("machine", "predict", plan, "--points", 4, "--json").data
     built = call("machine", "build", plan, "--json").data
-    assert told["efficiency"] == pytest.approx(built["efficiency"], rel=0.1)
-    assert told["input_stiffness"] > 0.0
-    outcome = call("machine", "predict", plan)
-    assert "efficiency, small strokes" in outcome.out
-
-
-@pytest.fixture
-def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Keep tables elsewhere than the user's; kernels stay where they are."""
-    folder = tmp_path / "tables"
-    monkeypatch.setattr("bellcrank.machines.shelf.usual_folder", lambda: folder)
-    return folder
-
-
-def test_the_whole_stroke_is_foretold_and_checked(plan: Path, tmp_path: Path, shelf: Path) -> None:
-    out = tmp_path / "stroke.json"
-    told = call(
-        "machine", "predict", plan, "--stroke", "--points", 4, "--check", "--out", out, "--json"
-    ).data
-    assert json.loads(out.read_text()) == told
-    stroke = told["stroke"]
-    assert len(stroke["motion"]) == len(stroke["output"]) == len(stroke["input_force"]) == 5
-    assert stroke["efficiency"] == stroke["output"][-1] / stroke["motion"][-1]
-    assert {stand["part"] for stand in stroke["stands"]} == {"first", "second"}
-    assert stroke["check"]["output_error"] < 0.15
-    assert stroke["check"]["force_error"] < 0.15
-    assert list(shelf.iterdir())
-
-
-def test_the_stroke_is_told_in_words_and_drawn(plan: Path, tmp_path: Path, shelf: Path) -> None:
-    picture = tmp_path / "stroke.png"
-    outcome = call(
-        "machine", "predict", plan, "--stroke", "--live", "--points", 3, "--check", "--out", picture
-    )
-    assert outcome.code == 0, outcome.err
-    for words in ("efficiency, full stroke", "itself, followed", "foretold motion off by"):
+    assert found["linear"]["efficiency"] == pytest.approx(built["efficiency"], rel=0.1)
+    assert found["linear"]["input_stiffness"] > 0.0
+    simulation = found["simulation"]
+    assert simulation["efficiency"] == pytest.approx(built["efficiency"], rel=1e-6)
+    assert (simulation["status"], simulation["reached"]) == ("converged", 1.0)
+    assert len(simulation["motion"]) == len(simulation["output"]) == 5
+    outcome = call("machine", "predict", plan, "--points", 2)
+    for words in ("linear assembly", "simulated, full stroke", "u_out/u_in"):
         assert words in outcome.out
-    assert picture.exists()
-    assert not shelf.exists()
 
 
-def test_a_stroke_is_refused_before_anything_is_computed(plan: Path, tmp_path: Path) -> None:
-    assert "add --stroke" in refusal("machine", "predict", plan, "--live")
-    assert "at least one" in refusal("machine", "predict", plan, "--stroke", "--points", 0)
-    stroke = ("machine", "predict", plan, "--stroke", "--out")
-    assert "ending in .json" in refusal(*stroke, tmp_path / "stroke.txt")
-    assert "exists" in refusal(*stroke, plan.with_name("lever.json"))
-
-
-def test_a_stroke_that_ends_early_is_said_to(plan: Path, tmp_path: Path, shelf: Path) -> None:
+def test_a_stroke_that_snaps_is_reported(plan: Path) -> None:
     plan.write_text(PLAN.replace('ports = ["first.input"]', 'ports = ["first.input"]\namount = 60'))
-    out = tmp_path / "stroke.svg"
-    outcome = call(
-        "machine", "predict", plan, "--stroke", "--live", "--points", 2, "--check", "--out", out
-    )
+    outcome = call("machine", "predict", plan, "--points", 2)
     assert outcome.code == 0, outcome.err
     assert "full stroke" not in outcome.out
-    assert "of the stroke, where stability is lost" in outcome.out
-    assert "note: stability is lost at" in outcome.err
-    assert not shelf.exists()
+    assert "of the stroke, where it snaps" in outcome.out
+    assert "at least one" in refusal("machine", "predict", plan, "--points", 0)
 
 
-def test_a_machine_that_comes_along_is_built_by_its_name(
+def test_a_bundled_machine_is_built_by_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "amplifier").mkdir()
@@ -146,7 +104,7 @@ def test_a_machine_that_comes_along_is_built_by_its_name(
 @pytest.mark.parametrize("name", ["", ".", "nosuch"])
 @pytest.mark.parametrize("words", [("build",), ("predict",)])
 def test_what_is_no_plan_is_said(name: str, words: tuple[str, ...]) -> None:
-    assert f"no plan {name!r}: neither a file nor one of amplifier" in refusal(
+    assert f"unknown plan {name!r}: expected a TOML file or one of amplifier" in refusal(
         "machine", *words, name
     )
 

@@ -33,11 +33,6 @@ def three(value: float) -> str:
     return f"{rounded:,.0f}" if rounded >= 1000.0 else f"{rounded:g}"
 
 
-def two(value: float) -> str:
-    """Two digits."""
-    return f"{float(f'{value:.2g}'):g}"
-
-
 def competition() -> Rows:
     for path in (DOCS / "competition").glob("*.json"):
         told = json.loads(path.read_text(encoding="utf-8"))
@@ -121,14 +116,13 @@ def searched() -> Rows:
             )  # fmt: skip
 
 
-def showcases() -> Rows:
-    for told in read("machines/showcases")["rows"]:
+def bundled() -> Rows:
+    for each in read("machines/bundled")["rows"]:
         yield row(
-            told["name"], told["parts"], f"{told['beams']} of {told['all_beams']}",
-            f"{told['building']:.2f}", f"{told['simulating']:.2f}", f"{told['small']:.3f}",
-            f"{told['foretold_small']:.3f}", f"{told['efficiency']:.3f}", f"{told['foretold']:.3f}",
-            *(f"{told[key]:.1%}" for key in ("output_error", "force_error", "live_error")),
-            "-" if told["designed"] is None else f"{told['designed']:.2f}",
+            each["name"], each["parts"], f"{each['beams']} of {each['all_beams']}",
+            f"{each['building']:.2f}", f"{each['simulating']:.2f}", f"{each['linear']:.3f}",
+            f"{each['small']:.3f}", f"{each['efficiency']:.3f}",
+            "-" if each["designed"] is None else f"{each['designed']:.2f}",
         )  # fmt: skip
 
 
@@ -140,25 +134,6 @@ def lengths() -> Rows:
             f"{told['sparse']:.2f}", f"{told['banded']:.2f} ({told['half_bandwidth']})",
             f"{told['superlu']:.2f}",
         )  # fmt: skip
-
-
-def strokes() -> Rows:
-    names = {
-        "row": "two in a row",
-        "turned": "second turned by 300 degrees",
-        "gripper": "two jaws on one input",
-        "driven by its output": "second driven by its output",
-        "bridge": "joined by a bridge",
-    }
-    for told in read("machines/strokes")["rows"]:
-        times = "" if told["times"] == 1 else f", x {told['times']}"
-        yield row(
-            names[told["machine"]] + times,
-            *(f"{told[key]:.3f}" for key in ("small_strokes", "full_stroke")),
-            f"{100.0 * told['linear_off']:.1f} %",
-            *(f"{100.0 * told[key]:.2f} %" for key in ("motion", "force", "live_motion")),
-            told["followed_themselves"],
-        )
 
 
 def two_ports() -> Rows:
@@ -173,18 +148,6 @@ def two_ports() -> Rows:
 
 def rest_of(port: TwoPort) -> tuple[float, float, float]:
     return port.efficiency, port.input_stiffness, port.output_compliance
-
-
-def potentials() -> Rows:
-    def told(fit: dict[str, Any]) -> str:
-        largest, typical = 100.0 * max(fit["error"]), 100.0 * max(fit["typical_error"])
-        if largest < 0.01:
-            return f"degree {fit['degree']}, below 0.01 %"
-        return f"degree {fit['degree']}, {two(largest)} % ({two(typical)} %)"
-
-    for each in read("machines/two-ports")["rows"]:
-        if each["potentials"]:
-            yield row(each["design"], *(told(each["potentials"][key]) for key in ("mean", "block")))
 
 
 def costs() -> Rows:
@@ -265,7 +228,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (competition,),
     "goals": (goals,),
     "validation": (levels, meshes, widths, correlation, searched),
-    "machines": (showcases, lengths, strokes, two_ports, potentials),
+    "machines": (bundled, lengths, two_ports),
     "surrogate": (costs, shipped, epochs, flips, driven, elsewhere),
 }
 

@@ -123,9 +123,9 @@ def test_a_network_predicts(
 
 
 def test_the_library_has_as_many_actuators_as_the_readme_says() -> None:
-    from bellcrank.machines.library import Library, shipped_folder
+    from bellcrank.machines.library import Library, bundled_folder
 
-    assert f"{len(Library((shipped_folder(),)))} elementary actuators" in README.read_text(
+    assert f"{len(Library((bundled_folder(),)))} elementary actuators" in README.read_text(
         encoding="utf-8"
     )
 

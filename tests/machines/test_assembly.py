@@ -174,57 +174,62 @@ def test_designable_is_all_but_ports_and_supports() -> None:
             {},
             "parts a and b overlap",
         ),
-        (PAIR, [], {"input": {"ports": ["b.input"]}}, "driven by hand and by a.output"),
+        (
+            PAIR,
+            [],
+            {"input": {"ports": ["b.input"]}},
+            "port b.input is driven twice: by the input of the machine and by a.output",
+        ),
         (
             {name: {**part, "supports": False} for name, part in PAIR.items()},
             [],
             {},
-            "nothing holds a, b",
+            "parts without support: a, b",
         ),
         (
             {**PAIR, "c": {"entry": "full", "join": "b.input", "mirror": True}},
             [],
             {"input": {"ports": ["c.input"]}},
-            "port c.input is driven by hand and by a.output",
+            "port c.input is driven twice: by the input of the machine and by a.output",
         ),
         (
             PAIR,
             [],
             {"input": {"ports": ["a.input"], "drive": "force"}},
-            "input.amount: must be given, for a is driven by a displacement",
+            "input.amount: required with drive 'force'",
         ),
-        (PAIR, [], {"output": {"ports": ["b.exit"]}}, "no port 'b.exit'"),
-        (PAIR, [], {"output": {"ports": ["a.input"]}}, "port 'a.input' is input and output"),
+        (PAIR, [], {"output": {"ports": ["b.exit"]}}, "unknown port 'b.exit'"),
+        (PAIR, [], {"output": {"ports": ["a.input"]}}, "port 'a.input' is both input and output"),
         ({"a": {"entry": "absent"}}, [], {"output": {"ports": ["a.output"]}}, "parts.a.entry: no"),
-        (PAIR, [{"from": "a.output", "to": "c.input"}], {}, "no port 'c.input'"),
+        (PAIR, [{"from": "a.output", "to": "c.input"}], {}, "unknown port 'c.input'"),
         (PAIR, [{"from": "a.output", "to": "a.output"}], {}, "linked to itself"),
-        ({"a": {"entry": "full"}, "b": {"entry": "full"}}, [], {}, "parts.b: placed nowhere"),
+        ({"a": {"entry": "full"}, "b": {"entry": "full"}}, [], {}, "parts.b: no position"),
         (
             {"a": {"entry": "full", "join": "b.output"}, "b": {"entry": "full", "join": "a.input"}},
             [],
             {},
-            "placed on one another in a circle",
+            "the positions of parts a, b depend on each other",
         ),
         (
             {"a": {"entry": "rolling", "rotate": 60}},
             [],
             {"output": {"ports": ["a.output"]}},
-            "part a stands on rollers along an axis and cannot be turned by 60 degrees",
+            "part a has roller supports and cannot be rotated by 60 degrees",
         ),
         (
             {"a": {"entry": "full"}, "b": {"entry": "stiff", "join": "a.output"}},
             [],
             {},
-            "parts a and b are made of different struts: stiffness 5 and 0.1 against 7 and 0.1",
+            "parts a and b have different stiffness: bond 5 and angle 0.1 against 7 and 0.1",
         ),
         (
             {"a": {"entry": "full"}, "b": {"entry": "full", "at": [-13.0, 0.0]}},
             [{"from": "a.output", "to": "b.input", "kind": "bridge"}] * 2,
             {},
-            "bridge from a.output to b.input: something is in its way at",
+            "bridge from a.output to b.input: the space between the ports is taken at",
         ),
         ({"a": {"entry": "full", "rotate": 45}}, [], {}, "expected a multiple of 60 degrees"),
-        ({"a": {"entry": "full", "join": "z.output"}}, [], {}, "no part 'z'"),
+        ({"a": {"entry": "full", "join": "z.output"}}, [], {}, "unknown part 'z'"),
         ({"a": {"entry": "full", "join": "a.output"}}, [], {}, "cannot join itself"),
     ],
 )
@@ -266,7 +271,7 @@ def test_files_are_checked_too(tmp_path: Path) -> None:
         'name = "x"\n[parts.a]\nentry = "full"\n[output]\nports = ["a.output"]\n'
         '[input]\nports = ["a.input"]\ndirection = [0.0, 0.0]\n'
     )
-    with pytest.raises(InvalidFile, match=r"input\.direction: .*a vector \[x, y\] of some length"):
+    with pytest.raises(InvalidFile, match=r"input\.direction: .*a nonzero vector \[x, y\]"):
         read_plan(path)
     path.write_text(
         'name = "x"\n[parts.a]\nentry = "full"\n'

@@ -10,8 +10,15 @@ import pytest
 from bellcrank.errors import InvalidSettings
 from bellcrank.machines import elementary, mean_ports, two_port_at
 from bellcrank.machines.elementary import DIRECTIONS
-from bellcrank.machines.library import plain_lever
-from bellcrank.machines.library.lever import ARMS, LEVER, Shape, lever_law, lever_of, shapes
+from bellcrank.machines.library.lever import (
+    ARMS,
+    LEVER,
+    Shape,
+    lever_law,
+    lever_of,
+    plain_lever,
+    shapes,
+)
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import Problem, Stiffness
 
@@ -112,10 +119,10 @@ def test_a_lever_keeps_the_goals_that_it_is_given() -> None:
 
 
 def test_goals_that_no_lever_keeps_are_said() -> None:
-    with pytest.raises(InvalidSettings, match="no plain lever is stable and keeps"):
+    with pytest.raises(InvalidSettings, match=r"no plain lever .*input-stiffness >= 1000"):
         plain_lever(elementary(7, "up"), ["input-stiffness >= 1000"])
 
 
 def test_what_has_no_joints_has_no_law() -> None:
-    with pytest.raises(InvalidSettings, match="no joints"):
+    with pytest.raises(InvalidSettings, match="expected a shape with a pivot"):
         lever_law(elementary(7, "up"), Shape("bar"))

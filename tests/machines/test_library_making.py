@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings, StorageError, UnknownName
-from bellcrank.machines.library import Library, Order, Task, make
-from bellcrank.machines.library.files import entry_to_dict
-from bellcrank.machines.library.making import WORK, Resisting
-from bellcrank.machines.library.summary import INDEX, entry_files
+from bellcrank.machines.library import Library, entry_to_dict
+from bellcrank.machines.library.catalogue import entry_files
+from bellcrank.machines.library.making import SEARCHES, InputStiffnessCheck, make
+from bellcrank.machines.library.tasks import EntryTask, MakeSettings
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.search import Verdict
 from bellcrank.storage.layout import LOCK
@@ -29,14 +29,19 @@ if TYPE_CHECKING:
 
     from bellcrank.search import Progress
 
-ORDER = Order(directions=("down",), columns=(5,), kinds=("free", "light"), steps=750, chains=2)
+SETTINGS = MakeSettings(
+    directions=("down",), columns=(5,), kinds=("free", "light"), steps=750, chains=2
+)
 TIMED = ("provenance", "checksum")
 SCRIPT = """
 import sys
 from pathlib import Path
-from bellcrank.machines.library import Order, make
-order = Order(directions=("down",), columns=(5,), kinds=("free", "light"), steps=750, chains=2)
-for made in make(order, Path(sys.argv[1]), workers=1):
+from bellcrank.machines.library.making import make
+from bellcrank.machines.library.tasks import MakeSettings
+settings = MakeSettings(
+    directions=("down",), columns=(5,), kinds=("free", "light"), steps=750, chains=2
+)
+for made in make(settings, Path(sys.argv[1]), workers=1):
     pass
 """
 
@@ -45,7 +50,7 @@ for made in make(order, Path(sys.argv[1]), workers=1):
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Entries that nothing stopped. Not to be changed."""
     folder = tmp_path_factory.mktemp("whole")
-    made = list(make(ORDER, folder, workers=1))
+    made = list(make(SETTINGS, folder, workers=1))
     assert [each.note for each in made] == ["made", "made"]
     return folder
 
@@ -63,8 +68,7 @@ def told(folder: Path) -> dict[str, object]:
 
 def test_each_task_makes_one_entry_and_leaves_nothing_else(whole: Path) -> None:
     names = sorted(path.name for path in whole.iterdir())
-    assert len(names) == 3
-    assert INDEX in names
+    assert len(names) == 2
     known = Library((whole,))
     free, light = known.find("down-5-free"), known.find("down-5-light")
     assert (free.direction, free.columns, free.kind) == ("down", 5, "free")
@@ -79,68 +83,57 @@ def test_each_task_makes_one_entry_and_leaves_nothing_else(whole: Path) -> None:
 
 def test_what_is_there_is_not_made_again(whole: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in whole.iterdir()}
-    made = list(make(ORDER, whole, workers=1))
-    assert [(each.note, each.entry) for each in made] == [("was there", None)] * 2
+    made = list(make(SETTINGS, whole, workers=1))
+    assert [(each.note, each.entry) for each in made] == [("exists", None)] * 2
     assert {path: path.stat().st_mtime_ns for path in whole.iterdir()} == before
 
 
 def test_after_a_stop_it_ends_with_the_same_entries(whole: Path, tmp_path: Path) -> None:
     stop = threading.Event()
-    seen: list[Task] = []
+    seen: list[EntryTask] = []
 
-    def tell(task: Task, _progress: Progress) -> None:
+    def tell(task: EntryTask, _progress: Progress) -> None:
         seen.append(task)
         if len(seen) == 4:  # in the second chain of the first task
             stop.set()
 
-    assert list(make(ORDER, tmp_path, workers=1, tell=tell, stop=stop)) == []
-    assert (tmp_path / WORK).exists()
-    assert [each.note for each in make(ORDER, tmp_path, workers=1)] == ["made", "made"]
+    assert list(make(SETTINGS, tmp_path, workers=1, report=tell, stop=stop)) == []
+    assert (tmp_path / SEARCHES).exists()
+    assert [each.note for each in make(SETTINGS, tmp_path, workers=1)] == ["made", "made"]
     assert told(tmp_path) == told(whole)
 
 
 def test_after_a_kill_it_ends_with_the_same_entries(whole: Path, tmp_path: Path) -> None:
     process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(tmp_path)])
     deadline = time.monotonic() + 120.0
-    while not any(tmp_path.glob(f"{WORK}/*/*/**/*.parquet")) and process.poll() is None:
+    while not any(tmp_path.glob(f"{SEARCHES}/*/*/**/*.parquet")) and process.poll() is None:
         assert time.monotonic() < deadline
         time.sleep(0.005)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    list(make(ORDER, tmp_path, workers=2))
+    list(make(SETTINGS, tmp_path, workers=2))
     assert told(tmp_path) == told(whole)
-    assert not (tmp_path / WORK).exists()
-
-
-def test_an_index_that_a_kill_kept_from_being_written_is_written(
-    whole: Path, tmp_path: Path
-) -> None:
-    for path in entry_files(whole):
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    (tmp_path / WORK / "down-5-free").mkdir(parents=True)
-    list(make(ORDER, tmp_path))
-    assert (tmp_path / INDEX).read_text() == (whole / INDEX).read_text()
-    assert not (tmp_path / WORK).exists()
+    assert not (tmp_path / SEARCHES).exists()
 
 
 def test_a_search_with_other_settings_is_not_mixed_in(tmp_path: Path) -> None:
     stop = threading.Event()
-    list(make(ORDER, tmp_path, workers=1, tell=lambda *_: stop.set(), stop=stop))
-    with pytest.raises(InvalidSettings, match="was begun with other settings"):
-        list(make(replace(ORDER, seed=1), tmp_path))
+    list(make(SETTINGS, tmp_path, workers=1, report=lambda *_: stop.set(), stop=stop))
+    with pytest.raises(InvalidSettings, match="other settings"):
+        list(make(replace(SETTINGS, seed=1), tmp_path))
 
 
 def test_what_is_better_takes_the_place_of_what_was_there(whole: Path, tmp_path: Path) -> None:
-    short = replace(ORDER, kinds=("free",), steps=2, chains=1)
+    short = replace(SETTINGS, kinds=("free",), steps=2, chains=1)
     (first,) = make(short, tmp_path)
-    better = replace(ORDER, kinds=("free",))
+    better = replace(SETTINGS, kinds=("free",))
     (second,) = make(better, tmp_path, again=True)
     assert first.entry is not None
     assert second.entry is not None
     assert second.entry.efficiency > first.entry.efficiency
     assert second.note == f"made in place of {first.entry.name}"
     assert [path.stem for path in entry_files(tmp_path)] == [second.entry.name]
-    assert Library((tmp_path,)).readable() == [second.entry.name]
+    assert Library((tmp_path,)).names() == [second.entry.name]
     assert second.entry.name in told(whole)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     (third,) = make(short, tmp_path, again=True)
@@ -152,48 +145,48 @@ def test_making_anew_goes_on_after_a_stop(whole: Path, tmp_path: Path) -> None:
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     stop, searched = threading.Event(), []
 
-    def tell(task: Task, _progress: Progress) -> None:
+    def tell(task: EntryTask, _progress: Progress) -> None:
         searched.append(task.name)
         if task.kind == "light":
             stop.set()
 
-    made = list(make(ORDER, tmp_path, workers=1, again=True, tell=tell, stop=stop))
+    made = list(make(SETTINGS, tmp_path, workers=1, again=True, report=tell, stop=stop))
     assert [each.note.startswith("none better than") for each in made] == [True]
     searched.clear()
-    made = list(make(ORDER, tmp_path, workers=1, again=True, tell=tell))
+    made = list(make(SETTINGS, tmp_path, workers=1, again=True, report=tell))
     assert [each.note.startswith("none better than") for each in made] == [True, True]
     assert set(searched) == {"down-5-light"}
     assert told(tmp_path) == told(whole)
-    assert not (tmp_path / WORK).exists()
+    assert not (tmp_path / SEARCHES).exists()
 
 
 def test_one_process_at_a_time_makes_entries_in_a_folder(whole: Path) -> None:
     with locked(whole / LOCK), pytest.raises(StorageError, match="another process makes entries"):
-        list(make(ORDER, whole))
+        list(make(SETTINGS, whole))
     assert not (whole / LOCK).exists()
 
 
 def test_orders_for_what_there_cannot_be_are_refused() -> None:
     with pytest.raises(InvalidSettings, match="direction: expected one of"):
-        Order(directions=("sideways",))
+        MakeSettings(directions=("sideways",))
     with pytest.raises(InvalidSettings, match="columns: expected at least 5"):
-        Order(columns=(3,))
+        MakeSettings(columns=(3,))
     with pytest.raises(UnknownName, match="unknown kind of actuator"):
-        Order(kinds=("strong",))
+        MakeSettings(kinds=("strong",))
     with pytest.raises(InvalidSettings, match="steps"):
-        Order(steps=0)
+        MakeSettings(steps=0)
 
 
 def test_a_folder_that_cannot_be_written_is_said_at_once(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageError, match="cannot be written"):
-        list(make(ORDER, tmp_path / "file" / "entries"))
+        list(make(SETTINGS, tmp_path / "file" / "entries"))
 
 
 def test_a_task_may_leave_supports_unused() -> None:
     """Else the plain lever, which stands on one node, would be outside of the search."""
-    problem = Task("up", 7, "free").problem()
-    full, lever = Task("up", 7, "free").starts(4).values()
+    problem = EntryTask("up", 7, "free").problem()
+    full, lever = EntryTask("up", 7, "free").starts(4).values()
     assert (full[1], lever[1]) == (2, 2)
     kept = np.flatnonzero(~np.isin(np.arange(len(problem.initial)), problem.designable))
     assert lever[0].initial[kept].all()
@@ -207,7 +200,7 @@ def test_what_merely_follows_its_input_is_forbidden() -> None:
     from bellcrank.machines.library.lever import Shape, lever_of
 
     problem = elementary(7, "down")
-    judge = Resisting(SpringEvaluator(problem))
+    judge = InputStiffnessCheck(SpringEvaluator(problem))
     bar = lever_of(problem, Shape("bar")).mask
     assert SpringEvaluator(problem).evaluate(bar).status is Status.CONVERGED
     assert judge.evaluate(bar).status is Verdict.FORBIDDEN

@@ -11,8 +11,9 @@ import pytest
 
 from bellcrank.errors import OutputExists
 from bellcrank.machines import elementary
-from bellcrank.machines.library import Library, measure, shipped_folder, write_entry
-from bellcrank.machines.library.index import PAGE, TABLE, draw, write_pages
+from bellcrank.machines.library import Library, bundled_folder, write_entry
+from bellcrank.machines.library.measurement import measure
+from bellcrank.machines.library.pages import PAGE, TABLE, draw, write_pages
 from bellcrank.machines.library.thumbnails import UNITS, thumbnail
 
 DOCS = Path(__file__).parents[2] / "docs" / "library"
@@ -29,7 +30,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 
 def test_a_drawing_moves_as_the_design_does() -> None:
-    entry = Library((shipped_folder(),)).find("down-9-free")
+    entry = Library((bundled_folder(),)).find("down-9-free")
     drawn = draw(entry)
     assert drawn.rest.keys() == drawn.moved.keys() == {"m", "i", "o"}
     for name, path in drawn.rest.items():
@@ -75,7 +76,7 @@ def test_pictures_of_entries_that_are_gone_are_removed(small: Library, tmp_path:
 def test_the_pages_in_the_documentation_show_what_comes_along() -> None:
     if not DOCS.is_dir():
         pytest.skip("no documentation beside the tests")
-    names = Library((shipped_folder(),)).names()
+    names = Library((bundled_folder(),)).names()
     assert sorted(path.stem for path in DOCS.glob("*.svg")) == names
     for page in (PAGE, TABLE):
         text = (DOCS / page).read_text()

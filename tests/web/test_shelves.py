@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from bellcrank.machines.bundled import bundled_machine, bundled_machines
 from bellcrank.machines.library import kinds, library
-from bellcrank.machines.showcases import showcase, showcases
 from bellcrank.model import unpack_mask
 from bellcrank.web.gallery import BundledDesigns
 from bellcrank.web.machine_gallery import LOADS, Actuators, Machines, Struts
@@ -41,15 +41,15 @@ def test_every_kind_of_actuator_is_called_something_a_person_understands() -> No
 
 
 def test_machines_say_what_they_do(shelves: dict[str, Any]) -> None:
-    assert [entry["key"] for entry in shelves["machines"]] == showcases()
+    assert [entry["key"] for entry in shelves["machines"]] == bundled_machines()
     assert all(len(entry["note"]) > 20 for entry in shelves["machines"])
 
 
-@pytest.mark.parametrize("name", showcases())
+@pytest.mark.parametrize("name", bundled_machines())
 def test_the_plan_of_a_machine_builds_that_machine(client: TestClient, name: str) -> None:
     plan = client.get(f"/api/machines/{name}").json()
     built = client.post("/api/machines", json={"plan": plan}).json()
-    exact = showcase(name).design
+    exact = bundled_machine(name).design
     problem = built["problem"]
     assert np.array_equal(problem["beams"], exact.problem.lattice.beams)
     assert np.allclose(problem["positions"], exact.problem.lattice.positions)

@@ -1,4 +1,4 @@
-"""`bellcrank characterise`: an actuator as others meet it, at its input and its output."""
+"""`bellcrank characterise`: an actuator as a two-port, at rest and along its stroke."""
 
 from __future__ import annotations
 
@@ -25,32 +25,29 @@ RECORD, PICTURE = "two-port.json", "two-port.png"
 @app.command()
 def characterise(
     design: DesignName,
-    points: Annotated[int, typer.Option(help="Equal increments of the stroke.")] = 20,
+    points: Annotated[int, typer.Option(help="Number of increments of the stroke.")] = 20,
     load: Annotated[
         list[str] | None,
         typer.Option(
-            help="free, blocked, spring:STIFFNESS or force:FORCE (below 0 resists), in lattice "
-            "units; may be given several times. \\[free, blocked, the best spring]"
+            help="Load at the output: free, blocked, spring:STIFFNESS or force:FORCE (negative if "
+            "it resists), in lattice units; repeatable. \\[free, blocked, matched spring]"
         ),
     ] = None,
     unloaded_beams: Annotated[
         str,
         typer.Option(help="counted (literal model), ignored (dead ends) or stripped (idle parts)."),
     ] = "keep",
-    potential: Annotated[
-        bool, typer.Option("--potential", help="Fit potentials for chains of actuators too.")
-    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Where to keep it: a record (json), a picture (png, svg, pdf), or a folder for "
+            help="Output: a record (json), a picture (png, svg, pdf), or a folder for both, "
             f"{RECORD} and {PICTURE}."
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the record.")] = False,
 ) -> None:
-    """Say how a design answers at its two ports: stiffness, efficiency under load, stroke."""
+    """Compute stiffness and efficiency at input and output, at rest and along the stroke."""
     from bellcrank.machines import (
         Load,
         characterisation_to_dict,
@@ -65,9 +62,7 @@ def characterise(
         raise InvalidSettings(f"--points: expected at least one, got {points}")
     targets = _targets(out, overwrite=overwrite)
     announce_compilation()
-    found = characterise(
-        chosen, loads, points, unloaded_beams=unloaded_beams, potentials=potential  # type: ignore[arg-type]
-    )  # fmt: skip
+    found = characterise(chosen, loads, points, unloaded_beams=unloaded_beams)  # type: ignore[arg-type]
     if as_json:
         print_json(json.dumps(characterisation_to_dict(found), indent=1))
     else:
@@ -81,7 +76,7 @@ def characterise(
 
 
 def _targets(out: Path | None, *, overwrite: bool) -> list[Path]:
-    """Return the files to write, refused before anything is computed if they cannot be."""
+    """Return the files to write; check before the computation that they can be written."""
     from bellcrank.model.storage import already_exists, check_folder
     from bellcrank.plots.saving import FORMATS, check_target
 
@@ -96,8 +91,7 @@ def _targets(out: Path | None, *, overwrite: bool) -> list[Path]:
         check_folder(out)
     elif out.suffix and not out.is_dir():
         raise InvalidSettings(
-            f"{out}: expected a record ending in .json, a picture ending in {', '.join(FORMATS)}, "
-            "or a folder"
+            f"{out}: expected a record (.json), a picture ({', '.join(FORMATS)}) or a folder"
         )
     else:
         targets = [out / RECORD, out / PICTURE]
@@ -118,25 +112,19 @@ def _print(found: Characterisation, name: str) -> None:
     for label, value in _figures(found.rest):
         linear.add_row(label, value)
     results.print(linear)
-    results.print("at the end of the stroke, forces from outside:")
+    results.print("at the end of the stroke, external forces:")
     stroke = Table(box=SIMPLE)
     for heading in ("load", "u_in", "F_in", "u_out", "u_out/u_in", "F_out", "status"):
-        stroke.add_column(heading, overflow="fold")  # a figure is not to be cut off
+        stroke.add_column(heading, overflow="fold")  # never cut off a figure
     for curve in found.curves:
         stroke.add_row(*_ending(curve))
     results.print(stroke)
-    for kind, fitted in found.potentials.items():
-        results.print(
-            f"potential by {kind} ports: degree {fitted.degree}, off by "
-            f"{fitted.typical_error.max():.2%} typically, {fitted.error.max():.2%} at most "
-            f"({fitted.held_out} equilibria held out)"
-        )
-    for doubt in found.doubts:
-        notes.print(f"[yellow]note:[/] {plain(doubt)}")
+    for warning in found.warnings:
+        notes.print(f"[yellow]warning:[/] {plain(warning)}")
 
 
 def _figures(rest: TwoPort) -> list[tuple[str, str]]:
-    """Return the figures of a linear two-port, in words."""
+    """Return the rows of a linear two-port."""
     rows = [
         ("efficiency, output free", rest.efficiency),
         ("input stiffness, output free", rest.input_stiffness),
@@ -148,14 +136,14 @@ def _figures(rest: TwoPort) -> list[tuple[str, str]]:
     ]
     if rest.connected:
         rows += [
-            ("spring that takes the most work", rest.matched_spring),
-            ("  and its share", rest.best_work_share),
+            ("matched spring (takes the most work)", rest.matched_spring),
+            ("  its share of the input work", rest.best_work_share),
         ]
     return [(label, _figure(value)) for label, value in rows]
 
 
 def _ending(curve: PortCurve) -> list[str]:
-    """Return the last state of a curve, in words."""
+    """Return the row of the last state of a curve."""
     figures = (
         curve.motion[-1], curve.input_force[-1], curve.output[-1], curve.efficiency[-1],
         curve.output_force[-1],
@@ -167,7 +155,7 @@ def _ending(curve: PortCurve) -> list[str]:
 
 
 def _figure(value: float) -> str:
-    """Return four digits; rounding errors are nothing, and what is no number is a dash."""
+    """Return four digits, 0 for rounding errors, a dash for a value that is not finite."""
     if not math.isfinite(value):
         return "-"
     return "0" if abs(value) < 1e-12 else f"{value:.4g}"

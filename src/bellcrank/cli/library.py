@@ -1,4 +1,4 @@
-"""`bellcrank library`: actuators that were found by searches, measured, and are known by name."""
+"""`bellcrank library`: elementary actuators, by name."""
 
 from __future__ import annotations
 
@@ -19,20 +19,23 @@ from bellcrank.errors import InvalidSettings
 
 library = typer.Typer(
     name="library",
-    help="Elementary actuators: found by searches, measured, known by name.",
+    help="Library of elementary actuators.",
     rich_markup_mode="rich",
 )
 app.add_typer(library)
 
-NAME = typer.Argument(help="Of an entry: its name, the beginning of it, or its hash.")
+NAME = typer.Argument(help="Entry: its name, a unique beginning of it, or its hash.")
 Name = Annotated[str, NAME]
+KIND_HELP = (
+    "free (free stroke), loaded (loaded output), light (low input force) or own (your designs)."
+)
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
 
 
 @library.command("list")
 def list_(as_json: AsJson = False) -> None:
-    """List all entries: those that come along, and your own."""
+    """List all entries, bundled and your own."""
     from bellcrank.machines.library import library
 
     known = library()
@@ -42,28 +45,27 @@ def list_(as_json: AsJson = False) -> None:
 @library.command()
 def search(
     direction: Annotated[
-        str | None, typer.Option(help="Where the output goes, like up-left.")
+        str | None, typer.Option(help="Output direction, for example up-left.")
     ] = None,
-    columns: Annotated[int | None, typer.Option(help="Size of the task.")] = None,
-    kind: Annotated[str | None, typer.Option(help="free, loaded, light or own.")] = None,
-    spring: Annotated[
-        float, typer.Option(help="At the mean output: efficiencies are against it.")
-    ] = 0.0,
-    efficiency: Annotated[float | None, typer.Option(help="At rest, at least.")] = None,
-    stiffness: Annotated[float | None, typer.Option(help="Of the input, at most.")] = None,
-    output_stiffness: Annotated[float | None, typer.Option(help="At least.")] = None,
+    columns: Annotated[int | None, typer.Option(help="Size of the lattice.")] = None,
+    kind: Annotated[str | None, typer.Option(help=KIND_HELP)] = None,
+    spring: Annotated[float, typer.Option(help="Stiffness of a spring at the output.")] = 0.0,
+    efficiency: Annotated[float | None, typer.Option(help="Minimum efficiency at rest.")] = None,
+    stiffness: Annotated[float | None, typer.Option(help="Maximum input stiffness.")] = None,
+    output_stiffness: Annotated[float | None, typer.Option(help="Minimum stiffness.")] = None,
     better: Annotated[
-        bool, typer.Option("--better", help="Only what beats the plain lever.")
+        bool, typer.Option("--better", help="Only entries better than the plain lever.")
     ] = False,
-    clear: Annotated[
-        bool, typer.Option("--clear", help="Only what has no struts that touch when it moves.")
+    no_warnings: Annotated[
+        bool,
+        typer.Option("--no-warnings", help="Only entries without contact or loss of stability."),
     ] = False,
     sort: Annotated[
         str, typer.Option(help="efficiency, stiffness, output-stiffness, work, gain or size.")
     ] = "efficiency",
     as_json: AsJson = False,
 ) -> None:
-    """Find entries that are as you want them, the best first; lattice units."""
+    """Search for entries, the best first; lattice units."""
     from bellcrank.machines.library import library
 
     known = library()
@@ -76,7 +78,7 @@ def search(
         stiffness=stiffness,
         output_stiffness=output_stiffness,
         better=better,
-        clear=clear,
+        no_warnings=no_warnings,
         sort=sort,
     )
     print_entries(known, found, as_json=as_json, spring=spring)
@@ -86,14 +88,13 @@ def search(
 def show(
     name: Name,
     out: Annotated[
-        Path | None, typer.Option(help="Draw it, at rest and moved (png, svg, pdf).")
+        Path | None, typer.Option(help="Picture at rest and moved (png, svg, pdf).")
     ] = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Say all that is known of an entry: its two-port, validation, lever, provenance."""
-    from bellcrank.machines.library import library
-    from bellcrank.machines.library.files import entry_to_dict
+    """Show an entry: two-port, frame analysis, plain lever, origin."""
+    from bellcrank.machines.library import entry_to_dict, library
 
     if out is not None:
         from bellcrank.model.storage import check_folder
@@ -119,14 +120,14 @@ def show(
 @library.command()
 def add(
     design: DesignName,
-    points: Annotated[int, typer.Option(help="Along the curves of the two-port.")] = 20,
+    points: Annotated[int, typer.Option(help="Number of increments of the stroke.")] = 20,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Measure a design of yours, and keep it in your own folder of the library."""
-    from bellcrank.machines.library import measure, user_folder, write_entry
+    """Measure a design, and add it to your folder of the library."""
+    from bellcrank.machines.library import entry_to_dict, user_folder, write_entry
     from bellcrank.machines.library.entry import name_of
-    from bellcrank.machines.library.files import entry_to_dict
+    from bellcrank.machines.library.measurement import measure
     from bellcrank.model.storage import already_exists
     from bellcrank.storage.files import make_folder
 
@@ -144,33 +145,34 @@ def add(
         print_json(json.dumps(entry_to_dict(entry), indent=1))
     else:
         print_entry(entry, path)
-    notes.print(f"kept {plain(entry.name)}")
+    notes.print(f"added {plain(entry.name)}")
 
 
 @library.command()
 def make(
     directions: Annotated[
-        str | None, typer.Option(help="With commas between. \\[all eight]")
+        str | None, typer.Option(help="Directions, separated by commas. \\[all eight]")
     ] = None,
-    columns: Annotated[str | None, typer.Option(help="Sizes. \\[9,7,12]")] = None,
-    kinds: Annotated[str | None, typer.Option(help="\\[free,loaded,light]")] = None,
-    steps: Annotated[int, typer.Option(help="Proposals of each chain.")] = 20_000,
-    chains: Annotated[int, typer.Option(help="For each entry.")] = 4,
-    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = 0,
+    columns: Annotated[str | None, typer.Option(help="Sizes of the lattice. \\[9,7,12]")] = None,
+    kinds: Annotated[str | None, typer.Option(help="Kinds. \\[free,loaded,light]")] = None,
+    steps: Annotated[int, typer.Option(help="Proposals per chain.")] = 20_000,
+    chains: Annotated[int, typer.Option(help="Chains per entry.")] = 4,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     workers: Annotated[
-        int | None, typer.Option(help="Chains at the same time. \\[all cores]")
+        int | None, typer.Option(help="Chains that run at the same time. \\[all cores]")
     ] = None,
     again: Annotated[
-        bool, typer.Option("--again", help="Search for what is there too; keep the better one.")
+        bool, typer.Option("--again", help="Search for existing entries too, and keep the better.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the entries. \\[your own of the library]")
+        Path | None, typer.Option(help="Folder of the entries. \\[your folder of the library]")
     ] = None,
 ) -> None:
-    """Search for entries and measure them; goes on where it was stopped or killed."""
+    """Search for entries and measure them; rerun the same command to resume."""
     from bellcrank.cli.design import stopping_on_interrupt
-    from bellcrank.machines.library import Order, user_folder
-    from bellcrank.machines.library import make as make_entries
+    from bellcrank.machines.library import user_folder
+    from bellcrank.machines.library.making import make as make_entries
+    from bellcrank.machines.library.tasks import MakeSettings
 
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
@@ -180,50 +182,50 @@ def make(
         "kinds": kinds and _words(kinds),
     }
     chosen: dict[str, Any] = {key: value for key, value in given.items() if value}
-    order = Order(steps=steps, chains=chains, seed=seed, **chosen)
+    settings = MakeSettings(steps=steps, chains=chains, seed=seed, **chosen)
     folder = out or user_folder()
     announce_compilation()
     done = 0
     start = time.monotonic()
-    with stopping_on_interrupt() as stop, MakingProgress(order) as progress:
-        for made in make_entries(
-            order, folder, workers=workers, again=again, tell=progress, stop=stop
+    with stopping_on_interrupt() as stop, MakingProgress(settings) as progress:
+        for outcome in make_entries(
+            settings, folder, workers=workers, again=again, report=progress, stop=stop
         ):
-            progress.finish(made, time.monotonic() - start)
+            progress.finish(outcome, time.monotonic() - start)
             done += 1
             if stop.is_set():
                 break
-    if done < len(order.tasks):
-        words = shlex.join(["bellcrank", *sys.argv[1:]])
-        notes.print(f"Stopped; what is done is kept. Go on with the same words: {plain(words)}")
+    if done < len(settings.tasks):
+        command = shlex.join(["bellcrank", *sys.argv[1:]])
+        notes.print(f"Stopped. Rerun the same command to resume: {plain(command)}")
         sys.exit(INTERRUPTED)
     notes.print(f"entries are in {plain(folder)}")
 
 
 @library.command()
 def index(
-    out: Annotated[Path, typer.Option(help="Folder to write it into.")],
+    out: Annotated[Path, typer.Option(help="Folder to write to.")],
     entries: Annotated[
-        Path | None, typer.Option(help="Only those of this folder. \\[the whole library]")
+        Path | None, typer.Option(help="Folder of entries. \\[the whole library]")
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write an index of the library: a page to browse (index.html) and one to read (README.md)."""
+    """Write pages of the library: index.html with filters, and README.md."""
     from bellcrank.machines.library import Library
     from bellcrank.machines.library import library as whole
-    from bellcrank.machines.library.index import write_pages
+    from bellcrank.machines.library.pages import write_pages
 
     known = whole() if entries is None else Library((entries,))
     warn(known)
     if not len(known):
-        raise InvalidSettings(f"{entries}: no entries of a library are there")
+        raise InvalidSettings(f"{entries}: expected a folder of library entries, found none")
     announce_compilation()
     for path in write_pages(known, out, overwrite=overwrite):
         notes.print(f"wrote {plain(path)}")
 
 
 def _words(text: str) -> tuple[str, ...]:
-    """Read names with commas between them, each once."""
+    """Split names separated by commas, each once."""
     return tuple(dict.fromkeys(word.strip() for word in text.split(",")))
 
 
@@ -231,6 +233,4 @@ def _numbers(option: str, text: str) -> tuple[int, ...]:
     try:
         return tuple(dict.fromkeys(int(word) for word in text.split(",")))
     except ValueError:
-        raise InvalidSettings(
-            f"{option} {text}: expected whole numbers with commas between"
-        ) from None
+        raise InvalidSettings(f"{option} {text}: expected integers separated by commas") from None

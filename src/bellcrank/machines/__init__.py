@@ -1,6 +1,6 @@
-"""Actuators as others meet them, two-ports at rest and along the stroke, and machines of them.
+"""Actuators as two-ports, a library of elementary actuators, and machines assembled from them.
 
-The work flow, in four lines:
+The workflow for one actuator:
 
 >>> from bellcrank.machines import characterise
 >>> from bellcrank.model import human_design
@@ -9,24 +9,19 @@ The work flow, in four lines:
 0.818 free, 0.456 loaded
 """
 
-from bellcrank.machines.assembly import Machine, assemble
-from bellcrank.machines.chaining import Prediction, predict
-from bellcrank.machines.characterise import Characterisation, characterise, usual_loads
-from bellcrank.machines.checking import Check, compare, foretold_to_dict, simulate
-from bellcrank.machines.curves import PortCurve, trace
-from bellcrank.machines.elementary import DIRECTIONS, elementary, strut
-from bellcrank.machines.foretelling import Foretold, foretell
-from bellcrank.machines.loads import Load
-from bellcrank.machines.plan import Plan, read_plan
-from bellcrank.machines.ports import INPUT, OUTPUT, Port, block_ports, mean_ports, ports_of
-from bellcrank.machines.potential import Potential, fit_potential
-from bellcrank.machines.record import (
+from bellcrank.machines.assembly import Machine, assemble, simulate
+from bellcrank.machines.characterisation import Characterisation, characterise, default_loads
+from bellcrank.machines.characterisation_files import (
     characterisation_from_dict,
     characterisation_to_dict,
     read_characterisation,
     write_characterisation,
 )
-from bellcrank.machines.sampling import Fit, Reach, fit, sample, usual_reach
+from bellcrank.machines.curves import Load, PortCurve, trace
+from bellcrank.machines.elementary import DIRECTIONS, elementary, strut
+from bellcrank.machines.linear_assembly import LinearResponse, linear_assembly
+from bellcrank.machines.plan import Plan, read_plan
+from bellcrank.machines.ports import INPUT, OUTPUT, Port, mean_ports, ports_of
 from bellcrank.machines.two_port import TwoPort, two_port_at
 
 __all__ = [
@@ -34,40 +29,27 @@ __all__ = [
     "INPUT",
     "OUTPUT",
     "Characterisation",
-    "Check",
-    "Fit",
-    "Foretold",
+    "LinearResponse",
     "Load",
     "Machine",
     "Plan",
     "Port",
     "PortCurve",
-    "Potential",
-    "Prediction",
-    "Reach",
     "TwoPort",
     "assemble",
-    "block_ports",
     "characterisation_from_dict",
     "characterisation_to_dict",
     "characterise",
-    "compare",
+    "default_loads",
     "elementary",
-    "fit",
-    "fit_potential",
-    "foretell",
-    "foretold_to_dict",
+    "linear_assembly",
     "mean_ports",
     "ports_of",
-    "predict",
     "read_characterisation",
     "read_plan",
-    "sample",
     "simulate",
     "strut",
     "trace",
     "two_port_at",
-    "usual_loads",
-    "usual_reach",
     "write_characterisation",
 ]

@@ -1,6 +1,6 @@
-"""One lattice of many parts: an ordinary problem and design.
+"""Assembly of a machine: the parts of a plan in one lattice, an ordinary problem and design.
 
-A beam that two parts share is there once, and present if it is in either.
+A beam that two parts share occurs once, and is present if it is present in either part.
 """
 
 from __future__ import annotations
@@ -9,14 +9,23 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 
 from bellcrank.errors import InvalidFile, InvalidProblem
-from bellcrank.machines.boundary import check_drive, check_held, designable, drive, moved, supports
+from bellcrank.machines.boundary import (
+    check_inputs,
+    check_supported,
+    designable_beams,
+    machine_input,
+    machine_output,
+    machine_supports,
+)
 from bellcrank.machines.bridges import bridge
-from bellcrank.machines.crossings import first_crossing
-from bellcrank.machines.placing import place_parts
+from bellcrank.machines.curves import Load, PortCurve, trace
+from bellcrank.machines.node_merging import merge_nodes, unique_rows
+from bellcrank.machines.placement import place_parts
 from bellcrank.machines.plan import PORTS, PortName
-from bellcrank.machines.union import numbered, unite
+from bellcrank.machines.ports import mean_ports
 from bellcrank.model import Design, Lattice, Problem
 
 if TYPE_CHECKING:
@@ -24,24 +33,28 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.machines.placing import Part
+    from bellcrank.machines.placement import Part
     from bellcrank.machines.plan import Plan
+
+END_INSET = 1e-6
+"""Fraction of its length by which each beam is shortened at both ends before crossings are
+searched, so that beams that share a node do not cross."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Machine:
-    """Parts in their places, and the one lattice that they make.
+    """An assembled machine: its parts, and the one lattice that they form.
 
     Parameters
     ----------
     plan, parts
-        What it was built from.
+        The plan, and its parts at their positions.
     design
-        All of it, an ordinary design.
+        The whole machine as an ordinary design.
     nodes
-        For each part, the number in the machine of each of its nodes.
+        For each part, the machine's node number of each of its nodes.
     beams
-        For each part, the number in the machine of each of its beams.
+        For each part, the machine's beam number of each of its beams.
     bridges : (b,) int64
         Numbers of the beams that belong to no part.
     """
@@ -59,48 +72,48 @@ class Machine:
         return [PortName(name, port) for name in self.parts for port in PORTS]
 
     def port_nodes(self, port: PortName) -> NDArray[np.int64]:
-        """Return the nodes of a port, by their numbers in the machine."""
+        """Return the machine's node numbers of a port."""
         return self.nodes[port.part][self.parts[port.part].region(port.port).nodes]
 
 
 def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
-    """Build what a plan describes.
+    """Assemble the machine that a plan describes.
 
     Parameters
     ----------
     plan
-        What to build.
+        The plan.
     find
-        Returns the design that an entry's name or a file stands for.
+        Function from the entry of a part (a name or a file) to its design.
 
     Raises
     ------
     InvalidFile
-        With the parts' names: if ports that are welded do not meet, parts overlap, a port is
-        driven by hand and by another part or lies on supports, or parts hang together with no
-        support. Also if there is no such entry.
+        If an entry does not exist, welded ports do not meet, parts overlap, a port is driven both
+        by the machine's input and by a part, a port lies on supports, or a group of parts has no
+        support. The message names the parts.
     """
-    check_drive(plan)
+    check_inputs(plan)
     parts = place_parts(plan, find)
-    nodes, positions = unite(plan, parts)
-    beams, numbers, present = _beams(plan, parts, nodes, positions)
+    nodes, positions = merge_nodes(plan, parts)
+    beams, numbers, present = _merge_beams(plan, parts, nodes, positions)
     count = len(beams)
-    positions, beams = _bridged(plan, parts, nodes, positions, beams)
+    positions, beams = _add_bridges(plan, parts, nodes, positions, beams)
     present = np.concatenate([present, np.ones(len(beams) - count, np.bool_)])
-    held = supports(plan, parts, nodes)
-    driven, wanted = drive(plan, parts, nodes), moved(plan, parts, nodes)
+    supports = machine_supports(plan, parts, nodes)
+    given, wanted = machine_input(plan, parts, nodes), machine_output(plan, parts, nodes)
     try:
         lattice = Lattice(positions, beams)
-        check_held(plan, nodes, lattice, held)
+        check_supported(plan, nodes, lattice, supports)
         problem = Problem(
             name=plan.table.name,
             lattice=lattice,
-            supports=held,
-            input=driven,
+            supports=supports,
+            input=given,
             output=wanted,
             stiffness=next(iter(parts.values())).design.problem.stiffness,
             initial=present,
-            designable=designable(plan, parts, nodes, beams, (held, driven, wanted)),
+            designable=designable_beams(plan, parts, nodes, beams, (supports, given, wanted)),
         )
     except InvalidProblem as error:
         raise InvalidFile(f"{plan.source}: {error}") from None
@@ -111,43 +124,81 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
     )  # fmt: skip
 
 
-def _beams(
+def simulate(machine: Machine, points: int = 20) -> PortCurve:
+    """Simulate the whole lattice of a machine along its stroke, with a free output.
+
+    Parameters
+    ----------
+    points
+        Number of equal increments of the stroke.
+    """
+    return trace(mean_ports(machine.design), Load("free"), points)
+
+
+def first_crossing(
+    positions: NDArray[np.float64], beams: NDArray[np.int64], owner: NDArray[np.int64]
+) -> tuple[int, int] | None:
+    """Return two crossing beams of different owners; None if no two cross.
+
+    Parameters
+    ----------
+    positions : (N, 2) float64
+    beams : (M, 2) int64
+    owner : (M,) int64
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> first_crossing(square, np.array([[0, 2], [1, 3]]), np.array([0, 1]))
+    (0, 1)
+    >>> first_crossing(square, np.array([[0, 2], [2, 3]]), np.array([0, 1])) is None
+    True
+    """
+    start, end = positions[beams[:, 0]], positions[beams[:, 1]]
+    inset = END_INSET * (end - start)
+    lines = shapely.linestrings(np.stack([start + inset, end - inset], axis=1))
+    first, second = shapely.STRtree(lines).query(lines, predicate="intersects")
+    bad = np.flatnonzero((first < second) & (owner[first] != owner[second]))
+    return (int(first[bad[0]]), int(second[bad[0]])) if len(bad) else None
+
+
+def _merge_beams(
     plan: Plan,
     parts: dict[str, Part],
     nodes: dict[str, NDArray[np.int64]],
     positions: NDArray[np.float64],
 ) -> tuple[NDArray[np.int64], dict[str, NDArray[np.int64]], NDArray[np.bool_]]:
-    """Return the beams of all parts, the numbers of each part's, and which are present."""
-    given = [nodes[name][part.design.problem.lattice.beams] for name, part in parts.items()]
-    every = np.concatenate(given)
-    first, number = numbered(np.sort(every, axis=1))
+    """Return the beams of all parts, the beam numbers of each part, and the present beams."""
+    ends = [nodes[name][part.design.problem.lattice.beams] for name, part in parts.items()]
+    every = np.concatenate(ends)
+    first, number = unique_rows(np.sort(every, axis=1))
     beams = every[first]
-    ends = np.cumsum([0, *map(len, given)])
     names = list(parts)
-    numbers = {name: number[ends[k] : ends[k + 1]] for k, name in enumerate(names)}
+    splits = np.cumsum([len(each) for each in ends])[:-1]
+    numbers = dict(zip(names, np.split(number, splits), strict=True))
     owner, present = np.empty(len(beams), np.int64), np.zeros(len(beams), np.bool_)
-    for place, (name, part) in enumerate(parts.items()):
-        owner[numbers[name]] = place
+    for index, (name, part) in enumerate(parts.items()):
+        owner[numbers[name]] = index
         present[numbers[name][part.design.mask]] = True
     crossing = first_crossing(positions, beams, owner)
     if crossing is not None:
         one, other = (names[owner[beam]] for beam in crossing)
         x, y = positions[beams[crossing[0]]].mean(axis=0)
         raise InvalidFile(
-            f"{plan.source}: parts {one} and {other} overlap: beams of theirs cross near "
+            f"{plan.source}: parts {one} and {other} overlap: their beams cross near "
             f"({x:.4g}, {y:.4g})"
         )
     return beams, numbers, present
 
 
-def _bridged(
+def _add_bridges(
     plan: Plan,
     parts: dict[str, Part],
     nodes: dict[str, NDArray[np.int64]],
     positions: NDArray[np.float64],
     beams: NDArray[np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return positions and beams with those of all bridges after them."""
+    """Return positions and beams with those of all bridges appended."""
     for link in plan.links:
         if link.kind == "bridge":
             ports = [

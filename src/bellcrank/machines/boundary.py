@@ -1,4 +1,4 @@
-"""What holds a machine, what drives it, what it moves, and what a search may change."""
+"""Supports, input, output and designable beams of a machine."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidFile
-from bellcrank.machines.plan import welded
+from bellcrank.machines.plan import welded_ports
 from bellcrank.model import Input, Output, Supports
 
 if TYPE_CHECKING:
@@ -15,18 +15,20 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.machines.placing import Part
+    from bellcrank.machines.placement import Part
     from bellcrank.machines.plan import Directions, Plan, PortName
     from bellcrank.model import Lattice
 
 
-def supports(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Supports:
-    """Return the supports of all parts that hold.
+def machine_supports(
+    plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]
+) -> Supports:
+    """Return the union of the supports of all supported parts.
 
     Raises
     ------
     InvalidFile
-        If a part on rollers is turned out of its axes.
+        If a part on rollers is rotated by other than a multiple of 180 degrees.
     """
     fixed: list[NDArray[np.int64]] = []
     rollers: dict[str, list[NDArray[np.int64]]] = {"x": [], "y": []}
@@ -38,53 +40,55 @@ def supports(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int
         for axis, given in (("x", own.fixed_x), ("y", own.fixed_y)):
             if len(given) and part.placement.rotate % 180:
                 raise InvalidFile(
-                    f"{plan.source}: part {name} stands on rollers along an axis and cannot be "
-                    f"turned by {part.placement.rotate} degrees"
+                    f"{plan.source}: part {name} has roller supports and cannot be rotated by "
+                    f"{part.placement.rotate} degrees; expected a multiple of 180"
                 )
             rollers[axis].append(nodes[name][given])
     return Supports(
-        fixed=_together(fixed), fixed_x=_together(rollers["x"]), fixed_y=_together(rollers["y"])
+        fixed=_unique(fixed), fixed_x=_unique(rollers["x"]), fixed_y=_unique(rollers["y"])
     )
 
 
-def drive(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Input:
-    """Return the machine's input; what the plan leaves open is as in its first part.
+def machine_input(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Input:
+    """Return the input of the machine; drive and amount default to those of its first part.
 
     Raises
     ------
     InvalidFile
-        If it is driven in another way than that part, and the plan does not say how far.
+        If the plan chooses another drive than that of the part without giving the amount.
     """
     table = plan.table.input
     ids, directions = _region(plan.inputs, parts, nodes, table.direction)
     first = parts[plan.inputs[0].part]
     own = first.design.problem.input
-    chosen = table.drive or own.drive
-    if table.amount is None and chosen != own.drive:
+    drive = table.drive or own.drive
+    if table.amount is None and drive != own.drive:
         raise InvalidFile(
-            f"{plan.source}: input.amount: must be given, for {first.name} is driven by a "
-            f"{own.drive}, and how much that is says nothing about a {chosen}"
+            f"{plan.source}: input.amount: required with drive {drive!r}, because part "
+            f"{first.name} is driven by a {own.drive}"
         )
     amount = own.amount * first.placement.scale if table.amount is None else table.amount
-    return Input(ids, directions, chosen, amount)
+    return Input(ids, directions, drive, amount)
 
 
-def moved(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]) -> Output:
-    """Return the machine's output."""
+def machine_output(
+    plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[np.int64]]
+) -> Output:
+    """Return the output of the machine."""
     ids, directions = _region(plan.outputs, parts, nodes, plan.table.output.direction)
     return Output(ids, directions)
 
 
-def designable(
+def designable_beams(
     plan: Plan,
     parts: dict[str, Part],
     nodes: dict[str, NDArray[np.int64]],
     beams: NDArray[np.int64],
     regions: tuple[Supports, Input, Output],
 ) -> NDArray[np.int64]:
-    """Return what a search may change: all but what touches a region or lies within a port."""
-    taken = np.concatenate([region.nodes for region in regions])
-    free = ~np.isin(beams, taken).any(axis=1)
+    """Return the beams that touch no region and lie within no linked port."""
+    region_nodes = np.concatenate([region.nodes for region in regions])
+    free = ~np.isin(beams, region_nodes).any(axis=1)
     for link in plan.links:
         for port in (link.first, link.second):
             own = nodes[port.part][parts[port.part].region(port.port).nodes]
@@ -92,49 +96,50 @@ def designable(
     return np.flatnonzero(free)
 
 
-def check_drive(plan: Plan) -> None:
-    """Refuse to drive by hand what another part drives.
+def check_inputs(plan: Plan) -> None:
+    """Check that no input port of the machine is also driven by the output of a part.
 
     Raises
     ------
     InvalidFile
     """
-    together = {port: ports for ports in welded(plan) for port in ports}
+    groups = {port: ports for ports in welded_ports(plan) for port in ports}
     for port in plan.inputs:
-        others = [other for other in together[port] if other != port]
+        linked = [other for other in groups[port] if other != port]
         for link in plan.links:
-            others += [
+            linked += [
                 there
                 for here, there in ((link.first, link.second), (link.second, link.first))
-                if link.kind == "bridge" and here in together[port]
+                if link.kind == "bridge" and here in groups[port]
             ]
-        if driving := [other for other in others if other.port == "output"]:
+        if driving := [other for other in linked if other.port == "output"]:
             raise InvalidFile(
-                f"{plan.source}: port {port} is driven by hand and by {driving[0]} at once"
+                f"{plan.source}: port {port} is driven twice: by the input of the machine and by "
+                f"{driving[0]}"
             )
 
 
-def check_held(
+def check_supported(
     plan: Plan,
     nodes: dict[str, NDArray[np.int64]],
     lattice: Lattice,
-    held: Supports,
+    supports: Supports,
 ) -> None:
-    """Refuse parts that hang together with nothing that holds them.
+    """Check that every part is connected to a support.
 
     Raises
     ------
     InvalidFile
     """
-    firm = lattice.reachable(held.nodes)
-    if loose := [name for name in nodes if not firm[nodes[name]].any()]:
+    connected = lattice.reachable(supports.nodes)
+    if loose := [name for name in nodes if not connected[nodes[name]].any()]:
         raise InvalidFile(
-            f"{plan.source}: nothing holds {', '.join(loose)}: no part that hangs together with "
-            f"it has a support"
+            f"{plan.source}: parts without support: {', '.join(loose)}; neither they nor the "
+            f"parts they are linked to have one"
         )
 
 
-def _together(lists: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+def _unique(lists: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
     return np.unique(np.concatenate([np.empty(0, np.int64), *lists]))
 
 
@@ -144,17 +149,17 @@ def _region(
     nodes: dict[str, NDArray[np.int64]],
     direction: Directions | None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the nodes of ports, each once, with their directions."""
-    wanted = None if direction is None else np.broadcast_to(direction, (len(ports), 2))
+    """Return the nodes of some ports, each once, with their unit directions."""
+    given = None if direction is None else np.broadcast_to(direction, (len(ports), 2))
     ids, directions = [], []
     for number, port in enumerate(ports):
         part = parts[port.part]
         own = nodes[port.part][part.region(port.port).nodes]
         ids.append(own)
-        if wanted is None:
+        if given is None:
             directions.append(part.direction(port.port))
         else:
-            unit = wanted[number] / np.linalg.norm(wanted[number])
+            unit = given[number] / np.linalg.norm(given[number])
             directions.append(np.tile(unit, (len(own), 1)))
     every = np.concatenate(ids)
     _, first = np.unique(every, return_index=True)

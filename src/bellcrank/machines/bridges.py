@@ -1,4 +1,4 @@
-"""Beams between two ports that do not lie on one another."""
+"""Bridges: beams between two ports that do not lie on one another."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-CLEAR = 0.6
-"""Of the spacing: how near a new node may come to one that is there."""
-LONGEST = 1.6
-"""Of the spacing: longer beams than this are not made."""
+MIN_DISTANCE = 0.6
+"""Smallest distance of a new node from a port node, in lattice spacings."""
+MAX_LENGTH = 1.6
+"""Length of the longest new beam, in lattice spacings."""
+HULL_TOLERANCE = 1e-9
+"""Distance from the hull of two ports, relative to its length, within which a beam belongs to
+their bridge."""
 
 
 def bridge(
@@ -30,31 +33,33 @@ def bridge(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Fill the convex hull of two ports with beams.
 
-    New nodes stand where the triangular lattice of the first port goes on; beams are those of
-    Delaunay's triangulation of them and the nodes of the ports, so that it joins ports of parts
-    that are turned or scaled against each other too.
+    New nodes continue the triangular lattice of the first port. The beams are the edges of a
+    Delaunay triangulation of the new nodes and the port nodes, so that ports of rotated or scaled
+    parts can be joined too.
 
     Parameters
     ----------
     positions : (N, 2) float64
     beams : (M, 2) int64
-        What is there.
+        Existing nodes and beams.
     ports
-        Nodes of the two.
+        Node numbers of the two ports.
     spacing
-        Of the first port's lattice.
+        Lattice spacing of the first port.
     name
-        What to call it in an error.
+        Name of the bridge in error messages.
 
     Returns
     -------
-    positions (N + n, 2), beams (m, 2)
-        With the new nodes; the new beams only.
+    positions : (N + n, 2)
+        All positions, the new ones last.
+    beams : (m, 2)
+        The new beams only.
 
     Raises
     ------
     InvalidFile
-        If something stands between the ports.
+        If another node lies between the ports.
     """
     ends = np.concatenate(ports)
     hull = shapely.MultiPoint(positions[ends]).convex_hull
@@ -62,25 +67,39 @@ def bridge(
     inside[ends] = False
     if inside.any():
         x, y = positions[np.flatnonzero(inside)[0]]
-        raise InvalidFile(f"{name}: something is in its way at ({x:.4g}, {y:.4g})")
-    grid = _grid(hull.bounds, positions[ports[0][0]], spacing)
+        raise InvalidFile(f"{name}: the space between the ports is taken at ({x:.4g}, {y:.4g})")
+    grid = _triangular_grid(hull.bounds, positions[ports[0][0]], spacing)
     grid = grid[shapely.contains_xy(hull, *grid.T)]
-    far, _ = cKDTree(positions[ends]).query(grid)
-    grid = grid[far > CLEAR * spacing]
+    distance, _ = cKDTree(positions[ends]).query(grid)
+    grid = grid[distance > MIN_DISTANCE * spacing]
     corners = np.concatenate([ends, len(positions) + np.arange(len(grid))])
-    everything = np.concatenate([positions, grid])
-    triangles = corners[Delaunay(everything[corners]).simplices]
+    extended = np.concatenate([positions, grid])
+    triangles = corners[Delaunay(extended[corners]).simplices]
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     made = np.unique(np.sort(sides, axis=1), axis=0)
-    length = np.linalg.norm(everything[made[:, 1]] - everything[made[:, 0]], axis=1)
+    length = np.linalg.norm(extended[made[:, 1]] - extended[made[:, 0]], axis=1)
     within = np.isin(made, ports[0]).all(axis=1) | np.isin(made, ports[1]).all(axis=1)
-    made = made[(length <= LONGEST * spacing) & ~within]
-    there = {tuple(pair) for pair in np.sort(beams, axis=1).tolist()}
-    made = np.array([pair for pair in made.tolist() if tuple(pair) not in there]).reshape(-1, 2)
-    return everything, made.astype(np.int64)
+    made = made[(length <= MAX_LENGTH * spacing) & ~within]
+    existing = {tuple(pair) for pair in np.sort(beams, axis=1).tolist()}
+    made = np.array([pair for pair in made.tolist() if tuple(pair) not in existing]).reshape(-1, 2)
+    return extended, made.astype(np.int64)
 
 
-def _grid(
+def between_ports(
+    positions: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    ports: Sequence[NDArray[np.int64]],
+) -> NDArray[np.bool_]:
+    """(m,) whether the middle of each beam lies in the convex hull of two ports."""
+    hull = shapely.MultiPoint(positions[np.concatenate(ports)]).convex_hull
+    middle = shapely.points(positions[beams].mean(axis=1))
+    near: NDArray[np.bool_] = shapely.distance(middle, hull) < HULL_TOLERANCE * max(
+        hull.length, 1.0
+    )
+    return near
+
+
+def _triangular_grid(
     bounds: tuple[float, float, float, float], origin: NDArray[np.float64], spacing: float
 ) -> NDArray[np.float64]:
     """Return the nodes (n, 2) of the triangular lattice through a point, within bounds."""
@@ -89,7 +108,7 @@ def _grid(
     rows = np.arange(np.floor(low[1] / height), np.ceil(high[1] / height) + 1)
     columns = np.arange(np.floor(low[0] / spacing) - 1, np.ceil(high[0] / spacing) + 2)
     row, column = (each.ravel() for each in np.meshgrid(rows, columns, indexing="ij"))
-    found: NDArray[np.float64] = origin + np.column_stack(
+    grid: NDArray[np.float64] = origin + np.column_stack(
         [(column + 0.5 * (row % 2)) * spacing, row * height]
     )
-    return found
+    return grid

@@ -1,10 +1,10 @@
-"""How an actuator goes along its stroke, against a load."""
+"""Curves of an actuator along its stroke, against a load at its output."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import numpy as np
 
@@ -15,27 +15,95 @@ from bellcrank.mechanics import Conditions, Status, follow
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.machines.loads import Load
     from bellcrank.mechanics import State, Superelement
+
+LoadKind = Literal["free", "blocked", "spring", "force"]
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """A load on the mean motion of an output.
+
+    Parameters
+    ----------
+    kind
+        ``"free"``: no load; ``"blocked"``: the output is held at rest; ``"spring"``: a linear
+        spring; ``"force"``: a dead force that is applied before the stroke.
+    value
+        Stiffness of the spring, or the force along the output direction (negative if it resists
+        the motion), in lattice units; 0 for the other kinds.
+
+    Raises
+    ------
+    InvalidSettings
+        If the kind is unknown, or the value does not fit it.
+    """
+
+    kind: LoadKind = "free"
+    value: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(LoadKind):
+            raise InvalidSettings(
+                f"load: expected one of {', '.join(get_args(LoadKind))}, got {self.kind!r}"
+            )
+        if not math.isfinite(self.value) or (self.kind == "spring" and self.value < 0.0):
+            raise InvalidSettings(
+                f"load {self.kind}: expected a finite number, for a spring at least 0, got "
+                f"{self.value!r}"
+            )
+        if self.kind in ("free", "blocked") and self.value != 0.0:
+            raise InvalidSettings(f"load {self.kind}: expected no value, got {self.value!r}")
+
+    @property
+    def label(self) -> str:
+        """Text of the load, as `read` parses it."""
+        return self.kind if self.kind in ("free", "blocked") else f"{self.kind}:{self.value!r}"
+
+    @classmethod
+    def read(cls, text: str) -> Load:
+        """Parse a load.
+
+        Raises
+        ------
+        InvalidSettings
+
+        Examples
+        --------
+        >>> Load.read("spring:0.5"), Load.read("blocked").label
+        (Load(kind='spring', value=0.5), 'blocked')
+        """
+        kind, colon, value = text.partition(":")
+        if kind not in get_args(LoadKind) or bool(colon) != (kind in ("spring", "force")):
+            raise InvalidSettings(
+                f"load {text!r}: expected free, blocked, spring:STIFFNESS or force:FORCE"
+            )
+        try:
+            number = float(value) if colon else 0.0
+        except ValueError:
+            raise InvalidSettings(f"load {text!r}: expected a number, got {value!r}") from None
+        return cls(cast("LoadKind", kind), number)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PortCurve:
-    """The way of an actuator along its stroke, against one load.
+    """Motions and forces of an actuator along its stroke, against one load.
 
     Parameters
     ----------
     load
+        Load at the output.
     motion, input_force : (p,)
-        Of the input, from rest on.
+        Motion of the input and external force on it; the first point is the start of the stroke.
     output, output_force : (p,)
-        Its motion, and the force from outside on it.
+        Motion of the output and external force on it.
     energy : (p,)
-        Elastic, of the actuator alone.
+        Elastic energy of the actuator.
     status
-        SNAPPED where stability is lost on the way: the curve ends at the last state before.
+        SNAPPED if stability is lost before the end of the stroke; the curve then ends at the
+        last stable state.
     reached
-        Part of the stroke that is stable, 0 to 1.
+        Stable fraction of the stroke, 0 to 1.
     """
 
     load: Load
@@ -49,32 +117,33 @@ class PortCurve:
 
     @property
     def efficiency(self) -> NDArray[np.float64]:
-        """(p,) output motion since the stroke began, over input motion; nan at its beginning."""
+        """(p,) output motion since the start of the stroke over input motion; nan at the start."""
         efficiency = np.full_like(self.output, math.nan)
         efficiency[1:] = (self.output[1:] - self.output[0]) / self.motion[1:]
         return efficiency
 
 
 def trace(element: Superelement, load: Load, points: int) -> PortCurve:
-    """Push an actuator along its stroke, against a load.
+    """Follow the equilibrium of an actuator along its stroke, against a load.
 
     Parameters
     ----------
     element
-        From `mean_ports`. A problem that is driven by a force goes up to its whole force.
+        Actuator from `mean_ports`. A problem that is driven by a force is loaded up to its full
+        force.
     load
+        Load at the output.
     points
         Number of equal increments.
 
     Raises
     ------
     InvalidSettings
-        If there are no points, or the load asks for what the actuator cannot do: to hold an
-        output that nothing connects, or to move one that nothing resists.
+        If `points` is below 1, or the load is impossible: a blocked output that is not connected,
+        or a force on an output without resistance.
 
     Examples
     --------
-    >>> from bellcrank.machines.loads import Load
     >>> from bellcrank.machines.ports import mean_ports
     >>> from bellcrank.model import find_problem
     >>> curve = trace(mean_ports(find_problem("scaling-8").full_design()), Load("blocked"), 4)
@@ -91,8 +160,8 @@ def trace(element: Superelement, load: Load, points: int) -> PortCurve:
     for number in range(points):
         if status is not Status.CONVERGED:
             break
-        asked = _conditions(element, load, (number + 1) / points)
-        arrival = follow(element, states[-1], asked)
+        target = _conditions(element, load, (number + 1) / points)
+        arrival = follow(element, states[-1], target)
         status = arrival.status
         reached = (number + arrival.fraction) / points
         if arrival.fraction > 0.0:
@@ -100,12 +169,13 @@ def trace(element: Superelement, load: Load, points: int) -> PortCurve:
     return _curve(load, states, status, reached)
 
 
-def _conditions(element: Superelement, load: Load, part: float) -> Conditions:
+def _conditions(element: Superelement, load: Load, fraction: float) -> Conditions:
+    """Return the boundary conditions at a fraction of the stroke."""
     given = element.design.problem.input
     driven = given.drive == "displacement"
-    whole = given.amount if driven else given.amount * len(given.nodes)
+    full = given.amount if driven else given.amount * len(given.nodes)
     value, spring = np.zeros(2), np.zeros(2)
-    value[INPUT] = part * whole
+    value[INPUT] = fraction * full
     if load.kind == "force":
         value[OUTPUT] = load.value
     elif load.kind == "spring":

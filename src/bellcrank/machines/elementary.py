@@ -1,8 +1,8 @@
-"""Tasks for elementary actuators: a push down on one side, a motion wanted on the other.
+"""Problems for elementary actuators, and struts.
 
-A strut is what passes a motion on as it is: a finger, a spacer. The ports of all are hexagons of
-seven nodes, which any turn by 60 degrees and any mirror takes to themselves: whatever way parts are
-placed, their ports fit.
+An elementary actuator is pushed down on the right and moves its left port in one of eight
+directions. A strut transmits a motion unchanged. All ports are hexagons of seven nodes, which are
+invariant under rotation by 60 degrees and reflection, so that ports fit in every orientation.
 """
 
 from __future__ import annotations
@@ -21,34 +21,35 @@ if TYPE_CHECKING:
     from bellcrank.model import Design, Lattice
 
 HEIGHT = math.sqrt(3.0) / 2.0
-PUSH = 0.02
-"""Of the height of the lattice: how far the input is pushed."""
-REACH = 2
-"""Nodes by which the rows of the ports are longer at each end."""
-SHORTEST = 3
-"""Strut whose ports do not share nodes."""
+STROKE = 0.02
+"""Input displacement as a fraction of the height of the lattice."""
+PORT_EXTENSION = 2
+"""Number of nodes by which the rows of the ports are longer at each end."""
+MIN_STRUT = 3
+"""Length of the shortest strut whose ports share no node."""
 DIRECTIONS = {
     "right": 0, "up-right": 45, "up": 90, "up-left": 135,
     "left": 180, "down-left": 225, "down": 270, "down-right": 315,
 }  # fmt: skip
-"""Degrees, counter-clockwise from +x."""
+"""Angle of each direction in degrees, counter-clockwise from +x."""
 
 
 def elementary(columns: int, direction: str, spring: float | None = None) -> Problem:
-    """Return the task: push the right port down, move the left one.
+    """Return the problem: the right port is pushed down, the left port is to move.
 
-    The lattice has `columns` and one less nodes in turn in its rows, about as many rows as
-    columns, and stands on the lowest. The ports, at the height of the second row from the top,
-    reach out of it by two spacings, so that parts side by side can share them.
+    The rows of the lattice have alternately `columns` and `columns` - 1 nodes; there are about as
+    many rows as columns, and the lowest row is supported. The ports lie at the height of the
+    second row from the top and extend beyond the lattice by two spacings, so that adjacent parts
+    can share them.
 
     Parameters
     ----------
     columns
-        Nodes of the lowest row, at least 5.
+        Number of nodes of the lowest row, at least 5.
     direction
-        Of the output: a key of `DIRECTIONS`.
+        Output direction, a key of `DIRECTIONS`.
     spring
-        k_ext of a spring at each output node, against which it has to work.
+        Stiffness k_ext of a spring at each output node; None for a free output.
 
     Raises
     ------
@@ -76,7 +77,7 @@ def elementary(columns: int, direction: str, spring: float | None = None) -> Pro
         supports=Supports(fixed=np.arange(columns)),
         input=Input(
             nodes=_hexagon(lattice, (columns, height)), direction=np.array([0.0, -1.0]),
-            drive="displacement", amount=PUSH * HEIGHT * rows,
+            drive="displacement", amount=STROKE * HEIGHT * rows,
         ),
         output=Output(
             nodes=_hexagon(lattice, (-1.0, height)),
@@ -86,14 +87,12 @@ def elementary(columns: int, direction: str, spring: float | None = None) -> Pro
 
 
 def strut(length: int) -> Problem:
-    """Return a bar of three rows, whose ports are its ends.
-
-    It has no supports: in a machine it hangs on what it is joined to.
+    """Return a bar of three rows of nodes, with a port at each end and without supports.
 
     Parameters
     ----------
     length
-        From the middle of one port to that of the other, at least 3.
+        Distance of the centres of its ports, at least 3.
 
     Raises
     ------
@@ -105,8 +104,8 @@ def strut(length: int) -> Problem:
     >>> bar.lattice.beam_count, bar.lattice.positions[bar.input.nodes].mean(axis=0).round(3)
     (54, array([6.   , 0.866]))
     """
-    if length < SHORTEST:
-        raise InvalidSettings(f"length: expected at least {SHORTEST}, got {length!r}")
+    if length < MIN_STRUT:
+        raise InvalidSettings(f"length: expected at least {MIN_STRUT}, got {length!r}")
     lattice = lattices["triangular-rows"]([length + 2, length + 3, length + 2], [-0.5, -1.0, -0.5])
     down = np.array([0.0, -1.0])
     return Problem(
@@ -115,7 +114,7 @@ def strut(length: int) -> Problem:
         supports=Supports(),
         input=Input(
             nodes=_hexagon(lattice, (length, HEIGHT)), direction=down, drive="displacement",
-            amount=PUSH * HEIGHT * length,
+            amount=STROKE * HEIGHT * length,
         ),
         output=Output(nodes=_hexagon(lattice, (0.0, HEIGHT)), direction=down),
         designable=np.arange(lattice.beam_count),
@@ -123,12 +122,12 @@ def strut(length: int) -> Problem:
 
 
 def strut_named(name: str) -> Design | None:
-    """Return the strut that a name like ``strut-6`` stands for; None for other names.
+    """Return the strut with a name like ``strut-6``; None for other names.
 
     Raises
     ------
     InvalidSettings
-        If it is too short.
+        If the strut is too short.
 
     Examples
     --------
@@ -143,16 +142,16 @@ def strut_named(name: str) -> Design | None:
 
 
 def _lattice(columns: int, rows: int) -> Lattice:
-    """Rows of a rectangle; the three highest reach out to hold the ports."""
+    """Return a rectangular lattice whose three upper rows extend to hold the ports."""
     counts = [columns - row % 2 for row in range(rows)]
     first = [0.5 * (row % 2) for row in range(rows)]
     for row in range(rows - 3, rows):
-        counts[row] += 2 * REACH
-        first[row] -= REACH
+        counts[row] += 2 * PORT_EXTENSION
+        first[row] -= PORT_EXTENSION
     return lattices["triangular-rows"](counts, first)
 
 
 def _hexagon(lattice: Lattice, centre: tuple[float, float]) -> NDArray[np.int64]:
-    """Return the node at a point and the six around it."""
+    """Return the node at a point and its six neighbours."""
     distance = np.linalg.norm(lattice.positions - np.array(centre), axis=1)
     return np.flatnonzero(distance < 1.1)

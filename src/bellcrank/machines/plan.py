@@ -1,4 +1,4 @@
-"""A machine as its maker writes it: parts, where they are, what links them, what drives them.
+"""Plans of machines: parts, their positions, links, input and output.
 
 A plan is a TOML file::
 
@@ -17,12 +17,12 @@ A plan is a TOML file::
     [output]
     ports = ["second.output"]
 
-A part is an entry of the library or a design file. It is mirrored left to right, turned by
-multiples of 60 degrees and scaled, in that order and about its input, and put where it belongs:
-with its input on ``at``, or with its input (or the port that ``by`` names) on the port that
-``join`` names, to which it is then welded. Further links are tables ``[[links]]`` with ``from``,
-``to`` and ``kind``: a ``weld`` makes the nodes of two ports that lie on one another the same
-nodes; a ``bridge`` fills what lies between two ports with beams.
+The ``entry`` of a part is a library entry or a design file. The part is reflected (``mirror``: x
+changes its sign), rotated by a multiple of 60 degrees and scaled, in that order and about its
+input. Its input is then placed at the point ``at``; or its input (or the port given by ``by``) is
+placed on the port given by ``join``, and welded to it. Further links are tables ``[[links]]`` with
+``from``, ``to`` and ``kind``: a ``weld`` merges coincident nodes of two ports; a ``bridge`` fills
+the space between two ports with beams.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ if TYPE_CHECKING:
     import os
 
 PORTS = ("input", "output")
-TURN = 60
-"""Degrees by which a triangular lattice may be turned."""
+ROTATION_STEP = 60
+"""Symmetry angle of the triangular lattice, in degrees."""
 
 Kind = Literal["weld", "bridge"]
 Vector = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 def _directions(given: object) -> object:
-    """Take one vector for a list of one."""
+    """Return one vector, or one for each port, as a list of vectors."""
     rows = given if isinstance(given, list) and given and isinstance(given[0], list) else [given]
     try:
         vectors = np.array(rows, dtype=np.float64)
@@ -61,17 +61,17 @@ def _directions(given: object) -> object:
         or not vectors.any(axis=1).all()
     ):
         raise PydanticCustomError(
-            "vectors", "Input should be a vector [x, y] of some length, or one for each port"
+            "vectors", "Input should be a nonzero vector [x, y], or one for each port"
         )
     return vectors.tolist()
 
 
 Directions = Annotated[list[list[float]], BeforeValidator(_directions)]
-"""One for all ports, or one for each."""
+"""One vector for all ports, or one for each."""
 
 
 class PartTable(Table):
-    """Where a part comes from and where it goes."""
+    """A part: its design and its placement."""
 
     entry: str = Field(min_length=1)
     at: Vector | None = None
@@ -84,7 +84,7 @@ class PartTable(Table):
 
 
 class LinkTable(Table):
-    """Two ports that are to move together."""
+    """A link of two ports."""
 
     from_: str = Field(alias="from")
     to: str
@@ -92,9 +92,9 @@ class LinkTable(Table):
 
 
 class InputTable(Table):
-    """What drives the machine; drive and amount are those of the first part by default.
+    """Input of the machine; drive and amount default to those of the first part.
 
-    Who drives it in another way says by how much.
+    The amount is required if the drive differs from that of the part.
     """
 
     ports: list[str] = Field(min_length=1)
@@ -104,14 +104,14 @@ class InputTable(Table):
 
 
 class OutputTable(Table):
-    """What the machine moves; directions are those of the parts by default."""
+    """Output of the machine; directions default to those of the parts."""
 
     ports: list[str] = Field(min_length=1)
     direction: Directions | None = None
 
 
 class MachineTable(Table):
-    """A whole plan."""
+    """A plan as it is written."""
 
     name: str = Field(min_length=1)
     about: str = ""
@@ -128,7 +128,7 @@ class PortName:
     Parameters
     ----------
     part
-        As the plan calls it.
+        Name of the part in the plan.
     port
         ``input`` or ``output``.
     """
@@ -142,7 +142,7 @@ class PortName:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """Two ports that are to move together.
+    """A link of two ports.
 
     Parameters
     ----------
@@ -159,18 +159,18 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A plan in which every port that is named exists.
+    """A checked plan: every port that it names exists.
 
     Parameters
     ----------
     source
-        What to call it in an error, usually the file.
+        Name in error messages, usually the file.
     table
-        As it was written.
+        The plan as it is written.
     links
-        Those of parts that join others included.
+        All links, those made by ``join`` included.
     order
-        Names of the parts, each after the one that it joins.
+        Names of the parts, each after the part that it joins.
     """
 
     source: str
@@ -180,30 +180,30 @@ class Plan:
 
     @property
     def inputs(self) -> list[PortName]:
-        """Ports that drive the machine."""
+        """Input ports of the machine."""
         return [port_name(text) for text in self.table.input.ports]
 
     @property
     def outputs(self) -> list[PortName]:
-        """Ports that the machine moves."""
+        """Output ports of the machine."""
         return [port_name(text) for text in self.table.output.ports]
 
 
 def read_plan(path: str | os.PathLike[str]) -> Plan:
-    """Read a plan, a TOML file.
+    """Read a plan from a TOML file.
 
     Raises
     ------
     InvalidFile
-        If it cannot be read, has unknown keys, names ports that no part has, or places a part
-        twice, nowhere, or on one that is placed on it.
+        If the file cannot be read, has unknown keys or unknown ports, or a part is placed twice,
+        not at all, or relative to itself.
     """
     source = str(path)
     return plan_of(parse(MachineTable, read_toml(path), source), source)
 
 
 def plan_of(table: MachineTable, source: str) -> Plan:
-    """Check what a plan says of its parts, ports and links.
+    """Check the parts, ports and links of a plan.
 
     Raises
     ------
@@ -222,8 +222,8 @@ def plan_of(table: MachineTable, source: str) -> Plan:
     for port in (*named, *plan.inputs, *plan.outputs):
         if port.part not in table.parts or port.port not in PORTS:
             raise InvalidFile(
-                f"{source}: no port {str(port)!r}; a port is an input or output of one of "
-                f"{', '.join(table.parts)}"
+                f"{source}: unknown port {str(port)!r}; expected PART.input or PART.output, with "
+                f"PART one of {', '.join(table.parts)}"
             )
     for name, region in (("input", table.input), ("output", table.output)):
         if region.direction and len(region.direction) not in (1, len(region.ports)):
@@ -232,7 +232,7 @@ def plan_of(table: MachineTable, source: str) -> Plan:
                 f"{len(region.ports)} ports, got {len(region.direction)}"
             )
     if both := [port for port in plan.inputs if port in plan.outputs]:
-        raise InvalidFile(f"{source}: port {str(both[0])!r} is input and output at once")
+        raise InvalidFile(f"{source}: port {str(both[0])!r} is both input and output")
     for link in links:
         if link.first == link.second:
             raise InvalidFile(f"{source}: port {str(link.first)!r} is linked to itself")
@@ -240,7 +240,7 @@ def plan_of(table: MachineTable, source: str) -> Plan:
 
 
 def port_name(text: str) -> PortName:
-    """Split ``part.port``; what has no dot is a port of no part.
+    """Split ``part.port``; without a dot, the name of the part is empty.
 
     Examples
     --------
@@ -251,8 +251,8 @@ def port_name(text: str) -> PortName:
     return PortName(part, port)
 
 
-def welded(plan: Plan) -> tuple[tuple[PortName, ...], ...]:
-    """Return all ports, those together that welds join, directly or by way of others.
+def welded_ports(plan: Plan) -> tuple[tuple[PortName, ...], ...]:
+    """Return all ports in groups that are welded together, directly or through other ports.
 
     Examples
     --------
@@ -261,7 +261,7 @@ def welded(plan: Plan) -> tuple[tuple[PortName, ...], ...]:
     ...     "parts": {"a": {"entry": "x"}, "b": {"entry": "x", "join": "a.output"},
     ...               "c": {"entry": "x", "join": "a.output"}},
     ... })
-    >>> [" ".join(map(str, ports)) for ports in welded(plan_of(table, "fork.toml"))]
+    >>> [" ".join(map(str, ports)) for ports in welded_ports(plan_of(table, "fork.toml"))]
     ['a.input', 'a.output b.input c.input', 'b.output', 'c.output']
     """
     every = [PortName(name, port) for name in plan.table.parts for port in PORTS]
@@ -275,11 +275,11 @@ def welded(plan: Plan) -> tuple[tuple[PortName, ...], ...]:
 
 def _check_part(name: str, part: PartTable, source: str) -> None:
     if "." in name:
-        raise InvalidFile(f"{source}: parts.{name}: a part's name cannot have a dot in it")
-    if part.rotate % TURN:
+        raise InvalidFile(f"{source}: parts.{name}: the name of a part must not contain a dot")
+    if part.rotate % ROTATION_STEP:
         raise InvalidFile(
-            f"{source}: parts.{name}.rotate: expected a multiple of {TURN} degrees, which a "
-            f"triangular lattice can be turned by, got {part.rotate}"
+            f"{source}: parts.{name}.rotate: expected a multiple of {ROTATION_STEP} degrees, a "
+            f"symmetry of the triangular lattice, got {part.rotate}"
         )
     if part.at is not None and part.join is not None:
         raise InvalidFile(f"{source}: parts.{name}: placed twice, by 'at' and by 'join'")
@@ -288,7 +288,7 @@ def _check_part(name: str, part: PartTable, source: str) -> None:
 
 
 def _in_order(table: MachineTable, source: str) -> tuple[str, ...]:
-    """Return the parts' names, each after the one that it joins."""
+    """Return the names of the parts, each after the part that it joins."""
     order: list[str] = []
     first = next(iter(table.parts))
     for wanted in table.parts:
@@ -297,22 +297,22 @@ def _in_order(table: MachineTable, source: str) -> tuple[str, ...]:
         while name not in order:
             part = table.parts[name]
             if name in waiting:
-                circle = ", ".join(waiting[waiting.index(name) :])
+                cycle = ", ".join(waiting[waiting.index(name) :])
                 raise InvalidFile(
-                    f"{source}: parts {circle} are placed on one another in a circle; give one of "
+                    f"{source}: the positions of parts {cycle} depend on each other; give one of "
                     f"them 'at' and link them in [[links]]"
                 )
             waiting.append(name)
             if part.join is None:
                 if part.at is None and name != first:
                     raise InvalidFile(
-                        f"{source}: parts.{name}: placed nowhere; give it 'at' or 'join'"
+                        f"{source}: parts.{name}: no position; give it 'at' or 'join'"
                     )
                 break
             name = port_name(part.join).part
             if name not in table.parts:
                 raise InvalidFile(
-                    f"{source}: parts.{waiting[-1]}.join: no part {name!r}; there are "
+                    f"{source}: parts.{waiting[-1]}.join: unknown part {name!r}; expected one of "
                     f"{', '.join(table.parts)}"
                 )
         order += [each for each in reversed(waiting) if each not in order]

@@ -1,15 +1,10 @@
-"""Where an actuator meets others: its input and its output, as generalised coordinates.
+"""Ports of an actuator: its input and its output as generalised coordinates.
 
-Two views of the same design:
+Each port has one coordinate, the mean of the displacement of its nodes along their unit
+directions, as in the efficiency. The conjugate force is distributed equally over the nodes. The
+nodes of an input that is driven by a displacement move along their directions only.
 
-- `mean_ports`: one coordinate a port, the mean of the displacement along the unit directions, as in
-  the efficiency; the force that does work on it is shared out equally over the nodes. An input that
-  is driven by a displacement slides, as the drive moves it: along its directions and not across.
-- `block_ports`: each port a rigid block of three coordinates, x, y and a finite rotation about
-  the centre of its nodes; what does work on them is a force and a moment. One coordinate is not
-  enough where actuators are linked: the output of most of them turns, and goes sideways.
-
-Forces are those from outside on the actuator. All is in lattice units.
+Forces are external forces on the actuator. Quantities are in lattice units.
 """
 
 from __future__ import annotations
@@ -20,11 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Loose, Rigid, Sliding, Superelement
+from bellcrank.mechanics import Loose, Sliding, Superelement
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from bellcrank.mechanics import Grip, UnloadedBeams
@@ -36,15 +29,15 @@ INPUT, OUTPUT = 0, 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Port:
-    """A region through which an actuator is moved, or moves something.
+    """Region of an actuator that is driven, or that drives something else.
 
     Parameters
     ----------
     nodes : (n,) int64
     centre : (2,)
-        Mean of their positions at rest.
+        Mean position of the nodes at rest.
     direction : (2,)
-        Mean of their unit directions: a unit vector if all are the same.
+        Mean of the unit directions of the nodes.
     """
 
     nodes: NDArray[np.int64]
@@ -73,21 +66,22 @@ def ports_of(design: Design) -> tuple[Port, Port]:
 def mean_ports(
     design: Design, unloaded_beams: UnloadedBeams = "keep", *, springs: bool = False
 ) -> Superelement:
-    """Return a design as felt through the mean motion of its ports: u_in and u_out.
+    """Return the superelement of a design with the coordinates u_in and u_out.
 
     Parameters
     ----------
     design
+        Actuator.
     unloaded_beams
-        As for an `SpringEvaluator`.
+        As for `bellcrank.mechanics.SpringEvaluator`.
     springs
-        Whether the problem's springs on the output belong to the actuator; by default they are
-        a load like any other, and left out.
+        Whether the springs of the problem at its output belong to the actuator. By default they
+        are a load, and left out.
 
     Raises
     ------
     InvalidSettings
-        If the input holds nothing that could resist, or turns about a single node.
+        If the input meets no resistance, or rotates about a single node.
 
     Examples
     --------
@@ -99,50 +93,22 @@ def mean_ports(
     given, wanted = design.problem.input, design.problem.output
     entry: Grip
     if given.drive == "displacement":
-        entry, share = Sliding(given.nodes, given.direction), np.ones(1)
+        entry, weights = Sliding(given.nodes, given.direction), np.ones(1)
     else:
-        entry, share = Loose(given.nodes), _mean(given)
+        entry, weights = Loose(given.nodes), _mean_weights(given)
     exit_ = Loose(wanted.nodes)
     measures = np.zeros((2, entry.count + exit_.count))
-    measures[INPUT, : entry.count] = share
-    measures[OUTPUT, entry.count :] = _mean(wanted)
-    return _gripped(design, [entry, exit_], measures, unloaded_beams, springs=springs)
+    measures[INPUT, : entry.count] = weights
+    measures[OUTPUT, entry.count :] = _mean_weights(wanted)
+    element = Superelement(design, [entry, exit_], measures, unloaded_beams, springs=springs)
+    if not element.reached[0]:
+        raise InvalidSettings(
+            f"{design.problem.name}: nothing resists the input: it is not connected to a support"
+        )
+    return element
 
 
-def block_ports(
-    design: Design, unloaded_beams: UnloadedBeams = "keep", *, springs: bool = False
-) -> Superelement:
-    """Return a design as felt through two rigid blocks: (x, y, rotation) of input, then output.
-
-    Parameters are those of `mean_ports`.
-
-    Raises
-    ------
-    InvalidSettings
-        As `mean_ports`.
-    """
-    positions = design.problem.lattice.positions
-    blocks = [Rigid(port.nodes, positions[port.nodes], port.centre) for port in ports_of(design)]
-    return _gripped(design, blocks, None, unloaded_beams, springs=springs)
-
-
-def _mean(region: Input | Output) -> NDArray[np.float64]:
+def _mean_weights(region: Input | Output) -> NDArray[np.float64]:
     """(2 n,) weights of the mean displacement along the directions."""
     weights: NDArray[np.float64] = region.direction.ravel() / len(region.nodes)
     return weights
-
-
-def _gripped(
-    design: Design,
-    grips: Sequence[Grip],
-    measures: NDArray[np.float64] | None,
-    unloaded_beams: UnloadedBeams,
-    *,
-    springs: bool,
-) -> Superelement:
-    element = Superelement(design, grips, measures, unloaded_beams, springs=springs)
-    if not element.reached[0]:
-        raise InvalidSettings(
-            f"{design.problem.name}: nothing resists the input: what it holds hangs loose"
-        )
-    return element

@@ -1,14 +1,14 @@
-"""An actuator as a linear two-port: three figures from which all its answers follow.
+"""Linear two-port of an actuator: input stiffness, efficiency and output compliance.
 
-With u_in, u_out the motions of the ports along their directions and F_in, F_out the forces from
-outside that do work on them, the hybrid form is
+With u_in, u_out the motions of the ports along their directions and F_in, F_out the conjugate
+external forces, the hybrid form is
 
     F_in  = k u_in - eta F_out,
-    u_out = eta u_in + C F_out:
+    u_out = eta u_in + C F_out,
 
-k the stiffness of the input while the output is free, eta the free efficiency, C the compliance of
-the output while the input is held. That one eta stands in both places is the reciprocity of
-Maxwell and Betti. Solved for the forces it is the stiffness form
+where k is the input stiffness with a free output, eta the free efficiency, and C the output
+compliance with the input held. Both coefficients eta are equal by the reciprocal theorem of Maxwell
+and Betti. Solved for the forces, the stiffness form is
 
     [F_in ]   [k + eta^2 / C   -eta / C] [u_in ]
     [F_out] = [   -eta / C        1 / C] [u_out].
@@ -31,23 +31,23 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import State, Superelement
 
-ROUNDED = 1e-8
-"""Of the input stiffness with a blocked output: what rounding may leave of that with a free one."""
+ROUNDING = 1e-8
+"""Ratio of free to blocked input stiffness below which the free one is attributed to rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class TwoPort:
-    """The linear answers of an actuator around one of its states.
+    """Linear response of an actuator around one of its equilibria.
 
     Parameters
     ----------
     input_stiffness
-        k = dF_in / du_in, output free.
+        k = dF_in / du_in with a free output.
     efficiency
-        eta = du_out / du_in, output free.
+        eta = du_out / du_in with a free output.
     output_compliance
-        C = du_out / dF_out, input held. Infinite for an output that nothing holds: then there
-        is a stiffness form, with zeros, but no hybrid one.
+        C = du_out / dF_out with the input held. Infinite for an output that is not connected:
+        the stiffness form then contains zeros, and there is no hybrid form.
 
     Examples
     --------
@@ -64,77 +64,77 @@ class TwoPort:
 
     @property
     def connected(self) -> bool:
-        """Whether the structure holds the output at all."""
+        """Whether the output is connected to the structure."""
         return math.isfinite(self.output_compliance)
 
     @property
     def output_stiffness(self) -> float:
-        """1 / C = dF_out / du_out, input held."""
+        """dF_out / du_out = 1 / C with the input held."""
         return 1.0 / self.output_compliance
 
     @property
     def transmitted_stiffness(self) -> float:
-        """Force on what blocks the output, per input motion: eta / C."""
+        """Blocked force per input motion, eta / C."""
         return self.efficiency / self.output_compliance
 
     @property
     def blocked_input_stiffness(self) -> float:
-        """dF_in / du_in, output held: k + eta^2 / C."""
+        """dF_in / du_in = k + eta^2 / C with the output held."""
         return self.input_stiffness + self.efficiency * self.transmitted_stiffness
 
     @property
     def force_efficiency(self) -> float:
-        """Force on what blocks the output, over the input force; nan if that vanishes."""
+        """Blocked force over input force; nan if the input force vanishes."""
         if self.blocked_input_stiffness == 0.0:
             return math.nan
         return self.transmitted_stiffness / self.blocked_input_stiffness
 
     @property
     def coupling(self) -> float:
-        """Share of the input's work, output blocked, that letting the output go sets free.
+        """Share of the input work with a blocked output that is released with the output.
 
-        ``eta^2 / (eta^2 + k C)``, between 0 and 1; nan for an input without any resistance. The
-        square of what is called coupling factor where electricity drives.
+        ``eta^2 / (eta^2 + k C)``, between 0 and 1; nan for an input without resistance. It is
+        the square of the coupling factor of electromechanical transducers.
         """
         return self.efficiency * self.force_efficiency
 
     @property
     def matched_spring(self) -> float:
-        """Stiffness of the spring at the output that takes the largest share of the work.
+        """Stiffness of the output spring that takes the largest share of the input work.
 
-        For an input without resistance that is the softest, which takes it all: 0.
+        It is 0 for an input without resistance.
         """
         return self._uncoupled * self.output_stiffness
 
     @property
     def best_work_share(self) -> float:
-        """That share: energy in the matched spring over work of the input."""
+        """Energy in the matched spring over the input work."""
         return (1.0 - self._uncoupled) / (1.0 + self._uncoupled)
 
     @property
     def _uncoupled(self) -> float:
-        """The s = sqrt(1 - coupling); rounding may leave a little of no resistance, or less."""
+        """sqrt(1 - coupling); 0 where the difference is of the order of rounding errors."""
         rest = 1.0 - self.coupling
-        return 0.0 if rest < ROUNDED else math.sqrt(rest)
+        return 0.0 if rest < ROUNDING else math.sqrt(rest)
 
     @property
     def stiffness(self) -> NDArray[np.float64]:
-        """(2, 2) symmetric and positive semidefinite."""
+        """(2, 2) stiffness form, symmetric and positive semidefinite."""
         across = -self.transmitted_stiffness
         return np.array([[self.blocked_input_stiffness, across], [across, self.output_stiffness]])
 
     @property
     def hybrid(self) -> NDArray[np.float64]:
-        """(2, 2) from (u_in, F_out) to (F_in, u_out).
+        """(2, 2) hybrid form, from (u_in, F_out) to (F_in, u_out).
 
         Raises
         ------
         InvalidSettings
-            If nothing holds the output.
+            If the output is not connected.
         """
         if not self.connected:
             raise InvalidSettings(
-                "a two-port has no hybrid form where nothing holds the output: a force there has "
+                "a two-port has no hybrid form if its output is not connected: a force there has "
                 "no equilibrium"
             )
         return np.array(
@@ -142,13 +142,13 @@ class TwoPort:
         )
 
     def efficiency_against(self, spring: float) -> float:
-        """Return u_out / u_in against a spring of some stiffness: eta / (1 + k_s C)."""
-        if spring == 0.0:  # also where nothing holds the output
+        """Return u_out / u_in against an output spring: eta / (1 + k_s C)."""
+        if spring == 0.0:  # also for an infinite compliance
             return self.efficiency
         return self.efficiency / (1.0 + spring * self.output_compliance)
 
     def input_stiffness_against(self, spring: float) -> float:
-        """Return F_in / u_in against a spring: k + eta^2 k_s / (1 + k_s C)."""
+        """Return F_in / u_in against an output spring: k + eta^2 k_s / (1 + k_s C)."""
         return self.input_stiffness + self.efficiency * spring * self.efficiency_against(spring)
 
     def output_under(self, motion: float, force: float) -> float:
@@ -157,20 +157,20 @@ class TwoPort:
 
 
 def two_port_at(element: Superelement, state: State) -> TwoPort:
-    """Condense an actuator to a two-port around one of its states.
+    """Return the linear two-port of an actuator around one of its equilibria.
 
     Parameters
     ----------
     element
-        From `mean_ports`.
+        Actuator from `mean_ports`.
     state
-        At rest, or anywhere along the stroke.
+        Equilibrium, at rest or along the stroke.
 
     Raises
     ------
     InvalidSettings
-        If the output is connected and swings freely while the input is held, or has lost its
-        stability there.
+        If the equilibrium with the input held is unstable, or the output is connected but moves
+        without resistance.
 
     Examples
     --------
@@ -184,13 +184,13 @@ def two_port_at(element: Superelement, state: State) -> TwoPort:
     linear = element.linear(state, Conditions(np.array([True, False]), np.zeros(2), np.zeros(2)))
     if not linear.is_stable():
         raise InvalidSettings(
-            f"{element.design.problem.name}: nothing resists the output while the input is held: "
-            "no two-port there"
+            f"{element.design.problem.name}: nothing resists the output while the input is held; "
+            "there is no two-port"
         )
-    answer = linear.transfer()
+    hybrid = linear.transfer()
     connected = bool(element.reached[OUTPUT])
     return TwoPort(
-        input_stiffness=float(answer[INPUT, INPUT]),
-        efficiency=float(answer[OUTPUT, INPUT]) if connected else 0.0,
-        output_compliance=float(answer[OUTPUT, OUTPUT]) if connected else math.inf,
+        input_stiffness=float(hybrid[INPUT, INPUT]),
+        efficiency=float(hybrid[OUTPUT, INPUT]) if connected else 0.0,
+        output_compliance=float(hybrid[OUTPUT, OUTPUT]) if connected else math.inf,
     )

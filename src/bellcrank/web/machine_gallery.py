@@ -6,9 +6,9 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import BellcrankError, UnknownName
+from bellcrank.machines.bundled import bundled_machine, bundled_machines, find_plan
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.library import library
-from bellcrank.machines.showcases import find_plan, showcase, showcases
 from bellcrank.web.gallery import Entry, LazyEntries
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ class Machines:
         UnknownName
             If there is no machine of that name.
         """
-        if key not in showcases():
+        if key not in bundled_machines():
             raise UnknownName(f"there is no machine {key!r}")
         plan = find_plan(key).table.model_dump(by_alias=True, exclude_defaults=True)
         for part in plan["parts"].values():
@@ -108,7 +108,7 @@ class Machines:
 
 
 def _machines() -> Iterator[Entry]:
-    for name in showcases():
-        machine = showcase(name)
+    for name in bundled_machines():
+        machine = bundled_machine(name)
         table = machine.plan.table
         yield Entry(name, table.name.capitalize(), table.about, machine.design)

@@ -21,11 +21,13 @@ def find_design(name_or_path: str) -> Design:
 
     Names are tried in this order:
 
-    1. ``human:NAME`` and ``machine:NAME``, the bundled designs of a bundled problem,
+    1. ``human:NAME`` and ``machine:NAME``, the bundled designs of a bundled problem; or
+       ``machine:NAME``, a bundled machine,
     2. a result folder, which holds a ``design.json``,
     3. a bundled problem: its initial design,
     4. a design file,
-    5. an entry of the library or a strut (``strut-6``), unless a file of that name exists,
+    5. an entry of the library, a bundled machine or a strut (``strut-6``), unless a file of that
+       name exists,
     6. a problem file: its initial design.
 
     Parameters
@@ -66,7 +68,7 @@ def find_design(name_or_path: str) -> Design:
     if path.suffix == ".json" and path.is_file() and _is_design(path):
         return read_design(path)
     if not path.exists():
-        design = _machine_part(name_or_path)
+        design = _design_of_machines(name_or_path)
         if design is not None:
             return design
     return find_problem(name_or_path).full_design()
@@ -79,21 +81,21 @@ def hides_problem(name: str) -> bool:
 
 def _bundled_design(kind: Kind, name: str) -> Design:
     design = gallery_design(kind, name)
+    if design is None and kind == "machine":
+        design = _design_of_machines(f"{kind}:{name}")
     if design is None:
         known = ", ".join(problem for problem in builtin if gallery_design(kind, problem))
         raise UnknownName(f"no {kind} design for {name!r}; known: {known}")
     return design
 
 
-def _machine_part(name: str) -> Design | None:
-    """Return the strut or library entry of that name, or None.
+def _design_of_machines(name: str) -> Design | None:
+    """Return the strut, library entry or bundled machine of that name, or None.
 
     The library is built with the workflows of this package. Loading it by name when it is needed
     keeps the import direction, and keeps it out of commands that do not use it.
     """
-    elementary = import_module("bellcrank.machines.elementary")
-    library = import_module("bellcrank.machines.library")
-    design: Design | None = elementary.strut_named(name) or library.library().design(name)
+    design: Design | None = import_module("bellcrank.machines.names").design_from_name(name)
     return design
 
 

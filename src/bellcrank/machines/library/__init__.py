@@ -1,7 +1,8 @@
-"""A library of elementary actuators: found by searches, measured, and known by name.
+"""Library of elementary actuators, found by searches and measured.
 
-Each `Entry` is a design with two ports, its two-port, what finite elements say of the part, and how
-much better than the plain lever it is. `library` finds entries, `make` makes them.
+An `Entry` is a design with its two-port, the results of frame analyses of the part, and the plain
+lever for the same problem. `library` finds entries. The module `measurement` measures a design as
+an entry, and `making` searches for new entries; both are imported where they are used.
 
 Examples
 --------
@@ -15,39 +16,37 @@ True
 from bellcrank.machines.library.catalogue import (
     SORTS,
     Library,
+    Summary,
+    bundled_folder,
     find_entry,
     library,
-    shipped_folder,
     user_folder,
 )
-from bellcrank.machines.library.entry import Entry, FrameCheck, LeverCheck
-from bellcrank.machines.library.files import read_entry, write_entry
-from bellcrank.machines.library.kinds import Kind, kinds
-from bellcrank.machines.library.lever import plain_lever
-from bellcrank.machines.library.making import Made, make
-from bellcrank.machines.library.measuring import measure
-from bellcrank.machines.library.orders import Order, Task
-from bellcrank.machines.library.summary import Summary
+from bellcrank.machines.library.entry import (
+    Entry,
+    FrameResult,
+    Kind,
+    LeverResult,
+    kind_title,
+    kinds,
+)
+from bellcrank.machines.library.files import entry_to_dict, read_entry, write_entry
 
 __all__ = [
     "SORTS",
     "Entry",
-    "FrameCheck",
+    "FrameResult",
     "Kind",
-    "LeverCheck",
+    "LeverResult",
     "Library",
-    "Made",
-    "Order",
     "Summary",
-    "Task",
+    "bundled_folder",
+    "entry_to_dict",
     "find_entry",
+    "kind_title",
     "kinds",
     "library",
-    "make",
-    "measure",
-    "plain_lever",
     "read_entry",
-    "shipped_folder",
     "user_folder",
     "write_entry",
 ]

@@ -1,29 +1,138 @@
-"""All entries that are at hand: those that come with the package, and the user's own."""
+"""The library: folders of entries, searched by their main figures."""
 
 from __future__ import annotations
 
 import difflib
+import math
 import os
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import BellcrankError, InvalidSettings, UnknownName
+from bellcrank.errors import BellcrankError, InvalidFile, InvalidSettings, UnknownName
 from bellcrank.machines.elementary import DIRECTIONS
-from bellcrank.machines.library.entry import DIGITS, MIXED, check_direction, check_kind
-from bellcrank.machines.library.files import read_entry
-from bellcrank.machines.library.summary import Summary, entry_files, read_index, read_summary
+from bellcrank.machines.library.entry import HASH_DIGITS, MIXED, check_direction, check_kind
+from bellcrank.machines.library.files import check_file_name, checked_table, read_entry
+from bellcrank.machines.two_port import TwoPort
+from bellcrank.model.parsing import read_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from bellcrank.machines.library.entry import Entry
     from bellcrank.model import Design
 
 VARIABLE = "BELLCRANK_LIBRARY"
-"""Of the environment: the user's folder."""
-LEAST_DIGITS = 4
-"""Of a hash that stands for a name by itself."""
+"""Environment variable with the user's folder."""
+MIN_DIGITS = 4
+"""Smallest number of digits of a hash that is accepted as a name."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """Main figures of an entry, read without building its lattice.
+
+    Parameters
+    ----------
+    name, direction, columns, kind
+        As in `Entry`.
+    beams
+        Number of beams.
+    efficiency
+        Efficiency at the full stroke, under the load that it was designed for.
+    free_efficiency, input_stiffness, output_compliance
+        Two-port at rest; the compliance is infinite for an output that is not connected.
+    frame_efficiency, frame_status
+        Result of the nonlinear frame analysis; nan if the full stroke is not reached.
+    lever_efficiency
+        Efficiency of the plain lever; nan if no lever is stable.
+    better
+        Whether the entry is more efficient than the plain lever.
+    warnings
+        Whether there are warnings: struts in contact, or a loss of stability.
+    """
+
+    name: str
+    direction: str
+    columns: int | None
+    kind: str
+    beams: int
+    efficiency: float
+    free_efficiency: float
+    input_stiffness: float
+    output_compliance: float
+    frame_efficiency: float
+    frame_status: str
+    lever_efficiency: float
+    better: bool
+    warnings: bool
+
+    @property
+    def two_port(self) -> TwoPort:
+        """The linear two-port at rest."""
+        return TwoPort(self.input_stiffness, self.free_efficiency, self.output_compliance)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON; null for figures that are not finite."""
+        return {
+            name: None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in asdict(self).items()
+        }
+
+
+def read_summary(path: Path) -> Summary:
+    """Read the main figures of an entry.
+
+    Raises
+    ------
+    InvalidFile
+        If the file is not an entry, or was changed.
+    """
+    table = checked_table(read_json(path), str(path))
+    check_file_name(path, table.name)
+    try:
+        found, rest = table.characterisation, table.characterisation["rest"]
+        return Summary(
+            name=table.name,
+            direction=table.direction,
+            columns=table.columns,
+            kind=table.kind,
+            beams=found["beams"],
+            efficiency=_number(table.design["efficiency"], math.nan),
+            free_efficiency=rest["efficiency"],
+            input_stiffness=rest["input_stiffness"],
+            output_compliance=_number(rest["output_compliance"], math.inf),
+            frame_efficiency=_number(table.validation.efficiency, math.nan),
+            frame_status=table.validation.status,
+            lever_efficiency=_number(table.lever.efficiency, math.nan),
+            better=table.lever.better,
+            warnings=bool(table.validation.warnings or found["warnings"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidFile(f"{path}: characterisation or design: {error!r}") from None
+
+
+def entry_files(folder: Path) -> list[Path]:
+    """Return the files of a folder that have the suffix of an entry, sorted."""
+    if not folder.is_dir():
+        return []
+    return sorted(path for path in folder.glob("*.json") if path.name[0] != ".")
+
+
+def bundled_folder() -> Path:
+    """Return the folder of the bundled entries."""
+    from importlib.resources import files
+
+    return Path(str(files("bellcrank.machines.library") / "entries"))
+
+
+def user_folder() -> Path:
+    """Return the user's folder, from the environment or in the usual place of user data."""
+    if folder := os.environ.get(VARIABLE):
+        return Path(folder)
+    data = os.environ.get("XDG_DATA_HOME")
+    return (Path(data) if data else Path.home() / ".local" / "share") / "bellcrank" / "library"
+
 
 SORTS: dict[str, Callable[[Summary, float], float]] = {
     "efficiency": lambda each, spring: -each.two_port.efficiency_against(spring),
@@ -33,95 +142,71 @@ SORTS: dict[str, Callable[[Summary, float], float]] = {
     "gain": lambda each, _spring: -(each.efficiency - each.lever_efficiency),
     "size": lambda each, _spring: float(each.beams),
 }
-"""What a search may be sorted by, the best first."""
-
-
-def shipped_folder() -> Path:
-    """Return the folder of the entries that come with the package."""
-    from importlib.resources import files
-
-    return Path(str(files("bellcrank.machines.library") / "entries"))
-
-
-def user_folder() -> Path:
-    """Return the user's folder: what the environment says, else where programs keep their data."""
-    if told := os.environ.get(VARIABLE):
-        return Path(told)
-    data = os.environ.get("XDG_DATA_HOME")
-    return (Path(data) if data else Path.home() / ".local" / "share") / "bellcrank" / "library"
+"""Sort keys of a search, smallest first; the second argument is the spring at the output."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Library:
-    """Folders of entries. Nothing is read before it is asked for.
+    """Folders of entries, read on first use.
 
     Parameters
     ----------
     folders
-        Of two entries of the same name, the one in the first folder is meant.
+        Folders in order of precedence for entries of the same name.
 
     Examples
     --------
-    >>> library = Library((shipped_folder(),))
+    >>> library = Library((bundled_folder(),))
     >>> len(library) >= 60
     True
     """
 
     folders: tuple[Path, ...]
-    _listed: dict[Path, tuple[list[Summary], list[str]]] = field(default_factory=dict, repr=False)
-
-    def _contents(self, folder: Path) -> tuple[list[Summary], list[str]]:
-        if folder not in self._listed:
-            self._listed[folder] = _listing(folder)
-        return self._listed[folder]
+    _contents: dict[Path, tuple[list[Summary], list[str]]] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.summaries)
 
     @property
     def summaries(self) -> list[Summary]:
-        """Of all entries that can be read, each once, by name."""
+        """Summaries of all readable entries, sorted by name."""
         found: dict[str, Summary] = {}
         for folder in self.folders:
-            for each in self._contents(folder)[0]:
+            for each in self._read(folder)[0]:
                 found.setdefault(each.name, each)
         return [found[name] for name in sorted(found)]
 
     @property
     def damaged(self) -> list[str]:
-        """What is wrong with files that cannot be read, in sentences."""
-        return [line for folder in self.folders for line in self._contents(folder)[1]]
-
-    def readable(self) -> list[str]:
-        """Names of the entries that can be read, in order."""
-        return [each.name for each in self.summaries]
+        """One error message for each file that cannot be read."""
+        return [line for folder in self.folders for line in self._read(folder)[1]]
 
     def names(self) -> list[str]:
-        """Of all files, readable or not."""
+        """Return the names of all files, readable or not."""
         return sorted({path.stem for folder in self.folders for path in entry_files(folder)})
 
     def resolve(self, text: str) -> str:
-        """Return the name that is meant: whole, its beginning if only one has it, or a hash.
+        """Return the full name of an entry from its name, a unique beginning of it, or its hash.
 
         Raises
         ------
         UnknownName
-            If there is none, or more than one.
+            If there is no such entry, or more than one.
         """
         names = self.names()
         if text in names:
             return text
         found = [name for name in names if text and name.startswith(text)]
-        if not found and LEAST_DIGITS <= len(text) <= DIGITS:
+        if not found and MIN_DIGITS <= len(text) <= HASH_DIGITS:
             found = [name for name in names if name.rpartition("-")[2].startswith(text)]
         if len(found) == 1:
             return found[0]
         if found:
             some = ", ".join(found[:4]) + (", ..." if len(found) > 4 else "")
-            raise UnknownName(f"{text!r} is the beginning of {len(found)} entries: {some}")
+            raise UnknownName(f"{text!r} is the beginning of {len(found)} library entries: {some}")
         near = difflib.get_close_matches(text, names, n=3, cutoff=0.5)
-        hint = f"; near: {', '.join(near)}" if near else ""
-        raise UnknownName(f"no entry {text!r} in the library{hint}; see bellcrank library list")
+        hint = f"; similar: {', '.join(near)}" if near else ""
+        raise UnknownName(f"no library entry {text!r}{hint}; see bellcrank library list")
 
     def path(self, text: str) -> Path:
         """Return the file of an entry.
@@ -134,10 +219,10 @@ class Library:
         for folder in self.folders:
             if (path := folder / f"{name}.json").is_file():
                 return path
-        raise UnknownName(f"no entry {name!r} in the library any more")
+        raise UnknownName(f"no library entry {name!r}: its file was removed")
 
     def find(self, text: str) -> Entry:
-        """Read an entry, by its name, the beginning of it, or its hash.
+        """Read an entry by its name, a unique beginning of it, or its hash.
 
         Raises
         ------
@@ -146,12 +231,12 @@ class Library:
         return read_entry(self.path(text))
 
     def design(self, text: str) -> Design | None:
-        """Return the design of an entry; None for what is not even like the name of one.
+        """Return the design of an entry; None if the text does not have the form of a name.
 
         Raises
         ------
         UnknownName
-            If it is like one, but there is none, or more than one.
+            If the text has the form of a name, but there is no such entry, or more than one.
         InvalidFile, InvalidProblem
             If the file is damaged.
         """
@@ -173,34 +258,34 @@ class Library:
         stiffness: float | None = None,
         output_stiffness: float | None = None,
         better: bool = False,
-        clear: bool = False,
+        no_warnings: bool = False,
         sort: str = "efficiency",
     ) -> list[Summary]:
-        """Return the entries that are as asked for, the best first.
+        """Return the summaries of the entries that satisfy all conditions, the best first.
 
         Parameters
         ----------
         direction, columns, kind
-            Of the entry.
+            Required properties of the entry.
         spring
-            At the mean output: efficiencies are those against it, from the two-port at rest.
+            Spring at the mean output, for efficiencies from the two-port at rest.
         efficiency
-            At least.
+            Minimum efficiency against the spring.
         stiffness
-            Of the input, output free, at most.
+            Maximum input stiffness with a free output.
         output_stiffness
-            Input held, at least.
+            Minimum output stiffness with the input held.
         better
-            Whether only what beats the plain lever is wanted.
-        clear
-            Whether only what there is nothing to be warned of is wanted: no struts that touch.
+            Only entries that are more efficient than the plain lever.
+        no_warnings
+            Only entries without warnings: no struts in contact, no loss of stability.
         sort
             A key of `SORTS`.
 
         Raises
         ------
         InvalidSettings, UnknownName
-            If there is no such direction or kind, or nothing to sort by that.
+            If direction, kind or sort key is unknown, or the spring is negative.
         """
         if direction is not None:
             check_direction(direction)
@@ -211,7 +296,7 @@ class Library:
         if not spring >= 0.0:
             raise InvalidSettings(f"spring: expected a stiffness of at least 0, got {spring!r}")
 
-        def fits(each: Summary) -> bool:
+        def matches(each: Summary) -> bool:
             return (
                 direction in (None, each.direction)
                 and columns in (None, each.columns)
@@ -220,38 +305,32 @@ class Library:
                 and (stiffness is None or each.input_stiffness <= stiffness)
                 and (output_stiffness is None or output_stiffness * each.output_compliance <= 1.0)
                 and (each.better or not better)
-                and (each.clear or not clear)
+                and not (each.warnings and no_warnings)
             )
 
         key = SORTS[sort]
-        return sorted(filter(fits, self.summaries), key=lambda each: key(each, spring))
+        return sorted(filter(matches, self.summaries), key=lambda each: key(each, spring))
 
-
-def _listing(folder: Path) -> tuple[list[Summary], list[str]]:
-    """Return the summaries of a folder, and what is wrong with the files that have none."""
-    if (indexed := read_index(folder)) is not None:
-        return indexed, []
-    return read_all(entry_files(folder))
-
-
-def read_all(paths: Iterable[Path]) -> tuple[list[Summary], list[str]]:
-    """Return the summaries of files, and what is wrong with those that have none."""
-    found, damaged = [], []
-    for path in paths:
-        try:
-            found.append(read_summary(path))
-        except BellcrankError as error:
-            damaged.append(str(error))
-    return found, damaged
+    def _read(self, folder: Path) -> tuple[list[Summary], list[str]]:
+        """Return the summaries of a folder, and the errors of files that cannot be read."""
+        if folder not in self._contents:
+            found, damaged = [], []
+            for path in entry_files(folder):
+                try:
+                    found.append(read_summary(path))
+                except BellcrankError as error:
+                    damaged.append(str(error))
+            self._contents[folder] = found, damaged
+        return self._contents[folder]
 
 
 def library() -> Library:
-    """Return the library: the user's folder, and the entries that come with the package."""
-    return Library((user_folder(), shipped_folder()))
+    """Return the library: the user's folder and the bundled entries."""
+    return Library((user_folder(), bundled_folder()))
 
 
 def find_entry(text: str) -> Entry:
-    """Read an entry of the library, by its name, the beginning of it, or its hash.
+    """Read an entry of the library by its name, a unique beginning of it, or its hash.
 
     Raises
     ------
@@ -262,6 +341,10 @@ def find_entry(text: str) -> Entry:
     >>> find_entry("up-9-fre-")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bellcrank.errors.UnknownName: no entry 'up-9-fre-' in the library...; see bellcrank library list
+    bellcrank.errors.UnknownName: no library entry 'up-9-fre-'...; see bellcrank library list
     """
     return library().find(text)
+
+
+def _number(value: Any, missing: float) -> float:
+    return missing if value is None else float(value)

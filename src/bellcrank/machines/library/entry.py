@@ -1,4 +1,9 @@
-"""An entry of the library: a design, and all that a person or a machine must know to use it."""
+"""Entries of the library, and the kinds of actuators.
+
+The kind of an actuator is the load case that it was designed for: the load at its output during
+the search, and the constraints that the search kept. Actuators of different kinds serve at
+different positions of a chain (`docs/machines.md`).
+"""
 
 from __future__ import annotations
 
@@ -12,40 +17,94 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.machines.elementary import DIRECTIONS
-from bellcrank.machines.library.kinds import OWN
+from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
-    from bellcrank.machines.characterise import Characterisation
+    from bellcrank.machines.characterisation import Characterisation
     from bellcrank.model import Design, Output
 
-DIGITS = 8
-"""Of the hash that a name ends with."""
+HASH_DIGITS = 8
+"""Number of hexadecimal digits of the hash at the end of a name."""
 MIXED = "mixed"
-"""Direction of an output whose nodes are to go different ways, like jaws."""
+"""Direction of an output whose nodes move in different directions, like jaws."""
+OWN = "own"
+"""Kind of an entry that was added by the user, with an unknown load case."""
 
 
 @dataclass(frozen=True, slots=True)
-class FrameCheck:
-    """What finite elements say of the part: frames, large and small motions.
+class Kind:
+    """A kind of elementary actuator.
+
+    Parameters
+    ----------
+    title
+        Name as it is shown; the registered name is the short form in names of entries.
+    about
+        Use of such actuators.
+    spring
+        Stiffness k_ext of the spring at each output node during the search; None for a free
+        output.
+    goals
+        Constraints that the search kept.
+
+    Examples
+    --------
+    >>> kinds["loaded"].spring, kinds["light"].goals[0]
+    (0.02, 'input-stiffness <= 0.1')
+    """
+
+    title: str
+    about: str
+    spring: float | None = None
+    goals: tuple[str, ...] = ()
+
+
+kinds: Registry[Kind] = Registry("kind of actuator")
+kinds.register("free")(Kind("free stroke", "large motion without a load"))
+kinds.register("loaded")(Kind("loaded output", "motion against springs at the output", spring=0.02))
+kinds.register("light")(
+    Kind(
+        "low input force",
+        "driven by other actuators, as the last stage of a chain",
+        # The lower bound excludes mechanisms, whose input stiffness is zero.
+        goals=("input-stiffness <= 0.1", "input-stiffness >= 0.001"),
+    )
+)
+
+
+def kind_title(kind: str) -> str:
+    """Return the name of a kind as it is shown.
+
+    Examples
+    --------
+    >>> kind_title("light"), kind_title("own")
+    ('low input force', 'own design')
+    """
+    return kinds[kind].title if kind in kinds else f"{kind} design"
+
+
+@dataclass(frozen=True, slots=True)
+class FrameResult:
+    """Results of the frame analyses of the part, linear and geometrically nonlinear.
 
     Parameters
     ----------
     status
-        ``converged`` if the part is stable all along the stroke.
+        ``converged`` if the part is stable along the whole stroke.
     reached
-        Part of the stroke up to which it is.
+        Stable fraction of the stroke.
     efficiency, linear_efficiency
-        At the full stroke, and for small motions; nan where there is none.
+        Efficiency at the full stroke, and for small strokes; nan if there is none.
     stress, strain
-        Largest von Mises stress, MPa, and principal strain at the last stable state.
+        Largest von Mises stress in MPa, and largest principal strain, at the last stable state.
     force
-        On the input there, N.
+        Input force at the last stable state, N.
     theory, material
-        Of the struts.
+        Beam theory and material.
     width, thickness, scale
-        Of the struts, and length of a lattice unit, mm.
+        Width and thickness of the struts, and length of a lattice unit, mm.
     warnings
-        What a builder should know, in sentences.
+        Limits of the results, one sentence each.
     """
 
     status: str
@@ -64,19 +123,19 @@ class FrameCheck:
 
 
 @dataclass(frozen=True, slots=True)
-class LeverCheck:
-    """The plain lever for the same task: under the same load, keeping the same goals.
+class LeverResult:
+    """The plain lever for the same problem, under the same load and constraints.
 
     Parameters
     ----------
     efficiency
-        At the full stroke; nan where no lever is stable and keeps the goals.
+        Efficiency at the full stroke; nan if no lever is stable and satisfies the constraints.
     unbound_efficiency
-        Of the best lever whatever goals it breaks.
+        Efficiency of the best lever without the constraints.
     shape
-        In words.
+        Description of the lever.
     mask
-        Its beams; empty where there is none.
+        Its beams, in hexadecimal; empty if there is none.
     """
 
     efficiency: float
@@ -92,21 +151,21 @@ class Entry:
     Parameters
     ----------
     design
-        With its efficiency under the load that it was made for.
+        Design, with its efficiency under the load that it was designed for.
     direction
-        Of the output: a name in `DIRECTIONS`, or ``"mixed"``.
+        Output direction: a name in `DIRECTIONS`, or ``"mixed"``.
     columns
-        Of the task, which say how large it is; None for a design of another lattice.
+        Size of its elementary problem; None for a design of another lattice.
     kind
-        What it was made for: a name in `kinds`, or ``"own"``.
+        Load case that it was designed for: a name in `kinds`, or ``"own"``.
     characterisation
-        As a two-port, its springs left out.
+        Two-port, without the springs of the problem.
     validation
-        By finite elements.
+        Results of the frame analyses.
     lever
-        What it is compared with.
+        Plain lever for comparison.
     provenance
-        How it came about.
+        Origin of the design and of the results.
     """
 
     design: Design
@@ -114,29 +173,24 @@ class Entry:
     columns: int | None
     kind: str
     characterisation: Characterisation
-    validation: FrameCheck
-    lever: LeverCheck
+    validation: FrameResult
+    lever: LeverResult
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def hash(self) -> str:
-        """What tells it from others: the same problem, beams and kind have the same."""
-        return identity(self.design, self.kind)
-
-    @property
     def name(self) -> str:
-        """``DIRECTION-COLUMNS-KIND-HASH``, without what it has not got."""
+        """``DIRECTION-COLUMNS-KIND-HASH``, without columns if there are none."""
         return name_of(self.design, self.direction, self.columns, self.kind)
 
     @property
     def efficiency(self) -> float:
-        """At the full stroke, under the load that it was made for."""
+        """Efficiency at the full stroke, under the load that it was designed for."""
         return math.nan if self.design.efficiency is None else self.design.efficiency
 
     @property
-    def clear(self) -> bool:
-        """Whether there is nothing to be warned of: struts that touch, a loss of stability."""
-        return not (self.validation.warnings or self.characterisation.doubts)
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings of the frame analyses and of the two-port."""
+        return (*self.validation.warnings, *self.characterisation.warnings)
 
     @property
     def better(self) -> bool:
@@ -145,7 +199,7 @@ class Entry:
 
 
 def identity(design: Design, kind: str) -> str:
-    """Return the hash that names a design of a kind.
+    """Return the hash of problem, beams and kind at the end of a name.
 
     Examples
     --------
@@ -153,14 +207,14 @@ def identity(design: Design, kind: str) -> str:
     >>> identity(elementary(9, "down").full_design(), "free")
     '15be2a2a'
     """
-    told = {"kind": kind, "mask": design.mask_hex, "problem": design.problem.hash}
-    return hashlib.sha256(canonical(told).encode()).hexdigest()[:DIGITS]
+    content = {"kind": kind, "mask": design.mask_hex, "problem": design.problem.hash}
+    return hashlib.sha256(canonical(content).encode()).hexdigest()[:HASH_DIGITS]
 
 
 def name_of(
     design: Design, direction: str | None = None, columns: int | None = None, kind: str = OWN
 ) -> str:
-    """Return the name of the entry that a design is or would be; by default somebody's own.
+    """Return the name of the entry of a design.
 
     Examples
     --------
@@ -168,17 +222,17 @@ def name_of(
     >>> name_of(human_design("crane"))
     'left-own-48476f52'
     """
-    whither = direction or direction_of(design.problem.output)
-    return f"{stem(whither, columns, kind)}-{identity(design, kind)}"
+    towards = direction or direction_of(design.problem.output)
+    return f"{stem(towards, columns, kind)}-{identity(design, kind)}"
 
 
 def canonical(data: Any) -> str:
-    """Return the one text of plain data that hashes are taken from."""
+    """Return the canonical JSON text of plain data, for hashes."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
 
 def stem(direction: str, columns: int | None, kind: str) -> str:
-    """Return the name of a task, with which those of its entries begin.
+    """Return the name of an entry without its hash.
 
     Examples
     --------
@@ -188,22 +242,19 @@ def stem(direction: str, columns: int | None, kind: str) -> str:
     return "-".join(str(part) for part in (direction, columns, kind) if part is not None)
 
 
-def check_kind(kind: str) -> str:
-    """Return a kind that an entry may have.
+def check_kind(kind: str) -> None:
+    """Check the kind of an entry.
 
     Raises
     ------
     UnknownName
     """
-    from bellcrank.machines.library.kinds import kinds
-
     if kind != OWN:
         kinds[kind]
-    return kind
 
 
-def check_direction(direction: str) -> str:
-    """Return a direction that an entry may have.
+def check_direction(direction: str) -> None:
+    """Check the direction of an entry.
 
     Raises
     ------
@@ -220,11 +271,10 @@ def check_direction(direction: str) -> str:
         raise InvalidSettings(
             f"direction: expected one of {', '.join(DIRECTIONS)}, got {direction!r}"
         )
-    return direction
 
 
 def direction_of(output: Output) -> str:
-    """Return the name of the direction nearest to where an output is to go, on average.
+    """Return the name of the direction nearest to the mean direction of an output.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""An entry as a file: JSON of the schema ``bellcrank/entry/1``, one line of it.
+"""Files of entries: JSON with the schema ``bellcrank/entry/1``, on one line.
 
 ::
 
@@ -7,9 +7,9 @@
      "validation": {"level": "frame", "efficiency": 5.1, ...},
      "lever": {"efficiency": 3.8, "better": true, ...}, "provenance": {...}, "checksum": "..."}
 
-``design`` is as in a design file, ``characterisation`` as `bellcrank characterise` keeps it. The
-hash in the name is that of problem, beams and kind; ``checksum`` is that of all other keys. Both
-are compared when a file is read, so that a figure that is read is the figure that was measured.
+``design`` has the form of a design file, ``characterisation`` that of a file of `bellcrank
+characterise`. The name ends with a hash of problem, beams and kind; ``checksum`` is a hash of all
+other keys. Both are verified when a file is read.
 """
 
 from __future__ import annotations
@@ -17,21 +17,25 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
 from bellcrank.errors import BellcrankError, InvalidFile
+from bellcrank.machines.characterisation_files import (
+    characterisation_from_dict,
+    characterisation_to_dict,
+)
 from bellcrank.machines.library.entry import (
     Entry,
-    FrameCheck,
-    LeverCheck,
+    FrameResult,
+    LeverResult,
     canonical,
     check_direction,
     check_kind,
 )
-from bellcrank.machines.record import characterisation_from_dict, characterisation_to_dict
 from bellcrank.model import design_from_dict, design_to_dict
 from bellcrank.model.parsing import Table, parse, read_json
 from bellcrank.model.storage import write_text
@@ -41,10 +45,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 SCHEMA = "bellcrank/entry/1"
+CHANGED = "the file was changed or is damaged; write the entry again (bellcrank library add DESIGN)"
 
 
 class FrameTable(Table):
-    """``validation``; null for what is no number."""
+    """``validation``; null for an efficiency that does not exist."""
 
     level: Literal["frame"]
     status: str
@@ -63,7 +68,7 @@ class FrameTable(Table):
 
 
 class LeverTable(Table):
-    """``lever``; null where no lever is stable."""
+    """``lever``; null for an efficiency that does not exist."""
 
     efficiency: float | None
     unbound_efficiency: float | None
@@ -73,7 +78,7 @@ class LeverTable(Table):
 
 
 class EntryTable(Table):
-    """A whole file."""
+    """A file."""
 
     schema_: Literal["bellcrank/entry/1"] = Field(alias="schema")
     name: str
@@ -89,13 +94,7 @@ class EntryTable(Table):
 
 
 def entry_to_dict(entry: Entry) -> dict[str, Any]:
-    """Return an entry as plain data, ready for JSON."""
-    check, lever = entry.validation, entry.lever
-    measured = {
-        name: getattr(check, name)
-        for name in FrameTable.model_fields
-        if name not in ("level", "warnings")
-    }
+    """Return an entry as plain data for JSON."""
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "name": entry.name,
@@ -104,45 +103,35 @@ def entry_to_dict(entry: Entry) -> dict[str, Any]:
         "kind": entry.kind,
         "design": design_to_dict(entry.design),
         "characterisation": characterisation_to_dict(entry.characterisation),
-        "validation": {
-            "level": "frame",
-            **measured,
-            "efficiency": _finite(check.efficiency),
-            "linear_efficiency": _finite(check.linear_efficiency),
-            "warnings": list(check.warnings),
-        },
-        "lever": {
-            "efficiency": _finite(lever.efficiency),
-            "unbound_efficiency": _finite(lever.unbound_efficiency),
-            "shape": lever.shape,
-            "mask": lever.mask,
-            "better": entry.better,
-        },
+        "validation": {"level": "frame", **_nan_to_null(asdict(entry.validation))},
+        "lever": {**_nan_to_null(asdict(entry.lever)), "better": entry.better},
         "provenance": dict(entry.provenance),
     }
+    data["validation"]["warnings"] = list(entry.validation.warnings)
     return {**data, "checksum": checksum(data)}
 
 
 def entry_from_dict(data: Mapping[str, Any], source: str) -> Entry:
-    """Read plain data back.
+    """Return the entry of plain data.
 
     Parameters
     ----------
     data
-        As `entry_to_dict` makes it.
+        Data in the form of `entry_to_dict`.
     source
-        What to call it in an error, usually the file.
+        Name in error messages, usually the file.
 
     Raises
     ------
     InvalidFile
-        If it is no entry, or has been changed since it was written.
+        If the data are not an entry, or were changed.
     InvalidProblem
-        If the problem in it is impossible.
+        If its problem is invalid.
     """
     table = checked_table(data, source)
     design = design_from_dict(table.design, f"{source}: design")
-    check, lever = table.validation, table.lever
+    check = _null_to_nan(table.validation.model_dump(exclude={"level"}))
+    lever = _null_to_nan(table.lever.model_dump(exclude={"better"}))
     entry = Entry(
         design=design,
         direction=table.direction,
@@ -151,35 +140,25 @@ def entry_from_dict(data: Mapping[str, Any], source: str) -> Entry:
         characterisation=characterisation_from_dict(
             table.characterisation, f"{source}: characterisation"
         ),
-        validation=FrameCheck(
-            **{
-                **check.model_dump(exclude={"level"}),
-                "efficiency": _number(check.efficiency),
-                "linear_efficiency": _number(check.linear_efficiency),
-                "warnings": tuple(check.warnings),
-            }
-        ),
-        lever=LeverCheck(
-            _number(lever.efficiency), _number(lever.unbound_efficiency), lever.shape, lever.mask
-        ),
+        validation=FrameResult(**{**check, "warnings": tuple(table.validation.warnings)}),
+        lever=LeverResult(**lever),
         provenance=dict(table.provenance),
     )
     if entry.name != table.name:
         raise InvalidFile(
-            f"{source}: name: expected {entry.name!r}, which its problem, beams and kind make, got "
+            f"{source}: name: expected {entry.name!r} from its problem, beams and kind, got "
             f"{table.name!r}; {CHANGED}"
         )
     found = entry.characterisation
     if (found.problem_hash, found.mask) != (design.problem.hash, design.mask_hex):
-        raise InvalidFile(f"{source}: characterisation: is that of another design; {CHANGED}")
+        raise InvalidFile(f"{source}: characterisation: belongs to another design; {CHANGED}")
     return entry
 
 
-CHANGED = "the file was changed or damaged: make the entry anew (bellcrank library add DESIGN)"
-
-
 def checked_table(data: Mapping[str, Any], source: str) -> EntryTable:
-    """Read the tables of an entry, but not yet what its design and two-port say.
+    """Return the table of an entry, after verification of its checksum.
+
+    The keys ``design`` and ``characterisation`` are not parsed.
 
     Raises
     ------
@@ -187,7 +166,7 @@ def checked_table(data: Mapping[str, Any], source: str) -> EntryTable:
     """
     table = parse(EntryTable, data, source)
     if checksum({key: value for key, value in data.items() if key != "checksum"}) != table.checksum:
-        raise InvalidFile(f"{source}: checksum: does not fit the content; {CHANGED}")
+        raise InvalidFile(f"{source}: checksum: does not match the content; {CHANGED}")
     try:
         check_direction(table.direction)
         check_kind(table.kind)
@@ -197,8 +176,19 @@ def checked_table(data: Mapping[str, Any], source: str) -> EntryTable:
 
 
 def checksum(data: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of plain data, shortened to 16 digits."""
+    """Return the first 16 hexadecimal digits of the SHA-256 hash of plain data."""
     return hashlib.sha256(canonical(data).encode()).hexdigest()[:16]
+
+
+def check_file_name(path: str | os.PathLike[str], name: str) -> None:
+    """Check that a file has the name of its entry.
+
+    Raises
+    ------
+    InvalidFile
+    """
+    if Path(path).stem != name:
+        raise InvalidFile(f"{path}: expected the file name {name}.json, the name of its entry")
 
 
 def read_entry(path: str | os.PathLike[str]) -> Entry:
@@ -207,21 +197,20 @@ def read_entry(path: str | os.PathLike[str]) -> Entry:
     Raises
     ------
     InvalidFile, InvalidProblem
-        As `entry_from_dict`, and if the file is not called like the entry in it.
+        As `entry_from_dict`, and if the file does not have the name of its entry.
     """
     entry = entry_from_dict(read_json(path), str(path))
-    if Path(path).stem != entry.name:
-        raise InvalidFile(f"{path}: holds the entry {entry.name}, and must be called like it")
+    check_file_name(path, entry.name)
     return entry
 
 
 def write_entry(entry: Entry, folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-    """Write an entry into a folder, under its name; whole or not at all.
+    """Write an entry into a folder under its name, atomically.
 
     Returns
     -------
     Path
-        Of the file.
+        The file.
 
     Raises
     ------
@@ -233,9 +222,16 @@ def write_entry(entry: Entry, folder: str | os.PathLike[str], *, overwrite: bool
     return path
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _nan_to_null(values: dict[str, Any]) -> dict[str, Any]:
+    """Replace nan by None in the efficiencies."""
+    return {
+        key: None if key.endswith("efficiency") and not math.isfinite(value) else value
+        for key, value in values.items()
+    }
 
 
-def _number(value: float | None) -> float:
-    return math.nan if value is None else value
+def _null_to_nan(values: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: math.nan if key.endswith("efficiency") and value is None else value
+        for key, value in values.items()
+    }

@@ -1,19 +1,17 @@
-"""The plain lever: what a design of the library must beat.
+"""The plain lever: the design that entries of the library are compared with.
 
-Drawn from lever mechanics, and from nothing that a search found. Stiff arms of triangulated struts
-turn about a pivot, a single node of the support, and hold the output. An input that only goes
-straight cannot be part of what turns, so a lever proper takes its motion by a *link*, a straight
-row of struts along a line of the lattice from a corner of the input to the *knee* of the lever.
-Then with r from the pivot, d the direction of the link, t_in and t_out those of the ports, and x
-the cross product,
+A plain lever follows from lever mechanics, without a search. Stiff arms of triangulated struts
+rotate about a pivot, a single supported node, and carry the output. An input that only translates
+cannot be part of the rotating arms; a *link*, a straight row of struts along a line of the lattice,
+connects a node of the input with the *knee* of the lever. With r measured from the pivot, d the
+direction of the link, t_in and t_out the directions of the ports, and x the cross product,
 
     efficiency = (d . t_in) (t_out . (z x r_output)) / (d . (z x r_knee)).
 
-The family has simpler members, welded to the input, that must bend: a bar from port to port, with
-and without a stay, a bell crank, a triangle. Of all members the most efficient is taken, by the
-same mechanics and under the same load as the design that it is compared with: a strong member of
-the family rather than a typical one. There are directions that no lever makes well; its
-efficiency there is about 0, or below.
+The family also contains simpler shapes that are welded to the input and must bend: a bar from port
+to port, with and without a stay, a bell crank, and a triangle. The plain lever is the most
+efficient member of the family, by the same mechanics and under the same load as the design that it
+is compared with. In some directions every lever is poor, with an efficiency near or below 0.
 """
 
 from __future__ import annotations
@@ -46,33 +44,33 @@ ARMS = {
     "bar with a stay at the output": (("pivot", "output"), ("input", "output")),
     "triangle": (("pivot", "input"), ("pivot", "output"), ("input", "output")),
 }
-"""Of each member of the family: from where to where; only the first has a link."""
-WIDTH = 0.9
-"""How far from the middle of an arm its nodes may be, in spacings: two rows at least."""
-LEAST_ARM = 1.5
-"""Of a knee from the pivot, in spacings."""
-LINK = (2, 8)
-"""Struts of a link, at least and at most."""
-STEEPEST = 0.35
-"""Least part of the input's motion that a link must take along."""
-DEAD = 1e-9
-"""Lever arm of a link, by its length, that is none."""
-MOST_PIVOTS = 24
-"""More support nodes than that are thinned out evenly."""
+"""Ends of the arms of each shape; only the first shape has a link."""
+HALF_WIDTH = 0.9
+"""Largest distance of a node from the axis of its arm, in spacings: at least two rows of nodes."""
+MIN_ARM = 1.5
+"""Smallest distance of the knee from the pivot, in spacings."""
+LINK_LENGTHS = (2, 8)
+"""Smallest and largest number of struts of a link."""
+MIN_ALIGNMENT = 0.35
+"""Smallest cosine of the angle between a link and the input direction."""
+DEAD_POINT = 1e-9
+"""Lever arm of a link, relative to its length, below which the lever is at a dead point."""
+MAX_PIVOTS = 24
+"""Largest number of pivots; more supported nodes are sampled evenly."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What a lever is made of.
+    """Shape of a lever.
 
     Parameters
     ----------
     arms
         A key of `ARMS`.
     pivot
-        Node of the support that it turns about; None for a bar that hangs between the ports.
+        Supported node that it rotates about; None for a bar between the ports.
     link
-        Nodes from the input to the knee; empty where there is none.
+        Nodes from the input to the knee; empty without a link.
 
     Examples
     --------
@@ -86,7 +84,7 @@ class Shape:
 
     @property
     def label(self) -> str:
-        """In words."""
+        """Description of the shape."""
         place = "" if self.pivot is None else f" about node {self.pivot}"
         return self.arms + place + (f", by a link of {len(self.link) - 1} struts" * bool(self.link))
 
@@ -96,13 +94,15 @@ def plain_lever(problem: Problem, goals: Sequence[str] = ()) -> Design:
 
     Parameters
     ----------
+    problem
+        Problem with fixed supports.
     goals
-        What it must keep, as a search would.
+        Constraints that it must satisfy.
 
     Raises
     ------
     InvalidSettings
-        If no lever of the family is stable and keeps the goals.
+        If no lever of the family is stable and satisfies the constraints.
 
     Examples
     --------
@@ -111,26 +111,26 @@ def plain_lever(problem: Problem, goals: Sequence[str] = ()) -> Design:
     >>> lever.provenance["pivot"] in range(7), lever.efficiency > 1.0
     (True, True)
     """
-    judge = ConstrainedEvaluator([LoadCase(problem)], goals)
+    evaluator = ConstrainedEvaluator([LoadCase(problem)], goals)
     best: Design | None = None
     for shape in shapes(problem):
         lever = lever_of(problem, shape)
-        response = judge.evaluate(lever.mask, VERIFICATION_INCREMENT)
+        response = evaluator.evaluate(lever.mask, VERIFICATION_INCREMENT)
         if response.status is not Status.CONVERGED:
             continue
         if best is None or best.efficiency is None or response.efficiency > best.efficiency:
             best = replace(lever, efficiency=response.efficiency)
     if best is None:
-        what = f"is stable and keeps {', '.join(goals)}" if goals else "is stable"
+        what = f"is stable and satisfies {', '.join(goals)}" if goals else "is stable"
         raise InvalidSettings(f"{problem.name}: no plain lever {what}")
     return best
 
 
 def shapes(problem: Problem) -> Iterator[Shape]:
-    """Yield all levers of the family, as shapes."""
+    """Yield the shapes of all levers of the family."""
     pivots = problem.supports.fixed
-    if len(pivots) > MOST_PIVOTS:
-        pivots = pivots[np.linspace(0, len(pivots) - 1, MOST_PIVOTS).round().astype(np.int64)]
+    if len(pivots) > MAX_PIVOTS:
+        pivots = pivots[np.linspace(0, len(pivots) - 1, MAX_PIVOTS).round().astype(np.int64)]
     links = list(_links(problem))
     positions, spacing = problem.lattice.positions, _spacing(problem)
     for arms in ARMS:
@@ -139,12 +139,12 @@ def shapes(problem: Problem) -> Iterator[Shape]:
         elif arms != LEVER:
             yield from (Shape(arms, pivot) for pivot in pivots.tolist())
     for pivot, link in itertools.product(pivots.tolist(), links):
-        if np.hypot(*(positions[link[-1]] - positions[pivot])) > LEAST_ARM * spacing:
+        if np.hypot(*(positions[link[-1]] - positions[pivot])) > MIN_ARM * spacing:
             yield Shape(LEVER, pivot, link)
 
 
 def lever_of(problem: Problem, shape: Shape) -> Design:
-    """Return a lever as a design: its arms, its link, both ports whole.
+    """Return the design of a lever: its arms, its link, and both complete ports.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def lever_of(problem: Problem, shape: Shape) -> Design:
         "output": lattice.positions[problem.output.nodes].mean(axis=0),
     }
     if shape.link:
-        # What turns keeps off what goes straight, but for the knee.
+        # The rotating arms share only the knee with the translating link and input.
         taken[problem.input.nodes] = taken[list(shape.link)] = True
         ends["knee"] = lattice.positions[shape.link[-1]]
         taken[shape.link[-1]] = False
@@ -171,7 +171,7 @@ def lever_of(problem: Problem, shape: Shape) -> Design:
     body = np.zeros(lattice.node_count, dtype=np.bool_)
     for start, stop in ARMS[shape.arms]:
         away = _distance(lattice.positions, ends[start], ends[stop])
-        body |= away < WIDTH * _spacing(problem)
+        body |= away < HALF_WIDTH * _spacing(problem)
     body[problem.output.nodes] = True
     body &= ~taken
     given = np.isin(np.arange(lattice.node_count), problem.input.nodes)
@@ -181,7 +181,7 @@ def lever_of(problem: Problem, shape: Shape) -> Design:
     mask[_beams_along(problem, shape.link)] = True
     provenance = {
         "kind": "lever",
-        "origin": f"drawn from lever mechanics: {shape.label}",
+        "origin": f"from lever mechanics: {shape.label}",
         "arms": shape.arms,
         "pivot": shape.pivot,
         "link": list(shape.link),
@@ -192,12 +192,12 @@ def lever_of(problem: Problem, shape: Shape) -> Design:
 def lever_law(problem: Problem, shape: Shape) -> float:
     """Return the efficiency of a lever with rigid arms, a rigid link and free joints.
 
-    Infinite at a dead point, where the link points at the pivot.
+    The efficiency is infinite at a dead point, where the link points at the pivot.
 
     Raises
     ------
     InvalidSettings
-        If it has no link.
+        If the shape has no link.
 
     Examples
     --------
@@ -208,24 +208,24 @@ def lever_law(problem: Problem, shape: Shape) -> float:
     True
     """
     if shape.pivot is None or not shape.link:
-        raise InvalidSettings(f"{shape.label}: has no joints, and so no law")
+        raise InvalidSettings(f"{shape.label}: expected a shape with a pivot and a link")
     positions = problem.lattice.positions
     pivot, first, knee = positions[[shape.pivot, shape.link[0], shape.link[-1]]]
     along = knee - first
     output = positions[problem.output.nodes].mean(axis=0)
     given = along @ problem.input.direction.mean(axis=0)
-    wanted = _turned(output - pivot) @ problem.output.direction.mean(axis=0)
-    arm = along @ _turned(knee - pivot)
-    return float(given * wanted / arm) if abs(arm) > DEAD * float(along @ along) else math.inf
+    wanted = _rotated(output - pivot) @ problem.output.direction.mean(axis=0)
+    arm = along @ _rotated(knee - pivot)
+    return float(given * wanted / arm) if abs(arm) > DEAD_POINT * float(along @ along) else math.inf
 
 
-def _turned(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2,) a vector turned by 90 degrees: its motion in a unit rotation."""
+def _rotated(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2,) a vector rotated by 90 degrees: its velocity in a unit rotation."""
     return np.array([-vector[1], vector[0]])
 
 
 def _at_ports(problem: Problem) -> NDArray[np.bool_]:
-    """(M,) the beams at the ports that every design of the problem has."""
+    """(M,) whether a beam is at a port and belongs to every design of the problem."""
     lattice = problem.lattice
     kept = problem.initial & lattice.beams_touching(
         np.concatenate([problem.input.nodes, problem.output.nodes])
@@ -240,7 +240,7 @@ def _spacing(problem: Problem) -> float:
 
 
 def _links(problem: Problem) -> Iterator[tuple[int, ...]]:
-    """Yield straight rows of nodes that lead away from the input, to where it pushes."""
+    """Yield straight rows of nodes from the input, roughly along its direction."""
     lattice = problem.lattice
     neighbours: list[list[int]] = [[] for _ in range(lattice.node_count)]
     for first, second in lattice.beams.tolist():
@@ -252,11 +252,11 @@ def _links(problem: Problem) -> Iterator[tuple[int, ...]]:
     for corner in problem.input.nodes.tolist():
         for second in neighbours[corner]:
             way = lattice.positions[second] - lattice.positions[corner]
-            if second in closed or abs(way @ push) < STEEPEST * np.hypot(*way):
+            if second in closed or abs(way @ push) < MIN_ALIGNMENT * np.hypot(*way):
                 continue
             row = [corner, second]
-            while len(row) <= LINK[1]:
-                if len(row) > LINK[0]:
+            while len(row) <= LINK_LENGTHS[1]:
+                if len(row) > LINK_LENGTHS[0]:
                     yield tuple(row)
                 ahead = [
                     node
@@ -269,13 +269,13 @@ def _links(problem: Problem) -> Iterator[tuple[int, ...]]:
 
 
 def _straight(positions: NDArray[np.float64], row: list[int], node: int) -> bool:
-    """Whether a node goes on with a row in its direction."""
+    """Whether a node continues a row in its direction."""
     before, after = positions[row[-1]] - positions[row[-2]], positions[node] - positions[row[-1]]
     return bool(before @ after > 0.99 * np.hypot(*before) * np.hypot(*after))
 
 
 def _beams_along(problem: Problem, row: Sequence[int]) -> NDArray[np.int64]:
-    """(n,) the beams between each two nodes of a row."""
+    """(n,) numbers of the beams between successive nodes of a row."""
     pairs = {frozenset(pair) for pair in itertools.pairwise(row)}
     return np.array(
         [
@@ -290,7 +290,7 @@ def _beams_along(problem: Problem, row: Sequence[int]) -> NDArray[np.int64]:
 def _distance(
     points: NDArray[np.float64], start: NDArray[np.float64], stop: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(n,) from each point to a segment."""
+    """(n,) distance of points from a segment."""
     way = stop - start
     part = np.clip((points - start) @ way / (way @ way), 0.0, 1.0)
     away: NDArray[np.float64] = np.linalg.norm(points - start - part[:, None] * way, axis=1)

@@ -1,7 +1,7 @@
-"""Small drawings of designs, at rest and moved, as SVG of a few kilobytes.
+"""Small SVG drawings of designs, at rest and moved.
 
-Coordinates are whole numbers, 20 a spacing. The paths at rest and moved have the same numbers of
-points in the same order, so that a page can move one into the other.
+Coordinates are integers, with 20 units per lattice spacing. The paths at rest and moved have the
+same points in the same order, so that a page can interpolate between them.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from bellcrank.plots.scene import Arrow
 
 UNITS = 20
-"""Of a drawing, in a spacing."""
+"""Drawing units per lattice spacing."""
 HEAD = 11.0
-"""Length of the head of an arrow, in those units."""
+"""Length of an arrowhead in drawing units."""
 STYLE = """
 svg{--rest:#d5dae0;--ink:#20262d;--in:#d55e00;--out:#0072b2;--ground:#c3c9d0;--back:#fff}
 @media(prefers-color-scheme:dark){svg{--rest:#3a424b;--ink:#e3e8ee;--in:#ff9352;--out:#63b7f2;\
@@ -44,19 +44,19 @@ path{fill:none;stroke-linecap:round;stroke-linejoin:round;stroke-width:4.2}
 
 @dataclass(frozen=True, slots=True)
 class Thumbnail:
-    """A drawing in parts.
+    """Paths of a drawing.
 
     Parameters
     ----------
     view_box
-        Of the SVG.
+        View box of the SVG.
     rest, moved
-        Paths of the beams that carry load: by ``"m"`` those of the structure, ``"i"`` of the input,
-        ``"o"`` of the output.
+        Paths of the loaded beams: ``"m"`` of the structure, ``"i"`` of the input, ``"o"`` of the
+        output.
     ground
-        A path along each row of supports.
+        Path along each row of supports.
     arrows
-        Paths of the push, ``"i"``, and of where the output should go, ``"o"``.
+        Arrows in the input direction, ``"i"``, and in the output direction, ``"o"``.
     """
 
     view_box: str
@@ -67,7 +67,7 @@ class Thumbnail:
 
     @property
     def content(self) -> str:
-        """What is inside of the SVG, in the classes of `STYLE`; the moved paths know their rest."""
+        """Content of the SVG, with the classes of `STYLE`; moved paths include those at rest."""
         rest = "".join(self.rest.values())
         parts = [f'<path class="g" d="{self.ground}"/>', f'<path class="r" d="{rest}"/>']
         parts += [
@@ -82,7 +82,7 @@ class Thumbnail:
         return "".join(parts)
 
     def svg(self, label: str) -> str:
-        """Return a file of its own, in the colours that the reader prefers."""
+        """Return an SVG file, in the light or dark colours that the reader prefers."""
         still = self.content
         for name in self.moved:
             still = still.replace(f' data-r="{self.rest[name]}"', "")
@@ -93,12 +93,14 @@ class Thumbnail:
 
 
 def thumbnail(design: Design, displacement: NDArray[np.float64]) -> Thumbnail:
-    """Draw a design and where it moves.
+    """Draw a design at rest and moved.
 
     Parameters
     ----------
+    design
+        Design to draw.
     displacement : (N, 2)
-        Of its nodes, drawn to scale.
+        Displacement of its nodes, drawn to scale; nan counts as zero.
 
     Examples
     --------
@@ -121,7 +123,7 @@ def thumbnail(design: Design, displacement: NDArray[np.float64]) -> Thumbnail:
     groups = {"m": ends[~of_input & ~of_output], "i": ends[of_input], "o": ends[of_output]}
     arrows = {"i": input_arrows(problem), "o": output_arrows(problem, places)}
     tips = np.array([point for each in arrows.values() for a in each for point in (a.tail, a.tip)])
-    # Room for an arrow to any side of the ports, so that drawings of a size are to one scale.
+    # Space for an arrow in any direction gives drawings of one lattice size the same scale.
     room = int(scale * arrow_length(problem)) + np.array([UNITS // 2, 0])
     sides = [rest.min(axis=0) - room, rest.max(axis=0) + np.array([UNITS // 2, 0])]
     corners = np.concatenate([rest, moved, (tips * flip).round().astype(np.int64), sides])
@@ -139,12 +141,12 @@ def thumbnail(design: Design, displacement: NDArray[np.float64]) -> Thumbnail:
 
 
 def _path(segments: Iterable[NDArray[np.int64]]) -> str:
-    """Return lines (n, 2, 2) as one path, each number on its own."""
+    """Return lines (n, 2, 2) as one path."""
     return "".join(f"M{x0} {y0}L{x1} {y1}" for (x0, y0), (x1, y1) in np.asarray(segments).tolist())
 
 
 def _arrow(arrow: Arrow, flip: NDArray[np.float64]) -> str:
-    """Return a shaft and a head."""
+    """Return the path of an arrow."""
     tail, tip = np.array(arrow.tail) * flip, np.array(arrow.tip) * flip
     along = (tip - tail) / max(float(np.hypot(*(tip - tail))), 1e-9)
     across = np.array([-along[1], along[0]])

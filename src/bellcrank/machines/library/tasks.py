@@ -1,4 +1,4 @@
-"""What entries to make: tasks, and how long to search for each."""
+"""Searches for entries: one problem for each direction, size and kind."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.machines.elementary import DIRECTIONS, elementary
-from bellcrank.machines.library.entry import stem
-from bellcrank.machines.library.kinds import Kind, kinds
+from bellcrank.machines.library.entry import kinds, stem
 from bellcrank.machines.library.lever import plain_lever
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.search import HoppingSettings
@@ -22,12 +21,17 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
-    """One entry to make.
+class EntryTask:
+    """The task of making one entry.
+
+    Parameters
+    ----------
+    direction, columns, kind
+        Properties of the entry.
 
     Examples
     --------
-    >>> Task("up", 9, "loaded").problem().name
+    >>> EntryTask("up", 9, "loaded").problem().name
     'elementary-9-up-loaded'
     """
 
@@ -37,11 +41,11 @@ class Task:
 
     @property
     def name(self) -> str:
-        """With which the name of the entry begins."""
+        """Name of the entry without its hash."""
         return stem(self.direction, self.columns, self.kind)
 
     def problem(self) -> Problem:
-        """Return what the search is given: it may leave supports unused, as levers do."""
+        """Return the problem of the search; beams at unused supports may be removed."""
         given = elementary(self.columns, self.direction, kinds[self.kind].spring)
         lattice = given.lattice
         held = np.isin(lattice.beams, given.supports.nodes).all(axis=1)
@@ -49,10 +53,10 @@ class Task:
         return replace(given, designable=np.flatnonzero(~held & ~at_ports))
 
     def starts(self, chains: int) -> dict[str, tuple[Problem, int]]:
-        """Return what searches begin with, and how many chains: the full lattice, and a lever.
+        """Return the initial designs of the searches, each with a number of chains.
 
-        Half of the chains are given the plain lever, if there is one. What it is good at is far
-        from the full lattice.
+        Half of the chains start from the full lattice, half from the plain lever if there is
+        one. Designs near the lever are hard to reach from the full lattice.
         """
         problem = self.problem()
         for goals in (kinds[self.kind].goals, ()):
@@ -63,26 +67,26 @@ class Task:
             return {"full": (problem, chains)}
         initial = problem.initial.copy()
         initial[problem.designable] = lever.mask[problem.designable]
-        begun = {
+        # With the complete port the lever may snap; a search cannot start there.
+        if SpringEvaluator(problem).evaluate(initial).status is not Status.CONVERGED:
+            return {"full": (problem, chains)}
+        starts = {
             "full": (problem, chains - chains // 2),
             "lever": (replace(problem, initial=initial), chains // 2),
         }
-        if SpringEvaluator(problem).evaluate(initial).status is not Status.CONVERGED:
-            # The whole port makes it snap, or so nearly that no search would begin there.
-            return {"full": (problem, chains)}
-        return {name: start for name, start in begun.items() if start[1]}
+        return {name: start for name, start in starts.items() if start[1]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
-    """What entries to make, and how long to search for each.
+class MakeSettings:
+    """Entries to make, and the length of each search.
 
     Parameters
     ----------
     directions, columns, kinds
-        An entry for each combination.
+        One entry is made for each combination.
     steps, chains, seed
-        Of each search.
+        Settings of each search.
 
     Raises
     ------
@@ -90,7 +94,7 @@ class Order:
 
     Examples
     --------
-    >>> len(Order().tasks)
+    >>> len(MakeSettings().tasks)
     72
     """
 
@@ -104,20 +108,20 @@ class Order:
     def __post_init__(self) -> None:
         for task in self.tasks:
             task.problem()
-            self.settings(kinds[task.kind])
+            self.search_settings(task.kind)
 
     @property
-    def tasks(self) -> list[Task]:
-        """Of one size after the other."""
+    def tasks(self) -> list[EntryTask]:
+        """The tasks, one size after the other."""
         return [
-            Task(direction, columns, kind)
+            EntryTask(direction, columns, kind)
             for columns in self.columns
             for direction in self.directions
             for kind in self.kinds
         ]
 
-    def settings(self, kind: Kind) -> SearchSettings:
-        """Return what the search for a kind is told."""
+    def search_settings(self, kind: str) -> SearchSettings:
+        """Return the settings of the search for a kind."""
         return HoppingSettings(
-            steps=self.steps, chains=self.chains, seed=self.seed, goals=kind.goals
+            steps=self.steps, chains=self.chains, seed=self.seed, goals=kinds[kind].goals
         )

@@ -1,4 +1,4 @@
-"""From a design to an entry: two-port, finite elements, plain lever."""
+"""Measurement of an entry: two-port, frame analyses, plain lever."""
 
 from __future__ import annotations
 
@@ -8,9 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings
-from bellcrank.machines.characterise import characterise
-from bellcrank.machines.library.entry import Entry, FrameCheck, LeverCheck, direction_of
-from bellcrank.machines.library.kinds import OWN, kinds
+from bellcrank.machines.characterisation import characterise
+from bellcrank.machines.library.entry import (
+    OWN,
+    Entry,
+    FrameResult,
+    LeverResult,
+    direction_of,
+    kinds,
+)
 from bellcrank.machines.library.lever import plain_lever
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.provenance import provenance
@@ -22,8 +28,8 @@ if TYPE_CHECKING:
     from bellcrank.model import Design, Problem
     from bellcrank.part import PartSpec
 
-LEAST_STIFFNESS = 1e-6
-"""Of an input: below it an actuator is a mechanism that follows its input and resists nothing."""
+MIN_INPUT_STIFFNESS = 1e-6
+"""Input stiffness below which a design is a mechanism without resistance."""
 
 
 def measure(
@@ -35,21 +41,23 @@ def measure(
     points: int = 20,
     notes: dict[str, Any] | None = None,
 ) -> Entry:
-    """Find out what an entry says of a design.
+    """Return the entry of a design, with all its results.
 
     Parameters
     ----------
+    design
+        Actuator.
     direction, columns, kind
-        Of its task; by default those of somebody's own design.
+        Properties of its task; by default those of a design of the user.
     points
-        Along the curves of the two-port.
+        Number of points of the curves of the two-port.
     notes
-        More to be kept in the provenance.
+        Additional items of the provenance.
 
     Raises
     ------
     InvalidSettings
-        If the design snaps, is a mechanism or cannot be built.
+        If the design snaps, has no input or output stiffness, or cannot be built.
 
     Examples
     --------
@@ -61,11 +69,11 @@ def measure(
     problem = design.problem
     response = SpringEvaluator(problem).evaluate(design.mask, VERIFICATION_INCREMENT)
     if response.status is not Status.CONVERGED:
-        raise InvalidSettings(f"{problem.name}: no actuator to rely on: {response.status.message}")
+        raise InvalidSettings(f"{problem.name}: not a usable actuator: {response.status.message}")
     found = characterise(design, points=points)
-    if not found.rest.connected or found.rest.input_stiffness < LEAST_STIFFNESS:
-        what = "input" if found.rest.connected else "output"
-        raise InvalidSettings(f"{problem.name}: no actuator, for nothing resists its {what}")
+    if not found.rest.connected or found.rest.input_stiffness < MIN_INPUT_STIFFNESS:
+        port = "input" if found.rest.connected else "output"
+        raise InvalidSettings(f"{problem.name}: not a usable actuator: nothing resists its {port}")
     origin = dict(design.provenance)
     return Entry(
         design=replace(design, efficiency=response.efficiency, provenance={}),
@@ -73,14 +81,14 @@ def measure(
         columns=columns,
         kind=kind,
         characterisation=replace(found, provenance={}),
-        validation=frame_check(design, spec_for(design)),
-        lever=lever_check(problem, () if kind == OWN else kinds[kind].goals),
+        validation=frame_result(design, spec_for(design)),
+        lever=lever_result(problem, () if kind == OWN else kinds[kind].goals),
         provenance={**provenance(**(notes or {})), **({"design": origin} if origin else {})},
     )
 
 
-def frame_check(design: Design, spec: PartSpec) -> FrameCheck:
-    """Analyse the part that a design becomes as frames, for large and for small motions.
+def frame_result(design: Design, spec: PartSpec) -> FrameResult:
+    """Analyse the part of a design as a frame, nonlinear and linear.
 
     Raises
     ------
@@ -89,7 +97,7 @@ def frame_check(design: Design, spec: PartSpec) -> FrameCheck:
     plan = [("frame", FemSettings()), ("frame", FemSettings(linear=True))]
     found = validate(design, spec, plan)
     large, small = found.analyses
-    return FrameCheck(
+    return FrameResult(
         status=large.status.value,
         reached=float(large.last.load),
         efficiency=float(large.efficiency),
@@ -106,12 +114,12 @@ def frame_check(design: Design, spec: PartSpec) -> FrameCheck:
     )
 
 
-def lever_check(problem: Problem, goals: Sequence[str] = ()) -> LeverCheck:
-    """Return how well the plain lever does, with the goals of a kind and without."""
+def lever_result(problem: Problem, goals: Sequence[str] = ()) -> LeverResult:
+    """Return the result of the plain lever, with constraints and without."""
     bound, unbound = _lever(problem, goals), _lever(problem, ()) if goals else None
     if bound is None:
-        return LeverCheck(math.nan, _efficiency(unbound))
-    return LeverCheck(
+        return LeverResult(math.nan, _efficiency(unbound))
+    return LeverResult(
         efficiency=_efficiency(bound),
         unbound_efficiency=_efficiency(unbound if goals else bound),
         shape=str(bound.provenance["origin"]),

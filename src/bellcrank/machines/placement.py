@@ -1,9 +1,9 @@
-"""Parts in their places: mirrored, turned, scaled and moved.
+"""Placement of parts: reflection, rotation, scaling and translation.
 
 Examples
 --------
->>> turned = Placement(rotate=60, shift=np.array([1.0, 0.0]))
->>> turned.positions(np.array([[1.0, 0.0]])).round(3)
+>>> rotated = Placement(rotate=60, shift=np.array([1.0, 0.0]))
+>>> rotated.positions(np.array([[1.0, 0.0]])).round(3)
 array([[1.5  , 0.866]])
 """
 
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import BellcrankError, InvalidFile
-from bellcrank.machines.plan import TURN, port_name
+from bellcrank.machines.plan import ROTATION_STEP, port_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,23 +29,23 @@ if TYPE_CHECKING:
 HALF = math.sqrt(3.0) / 2.0
 COSINE = (1.0, 0.5, -0.5, -1.0, -0.5, 0.5)
 SINE = (0.0, HALF, HALF, 0.0, -HALF, -HALF)
-"""Of multiples of 60 degrees, to the last bit the same for opposite ones."""
+"""Values at multiples of 60 degrees, equal to the last bit for opposite angles."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """A motion of the plane: mirror left to right, turn, scale, shift.
+    """A similarity transformation: reflect, rotate, scale, translate.
 
     Parameters
     ----------
     mirror
-        Whether x changes its sign, first of all.
+        Whether the sign of x is changed first.
     rotate
-        Degrees, counter-clockwise, a multiple of 60.
+        Rotation in degrees, counter-clockwise, a multiple of 60.
     scale
-        How many times as large.
+        Scale factor.
     shift : (2,) float64
-        Lattice units of the machine.
+        Translation in lattice units of the machine.
     """
 
     mirror: bool = False
@@ -54,37 +54,37 @@ class Placement:
     shift: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
 
     @property
-    def turn(self) -> NDArray[np.float64]:
-        """(2, 2) orthogonal matrix that directions are multiplied by."""
-        number = self.rotate // TURN % 6
+    def rotation(self) -> NDArray[np.float64]:
+        """(2, 2) orthogonal matrix of reflection and rotation."""
+        number = self.rotate // ROTATION_STEP % 6
         cosine, sine = COSINE[number], SINE[number]
-        turned = np.array([[cosine, -sine], [sine, cosine]])
-        return turned @ np.diag([-1.0, 1.0]) if self.mirror else turned
+        matrix = np.array([[cosine, -sine], [sine, cosine]])
+        return matrix @ np.diag([-1.0, 1.0]) if self.mirror else matrix
 
     def positions(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return where points (n, 2) go."""
+        """Return the transformed points (n, 2)."""
         return self.scale * self.directions(points) + self.shift
 
     def directions(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return how vectors (n, 2) are turned; none gets longer."""
-        turned: NDArray[np.float64] = vectors @ self.turn.T
-        return turned
+        """Return the reflected and rotated vectors (n, 2), of unchanged length."""
+        rotated: NDArray[np.float64] = vectors @ self.rotation.T
+        return rotated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A design in its place.
+    """A design and its placement in a machine.
 
     Parameters
     ----------
     name
-        As the plan calls it.
+        Name of the part in the plan.
     design
-        As it came.
+        Design in its own coordinates.
     placement
-        From its lattice to the machine.
+        Transformation from its coordinates to those of the machine.
     supported
-        Whether its supports hold in the machine.
+        Whether its supports are supports of the machine.
     """
 
     name: str
@@ -94,41 +94,41 @@ class Part:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(N, 2) of its nodes, in the machine."""
+        """(N, 2) node positions in the machine."""
         return self.placement.positions(self.design.problem.lattice.positions)
 
     @property
     def spacing(self) -> float:
-        """Median length of its beams, in the machine."""
+        """Median beam length in the machine."""
         return self.placement.scale * float(np.median(self.design.problem.lattice.rest_length))
 
     def region(self, port: str) -> Input | Output:
-        """Return its input or its output."""
+        """Return the input or the output of the design."""
         problem = self.design.problem
         return problem.input if port == "input" else problem.output
 
     def centre(self, port: str) -> NDArray[np.float64]:
-        """(2,) mean of the positions of a port's nodes, in the machine."""
-        middle: NDArray[np.float64] = self.positions[self.region(port).nodes].mean(axis=0)
-        return middle
+        """(2,) mean position of the nodes of a port, in the machine."""
+        centre: NDArray[np.float64] = self.positions[self.region(port).nodes].mean(axis=0)
+        return centre
 
     def direction(self, port: str) -> NDArray[np.float64]:
-        """(n, 2) of each of a port's nodes, in the machine."""
+        """(n, 2) unit directions of the nodes of a port, in the machine."""
         return self.placement.directions(self.region(port).direction)
 
 
 def place_parts(plan: Plan, find: Callable[[str], Design]) -> dict[str, Part]:
-    """Find the parts of a plan and put them where they belong, in the plan's order.
+    """Return the parts of a plan at their positions, in the order of the plan.
 
     Parameters
     ----------
     find
-        Returns the design that an entry's name or a file stands for.
+        Function from the entry of a part (a name or a file) to its design.
 
     Raises
     ------
     InvalidFile
-        If there is no such entry, or what is there is no design.
+        If an entry does not exist or is not a design, or parts have different stiffness.
     """
     parts: dict[str, Part] = {}
     for name in plan.order:
@@ -146,8 +146,8 @@ def _place(name: str, table: PartTable, design: Design, parts: dict[str, Part]) 
     placement = Placement(table.mirror, table.rotate, table.scale)
     part = Part(name, design, placement, table.supports)
     if table.join is not None:
-        onto = port_name(table.join)
-        target = parts[onto.part].centre(onto.port)
+        joined = port_name(table.join)
+        target = parts[joined.part].centre(joined.port)
     else:
         target = np.array(table.at or [0.0, 0.0])
     shift = target - part.centre(table.by if table.join is not None else "input")
@@ -155,14 +155,14 @@ def _place(name: str, table: PartTable, design: Design, parts: dict[str, Part]) 
 
 
 def _check_stiffness(plan: Plan, parts: dict[str, Part]) -> None:
-    """Refuse parts of other stiffness than the first: a problem has one for all its beams."""
+    """Check that all parts have the stiffness of the first: a problem has one for all beams."""
     first = next(iter(parts.values()))
     own = first.design.problem.stiffness
     for part in parts.values():
         other = part.design.problem.stiffness
         if (other.bond, other.angle) != (own.bond, own.angle):
             raise InvalidFile(
-                f"{plan.source}: parts {first.name} and {part.name} are made of different struts: "
-                f"stiffness {own.bond:g} and {own.angle:g} against {other.bond:g} and "
-                f"{other.angle:g}"
+                f"{plan.source}: parts {first.name} and {part.name} have different stiffness: "
+                f"bond {own.bond:g} and angle {own.angle:g} against {other.bond:g} and "
+                f"{other.angle:g}; all parts of a machine must have the same"
             )

@@ -1,8 +1,8 @@
-"""Machines that come with the package: plans of actuators of the library, by name.
+"""Bundled machines: plans made of library entries and struts, by name.
 
 Examples
 --------
->>> sorted(showcases())
+>>> bundled_machines()
 ['amplifier', 'gripper', 'reverser', 'sorter-left', 'sorter-right', 'wave']
 >>> find_plan("gripper").table.input.ports
 ['left.input']
@@ -22,36 +22,35 @@ from bellcrank.machines.plan import Plan, read_plan
 SUFFIX = ".toml"
 
 
-def showcases() -> list[str]:
-    """Return the names of the machines that come with the package."""
-    here = files("bellcrank.machines.showcases")
-    names = (Path(each.name) for each in here.iterdir())
+def bundled_machines() -> list[str]:
+    """Return the names of the bundled machines, sorted."""
+    names = (Path(each.name) for each in files(__package__).iterdir())
     return sorted(name.stem for name in names if name.suffix == SUFFIX)
 
 
 def find_plan(name_or_path: str) -> Plan:
-    """Return a plan from a file, or one that comes with the package.
+    """Return a plan from a file, or that of a bundled machine.
 
     Raises
     ------
     UnknownName
-        If it is neither.
+        If the name is neither a file nor a bundled machine.
     InvalidFile
         As `bellcrank.machines.read_plan`.
     """
     if Path(name_or_path).is_file() or Path(name_or_path).suffix == SUFFIX:
         return read_plan(name_or_path)
-    if name_or_path not in showcases():
+    if name_or_path not in bundled_machines():
         raise UnknownName(
-            f"no plan {name_or_path!r}: neither a file nor one of {', '.join(showcases())}"
+            f"unknown plan {name_or_path!r}: expected a TOML file or one of "
+            f"{', '.join(bundled_machines())}"
         )
-    source = files("bellcrank.machines.showcases") / f"{name_or_path}{SUFFIX}"
-    with as_file(source) as path:
+    with as_file(files(__package__) / f"{name_or_path}{SUFFIX}") as path:
         return read_plan(path)
 
 
-def showcase(name: str) -> Machine:
-    """Build a machine that comes with the package.
+def bundled_machine(name: str) -> Machine:
+    """Assemble a bundled machine.
 
     Raises
     ------
@@ -59,7 +58,7 @@ def showcase(name: str) -> Machine:
 
     Examples
     --------
-    >>> len(showcase("wave").parts)
+    >>> len(bundled_machine("wave").parts)
     10
     """
     return assemble(find_plan(name), lambda entry: strut_named(entry) or find_entry(entry).design)

@@ -7,7 +7,6 @@ import math
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidFile, OutputExists
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="module")
 def found() -> Characterisation:
-    return characterise(actuator("human:anti-parallel"), points=3, potentials=True)
+    return characterise(actuator("human:anti-parallel"), points=3)
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +44,6 @@ def test_what_is_written_is_read_back_the_same(found: Characterisation, tmp_path
     back = read_characterisation(path)
     assert characterisation_to_dict(back) == characterisation_to_dict(found)
     assert back.rest == found.rest
-    assert back.blocks == pytest.approx(found.blocks, abs=0.0)
-    x = np.array([0.1, -0.01])
-    assert back.potentials["mean"].potential.answer(x).tolist() == (
-        found.potentials["mean"].potential.answer(x).tolist()
-    )
     with pytest.raises(OutputExists):
         write_characterisation(found, path)
     write_characterisation(found, path, overwrite=True)
@@ -85,33 +79,19 @@ BAD = [
     (setting("schema", to="bellcrank/two-port/9"), "schema: expected 'bellcrank/two-port/1'"),
     (setting("colour", to="red"), "unknown key 'colour'"),
     (setting("rest", "efficiency", to="much"), "rest.efficiency: expected a valid number"),
-    (setting("rest", "output_compliance", to=0.0), "rest.output_compliance: expected more than 0"),
-    (setting("rest", "input_stiffness", to=-1.0), "rest.input_stiffness: expected at least 0"),
-    (setting("blocks", 0, 1, to=7.0), "blocks: expected a symmetric matrix"),
-    (setting("blocks", 0, 0, to=-7.0), "blocks: expected a positive semidefinite matrix"),
-    (setting("blocks", 0, to=[1.0]), "blocks: expected rows of equal length"),
-    (setting("blocks", to=[[1.0]]), r"blocks: expected shape \(6, 6\), got \(1, 1\)"),
-    (setting("input", "centre", to=[1.0]), r"input.centre: expected shape \(2,\), got \(1,\)"),
+    (setting("rest", "output_compliance", to=0.0), "rest.output_compliance: .*greater than 0"),
+    (
+        setting("rest", "input_stiffness", to=-1.0),
+        "rest.input_stiffness: expected greater than or equal",
+    ),
+    (setting("input", "centre", to=[1.0]), r"input.centre: .*at least 2 items"),
     (setting("curves", 0, "load", to="heavy"), r"curves\[0\].load 'heavy': expected free"),
-    (setting("curves", 1, "energy", to=[0.0]), r"curves\[1\].energy: expected shape \(4,\)"),
+    (
+        setting("curves", 1, "energy", to=[0.0]),
+        r"curves\[1\].energy: expected as many points as motion, 4, got 1",
+    ),
     (setting("curves", 1, "status", to="fine"), r"curves\[1\].status: expected 'converged'"),
     (setting("drive", to="hand"), "drive: expected 'displacement' or 'force'"),
-    (
-        setting("potentials", "mean", "scale", to=[0.0, 1.0]),
-        "potentials.mean.scale: expected numbers above 0",
-    ),
-    (
-        setting("potentials", "mean", "exponents", 0, to=[-1, 3]),
-        "potentials.mean.exponents: expected none below 0",
-    ),
-    (
-        setting("potentials", "mean", "coefficients", to=[1.0]),
-        r"potentials.mean.exponents: expected shape \(1, 2\)",
-    ),
-    (
-        setting("potentials", "mean", "quadratic", 0, 1, to=9.0),
-        "potentials.mean.quadratic: expected a symmetric matrix",
-    ),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Chains of condensed parts move as the one lattice of all of them."""
+"""Linear assembly of condensed parts against the linear response of the whole lattice."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidFile
-from bellcrank.machines import assemble, elementary, foretell
-from bellcrank.machines.chaining import predict
+from bellcrank.machines import assemble, elementary, linear_assembly
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.plan import MachineTable, PortName, plan_of
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Design
 
 STROKE = 1e-5
-"""Of the input: so small that all is linear."""
+"""Input displacement in the linear range."""
 
 
 def actuator(seed: int, columns: int = 7) -> Design:
@@ -70,12 +69,12 @@ def test_two_parts_chained_move_as_their_lattice(
     machine = build(
         {"a": {"entry": first}, "b": {"entry": second, "join": "a.output", "rotate": rotate}}
     )
-    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=within)
+    assert linear_assembly(machine).efficiency == pytest.approx(whole(machine), rel=within)
 
 
 def test_one_part_alone_is_what_it_is() -> None:
     machine = build({"a": {"entry": "1"}}, output={"ports": ["a.output"]})
-    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
+    assert linear_assembly(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
 
 
 def test_a_longer_chain_too() -> None:
@@ -84,7 +83,7 @@ def test_a_longer_chain_too() -> None:
         parts[name] = {"entry": seed, "join": f"{before}.output"}
     for port in ("a", "c", "d", "b"):
         alone = build(parts, output={"ports": [f"{port}.output"]})
-        expected, found = whole(alone), predict(alone).efficiency
+        expected, found = whole(alone), linear_assembly(alone).efficiency
         assert found == pytest.approx(expected, rel=1e-3, abs=1e-9)
 
 
@@ -104,9 +103,7 @@ def test_three_parts_at_one_joint_share_its_beams_once(links: list[Any], output:
     joint = machine.port_nodes(PortName("a", "output"))
     assert np.isin(inside, joint).all(axis=1).sum() == 12
     # Turned struts have beams in the gaps of others: their springs there are not foreseen.
-    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=0.01)
-    live = foretell(machine, points=1, live=True)
-    assert live.efficiency == pytest.approx(whole(machine), rel=0.01)
+    assert linear_assembly(machine).efficiency == pytest.approx(whole(machine), rel=0.01)
 
 
 def test_a_beam_that_only_one_part_has_in_a_joint_counts() -> None:
@@ -120,7 +117,9 @@ def test_a_beam_that_only_one_part_has_in_a_joint_counts() -> None:
     parts["b"] = replace(parts["b"], design=Design(parts["b"].design.problem, mask))
     lean = replace(machine, parts=parts)
     # Its springs are not quite those of a joint that both have whole; missing it is 13 %.
-    assert predict(lean).efficiency == pytest.approx(predict(machine).efficiency, rel=0.02)
+    assert linear_assembly(lean).efficiency == pytest.approx(
+        linear_assembly(machine).efficiency, rel=0.02
+    )
 
 
 def test_a_bridge_is_an_element_too() -> None:
@@ -128,7 +127,7 @@ def test_a_bridge_is_an_element_too() -> None:
         {"a": {"entry": "1"}, "b": {"entry": "2", "at": [-13.0, 0.0]}},
         [{"from": "a.output", "to": "b.input", "kind": "bridge"}],
     )
-    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
+    assert linear_assembly(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
 
 
 @pytest.mark.parametrize("by", ["input", "output"])
@@ -141,9 +140,11 @@ def test_what_a_cut_part_still_holds_counts_and_no_more(by: str) -> None:
     touching = np.isin(part.problem.lattice.beams, part.problem.input.nodes).sum(axis=1)
     cut = part.with_mask(part.mask & (touching != 1))
     machine = assemble(whole_part.plan, lambda entry: actuator(1) if entry == "1" else cut)
-    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
+    assert linear_assembly(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
     alone = build({"a": {"entry": "1"}}, **ends)
-    free = predict(machine).efficiency == pytest.approx(predict(alone).efficiency, rel=1e-6)
+    free = linear_assembly(machine).efficiency == pytest.approx(
+        linear_assembly(alone).efficiency, rel=1e-6
+    )
     assert free == (by == "input")
 
 
@@ -151,21 +152,21 @@ def test_a_part_can_be_driven_by_its_output() -> None:
     parts = {"a": {"entry": "1"}, "b": {"entry": "2", "join": "a.output", "by": "output",
                                         "mirror": True}}  # fmt: skip
     machine = build(parts, output={"ports": ["b.input"]})
-    assert predict(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
+    assert linear_assembly(machine).efficiency == pytest.approx(whole(machine), rel=1e-3)
 
 
 def test_forces_are_not_chained_yet() -> None:
     pushed = {"ports": ["a.input"], "drive": "force", "amount": 0.01}
     machine = build({"a": {"entry": "1"}}, input=pushed, output={"ports": ["a.output"]})
-    with pytest.raises(InvalidFile, match="driven by a displacement"):
-        predict(machine)
+    with pytest.raises(InvalidFile, match=r"input\.drive: .* expects a displacement, got 'force'"):
+        linear_assembly(machine)
 
 
 def test_what_swings_freely_is_refused() -> None:
     machine = build({"a": {"entry": "1"}, "b": {"entry": "hinged", "at": [-40.0, 0.0]}},
                     output={"ports": ["a.output"]})  # fmt: skip
-    with pytest.raises(InvalidFile, match="something in the machine swings freely"):
-        predict(machine)
+    with pytest.raises(InvalidFile, match="stiffness of the machine is singular"):
+        linear_assembly(machine)
 
 
 def test_two_bridges_from_one_port_count_once_each() -> None:
@@ -176,4 +177,4 @@ def test_two_bridges_from_one_port_count_once_each() -> None:
     links = [{"from": "a.output", "to": f"{end}.input", "kind": "bridge"} for end in "bc"]
     for port in ("a.output", "b.output", "c.output"):
         machine = build(parts, links, output={"ports": [port]})
-        assert predict(machine).efficiency == pytest.approx(whole(machine), rel=0.01)
+        assert linear_assembly(machine).efficiency == pytest.approx(whole(machine), rel=0.01)
