@@ -2,28 +2,28 @@
 A machine of several actuators
 ==============================
 
-Actuators can drive each other. What one does then depends on what it pushes against.
+Actuators can drive each other. The motion of each then depends on the load at its output.
 """
 
 # %%
 # Parts
 # -----
-# The library that comes along holds actuators by direction, size and kind. One is made to be
-# strong, another to be easy to drive.
+# The bundled library contains actuators by direction, size and kind. The first stage needs a loaded
+# output, the last stage a low input force.
 
 from pathlib import Path
 
-from bellcrank.machines import assemble, mean_ports, predict, two_port_at
+from bellcrank.machines import assemble, linear_assembly, mean_ports, two_port_at
 from bellcrank.machines.library import library
 from bellcrank.machines.plan import read_plan
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.plots import draw_motion
 from bellcrank.workflows import motion_of
 
-strong = library().find("down-9-loaded").design
-easy = library().find("down-9-light").design
+loaded = library().find("down-9-loaded").design
+light = library().find("down-9-light").design
 
-for name, design in (("strong", strong), ("easy", easy)):
+for name, design in (("loaded output", loaded), ("low input force", light)):
     element = mean_ports(design)
     port = two_port_at(element, element.rest())
     print(
@@ -32,9 +32,9 @@ for name, design in (("strong", strong), ("easy", easy)):
     )
 
 # %%
-# What the two-ports foretell: the first one's output against the second one's input.
+# Estimate from the two-ports: the output of the first stage works against the input of the second.
 
-first, second = (two_port_at(e, e.rest()) for e in (mean_ports(strong), mean_ports(easy)))
+first, second = (two_port_at(e, e.rest()) for e in (mean_ports(loaded), mean_ports(light)))
 gain = first.efficiency_against(second.input_stiffness) * second.efficiency
 print(f"about {gain:.1f}")
 
@@ -59,17 +59,17 @@ ports = ["first.input"]
 ports = ["second.output"]
 """)
 machine = assemble(read_plan("two-stage.toml"), lambda entry: library().find(entry).design)
-print(f"by all nodes of the ports: {predict(machine).efficiency:.2f}")
+print(f"linear assembly: {linear_assembly(machine).efficiency:.2f}")
 
 # %%
 # One lattice
 # -----------
-# The machine is an ordinary design: one piece, which every other command takes.
+# The machine is an ordinary design, which every command accepts.
 
 response = SpringEvaluator(machine.design.problem).evaluate(machine.design.mask)
-print(f"the whole lattice, along its whole stroke: {response.efficiency:.2f}")
+print(f"simulation at the full stroke: {response.efficiency:.2f}")
 draw_motion(motion_of(machine.design), "two-stage.png", title="two stages")
 
 # %%
-# ``bellcrank machine build two-stage.toml`` writes it; ``bellcrank design --from two-stage.json``
-# searches on from there, over the beams of the whole machine.
+# ``bellcrank machine build two-stage.toml`` writes the design; ``bellcrank design --from
+# two-stage.json`` starts a search from it, over the beams of the whole machine.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-FILES = ("library/*.svg", "library/index.html")
+FILES = ("library/*.svg",)
 
 
 def copy(app: Sphinx, failed: Exception | None) -> None:

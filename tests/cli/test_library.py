@@ -143,11 +143,7 @@ def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
     assert "none better than down-5-free-" in call(*words, "--again").err
     outcome = call("library", "index", "--entries", tmp_path / "made", "--out", tmp_path / "pages")
     assert outcome.code == 0, outcome.err
-    page = (tmp_path / "pages" / "index.html").read_text()
     (name,) = (path.stem for path in (tmp_path / "made").glob("down-*.json"))
-    assert page.count(f'data-name="{name}"') == 1
-    assert "http" not in page.replace("http://www.w3.org", "")
-    assert "$" not in page
     readable = (tmp_path / "pages" / "README.md").read_text()
     assert f"{name}.svg" in readable
     assert (tmp_path / "pages" / f"{name}.svg").read_text().startswith("<svg")

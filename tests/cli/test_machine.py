@@ -90,6 +90,19 @@ def test_a_stroke_that_snaps_is_reported(plan: Path) -> None:
     assert "at least one" in refusal("machine", "predict", plan, "--points", 0)
 
 
+def test_the_list_states_the_contact_of_struts() -> None:
+    rows = {line.split()[0]: line for line in call("machine", "list", width=200).out.splitlines()}
+    assert "struts touch from" in rows["reverser"]
+    assert "no contact" in rows["sorter-left"]
+
+
+def test_a_bundled_machine_is_a_design_by_its_name(here: Path) -> None:
+    built = call("machine", "build", "sorter-left", "--out", here / "sorter.json", "--json").data
+    for name in ("sorter-left", "machine:sorter-left"):
+        found = call("evaluate", name, "--json").data["results"][0]
+        assert found["efficiency"] == pytest.approx(built["efficiency"], abs=1e-8)
+
+
 def test_a_bundled_machine_is_built_by_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

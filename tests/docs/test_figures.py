@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 
 from bellcrank.machines import TwoPort
+from bellcrank.machines.bundled import bundled_machines, find_plan
+from bellcrank.machines.bundled.contact import bundled_contact
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -126,6 +128,12 @@ def bundled() -> Rows:
         )  # fmt: skip
 
 
+def contact() -> Rows:
+    for name in bundled_machines():
+        plan = find_plan(name).table
+        yield row(f"`{name}`", len(plan.parts), plan.about, bundled_contact(name).message)
+
+
 def lengths() -> Rows:
     for told in read("machines/factorisation")["rows"]:
         yield row(
@@ -228,7 +236,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (competition,),
     "goals": (goals,),
     "validation": (levels, meshes, widths, correlation, searched),
-    "machines": (bundled, lengths, two_ports),
+    "machines": (bundled, contact, lengths, two_ports),
     "surrogate": (costs, shipped, epochs, flips, driven, elsewhere),
 }
 

@@ -10,6 +10,7 @@ import pytest
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.machines import linear_assembly
 from bellcrank.machines.bundled import bundled_machine, bundled_machines, find_plan
+from bellcrank.machines.bundled.contact import bundled_contact, check_contact
 from bellcrank.machines.elementary import strut_named
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 
@@ -65,6 +66,31 @@ def test_one_machine_has_ten_actuators() -> None:
     machine = bundled_machine("wave")
     assert len(machine.parts) == 10
     assert 3000 <= machine.design.problem.lattice.beam_count <= 4000
+
+
+QUICK = "sorter-left"
+"""Machine whose frame analysis takes little time."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name == QUICK else pytest.param(name, marks=pytest.mark.slow)
+        for name in bundled_machines()
+    ],
+)
+def test_the_recorded_contact_is_that_of_the_frame_analysis(name: str) -> None:
+    found = check_contact(bundled_machine(name).design)
+    recorded = bundled_contact(name)
+    assert found.pairs == recorded.pairs
+    assert found.onset == (None if recorded.onset is None else pytest.approx(recorded.onset))
+
+
+def test_contact_is_recorded_for_machines_whose_struts_touch() -> None:
+    touching = {name for name in bundled_machines() if bundled_contact(name).onset is not None}
+    assert {"gripper", "reverser"} <= touching
+    with pytest.raises(UnknownName, match="'claw'"):
+        bundled_contact("claw")
 
 
 def test_unknown_plans_list_the_known_ones() -> None:

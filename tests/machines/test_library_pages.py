@@ -13,7 +13,7 @@ from bellcrank.errors import OutputExists
 from bellcrank.machines import elementary
 from bellcrank.machines.library import Library, bundled_folder, write_entry
 from bellcrank.machines.library.measurement import measure
-from bellcrank.machines.library.pages import PAGE, TABLE, draw, write_pages
+from bellcrank.machines.library.pages import PAGE, draw, page, write_page
 from bellcrank.machines.library.thumbnails import UNITS, thumbnail
 
 DOCS = Path(__file__).parents[2] / "docs" / "library"
@@ -50,34 +50,33 @@ def test_what_does_not_move_is_drawn_at_rest() -> None:
     assert drawn.rest == drawn.moved
 
 
-def test_pages_show_each_entry_once(small: Library, tmp_path: Path) -> None:
-    page, table = write_pages(small, tmp_path)
-    assert (page.name, table.name) == (PAGE, TABLE)
-    text = page.read_text()
+def test_the_page_shows_each_entry_once(small: Library, tmp_path: Path) -> None:
+    path = write_page(small, tmp_path)
+    assert path.name == PAGE
+    text = path.read_text()
     for name in small.names():
-        assert text.count(f'data-name="{name}"') == 1
-        assert table.read_text().count(f"`{name}`") == 1
+        assert text.count(f"`{name}`") == 1
         ET.parse(tmp_path / f"{name}.svg")
-    assert 'value="left"' in text
-    assert 'value="up"' not in text, "only what there is to choose from"
     assert "nan" not in text
     with pytest.raises(OutputExists):
-        write_pages(small, tmp_path)
+        write_page(small, tmp_path)
 
 
-def test_pictures_of_entries_that_are_gone_are_removed(small: Library, tmp_path: Path) -> None:
+def test_pictures_of_removed_entries_are_removed(small: Library, tmp_path: Path) -> None:
     for name in ("up-own-00000000.svg", "a-picture-of-mine.svg"):
         (tmp_path / name).write_text("<svg/>")
-    write_pages(small, tmp_path)
-    there = {path.stem for path in tmp_path.glob("*.svg")}
-    assert there == {*small.names(), "a-picture-of-mine"}
+    write_page(small, tmp_path)
+    found = {path.stem for path in tmp_path.glob("*.svg")}
+    assert found == {*small.names(), "a-picture-of-mine"}
 
 
-def test_the_pages_in_the_documentation_show_what_comes_along() -> None:
+def test_the_page_in_the_documentation_is_that_of_the_bundled_entries() -> None:
     if not DOCS.is_dir():
         pytest.skip("no documentation beside the tests")
-    names = Library((bundled_folder(),)).names()
-    assert sorted(path.stem for path in DOCS.glob("*.svg")) == names
-    for page in (PAGE, TABLE):
-        text = (DOCS / page).read_text()
-        assert all(name in text for name in names)
+    known = Library((bundled_folder(),))
+    assert sorted(path.stem for path in DOCS.glob("*.svg")) == known.names()
+    text = (DOCS / PAGE).read_text()
+    entry = known.find(known.names()[-1])
+    assert page([entry]).splitlines()[-1] in text
+    assert all(f"`{name}`" in text for name in known.names())
+    assert (DOCS / f"{entry.name}.svg").read_text() == draw(entry).svg(entry.name)

@@ -42,7 +42,10 @@ def test_every_kind_of_actuator_is_called_something_a_person_understands() -> No
 
 def test_machines_say_what_they_do(shelves: dict[str, Any]) -> None:
     assert [entry["key"] for entry in shelves["machines"]] == bundled_machines()
-    assert all(len(entry["note"]) > 20 for entry in shelves["machines"])
+    notes = {entry["key"]: entry["note"] for entry in shelves["machines"]}
+    assert all(len(note) > 20 for note in notes.values())
+    assert "struts touch from" in notes["reverser"]
+    assert "no contact" in notes["sorter-left"]
 
 
 @pytest.mark.parametrize("name", bundled_machines())

@@ -177,9 +177,9 @@ def make(
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
     given = {
-        "directions": directions and _words(directions),
+        "directions": directions and _names(directions),
         "columns": columns and _numbers("--columns", columns),
-        "kinds": kinds and _words(kinds),
+        "kinds": kinds and _names(kinds),
     }
     chosen: dict[str, Any] = {key: value for key, value in given.items() if value}
     settings = MakeSettings(steps=steps, chains=chains, seed=seed, **chosen)
@@ -210,21 +210,20 @@ def index(
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write pages of the library: index.html with filters, and README.md."""
+    """Write a page of the library, README.md, with a drawing of each entry."""
     from bellcrank.machines.library import Library
     from bellcrank.machines.library import library as whole
-    from bellcrank.machines.library.pages import write_pages
+    from bellcrank.machines.library.pages import write_page
 
     known = whole() if entries is None else Library((entries,))
     warn(known)
     if not len(known):
         raise InvalidSettings(f"{entries}: expected a folder of library entries, found none")
     announce_compilation()
-    for path in write_pages(known, out, overwrite=overwrite):
-        notes.print(f"wrote {plain(path)}")
+    notes.print(f"wrote {plain(write_page(known, out, overwrite=overwrite))}")
 
 
-def _words(text: str) -> tuple[str, ...]:
+def _names(text: str) -> tuple[str, ...]:
     """Split names separated by commas, each once."""
     return tuple(dict.fromkeys(word.strip() for word in text.split(",")))
 

@@ -42,13 +42,14 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 def list_machines() -> None:
     """List the bundled machines."""
     from bellcrank.machines.bundled import bundled_machines, find_plan
+    from bellcrank.machines.bundled.contact import bundled_contact
 
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for heading in ("machine", "parts", "about"):
+    for heading in ("machine", "parts", "about", "contact of 2 mm struts"):
         table.add_column(heading)
     for name in bundled_machines():
-        plan = find_plan(name).table
-        table.add_row(name, str(len(plan.parts)), plain(plan.about))
+        plan, contact = find_plan(name).table, bundled_contact(name)
+        table.add_row(name, str(len(plan.parts)), plain(plan.about), contact.message)
     results.print(table)
 
 
@@ -148,8 +149,8 @@ def _find_part(folder: Path, entry: str) -> Design:
     """Return the design of a part: a file beside the plan, or a named design."""
     from bellcrank.workflows import find_design
 
-    beside = folder / entry
-    return find_design(str(beside) if beside.exists() else entry)
+    path = folder / entry
+    return find_design(str(path) if path.exists() else entry)
 
 
 def _record(built: Machine, response: Response) -> dict[str, Any]:

@@ -112,10 +112,10 @@ def check_inputs(plan: Plan) -> None:
                 for here, there in ((link.first, link.second), (link.second, link.first))
                 if link.kind == "bridge" and here in groups[port]
             ]
-        if driving := [other for other in linked if other.port == "output"]:
+        if outputs := [other for other in linked if other.port == "output"]:
             raise InvalidFile(
                 f"{plan.source}: port {port} is driven twice: by the input of the machine and by "
-                f"{driving[0]}"
+                f"{outputs[0]}"
             )
 
 

@@ -172,15 +172,15 @@ def trace(element: Superelement, load: Load, points: int) -> PortCurve:
 def _conditions(element: Superelement, load: Load, fraction: float) -> Conditions:
     """Return the boundary conditions at a fraction of the stroke."""
     given = element.design.problem.input
-    driven = given.drive == "displacement"
-    full = given.amount if driven else given.amount * len(given.nodes)
+    displaced = given.drive == "displacement"
+    full = given.amount if displaced else given.amount * len(given.nodes)
     value, spring = np.zeros(2), np.zeros(2)
     value[INPUT] = fraction * full
     if load.kind == "force":
         value[OUTPUT] = load.value
     elif load.kind == "spring":
         spring[OUTPUT] = load.value
-    return Conditions(np.array([driven, load.kind == "blocked"]), value, spring)
+    return Conditions(np.array([displaced, load.kind == "blocked"]), value, spring)
 
 
 def _curve(load: Load, states: list[State], status: Status, reached: float) -> PortCurve:

@@ -108,17 +108,19 @@ def _condensed(
     if not selected.any():
         return np.zeros((2 * len(gripped), 2 * len(gripped)))
     lattice, supports = problem.lattice, problem.supports
-    kept = np.union1d(lattice.beams[selected], gripped)
-    grip = np.searchsorted(kept, gripped)
+    subset = np.union1d(lattice.beams[selected], gripped)
+    grip = np.searchsorted(subset, gripped)
     held = {
-        name: np.searchsorted(kept, np.intersect1d(getattr(supports, name), kept))
+        name: np.searchsorted(subset, np.intersect1d(getattr(supports, name), subset))
         for name in ("fixed", "fixed_x", "fixed_y")
     }
     # A superelement contains what its input reaches: all gripped nodes but one are the input.
     along = np.array([1.0, 0.0])
     piece = Problem(
         name=problem.name,
-        lattice=Lattice(lattice.positions[kept], np.searchsorted(kept, lattice.beams[selected])),
+        lattice=Lattice(
+            lattice.positions[subset], np.searchsorted(subset, lattice.beams[selected])
+        ),
         supports=Supports(**held),
         input=Input(grip[:-1], along, "displacement", 1.0),
         output=Output(grip[-1:], along),

@@ -89,8 +89,8 @@ def draw_characterisation(
             color=style.NOTE, linewidth=1.1, linestyle=(0, (4, 2)), zorder=1.5,
             label="load line, linear",
         )  # fmt: skip
-    for axes, (below, beside) in zip(panels, LABELS, strict=True):
-        style.label(axes, below, beside, style.SMALL_SIZE)
+    for axes, (x_label, y_label) in zip(panels, LABELS, strict=True):
+        style.label(axes, x_label, y_label, style.SMALL_SIZE)
         style.quieten(axes)
         axes.axhline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)
     panels[2].axvline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)

@@ -137,12 +137,12 @@ def place_parts(plan: Plan, find: Callable[[str], Design]) -> dict[str, Part]:
             design = find(table.entry)
         except BellcrankError as error:
             raise InvalidFile(f"{plan.source}: parts.{name}.entry: {error}") from None
-        parts[name] = _place(name, table, design, parts)
+        parts[name] = _placed(name, table, design, parts)
     _check_stiffness(plan, parts)
     return {name: parts[name] for name in plan.table.parts}
 
 
-def _place(name: str, table: PartTable, design: Design, parts: dict[str, Part]) -> Part:
+def _placed(name: str, table: PartTable, design: Design, parts: dict[str, Part]) -> Part:
     placement = Placement(table.mirror, table.rotate, table.scale)
     part = Part(name, design, placement, table.supports)
     if table.join is not None:

@@ -63,10 +63,10 @@ def ports_of(design: Design) -> tuple[Port, Port]:
     return given, wanted
 
 
-def mean_ports(
-    design: Design, unloaded_beams: UnloadedBeams = "keep", *, springs: bool = False
-) -> Superelement:
+def mean_ports(design: Design, unloaded_beams: UnloadedBeams = "keep") -> Superelement:
     """Return the superelement of a design with the coordinates u_in and u_out.
+
+    The springs of the problem at its output are a load, and left out.
 
     Parameters
     ----------
@@ -74,9 +74,6 @@ def mean_ports(
         Actuator.
     unloaded_beams
         As for `bellcrank.mechanics.SpringEvaluator`.
-    springs
-        Whether the springs of the problem at its output belong to the actuator. By default they
-        are a load, and left out.
 
     Raises
     ------
@@ -100,7 +97,7 @@ def mean_ports(
     measures = np.zeros((2, entry.count + exit_.count))
     measures[INPUT, : entry.count] = weights
     measures[OUTPUT, entry.count :] = _mean_weights(wanted)
-    element = Superelement(design, [entry, exit_], measures, unloaded_beams, springs=springs)
+    element = Superelement(design, [entry, exit_], measures, unloaded_beams)
     if not element.reached[0]:
         raise InvalidSettings(
             f"{design.problem.name}: nothing resists the input: it is not connected to a support"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import BellcrankError, UnknownName
 from bellcrank.machines.bundled import bundled_machine, bundled_machines, find_plan
+from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.library import library
 from bellcrank.web.gallery import Entry, LazyEntries
@@ -111,4 +112,5 @@ def _machines() -> Iterator[Entry]:
     for name in bundled_machines():
         machine = bundled_machine(name)
         table = machine.plan.table
-        yield Entry(name, table.name.capitalize(), table.about, machine.design)
+        note = f"{table.about}; {bundled_contact(name).message}"
+        yield Entry(name, table.name.capitalize(), note, machine.design)

@@ -85,8 +85,8 @@ class Shape:
     @property
     def label(self) -> str:
         """Description of the shape."""
-        place = "" if self.pivot is None else f" about node {self.pivot}"
-        return self.arms + place + (f", by a link of {len(self.link) - 1} struts" * bool(self.link))
+        pivot = "" if self.pivot is None else f" about node {self.pivot}"
+        return self.arms + pivot + (f", by a link of {len(self.link) - 1} struts" * bool(self.link))
 
 
 def plain_lever(problem: Problem, goals: Sequence[str] = ()) -> Design:
@@ -227,12 +227,12 @@ def _rotated(vector: NDArray[np.float64]) -> NDArray[np.float64]:
 def _at_ports(problem: Problem) -> NDArray[np.bool_]:
     """(M,) whether a beam is at a port and belongs to every design of the problem."""
     lattice = problem.lattice
-    kept = problem.initial & lattice.beams_touching(
+    present = problem.initial & lattice.beams_touching(
         np.concatenate([problem.input.nodes, problem.output.nodes])
     )
-    kept[problem.designable] = False
-    kept[lattice.beams_touching(problem.supports.nodes)] = False
-    return kept
+    present[problem.designable] = False
+    present[lattice.beams_touching(problem.supports.nodes)] = False
+    return present
 
 
 def _spacing(problem: Problem) -> float:
@@ -261,14 +261,14 @@ def _links(problem: Problem) -> Iterator[tuple[int, ...]]:
                 ahead = [
                     node
                     for node in neighbours[row[-1]]
-                    if node not in closed and _straight(lattice.positions, row, node)
+                    if node not in closed and _continues(lattice.positions, row, node)
                 ]
                 if not ahead:
                     break
                 row.append(ahead[0])
 
 
-def _straight(positions: NDArray[np.float64], row: list[int], node: int) -> bool:
+def _continues(positions: NDArray[np.float64], row: list[int], node: int) -> bool:
     """Whether a node continues a row in its direction."""
     before, after = positions[row[-1]] - positions[row[-2]], positions[node] - positions[row[-1]]
     return bool(before @ after > 0.99 * np.hypot(*before) * np.hypot(*after))

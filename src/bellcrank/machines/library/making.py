@@ -110,12 +110,12 @@ def make(
     with locked(folder / LOCK, f"{folder}: another process makes entries there; wait for its end"):
         for number, task in enumerate(settings.tasks):
             start = time.monotonic()
-            place = folder / SEARCHES / task.name
+            path = folder / SEARCHES / task.name
             old = _best_existing(folder, task)
             entry, note = None, "exists"
             if old is None or again:
                 try:
-                    found = _search(task, settings, place, workers, report, stop)
+                    found = _search(task, settings, path, workers, report, stop)
                     if found is None:
                         return  # stopped
                     entry, note = _entry(task, *found, old)
@@ -126,7 +126,7 @@ def make(
                 if old is not None:
                     (folder / f"{old.name}.json").unlink()
             if not again:
-                _remove(place)
+                _remove(path)
             total = len(settings.tasks)
             yield TaskOutcome(task, number, total, entry, note, time.monotonic() - start)
         # With `again`, searches are removed at the end: a resumed run must not repeat those that
@@ -155,12 +155,12 @@ def _entry(
     return entry, "made" if old is None else f"made in place of {old.name}"
 
 
-def _remove(place: Path) -> None:
+def _remove(path: Path) -> None:
     """Remove a search, and the folder of searches if it is empty."""
-    if place.exists():
-        shutil.rmtree(place)
-    if place.parent.exists() and not any(place.parent.iterdir()):
-        place.parent.rmdir()
+    if path.exists():
+        shutil.rmtree(path)
+    if path.parent.exists() and not any(path.parent.iterdir()):
+        path.parent.rmdir()
 
 
 class _NoUsableDesign(Exception):
@@ -170,7 +170,7 @@ class _NoUsableDesign(Exception):
 def _search(
     task: EntryTask,
     settings: MakeSettings,
-    place: Path,
+    path: Path,
     workers: int | None,
     report: Callable[[EntryTask, Progress], None],
     stop: threading.Event | None,
@@ -180,7 +180,7 @@ def _search(
     runs = []
     for name, (problem, chains) in task.starts(settings.chains).items():
         own = replace(search, chains=chains)
-        runs.append(_run(problem, own, place / name))
+        runs.append(_run(problem, own, path / name))
         if not run_chains(
             runs[-1], own, workers=workers, tell=lambda progress: report(task, progress), stop=stop
         ):
@@ -188,17 +188,17 @@ def _search(
     return _select(task.problem(), runs, search)
 
 
-def _run(problem: Problem, settings: SearchSettings, place: Path) -> RunFolder:
+def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
     """Start or reopen a search."""
-    if not (place / "run.json").exists():
-        if place.exists():  # killed before its description was written
-            shutil.rmtree(place)
-        make_folder(place.parent)
-        return start_design(problem, settings, place)
-    run = reopen_design(place)
+    if not (path / "run.json").exists():
+        if path.exists():  # killed before its description was written
+            shutil.rmtree(path)
+        make_folder(path.parent)
+        return start_design(problem, settings, path)
+    run = reopen_design(path)
     if read_settings(run.settings) != settings or run.problem.hash != problem.hash:
         raise InvalidSettings(
-            f"{place}: the search was started with other settings; use those, or remove the folder"
+            f"{path}: the search was started with other settings; use those, or remove the folder"
         )
     return run
 

@@ -1,7 +1,6 @@
 """Small SVG drawings of designs, at rest and moved.
 
-Coordinates are integers, with 20 units per lattice spacing. The paths at rest and moved have the
-same points in the same order, so that a page can interpolate between them.
+Coordinates are integers, with 20 units per lattice spacing.
 """
 
 from __future__ import annotations
@@ -65,30 +64,16 @@ class Thumbnail:
     ground: str
     arrows: dict[str, str]
 
-    @property
-    def content(self) -> str:
-        """Content of the SVG, with the classes of `STYLE`; moved paths include those at rest."""
-        rest = "".join(self.rest.values())
-        parts = [f'<path class="g" d="{self.ground}"/>', f'<path class="r" d="{rest}"/>']
-        parts += [
-            f'<path class="{name}" data-r="{self.rest[name]}" d="{path}"/>'
-            for name, path in self.moved.items()
-        ]
-        parts += [
-            f'<path class="{shade} a" d="{path}"/>'
-            for name, path in self.arrows.items()
-            for shade in ("h", name)
-        ]
-        return "".join(parts)
-
     def svg(self, label: str) -> str:
         """Return an SVG file, in the light or dark colours that the reader prefers."""
-        still = self.content
-        for name in self.moved:
-            still = still.replace(f' data-r="{self.rest[name]}"', "")
+        paths = [("g", self.ground), ("r", "".join(self.rest.values())), *self.moved.items()]
+        paths += [
+            (f"{shade} a", path) for name, path in self.arrows.items() for shade in ("h", name)
+        ]
+        content = "".join(f'<path class="{name}" d="{path}"/>' for name, path in paths)
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{self.view_box}" role="img" '
-            f'aria-label="{label}"><style>{STYLE}</style>{still}</svg>\n'
+            f'aria-label="{label}"><style>{STYLE}</style>{content}</svg>\n'
         )
 
 
