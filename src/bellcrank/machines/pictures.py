@@ -21,9 +21,9 @@ MARGIN, TOP, BOTTOM, GAP = 0.75, 1.05, 0.62, 0.85
 COLOURS = (style.OUTPUT, style.INPUT, style.BUILT, "#cc79a7", "#e69f00", "#56b4e9", style.INK)
 """Colours of the curves, in order (Okabe and Ito, 2008)."""
 LABELS = (
-    ("input motion", "output motion"),
-    ("input motion", "input force"),
-    ("output motion", "force of the output on its load"),
+    ("input displacement", "output displacement"),
+    ("input displacement", "input force"),
+    ("output displacement", "output force on the load"),
 )
 """Horizontal and vertical axis of each panel."""
 
@@ -65,7 +65,7 @@ def draw_characterisation(
         f"output stiffness {rest.output_stiffness:.3g}; lattice units"
     )
     figure = style.new_figure(*SIZE)
-    style.write_heading(figure, title or found.name, note, MARGIN, 0.22)
+    style.add_heading(figure, title or found.name, note, MARGIN, 0.22)
     panels = style.row_of_axes(figure, 3, MARGIN, 0.25, TOP, BOTTOM, GAP)
     for number, curve in enumerate(found.curves):
         colour = COLOURS[number % len(COLOURS)]
@@ -87,11 +87,11 @@ def draw_characterisation(
         panels[2].plot(
             [rest.efficiency * motion, 0.0], [0.0, rest.transmitted_stiffness * motion],
             color=style.NOTE, linewidth=1.1, linestyle=(0, (4, 2)), zorder=1.5,
-            label="load line, linear",
+            label="linear load line",
         )  # fmt: skip
     for axes, (x_label, y_label) in zip(panels, LABELS, strict=True):
-        style.label(axes, x_label, y_label, style.SMALL_SIZE)
-        style.quieten(axes)
+        style.label_axes(axes, x_label, y_label, style.SMALL_SIZE)
+        style.style_axes(axes)
         axes.axhline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)
     panels[2].axvline(0.0, color=style.IDLE, linewidth=0.8, zorder=1.0)
     _legend(panels[0], slice(None), "left")
