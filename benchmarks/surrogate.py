@@ -19,26 +19,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
+from bellcrank.surrogate.beginning import begin
+from bellcrank.surrogate.identity import architecture_of
+from bellcrank.surrogate.trained import TrainedModel
 
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.provenance import provenance
 from bellcrank.surrogate.backend import find_precision
-from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import Dataset
-from bellcrank.surrogate.identity import architecture_of
 from bellcrank.surrogate.models import models
 from bellcrank.surrogate.recipes import Recipe
-from bellcrank.surrogate.trained import TrainedModel
 from bellcrank.surrogate.views import PictureView, views
 from benchmarks.chains import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from bellcrank.surrogate.feeding import Feeder
     from numpy.typing import NDArray
 
-    from bellcrank.surrogate.feeding import Feeder
     from bellcrank.surrogate.pictures import Canvas
 
 PROBLEM = "crane"

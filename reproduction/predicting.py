@@ -82,7 +82,7 @@ def shipped(settings: Settings) -> dict[str, Any]:
     before = model.record.get("before", {}).get("designs", 0)
     return {
         "network": model.architecture,
-        "looks": model.seen["designs"],
+        "looks": model.record["designs"],
         "epochs": [{**each, "designs": each["designs"] + before} for each in epochs],
         "held_out_by_its_record": model.record["held_out"],
         **told,
@@ -91,8 +91,8 @@ def shipped(settings: Settings) -> dict[str, Any]:
 
 def trained(settings: Settings) -> dict[str, Any]:
     """Train a small network on most of the runs, and predict the others."""
-    from bellcrank.surrogate.beginning import begin
     from bellcrank.surrogate.recipes import recipe_of
+    from bellcrank.surrogate.training_setup import begin
 
     data = dataset(settings)
     recipe = recipe_of("own", model=settings.model, epochs=settings.epochs, precision="float32")
@@ -107,7 +107,12 @@ def trained(settings: Settings) -> dict[str, Any]:
         {"designs": each["designs"], "r_squared": each["r_squared"]}
         for each in model.record["epochs"]
     ]
-    return {"network": model.architecture, "looks": model.seen["designs"], "epochs": epochs, **told}
+    return {
+        "network": model.architecture,
+        "looks": model.record["designs"],
+        "epochs": epochs,
+        **told,
+    }
 
 
 @contextmanager

@@ -7,8 +7,6 @@ from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.model import Design, find_problem
-from bellcrank.plots.explanation import draw_explanation
-from reproduction.explanation import as_drawn, explain_design
 from reproduction.formatting import number, percent
 from reproduction.predicting import one_thread
 from reproduction.registry import Claim, Figures, Study, register
@@ -18,10 +16,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from bellcrank.surrogate.explaining import Explanation
+    from reproduction.networks.attribution import Attribution
     from reproduction.result_store import ResultStore
 
-MEASURES = ("screening", "network", "gradient", "occlusion", "white", "black")
+MEASURES = ("low_rank", "network", "occlusion", "white", "black")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,13 +81,14 @@ def _mean(values: list[float | None]) -> float | None:
 
 
 @cache
-def explained(name: str, mask: str, stride: int) -> Explanation:
+def explained(name: str, mask: str, stride: int) -> Attribution:
     """Return what the network that comes along makes of a design, and what is there."""
-    from bellcrank.surrogate.occlusion import Block
+    from bellcrank.surrogate.predictor import load_model
+    from reproduction.networks.attribution import Block, attribute
 
     design: Design = design_of(find_problem(name), mask)
     with one_thread():
-        return explain_design(design, block=Block(stride=stride))
+        return attribute(load_model(design.problem), design, Block(stride=stride))
 
 
 def _told(name: str, mask: str, stride: int) -> dict[str, Any]:
@@ -113,9 +112,11 @@ def _told(name: str, mask: str, stride: int) -> dict[str, Any]:
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
     """Draw what the network sees in the first design, beside what is there."""
+    from reproduction.networks.attribution_picture import draw_attribution
+
     first = figures["designs"][0]
     found = explained(figures["problem"], first["mask"], figures["stride"])
-    draw_explanation(as_drawn(found), path, overwrite=True)
+    draw_attribution(found, path, overwrite=True)
 
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
@@ -125,7 +126,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
         f"{words} {number(told[name]['spearman'])}"
         for name, words in (
             ("white", "a white block"), ("black", "a black block"), ("network", ("the network's "
-            "own flips")), ("gradient", "its gradient"), ("screening", "low-rank screening"),
+            "own flips")), ("low_rank", "low-rank update"),
         )
         if name in told
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`bellcrank explain`: what a network sees in a design, beside what is there."""
+"""`bellcrank explain`: which beams matter, to a trained network and to the mechanics."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from bellcrank.cli.console import (
     results,
     warn_of_other_stiffness,
 )
+from bellcrank.cli.predict import Device, ModelFile
 
 if TYPE_CHECKING:
-    from bellcrank.surrogate.explaining import Explanation
+    from reproduction.networks.attribution import Attribution
 
-ABOUT = {
-    "screening": "low-rank screening",
-    "network": "network, each flip",
-    "gradient": "network, gradient",
-    "occlusion": "network, fitting block",
+LABELS = {
+    "low_rank": "low-rank update",
+    "network": "network, flips",
+    "occlusion": "network, white and black block",
     "white": "network, white block",
     "black": "network, black block",
 }
@@ -38,13 +38,7 @@ ABOUT = {
 @app.command()
 def explain(
     what: DesignName,
-    model: Annotated[
-        Path | None,
-        typer.Option(
-            help="A trained model, or the folder of a training. "
-            "\\[the one that comes with bellcrank]"
-        ),
-    ] = None,
+    model: ModelFile = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -52,23 +46,25 @@ def explain(
         ),
     ] = None,
     block: Annotated[
-        int | None, typer.Option(help="Side of the block that hides, in pixels. \\[12]")
+        int | None, typer.Option(help="Side of the occluding block in pixels. \\[12]")
     ] = None,
     stride: Annotated[
-        int | None, typer.Option(help="From one place of the block to the next. \\[4]")
+        int | None, typer.Option(help="Distance of positions of the block in pixels. \\[4]")
     ] = None,
-    device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
+    device: Device = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture.")] = False,
 ) -> None:
-    """Say which beams matter, to a trained network and by mechanics, and how far they agree."""
+    """Compare which beams matter to a trained network and to the mechanics."""
     require_reproduction()
+    from bellcrank.plots.saving import check_target
     from bellcrank.surrogate.backend import import_torch
+    from bellcrank.surrogate.predictor import load_model
 
     design = design_named(what)
     import_torch()
-    from bellcrank.surrogate.occlusion import Block
-    from reproduction.explanation import explain_design
+    from reproduction.networks.attribution import Block, attribute
+    from reproduction.networks.attribution_picture import draw_attribution
 
     given = {
         key: value for key, value in (("size", block), ("stride", stride)) if value is not None
@@ -76,12 +72,14 @@ def explain(
     target = out
     if target is None and not as_json:
         target = Path(f"{design.problem.name}-explained.png")
+    if target is not None:
+        check_target(target, overwrite=overwrite)
+    network = load_model(design.problem, model, any_stiffness=True)
     announce_compilation()
-    found = explain_design(
-        design, model, target,
-        block=Block(**given) if given else None, device=device, overwrite=overwrite,
-    )  # fmt: skip
+    found = attribute(network, design, Block(**given) if given else None, device=device)
     warn_of_other_stiffness(design.problem, found.design.problem, "explained")
+    if target is not None:
+        draw_attribution(found, target, overwrite=overwrite)
     if as_json:
         print_json(json.dumps(found.to_dict(), indent=1))
     else:
@@ -90,18 +88,18 @@ def explain(
         notes.print(f"wrote {plain(target)}")
 
 
-def _print_agreements(found: Explanation) -> None:
+def _print_agreements(found: Attribution) -> None:
     results.print(
         f"{plain(found.design.problem.name)}: efficiency {found.efficiency:.4f} by mechanics, "
         f"{found.predicted:.4f} by {plain(found.architecture)}"
     )
-    table = Table("foreseen by", "flips", "count", "Pearson", "Spearman", "top 30", box=SIMPLE)
-    for name, told in found.correlations().items():
-        for subset, one in told.items():
+    table = Table("predicted by", "flips", "count", "Pearson", "Spearman", "top 30", box=SIMPLE)
+    for name, subsets in found.correlations().items():
+        for subset, one in subsets.items():
             if one.count:
                 figures = [_figure(value) for value in (one.pearson, one.spearman, one.recall)]
-                table.add_row(ABOUT[name] if subset == "all" else "", subset, str(one.count),
-                              *figures)  # fmt: skip
+                label = LABELS[name] if subset == "all" else ""
+                table.add_row(label, subset, str(one.count), *figures)
     results.print(table)
 
 

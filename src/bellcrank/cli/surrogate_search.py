@@ -19,7 +19,10 @@ from bellcrank.cli.live import Live
 from bellcrank.cli.predict import Device, ModelFile
 
 if TYPE_CHECKING:
-    from reproduction.surrogate_search import SurrogateSearchProgress, SurrogateSearchResult
+    from reproduction.networks.surrogate_search import (
+        SurrogateSearchProgress,
+        SurrogateSearchResult,
+    )
 
 UNITS = {"searching": "chains", "verifying": "chains", "comparing": "chains"}
 
@@ -59,8 +62,8 @@ def surrogate_search(
     from bellcrank.storage import check_free
     from bellcrank.surrogate.dataset import read_dataset
     from bellcrank.surrogate.predictor import load_predictor
-    from reproduction.surrogate_search import SurrogateSearchSettings, run_surrogate_search
-    from reproduction.surrogate_search_files import write_surrogate_search
+    from reproduction.networks.surrogate_search import SurrogateSearchSettings, run_surrogate_search
+    from reproduction.networks.surrogate_search_files import write_surrogate_search
 
     task = find_problem(problem)
     chosen = SurrogateSearchSettings(
@@ -104,7 +107,7 @@ class SurrogateSearchLive(Live):
 
 def _print_result(result: SurrogateSearchResult) -> None:
     """Print the medians of the offered designs, the effort and the best design."""
-    from reproduction.surrogate_search import OFFERS
+    from reproduction.networks.surrogate_search import OFFERS
 
     medians = result.medians()
     columns = {"predicted": "predicted", "network": "with network"}

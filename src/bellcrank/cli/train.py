@@ -22,7 +22,7 @@ from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
     from bellcrank.surrogate.progress import Progress
-    from bellcrank.surrogate.trained import TrainedModel
+    from bellcrank.surrogate.trained_model import TrainedModel
 
 
 @app.command()
@@ -49,10 +49,10 @@ def train(
 ) -> None:
     """Train a network, and test it on runs that are held out."""
     from bellcrank.cli.design import stopping_on_interrupt
-    from bellcrank.surrogate.beginning import begin
-    from bellcrank.surrogate.beginning import resume as resume_training
     from bellcrank.surrogate.dataset import read_dataset
     from bellcrank.surrogate.recipes import recipe_of
+    from bellcrank.surrogate.training_setup import begin
+    from bellcrank.surrogate.training_setup import resume as resume_training
 
     given = [model, recipe, epochs, seed, settings, out]
     if resume is not None:
@@ -71,7 +71,7 @@ def train(
     with stopping_on_interrupt() as stop, TrainingLive() as live:
         for progress in training.run(stop.is_set):
             live(progress)
-        trained = training.finish(tell=live) if training.is_done else None
+        trained = training.finish(live) if training.is_done else None
     if trained is None:
         command = f"bellcrank train {shlex.quote(str(dataset))} --resume {shlex.quote(str(folder))}"
         notes.print(f"Stopped; the training is saved. Resume it with: {plain(command)}")

@@ -1,4 +1,4 @@
-"""PyTorch, where it is installed, and what the machine at hand does well."""
+"""PyTorch as an optional dependency, and devices and precisions of this machine."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def import_torch() -> Any:
     Raises
     ------
     InvalidSettings
-        If it, or the format of its weights, is not installed.
+        If PyTorch or safetensors is not installed.
     """
     try:
         import safetensors  # noqa: F401
@@ -38,7 +38,7 @@ def find_device(name: str) -> torch_module.device:
     Raises
     ------
     InvalidSettings
-        If there is no such device here.
+        If the device is not available.
     """
     torch = import_torch()
     if name == "auto":
@@ -50,7 +50,7 @@ def find_device(name: str) -> torch_module.device:
         torch.empty(1, device=device)
     except (RuntimeError, AssertionError) as error:
         raise InvalidSettings(
-            f"device: {name!r} cannot be used here ({first_line(error)}); "
+            f"device: {name!r} is not available here ({first_line(error)}); "
             f"expected auto, cpu or cuda"
         ) from None
     found: torch_module.device = device
@@ -58,12 +58,12 @@ def find_device(name: str) -> torch_module.device:
 
 
 def find_precision(name: str, device: torch_module.device) -> str:
-    """Return ``float32`` or ``bfloat16``; ``auto`` is the latter where the hardware has it.
+    """Return ``float32`` or ``bfloat16``; ``auto`` is bfloat16 where the hardware supports it.
 
     Raises
     ------
     InvalidSettings
-        If it is neither.
+        If the name is unknown.
     """
     torch = import_torch()
     if name not in PRECISIONS:
@@ -73,8 +73,7 @@ def find_precision(name: str, device: torch_module.device) -> str:
     if device.type == "cuda":
         return "bfloat16" if torch.cuda.is_bf16_supported() else "float32"
     has = torch.cpu.get_capabilities()
-    fast = has.get("avx512_bf16") or has.get("amx_bf16")
-    return "bfloat16" if fast else "float32"
+    return "bfloat16" if has.get("avx512_bf16") or has.get("amx_bf16") else "float32"
 
 
 def autocast(device: torch_module.device, precision: str) -> Any:
@@ -84,6 +83,6 @@ def autocast(device: torch_module.device, precision: str) -> Any:
 
 
 def name_of(device: torch_module.device) -> str:
-    """Return what a device is called: a GPU by its make."""
+    """Return the model of a GPU, or the type of another device."""
     torch = import_torch()
     return str(torch.cuda.get_device_name(device)) if device.type == "cuda" else device.type

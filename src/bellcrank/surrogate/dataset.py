@@ -1,8 +1,8 @@
-"""Datasets: designs with the efficiencies that the mechanics gives them.
+"""Datasets: designs with their efficiencies by mechanics.
 
-One Parquet file holds packed masks and efficiencies, run by run, and in its footer the
-problem and how the data was made. Designs of one run resemble each other, so a network is
-always tested on runs that it has seen nothing of.
+A dataset is one Parquet file of packed masks and efficiencies, run by run; its footer holds the
+problem and the origin of the data. Designs of one run are similar, so that networks are always
+tested on other runs than they are trained on.
 
 Examples
 --------
@@ -40,17 +40,18 @@ from bellcrank.storage.shards import arrays_of, parquet_file, parquet_writer
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
 
+DATASET_FILE = "dataset.parquet"
+"""Name of the dataset in the folder that it was built in."""
 DATASET_SCHEMA = "bellcrank/dataset/1"
 COLUMNS = ("run", "step", "mask", "efficiency", "accepted")
 ROW_GROUP = 2**17
 MOST = 2**31 - 1
-"""Number of a run or a step."""
+"""Largest number of a run or a step."""
 WRITER = {
     "compression": "zstd",
     "compression_level": 9,
@@ -58,35 +59,34 @@ WRITER = {
     "column_encoding": {"efficiency": "BYTE_STREAM_SPLIT", "run": "DELTA_BINARY_PACKED",
                         "step": "DELTA_BINARY_PACKED"},
 }  # fmt: skip
-WHAT_TO_DO = "build it again: bellcrank dataset build"
+REMEDY = "build it again: bellcrank dataset build"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dataset:
-    """Designs for one problem, with their efficiencies.
+    """Designs of one problem with their efficiencies.
 
     Parameters
     ----------
     problem
-        What the designs are for.
+        The problem.
     packed : (n, bytes) uint8
-        Masks over the problem's beams, as `numpy.packbits` leaves them.
+        Masks over the beams of the problem, as `numpy.packbits` returns them.
     efficiency : (n,) float64
-        By the mechanics; each design has a unique, stable response.
+        Efficiencies by mechanics; each design has a unique, stable response.
     run : (n,) int64
-        Which run each comes from, from 0.
+        Number of the run that proposed the design, from 0.
     step : (n,) int64
-        In its run; by default 0, 1, 2, ...
+        Number of the proposal in its run; by default 0, 1, 2, ...
     accepted : (n,) bool
-        Whether the search went there; by default all.
+        Whether the search accepted the design; by default all.
     origin
-        How it was made, as plain data.
+        How the data were made, as plain data.
 
     Raises
     ------
     InvalidDataset
-        If it is empty, columns are of different lengths, an efficiency is no number, or a run or
-        a step is no number of one.
+        If the dataset is empty, columns have different lengths, or a value is out of range.
     """
 
     problem: Problem
@@ -128,7 +128,7 @@ class Dataset:
         return len(np.unique(self.run))
 
     def take(self, rows: NDArray[Any]) -> Dataset:
-        """Return some of the rows, by index or by a mask over all."""
+        """Return some of the rows, selected by index or by a boolean mask."""
         return Dataset(
             self.problem, self.packed[rows], self.efficiency[rows], self.run[rows],
             self.step[rows], self.accepted[rows], self.origin,
@@ -184,7 +184,7 @@ def _check(data: Dataset) -> None:
         row = int(wrong[0])
         raise InvalidDataset(
             f"efficiency: row {row} (run {data.run[row]}, step {data.step[row]}) is "
-            f"{data.efficiency[row]}; leave out designs without a response"
+            f"{data.efficiency[row]}; leave out designs without a unique response"
         )
 
 
@@ -194,11 +194,11 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     Raises
     ------
     InvalidFile
-        If there is no such file, or it is no dataset.
+        If there is no such file, or it is not a dataset.
     CorruptRun
         If it is damaged.
     InvalidDataset
-        If what is in it cannot be.
+        If its values are invalid.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -209,7 +209,7 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     if place.is_dir():
         raise InvalidFile(f"{path}: no {DATASET_FILE} in this folder")
     if not place.is_file():
-        raise InvalidFile(f"{path}: no such file; bellcrank dataset build makes datasets")
+        raise InvalidFile(f"{path}: no such file; build a dataset with: bellcrank dataset build")
     try:
         named = pq.read_schema(place).names
     except (OSError, pa.ArrowException, ValueError) as error:
@@ -218,17 +218,17 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
         ) from None
     if missing := [name for name in COLUMNS if name not in named]:
         raise InvalidFile(
-            f"{place}: not a dataset: it has no column {missing[0]!r}; bellcrank dataset build "
-            f"makes datasets"
+            f"{place}: not a dataset: it has no column {missing[0]!r}; build one with: bellcrank "
+            f"dataset build"
         )
-    with parquet_file(place, WHAT_TO_DO) as (file, header):
+    with parquet_file(place, REMEDY) as (file, header):
         if header.get("schema") != DATASET_SCHEMA:
             raise CorruptRun(
                 f"{place}: expected schema {DATASET_SCHEMA!r}, got {header.get('schema')!r}"
             )
         columns = arrays_of(file.read(columns=list(COLUMNS)), COLUMNS)
-        told, origin = header["problem"], dict(header["origin"])
-    problem = problem_from_dict(told, str(place))
+        data, origin = header["problem"], dict(header["origin"])
+    problem = problem_from_dict(data, str(place))
     try:
         found = Dataset(
             problem, columns["mask"], columns["efficiency"], columns["run"], columns["step"],
@@ -236,9 +236,9 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
         )  # fmt: skip
     except InvalidDataset as error:
         raise InvalidDataset(f"{place}: {error}") from None
-    # Parquet checks its pages, but not its footer, which says which rows there are.
+    # Parquet has checksums of its pages, but not of its footer, which lists the rows.
     if header.get("digest") not in (None, _digest(found)):
-        raise CorruptRun(f"{place}: damaged (its rows are not those it was written with)")
+        raise CorruptRun(f"{place}: damaged (the checksum of its rows is wrong)")
     return found
 
 
@@ -248,38 +248,3 @@ def _digest(data: Dataset) -> str:
     for column in (data.packed, data.efficiency, data.run, data.step, data.accepted):
         digest.update(np.ascontiguousarray(column).tobytes())
     return digest.hexdigest()
-
-
-DATASET_FILE = "dataset.parquet"
-"""Name of the dataset in the folder that it was built in."""
-
-
-def merge(parts: Sequence[Dataset]) -> Dataset:
-    """Join datasets for one problem; their runs are numbered through.
-
-    Raises
-    ------
-    InvalidDataset
-        If there are none, or they are for different problems.
-    """
-    if not parts:
-        raise InvalidDataset("expected at least one dataset to join, got none")
-    first = parts[0]
-    told = problem_to_dict(first.problem)
-    runs, offset = [], 0
-    for part in parts:
-        if problem_to_dict(part.problem) != told:
-            raise InvalidDataset(
-                f"datasets for different problems: {first.problem.name!r} and {part.problem.name!r}"
-            )
-        runs.append(part.run + offset)
-        offset += int(part.run.max()) + 1
-    return Dataset(
-        first.problem,
-        np.concatenate([part.packed for part in parts]),
-        np.concatenate([part.efficiency for part in parts]),
-        np.concatenate(runs),
-        np.concatenate([part.step for part in parts]),
-        np.concatenate([part.accepted for part in parts]),
-        {"parts": [part.origin for part in parts]},
-    )

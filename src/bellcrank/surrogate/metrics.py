@@ -1,4 +1,4 @@
-"""How good predictions are, by several measures that are easily confused."""
+"""Accuracy of predictions."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """Predictions against the truth.
+    """Agreement of predicted with actual efficiencies.
 
     Parameters
     ----------
     r_squared
-        Of the linear regression of predicted on actual: the square of their correlation. The
-        paper's measure; it forgives a wrong scale and a wrong zero. nan if one is constant.
-    determination
-        1 - (mean squared error) / (variance of the truth); forgives nothing. nan if the truth is
+        R² of the linear regression of predicted on actual values: the square of their
+        correlation. The paper's measure; it ignores a wrong scale and offset. nan if one side is
         constant.
+    determination
+        Coefficient of determination, 1 - (mean squared error) / (variance of the actual values).
+        nan if the actual values are constant.
     rms_error
-        Root of the mean squared error, in units of the efficiency.
+        Root mean square error in units of the efficiency.
     count
-        Designs that were looked at.
+        Number of designs.
     """
 
     r_squared: float
@@ -36,30 +37,20 @@ class Accuracy:
     count: int
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the measures as plain data; what is not a number becomes None."""
+        """Return the measures as plain data; nan becomes None."""
         return {name: finite(value) for name, value in asdict(self).items()}
 
     @classmethod
-    def from_dict(cls, told: dict[str, Any]) -> Self:
-        """Rebuild the measures from `to_dict`.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If they are none.
-        """
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Rebuild the measures from `to_dict`."""
         numbers: dict[str, Any] = {
-            name: math.nan if each is None else each for name, each in told.items()
+            name: math.nan if each is None else each for name, each in data.items()
         }
         return cls(**numbers)
 
 
 def accuracy(predicted: NDArray[np.floating[Any]], actual: NDArray[np.floating[Any]]) -> Accuracy:
-    """Compare predictions with the truth.
-
-    Parameters
-    ----------
-    predicted, actual : (n,)
+    """Compare predicted with actual values, (n,) each.
 
     Examples
     --------
@@ -71,7 +62,7 @@ def accuracy(predicted: NDArray[np.floating[Any]], actual: NDArray[np.floating[A
     truth = np.asarray(actual, np.float64)
     guess = np.asarray(predicted, np.float64)
     error = float(np.mean((guess - truth) ** 2))
-    varies = truth.min() < truth.max()  # a variance may be a remnant of rounding
+    varies = truth.min() < truth.max()  # a variance may be rounding noise
     return Accuracy(
         correlation(guess, truth) ** 2,
         1.0 - error / float(truth.var()) if varies else math.nan,
@@ -81,7 +72,7 @@ def accuracy(predicted: NDArray[np.floating[Any]], actual: NDArray[np.floating[A
 
 
 def correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-    """Pearson's correlation; nan where one of them is constant."""
+    """Return Pearson's correlation; nan if one side is constant."""
     if first.min() == first.max() or second.min() == second.max():
         return math.nan
     a, b = first - first.mean(), second - second.mean()
@@ -90,23 +81,5 @@ def correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> floa
 
 
 def finite(value: float) -> float | None:
-    """Return a number as JSON can have it: None if it is nan or infinite."""
+    """Return a number for JSON: None if it is nan or infinite."""
     return value if math.isfinite(value) else None
-
-
-def recall(predicted: NDArray[np.float64], actual: NDArray[np.float64], count: int) -> float:
-    """Fraction of the `count` largest actual values among the `count` largest predicted ones.
-
-    Where there are fewer, of all; nan where there are none.
-
-    Examples
-    --------
-    >>> recall(np.array([3.0, 2.0, 1.0, 0.0]), np.array([3.0, 0.0, 1.0, 2.0]), 2)
-    0.5
-    """
-    wanted = min(count, len(actual))
-    if wanted < 1:
-        return math.nan
-    best = np.argsort(-actual, kind="stable")[:wanted]
-    named = np.argsort(-predicted, kind="stable")[:wanted]
-    return len(np.intersect1d(best, named)) / wanted

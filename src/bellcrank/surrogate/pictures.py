@@ -1,13 +1,12 @@
-"""Pictures of designs, made as fast as a network can look at them.
+"""Pictures of designs as input of networks.
 
-Each beam is drawn once, alone, by matplotlib's Agg without snapping to pixels. What a design's
-picture then shows in a pixel is the product, over its beams, of what each lets through:
+Each beam is drawn once, alone, by matplotlib's Agg renderer without snapping to pixels. The
+picture of a design is the product of the transmissions of its beams,
 
-    ink = 1 - prod over present beams (1 - coverage)
+    ink = 1 - prod over present beams (1 - coverage),
 
-which is exact where beams do not overlap, and within a few grey levels where their ends do.
-On one core that is a sparse product of a few thousand terms a picture; on a GPU it is one
-matrix product, ``exp(bits @ log(1 - coverage))``.
+which is exact where beams do not overlap, and within a few grey levels where their ends do: a
+sparse product of a few thousand terms for each picture.
 
 Examples
 --------
@@ -35,23 +34,23 @@ if TYPE_CHECKING:
     from bellcrank.surrogate.kernels.rendering import Strokes
 
 DOTS_PER_INCH = 72.0
-"""At which a point is a pixel."""
+"""Resolution at which a point is a pixel."""
 SMALLEST, LARGEST = 8, 4096
-"""Sides of a canvas, in pixels."""
+"""Smallest and largest side of a canvas in pixels."""
 
 
 @dataclass(frozen=True, slots=True)
 class Canvas:
-    """The sheet that lattices are drawn on.
+    """Size of pictures and width of lines.
 
     Parameters
     ----------
     width, height
-        In pixels; the paper's pictures have 192 x 128.
+        In pixels; 192 x 128 in the paper.
     line
-        Width of a beam's line, in pixels.
+        Line width of a beam in pixels.
     margin
-        Between the outermost lines and the border, in pixels.
+        Distance of the outermost lines from the border in pixels.
 
     Raises
     ------
@@ -76,31 +75,31 @@ class Canvas:
             )
         if not self.border < min(sides):
             raise InvalidSettings(
-                f"canvas: a line of {self.line} and margins of {self.margin} leave no room on "
+                f"canvas: a line of {self.line} and margins of {self.margin} leave no space on "
                 f"{self.width} x {self.height} pixels"
             )
 
     @property
     def border(self) -> float:
-        """Pixels that nodes stay away from two opposite sides, both together."""
+        """Pixels between nodes and two opposite sides, both together."""
         return 2.0 * self.margin + self.line
 
     def to_dict(self) -> dict[str, Any]:
         """Return the canvas as plain data."""
         return asdict(self)
 
-    def place(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return pixel coordinates of nodes, from the lower left corner: centred, as large as fits.
+    def pixels_of(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return pixel coordinates of nodes from the lower left corner, centred and scaled to fit.
 
         Parameters
         ----------
         positions : (N, 2)
         """
         low, high = positions.min(axis=0), positions.max(axis=0)
-        sheet = np.array([self.width, self.height], dtype=np.float64)
+        size = np.array([self.width, self.height], dtype=np.float64)
         extent = np.maximum(high - low, 1e-9)
-        scale = float(((sheet - self.border) / extent).min())
-        return np.asarray((positions - 0.5 * (low + high)) * scale + 0.5 * sheet)
+        scale = float(((size - self.border) / extent).min())
+        return np.asarray((positions - 0.5 * (low + high)) * scale + 0.5 * size)
 
 
 class Renderer:
@@ -109,18 +108,13 @@ class Renderer:
     Parameters
     ----------
     lattice
-        Whose beams are drawn, at rest.
+        The lattice, at rest.
     canvas
-        What they are drawn on.
-    usual : (M,) bool
-        Beams that most designs have: drawn first, and at once where a design has them all. That
-        changes no bit against drawing them first one by one; against another order of drawing,
-        products round differently, by one grey level at most.
-
-    Raises
-    ------
-    InvalidDataset
-        By `render`, if masks are not those of the lattice.
+        Size of the pictures.
+    common : (M,) bool
+        Beams that most designs have. They are multiplied first, and at once in a design that has
+        them all, which does not change a bit. Another order of multiplication changes results by
+        at most one grey level.
     """
 
     __slots__ = ("background", "canvas", "strokes")
@@ -129,16 +123,16 @@ class Renderer:
         self,
         lattice: Lattice,
         canvas: Canvas | None = None,
-        usual: NDArray[np.bool_] | None = None,
+        common: NDArray[np.bool_] | None = None,
     ) -> None:
-        from bellcrank.surrogate.kernels.rendering import Background, lay_all
+        from bellcrank.surrogate.kernels.rendering import Background, draw_beams
 
         self.canvas = canvas or Canvas()
         self.strokes = _draw_each_beam(lattice, self.canvas)
-        shared = np.zeros(lattice.beam_count, np.bool_) if usual is None else usual
+        shared = np.zeros(lattice.beam_count, np.bool_) if common is None else common
         packed = np.packbits(shared)
         passed = np.ones(self.canvas.width * self.canvas.height, np.float32)
-        lay_all(self.strokes, packed, passed)
+        draw_beams(self.strokes, packed, passed)
         self.background = Background(packed, passed)
 
     def render(
@@ -149,9 +143,9 @@ class Renderer:
         Parameters
         ----------
         packed : (n, bytes) uint8
-            Masks over the lattice's beams, packed.
+            Packed masks over the beams of the lattice.
         out : (n, height, width) uint8
-            Where to; new by default.
+            Array for the result; new by default.
 
         Returns
         -------
@@ -161,13 +155,13 @@ class Renderer:
         Raises
         ------
         InvalidDataset
-            If masks have not one bit for each beam of the lattice.
+            If the masks have the wrong number of bits.
         InvalidSettings
-            If `out` is of another shape or kind, or not contiguous.
+            If `out` has another shape or type, or is not contiguous.
         """
         from bellcrank.surrogate.kernels.rendering import draw
 
-        # The kernel reads and writes where it is told, without looking.
+        # The kernel does not check bounds.
         masks = np.ascontiguousarray(check_masks(packed, len(self.strokes.start) - 1))
         shape = (len(masks), self.canvas.height, self.canvas.width)
         ink = np.empty(shape, np.uint8) if out is None else out
@@ -180,21 +174,9 @@ class Renderer:
         draw(self.strokes, self.background, masks, picture, ink.reshape(len(masks), picture.size))
         return ink
 
-    def coverage(self) -> NDArray[np.float32]:
-        """Return the ink that each beam would lay alone, (beams, pixels)."""
-        start, pixel, passed = self.strokes
-        beams = np.repeat(np.arange(len(start) - 1), np.diff(start))
-        dense = np.zeros((len(start) - 1, self.canvas.height * self.canvas.width), np.float32)
-        dense[beams, pixel] = 1.0 - passed
-        return dense
-
 
 def check_masks(packed: NDArray[Any], beams: int) -> NDArray[np.uint8]:
-    """Return packed masks as they are, if they can be over so many beams.
-
-    Parameters
-    ----------
-    packed : (n, bytes) uint8
+    """Return packed masks (n, bytes) unchanged after a check of their shape and type.
 
     Raises
     ------
@@ -210,31 +192,26 @@ def check_masks(packed: NDArray[Any], beams: int) -> NDArray[np.uint8]:
 
 
 def _draw_each_beam(lattice: Lattice, canvas: Canvas) -> Strokes:
-    """Let Agg draw each beam alone, and keep the pixels that it touches."""
+    """Draw each beam alone, and keep the pixels that it covers."""
     from bellcrank.surrogate.kernels.rendering import Strokes
 
     start, pixels, passed = [0], [], []
-    for ends in canvas.place(lattice.positions)[lattice.beams]:
+    for ends in canvas.pixels_of(lattice.positions)[lattice.beams]:
         coverage = draw_lines(canvas, ends[None]).ravel()
-        touched = np.flatnonzero(coverage)
-        pixels.append(touched.astype(np.uint32))
-        passed.append((255 - coverage[touched]).astype(np.float32) / np.float32(255.0))
-        start.append(start[-1] + len(touched))
+        covered = np.flatnonzero(coverage)
+        pixels.append(covered.astype(np.uint32))
+        passed.append((255 - coverage[covered]).astype(np.float32) / np.float32(255.0))
+        start.append(start[-1] + len(covered))
     return Strokes(np.array(start), np.concatenate(pixels), np.concatenate(passed))
 
 
-def draw_lines(
-    canvas: Canvas, lines: NDArray[np.float64], *, snap: bool = False
-) -> NDArray[np.uint8]:
-    """Let matplotlib's Agg draw lines in one go.
+def draw_lines(canvas: Canvas, lines: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Draw lines with matplotlib's Agg renderer.
 
     Parameters
     ----------
     lines : (m, 2, 2)
-        Ends in pixels, from the lower left corner.
-    snap
-        Whether Agg may move horizontal and vertical lines to whole pixels, as it does unless it
-        is told not to.
+        Ends in pixels from the lower left corner.
 
     Returns
     -------
@@ -250,8 +227,7 @@ def draw_lines(
     context.set_linewidth(canvas.line)
     context.set_capstyle("round")
     context.set_foreground("black")
-    # True would move the ends of sloping lines too, which nobody's figures do.
-    context.set_snap(None if snap else False)
+    context.set_snap(False)
     for line in lines:
         renderer.draw_path(context, Path(line), IdentityTransform())
     return np.array(renderer.buffer_rgba())[:, :, 3]

@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidModel, InvalidProblem
-from bellcrank.surrogate.folder import MODEL
 from bellcrank.surrogate.matching import beams_between, renumbered
-from bellcrank.surrogate.trained import TrainedModel, read_model
+from bellcrank.surrogate.trained_model import TrainedModel, read_model
+from bellcrank.surrogate.training_folder import MODEL
 
 if TYPE_CHECKING:
     import os

@@ -1,4 +1,4 @@
-"""How a training tells where it is, and what it keeps of each epoch."""
+"""Progress of a training and records of its epochs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import csv
 import io
 import math
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from bellcrank.errors import RunFailed
 from bellcrank.surrogate.metrics import finite
@@ -16,27 +16,27 @@ if TYPE_CHECKING:
 
     import torch
 
-FORGETTING = 0.02
-"""Weight of the newest batch in the running loss."""
+SMOOTHING = 0.02
+"""Weight of the newest batch in the smoothed loss."""
 
 
 @dataclass(frozen=True, slots=True)
 class EpochRecord:
-    """How a network stands after an epoch.
+    """State of a training after an epoch.
 
     Parameters
     ----------
     epoch
         From 1.
     designs
-        Seen so far, in all epochs.
+        Training designs so far, in all epochs.
     seconds
-        Spent on training so far, in all sessions.
+        Duration of the training so far, in all sessions.
     loss
-        Mean squared error over the batches of the epoch, each by the weights that it found, in
-        units of the variance.
+        Mean squared error over the batches of the epoch, each before its step, in units of the
+        variance.
     r_squared, determination, rms_error
-        On held-out runs; see `bellcrank.surrogate.metrics.Accuracy`.
+        Accuracy on held-out runs; see `bellcrank.surrogate.metrics.Accuracy`.
     """
 
     epoch: int
@@ -48,24 +48,24 @@ class EpochRecord:
     rms_error: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the record as plain data; what is not a number becomes None."""
+        """Return the record as plain data; nan becomes None."""
         return {name: finite(value) for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where training is.
+    """Progress of a training.
 
     Parameters
     ----------
     done, total
-        Designs seen, and to be seen.
+        Training designs so far, and in all epochs.
     loss
-        Running mean squared error, in units of the variance; nan before the first batch.
+        Smoothed mean squared error in units of the variance; nan before the first batch.
     epoch
-        The record of the epoch that has just ended, if one has.
+        Record of the epoch that has just ended, or None.
     testing
-        In the end: how many held-out designs were tested so far, of how many.
+        In the final test: held-out designs tested so far, and their number.
     """
 
     done: int
@@ -77,66 +77,64 @@ class Progress:
 
 @dataclass(slots=True)
 class LossMeter:
-    """Collects the losses of batches without asking the device for each: asking waits.
+    """Smoothed and mean loss, evaluated in groups, since each evaluation waits for the device.
 
     Parameters
     ----------
-    running
-        Mean that forgets; nan before the first batch.
+    smoothed
+        Exponentially smoothed loss; nan before the first batch.
     total, count
-        Sum over the epoch at hand, and of how many batches.
+        Sum over the current epoch and number of batches.
     """
 
-    running: float = math.nan
+    smoothed: float = math.nan
     total: float = 0.0
     count: int = 0
-    _waiting: list[torch.Tensor] = field(default_factory=list)
+    _pending: list[torch.Tensor] = field(default_factory=list)
 
     def add(self, loss: torch.Tensor) -> None:
-        """Note the loss of a batch."""
-        self._waiting.append(loss.detach())
+        """Add the loss of a batch, to be evaluated later."""
+        self._pending.append(loss.detach())
 
     def settle(self) -> None:
-        """Count in what was noted, one by one, so that it does not matter when this is done.
+        """Evaluate pending losses one by one; the result does not depend on when this is done.
 
         Raises
         ------
         RunFailed
-            If a loss is no number any more.
+            If a loss is not finite.
         """
-        if not self._waiting:
+        if not self._pending:
             return
         import torch
 
-        losses = torch.stack(self._waiting).tolist()
-        self._waiting.clear()
+        losses = torch.stack(self._pending).tolist()
+        self._pending.clear()
         for loss in losses:
             if not math.isfinite(loss):
                 raise RunFailed(
                     f"the training diverged: its loss is {loss}; train again with a lower "
                     f"learning_rate"
                 )
-            first = math.isnan(self.running)
-            self.running = loss if first else (1.0 - FORGETTING) * self.running + FORGETTING * loss
+            first = math.isnan(self.smoothed)
+            self.smoothed = loss if first else (1.0 - SMOOTHING) * self.smoothed + SMOOTHING * loss
             self.total += loss
             self.count += 1
 
     def end_epoch(self) -> float:
-        """Return the mean over the epoch, and begin the next."""
-        mean = self.total / self.count if self.count else self.running
+        """Return the mean loss of the epoch, and start the next."""
+        mean = self.total / self.count if self.count else self.smoothed
         self.total, self.count = 0.0, 0
         return mean
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures, as a checkpoint keeps them."""
-        return {"loss": self.running, "loss_total": self.total, "loss_count": self.count}
+        """Return the figures for a checkpoint."""
+        return {"loss": self.smoothed, "loss_total": self.total, "loss_count": self.count}
 
     @classmethod
-    def from_dict(cls, told: dict[str, Any]) -> LossMeter:
-        """Go on from a checkpoint; early ones had the running loss only."""
-        return cls(
-            float(told["loss"]), float(told.get("loss_total", 0.0)), int(told.get("loss_count", 0))
-        )
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Rebuild the figures from a checkpoint."""
+        return cls(float(data["loss"]), float(data["loss_total"]), int(data["loss_count"]))
 
 
 def log_text(log: Sequence[EpochRecord]) -> str:

@@ -1,63 +1,71 @@
-"""Recipes: how a network is trained."""
+"""Recipes: settings of a training."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.registry import Registry
 
-OPTIMISERS = ("adam", "adamw")
-SCHEDULES = ("constant", "cosine")
 PRECISIONS = ("auto", "float32", "bfloat16")
+CHOICES = {
+    "optimiser": ("adam", "adamw"),
+    "schedule": ("constant", "cosine"),
+    "precision": PRECISIONS,
+}
+LEAST = {"epochs": 1, "batch": 2, "warm_up": 0, "tested": 2, "seed": 0, "split_seed": 0}
+"""Smallest values of whole numbers."""
+RANGES = {
+    "learning_rate": ("above 0", math.ulp(0.0), math.inf),
+    "weight_decay": ("at least 0", 0.0, math.inf),
+    "held_out": ("above 0 and below 1", math.ulp(0.0), 1.0),
+    "averaging": ("at least 0 and below 1", 0.0, 1.0),
+}
+"""Range of each real number, in words and as a half-open interval."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
-    """How a network is trained; the defaults are the paper's.
+    """Settings of a training; the defaults are the paper's.
 
     Parameters
     ----------
     model
         Name in the registry of models.
     epochs
-        Times that as many designs are seen as there are to train with, or `epoch_size`.
+        Number of epochs.
     batch
-        Designs between two changes of the weights.
+        Designs in each step of the optimiser.
     optimiser
-        ``adam``, or ``adamw``, which forgets by `weight_decay`.
+        ``adam`` or ``adamw`` (with `weight_decay`).
     learning_rate, schedule, warm_up
-        Highest rate; ``constant``, or falling to nothing along a ``cosine``; steps over which
-        it rises from nothing.
+        Largest learning rate; ``constant``, or decreasing to 0 along a ``cosine``; steps of
+        linear increase from 0.
     weight_decay
-        Of ``adamw``.
-    differences
-        Weight of the error in the differences between designs that a run proposed one after
-        the other, which a flip or two tell apart; 0 leaves it out. Half of the designs of a
-        batch are then the neighbours of the other half.
+        Weight decay of ``adamw``.
     resampling
-        Whether designs are drawn, with replacement, so that efficiencies are seen equally often.
+        Draw designs with replacement so that efficiencies are distributed uniformly.
     averaging
-        Decay, a step, of the running average of the weights that is kept in the end; 0 keeps
-        the last weights themselves.
+        Decay per step of an exponential moving average of the weights, which becomes the result;
+        0 for no average.
     epoch_size
-        Designs in an epoch; None for all there are to train with. An epoch of fewer goes on
-        where the last one left off.
+        Designs in an epoch; None for the size of the training set. A shorter epoch continues
+        where the last one ended.
     held_out
-        Fraction of the runs to test on.
+        Fraction of the runs held out for tests.
     tested
-        Most held-out designs that each epoch is tested on, and each round of learning from its
-        own searches.
+        Largest number of held-out designs in the test after each epoch.
     tested_last
-        Most that the end of a training is tested on; None for all.
+        Largest number in the final test; None for all.
     seed
-        Of the initial weights and of the order of designs.
+        Seed of the initial weights and the order of the designs.
     split_seed
-        Of what is held out.
+        Seed of the choice of held-out runs.
     precision
-        Of the arithmetic inside the network: ``auto`` takes bfloat16 where it is fast.
+        Arithmetic of the network: ``float32``, ``bfloat16``, or ``auto``, which is bfloat16 where
+        the hardware supports it.
 
     Raises
     ------
@@ -76,7 +84,6 @@ class Recipe:
     schedule: str = "constant"
     warm_up: int = 0
     weight_decay: float = 0.0
-    differences: float = 0.0
     resampling: bool = True
     averaging: float = 0.0
     epoch_size: int | None = None
@@ -88,82 +95,47 @@ class Recipe:
     precision: str = "auto"
 
     def __post_init__(self) -> None:
-        _at_least("epochs", self.epochs, 1)
-        _at_least("batch", self.batch, 2)
-        _at_least("warm_up", self.warm_up, 0)
-        _at_least("tested", self.tested, 2)
+        for name, least in LEAST.items():
+            _check_whole(name, getattr(self, name), least)
         if self.tested_last is not None:
-            _at_least("tested_last", self.tested_last, 2)
-        _at_least("seed", self.seed, 0)
-        _at_least("split_seed", self.split_seed, 0)
+            _check_whole("tested_last", self.tested_last, LEAST["tested"])
         if self.epoch_size is not None:
-            _at_least("epoch_size", self.epoch_size, self.batch)
-        _one_of("optimiser", self.optimiser, OPTIMISERS)
-        _one_of("schedule", self.schedule, SCHEDULES)
-        _one_of("precision", self.precision, PRECISIONS)
-        for name, least, below in _RANGES:
-            _in_range(name, getattr(self, name), least, below)
+            _check_whole("epoch_size", self.epoch_size, self.batch)
+        for name, (words, low, high) in RANGES.items():
+            value = getattr(self, name)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not low <= value < high:
+                raise InvalidSettings(f"{name}: expected a number {words}, got {value!r}")
+        for name, known in CHOICES.items():
+            if (value := getattr(self, name)) not in known:
+                raise InvalidSettings(f"{name}: expected one of {', '.join(known)}, got {value!r}")
         if not isinstance(self.resampling, bool):
             raise InvalidSettings(f"resampling: expected true or false, got {self.resampling!r}")
-        if self.differences and self.batch % 2:
-            raise InvalidSettings(
-                f"batch: expected an even number, since designs come in pairs (differences), "
-                f"got {self.batch}"
-            )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the recipe as plain data."""
         return asdict(self)
 
-    def of_member(self, member: int) -> Self:
-        """Return the recipe of a network of several, from 0: each has the next seed."""
-        return replace(self, seed=self.seed + member)
-
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Rebuild a recipe.
+        """Rebuild a recipe from plain data.
 
         Raises
         ------
         InvalidSettings
-            If it has keys that recipes have not.
+            If a key is unknown or a value is invalid.
         """
         known = {each.name for each in fields(cls)}
         if unknown := sorted(set(data) - known):
             raise InvalidSettings(
-                f"{unknown[0]}: no such key in a recipe; it has: {', '.join(sorted(known))}"
+                f"{unknown[0]}: unknown key of a recipe; expected one of {', '.join(sorted(known))}"
             )
         return cls(**data)
 
 
-_TINY = 1e-300
-"""The least number above nothing that is worth telling from it."""
-_RANGES = (
-    ("learning_rate", _TINY, math.inf),
-    ("weight_decay", 0.0, math.inf),
-    ("differences", 0.0, math.inf),
-    ("held_out", _TINY, 1.0),
-    ("averaging", 0.0, 1.0),
-)
-"""Figures of a recipe, with the least that they may be and what they must stay below."""
-
-
-def _in_range(name: str, value: float, least: float, below: float) -> None:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not least <= value < below:
-        low = "at least 0" if least == 0.0 else "above 0"
-        high = "" if below == math.inf else f" and below {below:g}"
-        raise InvalidSettings(f"{name}: expected a number {low}{high}, got {value!r}")
-
-
-def _at_least(name: str, value: int, least: int) -> None:
+def _check_whole(name: str, value: object, least: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise InvalidSettings(f"{name}: expected a whole number of at least {least}, got {value!r}")
-
-
-def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise InvalidSettings(f"{name}: expected one of {', '.join(known)}, got {value!r}")
 
 
 recipes: Registry[Recipe] = Registry("recipe")
@@ -185,7 +157,7 @@ recipes.register("own")(
 
 
 def recipe_of(name: str, /, **changes: Any) -> Recipe:
-    """Return a registered recipe, with changes; what is None stays as it is.
+    """Return a registered recipe with changes; a change to None is ignored.
 
     Raises
     ------
@@ -196,5 +168,5 @@ def recipe_of(name: str, /, **changes: Any) -> Recipe:
     >>> recipe_of("paper", epochs=2).epochs, recipe_of("paper").epochs
     (2, 10)
     """
-    told = {key: value for key, value in changes.items() if value is not None}
-    return Recipe.from_dict({**recipes[name].to_dict(), **told})
+    given = {key: value for key, value in changes.items() if value is not None}
+    return Recipe.from_dict({**recipes[name].to_dict(), **given})

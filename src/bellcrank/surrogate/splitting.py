@@ -1,4 +1,4 @@
-"""Which designs a network learns from, which ones it is tested on, and how often it sees each."""
+"""Split of a dataset into training and held-out runs, and the order of training designs."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.surrogate.dataset import Dataset
+    from bellcrank.surrogate.recipes import Recipe
 
 BINS = 50
-"""Of the histogram that resampling makes flat."""
+"""Bins of the histogram that resampling makes uniform."""
 TAILS = 1e-4
-"""Fraction of the designs at either end that go to the outermost bins."""
+"""Fraction of the designs at either end that belong to the outermost bins."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Split:
-    """Rows to train with and rows held out, of different runs.
+    """Training rows and held-out rows, from different runs.
 
     Parameters
     ----------
@@ -34,15 +35,7 @@ class Split:
     held_out: NDArray[np.int64]
 
     def some_held_out(self, most: int | None, seed: int) -> NDArray[np.int64]:
-        """Return held-out rows, at most so many: the same whenever as many are asked for.
-
-        Parameters
-        ----------
-        most
-            None for all.
-        seed
-            Names which.
-        """
+        """Return at most `most` held-out rows (None: all), drawn by a seed."""
         if most is None or len(self.held_out) <= most:
             return self.held_out
         rng = np.random.default_rng(seed)
@@ -75,8 +68,8 @@ def split_by_run(data: Dataset, fraction: float, seed: int) -> Split:
     runs = np.unique(data.run)
     if len(runs) < 2:
         raise InvalidDataset(
-            f"all {len(data)} designs come from one run, so that none can be held out to test "
-            f"on; build a dataset of at least 2 runs"
+            f"all {len(data)} designs come from one run, so that none can be held out for a test; "
+            f"build a dataset of at least 2 runs"
         )
     count = min(max(round(fraction * len(runs)), 1), len(runs) - 1)
     chosen = np.random.default_rng(seed).permutation(runs)[:count]
@@ -84,19 +77,53 @@ def split_by_run(data: Dataset, fraction: float, seed: int) -> Split:
     return Split(np.flatnonzero(~is_held_out), np.flatnonzero(is_held_out))
 
 
-def thinned(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:
-    """Return every second, third, ... of some rows, so that they are not too many.
+def rows_of_epoch(
+    recipe: Recipe,
+    epoch: int,
+    rows: NDArray[np.int64],
+    efficiency: NDArray[np.float64],
+    count: int,
+) -> NDArray[np.int64]:
+    """Return the rows of an epoch in their order.
+
+    Without resampling, epochs traverse the rows in a random order, each from where the last one
+    ended, and all rows before any is repeated.
+
+    Parameters
+    ----------
+    recipe
+        Its seed and the epoch determine the random numbers.
+    epoch
+        From 0.
+    rows
+        Training rows.
+    efficiency
+        Efficiencies of these rows.
+    count
+        Number of rows to return.
 
     Examples
     --------
-    >>> thinned(np.arange(7), 3).tolist()
-    [0, 3, 6]
+    >>> from bellcrank.surrogate.recipes import Recipe
+    >>> plain = Recipe(resampling=False)
+    >>> halves = [rows_of_epoch(plain, epoch, np.arange(4), np.zeros(4), 2) for epoch in (0, 1)]
+    >>> sorted(np.concatenate(halves).tolist())
+    [0, 1, 2, 3]
     """
-    return rows[:: -(-len(rows) // most)]
+
+    def stream(number: int) -> np.random.Generator:
+        return np.random.default_rng(np.random.SeedSequence(recipe.seed, spawn_key=(number,)))
+
+    if recipe.resampling:
+        return np.asarray(stream(epoch).choice(rows, count, p=uniform_weights(efficiency)))
+    start, stop = epoch * count, (epoch + 1) * count
+    first, last = start // len(rows), (stop - 1) // len(rows)
+    passes = np.concatenate([stream(each).permutation(rows) for each in range(first, last + 1)])
+    return passes[start - first * len(rows) :][:count]
 
 
-def flattening_chances(efficiency: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return chances that make the distribution of efficiencies flat when rows are drawn by them.
+def uniform_weights(efficiency: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return probabilities of rows that make the distribution of drawn efficiencies uniform.
 
     Parameters
     ----------
@@ -105,19 +132,19 @@ def flattening_chances(efficiency: NDArray[np.float64]) -> NDArray[np.float64]:
     Returns
     -------
     (n,) float64
-        Of sum 1: the same for each filled bin of a histogram, shared among its rows.
+        Equal for each filled bin of a histogram, divided equally among its rows; sum 1.
     """
     low, high = np.quantile(efficiency, [TAILS, 1.0 - TAILS])
-    place = (efficiency - low) / max(high - low, 1e-12) * BINS
-    bin_of = np.clip(place, 0, BINS - 1).astype(np.int64)
+    position = (efficiency - low) / max(high - low, 1e-12) * BINS
+    bin_of = np.clip(position, 0, BINS - 1).astype(np.int64)
     count = np.bincount(bin_of, minlength=BINS)
-    chance = 1.0 / count[bin_of]
-    return np.asarray(chance / chance.sum())
+    weight = 1.0 / count[bin_of]
+    return np.asarray(weight / weight.sum())
 
 
 @dataclass(frozen=True, slots=True)
 class Overlap:
-    """How much of what is held out is not new.
+    """Number of held-out designs that also occur in the training set.
 
     Parameters
     ----------
@@ -126,9 +153,9 @@ class Overlap:
     distinct
         Different designs among them.
     held_out
-        Rows held out.
+        Held-out rows.
     repeated
-        Of these, designs that are among the training rows too.
+        Held-out rows whose design is also a training row.
     """
 
     designs: int
@@ -138,7 +165,7 @@ class Overlap:
 
 
 def overlap(data: Dataset, split: Split) -> Overlap:
-    """Count designs that occur more than once, and those on both sides of a split."""
+    """Count repeated designs, and those on both sides of a split."""
     words = np.ascontiguousarray(data.packed).view([("", np.uint8, data.packed.shape[1])]).ravel()
     _, name = np.unique(words, return_inverse=True)
     known = np.zeros(int(name.max()) + 1, np.bool_)

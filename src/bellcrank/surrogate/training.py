@@ -1,12 +1,13 @@
-"""Training: a generator of what happens, that can be killed at any time and gone on with.
+"""Training of a network: a generator of progress that can be killed and resumed at any time.
 
-All random numbers come from streams named by seed and epoch, and a checkpoint is the weights,
-the optimiser's running figures and two counters: a training that was stopped and resumed ends
-with the same weights, to the last bit on the same machine, as one that was not.
+Random numbers come from streams named by seed and epoch, and a checkpoint holds the weights, the
+state of the optimiser and counters. A training that was stopped and resumed ends, on the same
+machine, with the same weights to the last bit as an uninterrupted one.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -14,13 +15,17 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.model.storage import write_bytes, write_text
 from bellcrank.provenance import provenance
 from bellcrank.surrogate.backend import autocast, import_torch, name_of
-from bellcrank.surrogate.checkpoints import checkpoint_bytes
-from bellcrank.surrogate.folder import CHECKPOINT, LOG, MODEL
+from bellcrank.surrogate.checkpoints import (
+    TrainingTensors,
+    checkpoint_bytes,
+    damaged_checkpoint,
+    load_checkpoint,
+)
 from bellcrank.surrogate.metrics import accuracy
 from bellcrank.surrogate.progress import EpochRecord, LossMeter, Progress, log_text
-from bellcrank.surrogate.schedule import move_average, neighbours_of, rate_of, rows_of_epoch
-from bellcrank.surrogate.splitting import overlap
-from bellcrank.surrogate.trained import run_network
+from bellcrank.surrogate.splitting import overlap, rows_of_epoch
+from bellcrank.surrogate.trained_model import inputs_of, run_network
+from bellcrank.surrogate.training_folder import CHECKPOINT, LOG, MODEL
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -29,37 +34,39 @@ if TYPE_CHECKING:
     import torch
 
     from bellcrank.surrogate.dataset import Dataset
-    from bellcrank.surrogate.feeding import Feeder
     from bellcrank.surrogate.metrics import Accuracy
     from bellcrank.surrogate.recipes import Recipe
     from bellcrank.surrogate.splitting import Split
-    from bellcrank.surrogate.trained import TrainedModel
-    from bellcrank.surrogate.views import View
+    from bellcrank.surrogate.trained_model import TrainedModel
 
 CHECKPOINT_SECONDS = 60.0
-"""Between two checkpoints: what a kill can cost."""
-TELL_SECONDS = 0.5
-"""Between two reports."""
+"""Interval between checkpoints: the largest loss by a kill."""
+REPORT_SECONDS = 0.5
+"""Interval between reports of progress."""
 STEPS_AT_ONCE = 50
-"""That a GPU makes between two looks at the clock: asking how it goes waits for it."""
+"""Steps on a GPU between evaluations of the loss, which wait for the device."""
 
 
 @dataclass(slots=True, eq=False)
 class Training:
-    """A training under way. Made by `begin` or `resume` of `bellcrank.surrogate.beginning`.
+    """A training in progress, made by `begin` or `resume` of `training_setup`.
 
     Parameters
     ----------
     data, recipe, split
-        What is learnt, how, and with which rows.
+        Dataset, settings, and training and held-out rows.
     folder
-        Where it is kept; None keeps nothing.
-    device
-        Where the network is.
-    precision
-        ``float32`` or ``bfloat16``.
-    before
-        Designs and seconds that the network had seen and taken before, if it goes on from one.
+        Folder of its files; None to write nothing.
+    device, precision
+        Device of the network; ``float32`` or ``bfloat16``.
+    model
+        Network with its normalisation.
+    tensors
+        Network, optimiser and moving average.
+    step, seconds
+        Steps of the optimiser so far, and their duration.
+    losses, log
+        Losses of the current epoch, and records of finished epochs.
     """
 
     data: Dataset
@@ -69,24 +76,17 @@ class Training:
     device: torch.device
     precision: str
     model: TrainedModel
-    feeder: Feeder
-    optimiser: torch.optim.Optimizer
-    average: torch.nn.Module | None
+    tensors: TrainingTensors
     step: int = 0
     seconds: float = 0.0
     losses: LossMeter = field(default_factory=LossMeter)
     log: list[EpochRecord] = field(default_factory=list)
-    before: dict[str, float] | None = None
-
-    @property
-    def epoch_size(self) -> int:
-        """Designs in an epoch."""
-        return self.recipe.epoch_size or len(self.split.training)
 
     @property
     def steps_per_epoch(self) -> int:
-        """Batches in an epoch; what is left over is not seen."""
-        return max(self.epoch_size // self.recipe.batch, 1)
+        """Batches in an epoch; an incomplete last batch is left out."""
+        designs = self.recipe.epoch_size or len(self.split.training)
+        return max(designs // self.recipe.batch, 1)
 
     @property
     def total_steps(self) -> int:
@@ -95,15 +95,15 @@ class Training:
 
     @property
     def is_done(self) -> bool:
-        """Whether all epochs are over and logged."""
+        """Whether all epochs are finished."""
         return len(self.log) == self.recipe.epochs
 
     def run(self, stop: Callable[[], bool] = lambda: False) -> Iterator[Progress]:
-        """Train to the end, or until `stop` says so; tell how it goes.
+        """Train to the end, or until `stop` returns true, and yield the progress.
 
-        The folder then holds a checkpoint, the log, and after the last epoch the model.
+        The folder then contains a checkpoint and the log.
         """
-        saved = told = time.monotonic()
+        saved = reported = time.monotonic()
         while not self.is_done:
             if self.step < (len(self.log) + 1) * self.steps_per_epoch:
                 for _ in self._steps_of_epoch():
@@ -111,9 +111,9 @@ class Training:
                     if now - saved > CHECKPOINT_SECONDS:
                         self.save()
                         saved = time.monotonic()
-                    if now - told > TELL_SECONDS:
+                    if now - reported > REPORT_SECONDS:
                         yield self._progress()
-                        told = now
+                        reported = now
                     if stop():
                         self.save()
                         return
@@ -123,41 +123,65 @@ class Training:
             saved = time.monotonic()
             yield self._progress(self.log[-1])
 
-    def look_through(self, view: View) -> None:
-        """Let the network see designs in another way, pictures of another size for example."""
-        from bellcrank.surrogate.feeding import feeder_of
-
-        self.model = replace(self.model, view=view)
-        self.feeder = feeder_of(view, self.device)
-
-    def finish(
-        self,
-        most: int | None = None,
-        tell: Callable[[Progress], None] = lambda _progress: None,
-    ) -> TrainedModel:
-        """Test on what is held out, and return the model; write it to the folder.
+    def finish(self, report: Callable[[Progress], None] = lambda _progress: None) -> TrainedModel:
+        """Test the network on held-out runs, and return the model; write it to the folder.
 
         Parameters
         ----------
-        most
-            Held-out designs to test on; by default as the recipe says.
-        tell
-            Called now and then with where the test is.
+        report
+            Called with the progress of the test.
         """
 
         def tested(done: int, total: int) -> None:
-            tell(replace(self._progress(), testing=(done, total)))
+            report(replace(self._progress(), testing=(done, total)))
 
-        record = self._record(self._test(most or self.recipe.tested_last, tested))
-        model = replace(self.model, network=self._kept, record=record)
+        record = self._record(self._test(self.recipe.tested_last, tested))
+        model = replace(self.model, network=self._result, record=record)
         if self.folder is not None:
             self._write_log(self.folder)  # a kill may have come between checkpoint and log
             model.write(self.folder / MODEL, overwrite=True)
         return model
 
+    def save(self) -> None:
+        """Write a checkpoint and the log to the folder."""
+        if self.folder is None:
+            return
+        self.losses.settle()
+        data = {
+            "step": self.step,
+            "seconds": self.seconds,
+            **self.losses.to_dict(),
+            "log": [asdict(epoch) for epoch in self.log],
+        }
+        content = checkpoint_bytes(self.tensors, data)
+        write_bytes(self.folder / CHECKPOINT, content, overwrite=True)
+        self._write_log(self.folder)
+
+    def restore(self, path: Path) -> None:
+        """Continue from a checkpoint.
+
+        Raises
+        ------
+        InvalidModel
+            If it is damaged or belongs to another network.
+        """
+        data = load_checkpoint(self.tensors, path)
+        try:
+            self.step, self.seconds = int(data["step"]), float(data["seconds"])
+            self.losses = LossMeter.from_dict(data)
+            self.log = [EpochRecord(**epoch) for epoch in data["log"]]
+        except (KeyError, TypeError, ValueError) as error:
+            raise damaged_checkpoint(path, error) from None
+
+    @property
+    def _result(self) -> torch.nn.Module:
+        """Network that becomes the model: the moving average, if there is one."""
+        average = self.tensors.average
+        return self.model.network if average is None else average
+
     def _record(self, found: Accuracy) -> dict[str, Any]:
-        """Return how the network was trained and how well it does."""
-        record = {
+        """Return how the network was trained, and its accuracy."""
+        return {
             "recipe": self.recipe.to_dict(),
             "precision": self.precision,
             "device": name_of(self.device),
@@ -168,77 +192,100 @@ class Training:
             "epochs": [epoch.to_dict() for epoch in self.log],
             "provenance": provenance(torch=import_torch().__version__),
         }
-        return record if self.before is None else {**record, "before": self.before}
 
     def _progress(self, epoch: EpochRecord | None = None) -> Progress:
         batch = self.recipe.batch
         self.losses.settle()
-        return Progress(self.step * batch, self.total_steps * batch, self.losses.running, epoch)
-
-    @property
-    def _kept(self) -> torch.nn.Module:
-        """The network that is kept in the end: the average, if there is one."""
-        return self.model.network if self.average is None else self.average
+        return Progress(self.step * batch, self.total_steps * batch, self.losses.smoothed, epoch)
 
     def _steps_of_epoch(self) -> Iterator[None]:
-        """Make the steps that are left of the epoch at hand; yield now and then."""
+        """Make the remaining steps of the current epoch; yield between groups of steps."""
         import torch
 
-        from bellcrank.surrogate.losses import loss_of
-
         epoch, first = divmod(self.step, self.steps_per_epoch)
-        training, wanted = self.split.training, self.steps_per_epoch * self.recipe.batch
+        training, count = self.split.training, self.steps_per_epoch * self.recipe.batch
         efficiency = self.data.efficiency[training]
-        paired = neighbours_of(self.data.run) if self.recipe.differences else None
-        rows = rows_of_epoch(self.recipe, epoch, training, efficiency, wanted, paired)
-        network = self.model.network.train()
+        rows = rows_of_epoch(self.recipe, epoch, training, efficiency, count)
+        network, optimiser = self.model.network.train(), self.tensors.optimiser
         labels = ((self.data.efficiency - self.model.mean) / self.model.deviation).astype("f4")
-        breath = 1 if self.device.type == "cpu" else STEPS_AT_ONCE
+        group_size = 1 if self.device.type == "cpu" else STEPS_AT_ONCE
         for number in range(first, self.steps_per_epoch):
             start = time.monotonic()
             chosen = rows[number * self.recipe.batch : (number + 1) * self.recipe.batch]
-            inputs = self.feeder.feed(self.data.packed[chosen])
+            arrays = self.model.view.arrays(self.data.packed[chosen])
+            inputs = inputs_of(arrays, self.model.view.scale, self.device)
             target = torch.from_numpy(labels[chosen]).to(self.device)
-            for group in self.optimiser.param_groups:
-                group["lr"] = rate_of(self.recipe, self.step, self.total_steps)
+            for group in optimiser.param_groups:
+                group["lr"] = learning_rate(self.recipe, self.step, self.total_steps)
             with autocast(self.device, self.precision):
                 output = network(inputs)
-            loss = loss_of(output.float(), target, self.recipe.differences)
-            self.optimiser.zero_grad(set_to_none=True)
+            loss = torch.mean((output.float() - target) ** 2)
+            optimiser.zero_grad(set_to_none=True)
             loss.backward()  # type: ignore[no-untyped-call]
-            self.optimiser.step()
+            optimiser.step()
             self.step += 1
-            if self.average is not None:
-                move_average(self.average, network, self.recipe.averaging, self.step)
+            if self.tensors.average is not None:
+                decay = self.recipe.averaging
+                update_average(self.tensors.average, network, decay, self.step)
             self.losses.add(loss)
-            if self.step % breath == 0:
+            if self.step % group_size == 0:
                 self.losses.settle()
             self.seconds += time.monotonic() - start
-            if self.step % breath == 0:
+            if self.step % group_size == 0:
                 yield
 
     def _test(
-        self, most: int | None, tell: Callable[[int, int], None] = lambda _done, _total: None
+        self, most: int | None, report: Callable[[int, int], None] = lambda _done, _total: None
     ) -> Accuracy:
-        """Test the network that is kept on held-out rows, at most so many."""
+        """Test the resulting network on at most so many held-out rows."""
         rows = self.split.some_held_out(most, self.recipe.split_seed)
-        found = run_network(self._kept, self.feeder, self.data.packed[rows], self.precision, tell)
+        view = self.model.view
+        found = run_network(
+            self._result, view.arrays, self.data.packed[rows], view.scale, self.precision, report
+        )
         return accuracy(self.model.efficiencies(found), self.data.efficiency[rows])
 
     def _end_epoch(self) -> EpochRecord:
-        """Return how the network stands after the epoch at hand."""
+        """Test the network and return the record of the current epoch."""
         found = self._test(self.recipe.tested)
         return EpochRecord(
             len(self.log) + 1, self.step * self.recipe.batch, round(self.seconds, 2),
             self.losses.end_epoch(), found.r_squared, found.determination, found.rms_error,
         )  # fmt: skip
 
-    def save(self) -> None:
-        """Write a checkpoint and the log, if there is a folder."""
-        if self.folder is not None:
-            self.losses.settle()
-            write_bytes(self.folder / CHECKPOINT, checkpoint_bytes(self), overwrite=True)
-            self._write_log(self.folder)
-
     def _write_log(self, folder: Path) -> None:
         write_text(folder / LOG, log_text(self.log), overwrite=True)
+
+
+def learning_rate(recipe: Recipe, step: int, total: int) -> float:
+    """Return the learning rate of a step, counted from 0.
+
+    Examples
+    --------
+    >>> from bellcrank.surrogate.recipes import Recipe
+    >>> recipe = Recipe(learning_rate=0.1, warm_up=10, schedule="cosine")
+    >>> [round(learning_rate(recipe, step, 100), 4) for step in (0, 9, 50, 100)]
+    [0.01, 0.098, 0.05, 0.0]
+    """
+    rate = recipe.learning_rate
+    if recipe.warm_up:
+        rate *= min(1.0, (step + 1) / recipe.warm_up)
+    if recipe.schedule == "cosine":
+        rate *= 0.5 + 0.5 * math.cos(math.pi * step / total)
+    return rate
+
+
+def update_average(
+    average: torch.nn.Module, network: torch.nn.Module, decay: float, step: int
+) -> None:
+    """Update the moving average of the weights; its decay is smaller in the first steps."""
+    import torch
+
+    weight = 1.0 - min(decay, (1.0 + step) / (10.0 + step))
+    with torch.no_grad():
+        target, source = average.state_dict(), network.state_dict()
+        moving = [name for name, value in target.items() if value.is_floating_point()]
+        torch._foreach_lerp_([target[n] for n in moving], [source[n] for n in moving], weight)
+        for name, value in target.items():
+            if not value.is_floating_point():
+                value.copy_(source[name])

@@ -1,7 +1,7 @@
-"""What a network looks at: pictures or bits.
+"""Inputs of networks: pictures of designs, or the bits of their masks.
 
-A view turns packed masks into arrays of bytes, and says how bytes become numbers: training
-moves bytes, and the numbers are made where the network is.
+A view turns packed masks into arrays of bytes with a scale, so that only bytes are transferred
+to the device of the network.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 
 
 class View(Hashable, Protocol):
-    """What all views can do."""
+    """Input of a network."""
 
     shape: tuple[int, ...]
-    """Of what the network gets for one design."""
+    """Shape of the input for one design."""
     scale: float
-    """A byte times this is what the network gets."""
+    """Factor from bytes to the values of the input."""
 
-    def look(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def arrays(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Turn packed masks (n, bytes) into arrays (n, *shape)."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is needed to see the same again, besides the problem."""
+        """Return the options of the view, in addition to the problem."""
 
 
 views: Registry[Callable[..., View]] = Registry("view")
@@ -42,17 +42,17 @@ views: Registry[Callable[..., View]] = Registry("view")
 
 @views.register("picture")
 class PictureView:
-    """Designs drawn in black on white, as in the paper."""
+    """Black drawings on white, as in the paper."""
 
     scale = 1.0 / 255.0
 
     def __init__(self, problem: Problem, **canvas: Any) -> None:
-        usual = problem.initial.copy()
-        usual[problem.designable] = False
-        self.renderer = Renderer(problem.lattice, Canvas(**canvas), usual)
+        common = problem.initial.copy()
+        common[problem.designable] = False
+        self.renderer = Renderer(problem.lattice, Canvas(**canvas), common)
         self.shape = (1, self.renderer.canvas.height, self.renderer.canvas.width)
 
-    def look(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def arrays(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Draw the designs."""
         return self.renderer.render(packed)[:, None]
 
@@ -63,17 +63,17 @@ class PictureView:
 
 @views.register("bits")
 class BitsView:
-    """The mask itself."""
+    """Bits of the mask."""
 
     scale = 1.0
 
     def __init__(self, problem: Problem) -> None:
         self.shape = (problem.lattice.beam_count,)
 
-    def look(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def arrays(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Unpack the bits."""
         return np.unpackbits(check_masks(packed, self.shape[0]), axis=1, count=self.shape[0])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return nothing: there is no choice."""
+        """Return no options."""
         return {}

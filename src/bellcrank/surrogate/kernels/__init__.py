@@ -1,1 +1,1 @@
-"""Compiled loops of the surrogate: plain arrays in, arrays out."""
+"""Compiled kernels of the surrogate: plain arrays in, plain arrays out."""

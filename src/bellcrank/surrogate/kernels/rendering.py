@@ -1,4 +1,4 @@
-"""Pictures of designs as products of what each beam lets through."""
+"""Pictures of designs as products of the transmissions of their beams."""
 
 from __future__ import annotations
 
@@ -13,40 +13,40 @@ if TYPE_CHECKING:
 
 
 class Strokes(NamedTuple):
-    """The pixels that each of M beams touches, one beam after the other."""
+    """The pixels that each of M beams covers, one beam after the other."""
 
     start: NDArray[np.int64]
-    """(M + 1,) where each beam's pixels begin."""
+    """(M + 1,) index of the first pixel of each beam."""
     pixel: NDArray[np.uint32]
-    """Indices into a picture of pixels row by row."""
+    """Indices into a picture, row by row."""
     passed: NDArray[np.float32]
-    """Fraction of the pixel that the beam leaves white."""
+    """Transmission: fraction of the pixel that the beam leaves white."""
 
 
 class Background(NamedTuple):
-    """What most designs have in common, drawn once."""
+    """Beams that most designs have in common, drawn once."""
 
     packed: NDArray[np.uint8]
-    """(bytes,) its beams."""
+    """(bytes,) packed mask of these beams."""
     passed: NDArray[np.float32]
-    """(pixels,) what they leave white."""
+    """(pixels,) their transmission."""
 
 
 @kernel
-def lay(
+def draw_beam(
     strokes: Strokes, packed: NDArray[np.uint8], beam: int, passed: NDArray[np.float32]
 ) -> None:
-    """Draw one beam of a design, if it is there."""
+    """Multiply the transmission of one beam into a picture, if a design has the beam."""
     if packed[beam >> 3] & (128 >> (beam & 7)):
         for at in range(strokes.start[beam], strokes.start[beam + 1]):
             passed[strokes.pixel[at]] *= strokes.passed[at]
 
 
 @entry
-def lay_all(strokes: Strokes, packed: NDArray[np.uint8], passed: NDArray[np.float32]) -> None:
-    """Draw the beams of one design onto what is there."""
+def draw_beams(strokes: Strokes, packed: NDArray[np.uint8], passed: NDArray[np.float32]) -> None:
+    """Multiply the transmissions of the beams of one design into a picture."""
     for beam in range(len(strokes.start) - 1):
-        lay(strokes, packed, beam, passed)
+        draw_beam(strokes, packed, beam, passed)
 
 
 @entry
@@ -57,19 +57,19 @@ def draw(
     picture: NDArray[np.float32],
     ink: NDArray[np.uint8],
 ) -> None:
-    """Draw designs: the ink in a pixel is 1 - prod over present beams of what they let pass.
+    """Draw designs: the ink in a pixel is 1 minus the product of the transmissions of the beams.
 
-    The beams of the background are drawn first, whether at once or one by one: a picture
-    comes out the same to the last bit.
+    The beams of the background are multiplied first, at once or one by one: both give the same
+    picture to the last bit.
 
     Parameters
     ----------
     packed : (n, bytes)
-        The designs, as `numpy.packbits` leaves them.
+        Designs as `numpy.packbits` returns them.
     picture : (pixels,)
-        To work on.
+        Workspace.
     ink : (n, pixels)
-        Filled: 0 where there is paper, 255 where all is covered.
+        Result: 0 is white, 255 is black.
     """
     beams = len(strokes.start) - 1
     for number in range(len(packed)):
@@ -84,9 +84,9 @@ def draw(
             picture[:] = np.float32(1.0)
             for beam in range(beams):
                 if background.packed[beam >> 3] & (128 >> (beam & 7)):
-                    lay(strokes, design, beam, picture)
+                    draw_beam(strokes, design, beam, picture)
         for beam in range(beams):
             if not background.packed[beam >> 3] & (128 >> (beam & 7)):
-                lay(strokes, design, beam, picture)
+                draw_beam(strokes, design, beam, picture)
         for pixel in range(len(picture)):
             ink[number, pixel] = np.uint8(np.float32(255.5) - np.float32(255.0) * picture[pixel])

@@ -34,7 +34,7 @@ from bellcrank.provenance import provenance
 from bellcrank.search import Evaluator, MetropolisSettings, chain_blocks
 from bellcrank.surrogate.evaluator import NetworkEvaluator
 from bellcrank.surrogate.matching import beams_between, renumbered
-from reproduction.distances import smallest_distances
+from reproduction.networks.distances import smallest_distances
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

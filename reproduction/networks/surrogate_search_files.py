@@ -12,16 +12,16 @@ from bellcrank.model.storage import write_text
 from bellcrank.plots import style
 from bellcrank.storage import check_free
 from bellcrank.storage.files import make_folder
+from reproduction.networks.surrogate_search import OFFERS
 from reproduction.pictures.charts import Chart, Level, Series
 from reproduction.pictures.sheets import Sheet, draw_sheet
-from reproduction.surrogate_search import OFFERS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from reproduction.surrogate_search import OfferedDesign, SurrogateSearchResult
+    from reproduction.networks.surrogate_search import OfferedDesign, SurrogateSearchResult
 
 RECORD = "surrogate-search.json"
 DESIGN = "design.json"

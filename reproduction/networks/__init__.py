@@ -1,0 +1,1 @@
+"""The paper's study of networks: search with a network, attribution, accuracy."""

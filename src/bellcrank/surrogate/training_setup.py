@@ -1,0 +1,137 @@
+"""Start and resumption of a training.
+
+Examples
+--------
+>>> from bellcrank.surrogate.recipes import recipe_of
+>>> training = begin(data, recipe_of("own"), "crane-training")  # doctest: +SKIP
+>>> for progress in training.run(): ...  # doctest: +SKIP
+>>> model = training.finish()  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.surrogate.backend import find_device, find_precision
+from bellcrank.surrogate.checkpoints import TrainingTensors
+from bellcrank.surrogate.splitting import split_by_run
+from bellcrank.surrogate.trained_model import TrainedModel, architecture_of
+from bellcrank.surrogate.training import Training
+from bellcrank.surrogate.training_folder import (
+    CHECKPOINT,
+    Description,
+    check_new,
+    data_hash,
+    read_description,
+    remove_leftovers,
+    write_description,
+)
+from bellcrank.surrogate.views import views
+
+if TYPE_CHECKING:
+    import os
+
+    import torch
+
+    from bellcrank.surrogate.dataset import Dataset
+    from bellcrank.surrogate.recipes import Recipe
+
+
+def begin(
+    data: Dataset,
+    recipe: Recipe,
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    device: str = "auto",
+) -> Training:
+    """Start a training with random weights.
+
+    Parameters
+    ----------
+    folder
+        New folder for its files; None to write nothing.
+
+    Raises
+    ------
+    InvalidDataset
+        If the data come from a single run.
+    InvalidSettings
+        If PyTorch or the device is not available, or all training or all held-out efficiencies
+        are equal.
+    UnknownName
+        If there is no such model.
+    OutputExists
+        If the folder contains files of a training.
+    """
+    if folder is not None:
+        check_new(folder)
+    where = find_device(device)
+    training = _build(data, recipe, where, find_precision(recipe.precision, where))
+    if folder is not None:
+        training.folder = Path(folder)
+        remove_leftovers(training.folder)
+        write_description(training.folder, Description(recipe, training.precision, data_hash(data)))
+    return training
+
+
+def resume(folder: str | os.PathLike[str], data: Dataset, *, device: str = "auto") -> Training:
+    """Resume the training in a folder.
+
+    Raises
+    ------
+    InvalidFile
+        If there is none, or its description is damaged.
+    InvalidSettings
+        If it was started with other data.
+    InvalidModel
+        If its checkpoint is damaged.
+    """
+    place = Path(folder)
+    description = read_description(place)
+    if description.data != data_hash(data):
+        raise InvalidSettings(f"{folder}: the training there was started with other data")
+    training = _build(data, description.recipe, find_device(device), description.precision)
+    training.folder = place
+    remove_leftovers(place)
+    if (place / CHECKPOINT).exists():
+        training.restore(place / CHECKPOINT)
+    return training
+
+
+def _build(data: Dataset, recipe: Recipe, device: torch.device, precision: str) -> Training:
+    """Set up a training with random weights and without a folder."""
+    import torch
+
+    split = split_by_run(data, recipe.held_out, recipe.split_seed)
+    seen, held_out = data.efficiency[split.training], data.efficiency[split.held_out]
+    if seen.min() == seen.max():  # their deviation may be rounding noise
+        raise InvalidSettings(
+            f"all training efficiencies are {seen[0]:g}: a network cannot be trained on them"
+        )
+    if held_out.min() == held_out.max():
+        raise InvalidSettings(
+            f"all held-out efficiencies are {held_out[0]:g}: a network cannot be tested on them; "
+            f"use more or longer runs"
+        )
+    architecture = architecture_of(recipe.model)
+    view = views[architecture.view](data.problem)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(recipe.seed)
+        network = architecture.build(view.shape)
+    network = network.to(device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    model = TrainedModel(
+        architecture=recipe.model, problem=data.problem, view=view, mean=float(seen.mean()),
+        deviation=float(seen.std()), network=network,
+    )  # fmt: skip
+    average = copy.deepcopy(network) if recipe.averaging else None
+    kind = torch.optim.AdamW if recipe.optimiser == "adamw" else torch.optim.Adam
+    optimiser = kind(
+        network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay
+    )
+    return Training(
+        data, recipe, split, None, device, precision, model,
+        TrainingTensors(network, optimiser, average),
+    )  # fmt: skip
