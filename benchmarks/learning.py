@@ -19,10 +19,10 @@ import numpy as np
 
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
-from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import Dataset, read_dataset
 from bellcrank.surrogate.metrics import accuracy
 from bellcrank.surrogate.recipes import recipe_of
+from bellcrank.surrogate.training_setup import begin
 
 RECORD = Path("docs/surrogate/learning.json")
 TESTED = 20_000

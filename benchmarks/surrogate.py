@@ -13,15 +13,12 @@ import io
 import json
 import platform
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
-from bellcrank.surrogate.beginning import begin
-from bellcrank.surrogate.identity import architecture_of
-from bellcrank.surrogate.trained import TrainedModel
 
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
@@ -30,13 +27,14 @@ from bellcrank.surrogate.backend import find_precision
 from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.models import models
 from bellcrank.surrogate.recipes import Recipe
-from bellcrank.surrogate.views import PictureView, views
+from bellcrank.surrogate.trained_model import TrainedModel, architecture_of
+from bellcrank.surrogate.training_setup import begin
+from bellcrank.surrogate.views import PictureView, View, views
 from benchmarks.chains import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bellcrank.surrogate.feeding import Feeder
     from numpy.typing import NDArray
 
     from bellcrank.surrogate.pictures import Canvas
@@ -122,7 +120,7 @@ def measure_rendering(masks: NDArray[np.bool_], effort: Effort) -> dict[str, flo
 
     ours = seconds_of(render, effort.seconds) / len(packed)
     canvas = view.renderer.canvas
-    lines = canvas.place(problem.lattice.positions)[problem.lattice.beams]
+    lines = canvas.pixels_of(problem.lattice.positions)[problem.lattice.beams]
     start = time.process_time()
     for mask in masks[: effort.saved]:
         save_as_matplotlib(lines[mask], canvas)
@@ -131,17 +129,18 @@ def measure_rendering(masks: NDArray[np.bool_], effort: Effort) -> dict[str, flo
             "ratio": theirs / ours}  # fmt: skip
 
 
-class TimedFeeder:
-    """Notes how long a network waits for what it looks at."""
+class TimedView:
+    """A view that measures the time of its calls."""
 
-    def __init__(self, feeder: Feeder) -> None:
-        self.feeder = feeder
+    def __init__(self, view: View) -> None:
+        self.view = view
+        self.scale = view.scale
         self.seconds = 0.0
 
-    def feed(self, packed: NDArray[np.uint8]) -> torch.Tensor:
-        """Feed, and note the time."""
+    def arrays(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Compute the arrays, and add the time."""
         start = time.process_time()
-        found = self.feeder.feed(packed)
+        found = self.view.arrays(packed)
         self.seconds += time.process_time() - start
         return found
 
@@ -155,8 +154,8 @@ def measure_waiting(masks: NDArray[np.bool_], name: str, effort: Effort) -> floa
     steps = effort.training_steps if name.startswith("resnet") else 20 * effort.training_steps
     recipe = Recipe(model=name, epochs=1, epoch_size=32 * (steps + 1), tested=2)
     training = begin(data, recipe, device="cpu")
-    timed = TimedFeeder(training.feeder)
-    training.feeder = timed
+    timed = TimedView(training.model.view)
+    training.model = replace(training.model, view=timed)
     story = training._steps_of_epoch()  # noqa: SLF001
     next(story)
     timed.seconds, start = 0.0, time.process_time()
@@ -194,7 +193,9 @@ def network(name: str) -> TrainedModel:
     architecture = architecture_of(name)
     view = views[architecture.view](problem)
     built = architecture.build(view.shape).to(memory_format=torch.channels_last).eval()
-    return TrainedModel(name, problem, view, 0.0, 1.0, network=built)
+    return TrainedModel(
+        architecture=name, problem=problem, view=view, mean=0.0, deviation=1.0, network=built
+    )
 
 
 def measure_network(masks: NDArray[np.bool_], name: str, effort: Effort) -> list[Cost]:

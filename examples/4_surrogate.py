@@ -16,8 +16,8 @@ from pathlib import Path
 
 from bellcrank.campaign.dataset import DatasetSpec, build_dataset
 from bellcrank.model import find_problem
-from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.recipes import recipe_of
+from bellcrank.surrogate.training_setup import begin
 
 problem = find_problem("scaling-8")
 data = build_dataset(DatasetSpec(problem=problem, runs=40, steps=400), Path("dataset"))

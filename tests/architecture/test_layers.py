@@ -40,7 +40,7 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     "statement",
     [
         "import bellcrank.cli.main",
-        "import bellcrank.surrogate.predictor, bellcrank.surrogate.beginning",
+        "import bellcrank.surrogate.predictor, bellcrank.surrogate.training_setup",
         "from bellcrank.surrogate.dataset import read_dataset",
         HELP,
     ],

@@ -9,9 +9,8 @@ import numpy as np
 
 from bellcrank.model import Input, Lattice, Problem, Supports, problem_to_dict
 from bellcrank.surrogate.dataset import Dataset
-from bellcrank.surrogate.identity import architecture_of
 from bellcrank.surrogate.recipes import Recipe
-from bellcrank.surrogate.trained import TrainedModel
+from bellcrank.surrogate.trained_model import TrainedModel, architecture_of
 from bellcrank.surrogate.views import views
 
 if TYPE_CHECKING:
@@ -80,9 +79,12 @@ def untrained(problem: Problem, name: str = "mlp", seed: int = 0, **view: Any) -
         for each in norms:
             each.momentum = 1.0  # one pass sets the running figures: predictions then differ
         packed = np.packbits(random_masks(problem, 8, seed=77), axis=1)
-        network.train()(torch.from_numpy(looks.look(packed)).float() * looks.scale)
+        network.train()(torch.from_numpy(looks.arrays(packed)).float() * looks.scale)
     record = {"note": "untrained"}
-    return TrainedModel(name, problem, looks, 0.25, 0.5, record, network=network.eval())
+    return TrainedModel(
+        architecture=name, problem=problem, view=looks, mean=0.25, deviation=0.5,
+        network=network.eval(), record=record,
+    )  # fmt: skip
 
 
 def weights(model: TrainedModel) -> dict[str, Any]:

@@ -32,15 +32,15 @@ def test_beams_are_found_under_another_numbering(name: str) -> None:
     assert np.array_equal(beams_between(known, known), np.arange(known.lattice.beam_count))
 
 
-@pytest.mark.parametrize("name", ["mlp", "grid", "resnet18-w16"])
+@pytest.mark.parametrize("name", ["mlp", "resnet18-w16"])
 def test_predictions_do_not_depend_on_numbering_and_place(problem: Problem, name: str) -> None:
     model = untrained(problem, name)
     given, old_beam = moved(problem)
     masks = random_masks(problem, 5)
-    here = Predictor(problem, [model], device="cpu").predict(masks)
-    there = Predictor(given, [model], device="cpu").predict(masks[:, old_beam])
-    assert np.array_equal(here.efficiency, there.efficiency)
-    assert here.efficiency.std() > 0.0
+    here = Predictor(problem, model, device="cpu").predict(masks)
+    there = Predictor(given, model, device="cpu").predict(masks[:, old_beam])
+    assert np.array_equal(here, there)
+    assert here.std() > 0.0
 
 
 def test_the_independently_numbered_crane_is_the_crane(crane: Problem, reference: Path) -> None:
@@ -52,8 +52,8 @@ def test_the_independently_numbered_crane_is_the_crane(crane: Problem, reference
     translated[:, ours] = masks
     model = untrained(crane)
     assert np.array_equal(
-        Predictor(other, [model], device="cpu").predict(masks).efficiency,
-        Predictor(crane, [model], device="cpu").predict(translated).efficiency,
+        Predictor(other, model, device="cpu").predict(masks),
+        Predictor(crane, model, device="cpu").predict(translated),
     )
     assert not np.array_equal(ours, np.arange(len(ours)))
 
@@ -106,20 +106,20 @@ def forced(problem: Problem) -> Problem:
 
 
 CHANGES: list[tuple[Callable[[Any], Any], str]] = [
-    (nudged, "with no node where 'scaling-8' has node 40"),
-    (rewired, "a lattice without beam 100 of 'scaling-8'"),
-    (stiffer, r"stiffness of joints is another .* \(0\.1 there, 0\.1001 here\)"),
-    (rolling, r"support \(fixed\) is another"),
-    (fewer_outputs, "output region is another"),
-    (loaded, r"output spring is another .* \(None there, 0\.1 here\)"),
-    (turned, "output direction is another"),
-    (reverse, "output direction is another"),
-    (further, "amount is another"),
-    (forced, "drive is another"),
-    (lambda problem: replace(problem, aggregate="sum"), "aggregate is another"),
+    (nudged, "node 40"),
+    (rewired, "no beam 100"),
+    (stiffer, r"stiffness of joints .* 0\.1 in training, 0\.1001 here"),
+    (rolling, r"support \(fixed\)"),
+    (fewer_outputs, "output region"),
+    (loaded, r"output spring .* None in training, 0\.1 here"),
+    (turned, "output direction"),
+    (reverse, "output direction"),
+    (further, "amount"),
+    (forced, "drive"),
+    (lambda problem: replace(problem, aggregate="sum"), "aggregate"),
     (
         lambda problem: replace(problem, objective="directional:4"),
-        r"exponent of the objective is another .* \(2\.0 there, 4\.0 here\)",
+        r"exponent of the objective .* 2\.0 in training, 4\.0 here",
     ),
     (lambda _: find_problem("crane"), r"with 125 nodes and 219 beams|nodes and .* has 133 and 352"),
 ]
@@ -144,36 +144,20 @@ def test_naming_the_usual_objective_changes_nothing(problem: Problem) -> None:
     assert len(beams_between(problem, named)) == problem.lattice.beam_count
     pliers = find_problem("pliers")
     assert len(beams_between(pliers, replace(pliers, objective="force"))) > 0
-    with pytest.raises(InvalidModel, match="objective is another"):
+    with pytest.raises(InvalidModel, match="objective"):
         beams_between(pliers, replace(pliers, objective="displacement"))
 
 
-def test_several_networks_give_their_mean_and_how_much_they_dispute(problem: Problem) -> None:
-    members = [untrained(problem, "mlp", seed) for seed in range(3)]
-    masks = random_masks(problem, 6)
-    packed = np.packbits(masks, axis=1)
-    each = np.array([member.predict(packed, device="cpu") for member in members])
-    found = Predictor(problem, members, device="cpu").predict(masks)
-    assert np.allclose(found.efficiency, each.sum(axis=0) / 3)
-    assert found.spread is not None
-    variance = ((each - each.sum(axis=0) / 3) ** 2).sum(axis=0) / 2
-    assert np.allclose(found.spread, np.sqrt(variance))
-    assert Predictor(problem, members[:1], device="cpu").predict(masks).spread is None
-    assert found.efficiency.shape == (6,)
-    assert Predictor(problem, members, device="cpu").predict(masks[:0]).efficiency.shape == (0,)
-
-
-def test_predictions_need_networks_and_masks_of_the_problem(
+def test_predictions_need_masks_of_the_problem(
     problem: Problem, crane: Problem, tmp_path: Path
 ) -> None:
-    with pytest.raises(InvalidModel, match="at least one trained model"):
-        Predictor(problem, [])
-    predictor = Predictor(problem, [untrained(problem)], device="cpu")
+    predictor = Predictor(problem, untrained(problem), device="cpu")
+    assert predictor.predict(random_masks(problem, 6)[:0]).shape == (0,)
     for wrong in (np.ones((2, 352), bool), np.ones(219, bool), np.ones((2, 219))):
         with pytest.raises(InvalidProblem, match=r"masks: expected booleans of shape \(n, 219\)"):
             predictor.predict(wrong)  # type: ignore[arg-type]
     path = tmp_path / "model.safetensors"
     untrained(problem).write(path)
-    assert load_predictor(problem, [path], device="cpu").predict(random_masks(problem, 2))
-    with pytest.raises(InvalidModel, match="has learnt 'scaling-8'"):
-        load_predictor(crane, [path])
+    assert load_predictor(problem, path, device="cpu").predict(random_masks(problem, 2)).std()
+    with pytest.raises(InvalidModel, match="'scaling-8'"):
+        load_predictor(crane, path)

@@ -9,9 +9,8 @@ import pytest
 import torch
 
 from bellcrank.errors import UnknownName
-from bellcrank.surrogate.identity import architecture_of
-from bellcrank.surrogate.models import models
-from bellcrank.surrogate.models.resnet50 import ResNet50
+from bellcrank.surrogate.models import ResNet50, models
+from bellcrank.surrogate.trained_model import architecture_of
 from bellcrank.surrogate.views import views
 
 KERAS_WITHOUT_TOP = 23_587_712

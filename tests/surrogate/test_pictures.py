@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
 from bellcrank.errors import InvalidDataset, InvalidSettings
 from bellcrank.model import Problem, find_problem
-from bellcrank.surrogate.feeding import HostFeeder, PictureFeeder, feeder_of
 from bellcrank.surrogate.pictures import Canvas, Renderer, draw_lines
 from bellcrank.surrogate.views import PictureView
 
@@ -24,7 +22,7 @@ TOLERANCE = 3
 def test_a_product_of_beams_is_what_one_pass_of_agg_draws(name: str) -> None:
     problem = find_problem(name)
     renderer = Renderer(problem.lattice)
-    lines = renderer.canvas.place(problem.lattice.positions)[problem.lattice.beams]
+    lines = renderer.canvas.pixels_of(problem.lattice.positions)[problem.lattice.beams]
     rng = np.random.default_rng(2)
     for _ in range(6):
         mask = rng.random(len(lines)) < rng.random()
@@ -39,7 +37,7 @@ def test_the_background_is_drawn_at_once_or_beam_by_beam_to_the_same_bit(crane: 
     masks = random_masks(crane, 20)
     masks[::2, np.flatnonzero(usual)[3]] = False  # so that the background is not whole
     packed = np.packbits(masks, axis=1)
-    renderer = Renderer(crane.lattice, usual=usual)
+    renderer = Renderer(crane.lattice, common=usual)
     found = renderer.render(packed)
     # Without the shortcut: no design has all beams of a background that holds one more.
     renderer.background.passed[:] = np.nan
@@ -53,7 +51,7 @@ def test_shortcut_and_detour_agree_on_the_same_design(crane: Problem) -> None:
     usual = crane.initial.copy()
     usual[crane.designable] = False
     packed = np.packbits(random_masks(crane, 20), axis=1)
-    fast = Renderer(crane.lattice, usual=usual)
+    fast = Renderer(crane.lattice, common=usual)
     expected = fast.render(packed)
     lattice_order = np.argsort(~usual, kind="stable")  # background first, as the kernel draws
     for design, picture in zip(packed, expected, strict=True):
@@ -70,18 +68,18 @@ def test_shortcut_and_detour_agree_on_the_same_design(crane: Problem) -> None:
 def test_a_picture_does_not_depend_on_the_batch_it_is_drawn_in(problem: Problem) -> None:
     packed = np.packbits(random_masks(problem, 17), axis=1)
     view = PictureView(problem)
-    whole = view.look(packed)
+    whole = view.arrays(packed)
     for size in (1, 5, 16):
-        parts = [view.look(packed[first : first + size]) for first in range(0, 17, size)]
+        parts = [view.arrays(packed[first : first + size]) for first in range(0, 17, size)]
         assert np.array_equal(np.concatenate(parts), whole)
-    assert np.array_equal(view.look(packed[::-1])[::-1], whole)
-    assert view.look(packed[:0]).shape == (0, 1, 128, 192)
+    assert np.array_equal(view.arrays(packed[::-1])[::-1], whole)
+    assert view.arrays(packed[:0]).shape == (0, 1, 128, 192)
 
 
 def test_the_uppermost_row_of_pixels_shows_the_uppermost_nodes(crane: Problem) -> None:
     canvas = Canvas()
     renderer = Renderer(crane.lattice, canvas)
-    place = canvas.place(crane.lattice.positions)
+    place = canvas.pixels_of(crane.lattice.positions)
     for beam in (0, 100, 351):
         alone = np.zeros(352, bool)
         alone[beam] = True
@@ -100,7 +98,7 @@ def test_the_uppermost_row_of_pixels_shows_the_uppermost_nodes(crane: Problem) -
 def test_the_lattice_fits_and_keeps_its_shape(name: str, size: tuple[int, int]) -> None:
     lattice = find_problem(name).lattice
     canvas = Canvas(*size, line=1.5, margin=3.0)
-    place = canvas.place(lattice.positions)
+    place = canvas.pixels_of(lattice.positions)
     room = 3.0 + 0.75 - 1e-9
     assert place.min() >= room
     assert (np.array(size) - place >= room).all()
@@ -145,24 +143,3 @@ def test_masks_that_are_not_contiguous_are_drawn_the_same(problem: Problem) -> N
     assert np.array_equal(renderer.render(packed[::2]), renderer.render(packed[::2].copy()))
     columns = np.asfortranarray(packed)
     assert np.array_equal(renderer.render(columns), renderer.render(packed))
-
-
-@pytest.mark.parametrize("name", ["crane", "discs"])
-@pytest.mark.parametrize("precision", ["float32", "bfloat16"])
-def test_what_a_gpu_would_draw_is_what_the_host_draws(name: str, precision: str) -> None:
-    problem = find_problem(name)
-    view, device = PictureView(problem), torch.device("cpu")
-    packed = np.packbits(random_masks(problem, 9), axis=1)
-    with torch.autocast("cpu", torch.bfloat16, enabled=precision == "bfloat16"):
-        there = PictureFeeder(view, device).feed(packed)
-    here = HostFeeder(view, device).feed(packed)
-    assert there.shape == here.shape == (9, 1, 128, 192)
-    assert there.dtype == here.dtype == torch.float32
-    assert float((there - here).abs().max()) <= 1.5 / 255.0
-
-
-def test_a_processor_is_fed_by_the_host(problem: Problem) -> None:
-    assert isinstance(feeder_of(PictureView(problem), torch.device("cpu")), HostFeeder)
-    feeder = PictureFeeder(PictureView(problem), torch.device("cpu"))
-    with pytest.raises(InvalidDataset, match="packed: expected masks of 28 bytes"):
-        feeder.feed(np.zeros((1, 20), np.uint8))

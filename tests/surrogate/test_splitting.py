@@ -11,8 +11,13 @@ from scipy.stats import chisquare
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.surrogate.recipes import Recipe
-from bellcrank.surrogate.schedule import rows_of_epoch
-from bellcrank.surrogate.splitting import BINS, flattening_chances, overlap, split_by_run
+from bellcrank.surrogate.splitting import (
+    BINS,
+    overlap,
+    rows_of_epoch,
+    split_by_run,
+    uniform_weights,
+)
 
 from .helpers import flat_bins
 
@@ -98,7 +103,7 @@ def test_drawing_all_rows_alike_does_not(rng: np.random.Generator) -> None:
 
 def test_rows_of_one_bin_are_drawn_alike(rng: np.random.Generator) -> None:
     efficiency = peaked(rng)
-    chance = flattening_chances(efficiency)
+    chance = uniform_weights(efficiency)
     edges, _ = flat_bins(efficiency, BINS)
     bin_of = np.digitize(efficiency, edges)
     assert chance.sum() == pytest.approx(1.0)
@@ -111,7 +116,7 @@ def test_rows_of_one_bin_are_drawn_alike(rng: np.random.Generator) -> None:
 def test_efficiencies_that_are_nearly_all_the_same_can_be_drawn() -> None:
     efficiency = np.zeros(100_000)
     efficiency[:2] = [1e9, -1e9]
-    chance = flattening_chances(efficiency)
+    chance = uniform_weights(efficiency)
     assert chance.sum() == pytest.approx(1.0)
     assert chance[0] == pytest.approx(0.5)
 

@@ -24,32 +24,30 @@ from bellcrank.errors import (
     UnknownName,
 )
 from bellcrank.surrogate import training as module
-from bellcrank.surrogate.beginning import begin, resume
-from bellcrank.surrogate.dataset import Dataset
-from bellcrank.surrogate.folder import (
+from bellcrank.surrogate.metrics import Accuracy, accuracy
+from bellcrank.surrogate.progress import LossMeter
+from bellcrank.surrogate.recipes import Recipe, recipe_of
+from bellcrank.surrogate.splitting import rows_of_epoch, split_by_run
+from bellcrank.surrogate.trained_model import read_model
+from bellcrank.surrogate.training_folder import (
     CHECKPOINT,
     DESCRIPTION,
-    INITIAL,
     LOG,
     MODEL,
     read_description,
 )
-from bellcrank.surrogate.metrics import Accuracy, accuracy, correlation
-from bellcrank.surrogate.progress import LossMeter
-from bellcrank.surrogate.recipes import Recipe, recipe_of
-from bellcrank.surrogate.schedule import rows_of_epoch
-from bellcrank.surrogate.splitting import Split, split_by_run
-from bellcrank.surrogate.trained import read_model
+from bellcrank.surrogate.training_setup import begin, resume
 
-from .helpers import TINY, moved, random_dataset, same_weights, untrained
+from .helpers import TINY, random_dataset, same_weights
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from bellcrank.model import Problem
+    from bellcrank.surrogate.dataset import Dataset
     from bellcrank.surrogate.progress import EpochRecord
-    from bellcrank.surrogate.trained import TrainedModel
+    from bellcrank.surrogate.trained_model import TrainedModel
     from bellcrank.surrogate.training import Training
 
 STEPS = 15
@@ -111,7 +109,7 @@ def test_a_training_stopped_every_few_steps_ends_with_the_same_weights(
 def test_a_consumer_that_walks_away_costs_what_came_after_the_last_checkpoint(
     data: Dataset, whole: tuple[Path, Training], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "TELL_SECONDS", -1.0)
+    monkeypatch.setattr(module, "REPORT_SECONDS", -1.0)
     training = begin(data, AVERAGED, tmp_path / "t", device="cpu")
     story = training.run()
     told = [next(story) for _ in range(8)]
@@ -127,7 +125,7 @@ def test_a_consumer_that_walks_away_costs_what_came_after_the_last_checkpoint(
 def test_the_object_itself_goes_on_where_its_story_was_left(
     data: Dataset, whole: tuple[Path, Training], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "TELL_SECONDS", -1.0)
+    monkeypatch.setattr(module, "REPORT_SECONDS", -1.0)
     training = begin(data, AVERAGED, device="cpu")
     for number, _ in enumerate(training.run()):
         if number == 7:
@@ -138,7 +136,7 @@ def test_the_object_itself_goes_on_where_its_story_was_left(
 def test_asking_a_network_in_the_middle_of_its_training_does_not_change_what_it_learns(
     data: Dataset, whole: tuple[Path, Training], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "TELL_SECONDS", -1.0)
+    monkeypatch.setattr(module, "REPORT_SECONDS", -1.0)
     training = begin(data, AVERAGED, device="cpu")
     for _ in training.run():
         training.model.predict(data.packed[:3], device="cpu")
@@ -161,10 +159,10 @@ CHILD = """
 import sys, torch
 torch.set_num_threads(1)
 from bellcrank.surrogate import training
-from bellcrank.surrogate.beginning import begin
+from bellcrank.surrogate.training_setup import begin
 from bellcrank.surrogate.dataset import read_dataset
-from bellcrank.surrogate.folder import read_description
-training.CHECKPOINT_SECONDS = training.TELL_SECONDS = 0.0
+from bellcrank.surrogate.training_folder import read_description
+training.CHECKPOINT_SECONDS = training.REPORT_SECONDS = 0.0
 data = read_dataset(sys.argv[1])
 running = begin(data, read_description(sys.argv[3]).recipe, sys.argv[2], device="cpu")
 print("start", running.step, flush=True)
@@ -173,6 +171,7 @@ for progress in running.run():
 """
 
 
+@pytest.mark.slow
 def test_a_training_killed_without_warning_ends_with_the_same_weights(
     data: Dataset, whole: tuple[Path, Training], tmp_path: Path
 ) -> None:
@@ -206,8 +205,8 @@ def test_the_log_has_a_line_for_each_epoch(whole: tuple[Path, Training]) -> None
 def test_the_loss_of_an_epoch_is_the_mean_over_its_batches(
     data: Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bellcrank.surrogate.progress.FORGETTING", 1.0)  # the newest loss alone
-    monkeypatch.setattr(module, "TELL_SECONDS", -1.0)
+    monkeypatch.setattr("bellcrank.surrogate.progress.SMOOTHING", 1.0)  # the newest loss alone
+    monkeypatch.setattr(module, "REPORT_SECONDS", -1.0)
     training = begin(data, TINY, device="cpu")
     losses: list[float] = []
     for progress in training.run():
@@ -238,11 +237,10 @@ def test_the_last_test_may_be_on_a_part_and_says_how_far_it_is(data: Dataset) ->
     for _ in training.run():
         pass
     seen: list[tuple[int, int]] = []
-    model = training.finish(tell=lambda progress: seen.append(progress.testing or (0, 0)))
+    model = training.finish(lambda progress: seen.append(progress.testing or (0, 0)))
     assert model.record["held_out"]["count"] == 40 < len(training.split.held_out)
     assert seen[-1] == (40, 40)
     assert [done for done, _ in seen] == sorted({done for done, _ in seen})
-    assert training.finish(most=25).record["held_out"]["count"] == 25
 
 
 def test_a_network_learns_to_count_beams(problem: Problem) -> None:
@@ -257,15 +255,6 @@ def test_a_network_learns_to_count_beams(problem: Problem) -> None:
     assert accuracy(predicted, fresh.efficiency).determination > 0.9
 
 
-def test_a_checkpoint_of_before_losses_were_summed_can_be_gone_on_with() -> None:
-    meter = LossMeter.from_dict({"step": 3, "seconds": 1.0, "loss": 0.25, "log": []})
-    assert meter == LossMeter(0.25, 0.0, 0)
-    meter.add(torch.tensor(0.5))
-    meter.settle()
-    assert meter.running == pytest.approx(0.98 * 0.25 + 0.02 * 0.5)
-    assert meter.end_epoch() == 0.5
-
-
 def test_it_does_not_matter_when_losses_are_asked_for() -> None:
     losses = torch.rand(20)
     often, rarely = LossMeter(), LossMeter()
@@ -276,7 +265,7 @@ def test_it_does_not_matter_when_losses_are_asked_for() -> None:
     rarely.settle()
     assert often == rarely
     assert often.end_epoch() == pytest.approx(float(losses.mean()))
-    assert math.isnan(LossMeter().running)
+    assert math.isnan(LossMeter().smoothed)
 
 
 def test_a_training_that_diverges_says_so(data: Dataset) -> None:
@@ -289,15 +278,15 @@ def test_resuming_with_other_data_is_refused(
     data: Dataset, whole: tuple[Path, Training], problem: Problem
 ) -> None:
     other = random_dataset(problem, seed=5)
-    with pytest.raises(InvalidSettings, match="was begun with other data"):
+    with pytest.raises(InvalidSettings, match="other data"):
         resume(whole[0], other, device="cpu")
-    with pytest.raises(InvalidSettings, match="was begun with other data"):
+    with pytest.raises(InvalidSettings, match="other data"):
         resume(whole[0], data.take(np.arange(len(data) - 1)), device="cpu")
 
 
 def test_a_folder_without_a_training_cannot_be_gone_on_with(data: Dataset, tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "absent"):
-        with pytest.raises(InvalidFile, match=r"no training to go on with: it has no training\.js"):
+        with pytest.raises(InvalidFile, match=r"there is no training\.json"):
             resume(folder, data)
 
 
@@ -334,7 +323,8 @@ def test_a_damaged_checkpoint_is_named_and_training_begins_again_without_it(
 
 def test_a_checkpoint_of_another_network_is_refused(data: Dataset, tmp_path: Path) -> None:
     folder = half(data, tmp_path / "t")
-    list(begin(data, replace(TINY, model="grid"), tmp_path / "g", device="cpu").run(after(1)))
+    other = replace(TINY, model="resnet18-w16", batch=2, epoch_size=4, tested=2)
+    list(begin(data, other, tmp_path / "g", device="cpu").run(after(1)))
     (folder / CHECKPOINT).write_bytes((tmp_path / "g" / CHECKPOINT).read_bytes())
     with pytest.raises(InvalidModel, match="damaged"):
         resume(folder, data, device="cpu")
@@ -342,7 +332,7 @@ def test_a_checkpoint_of_another_network_is_refused(data: Dataset, tmp_path: Pat
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"schema": "other"}', '{"schema": "S"}'])
 def test_a_damaged_description_is_refused(data: Dataset, tmp_path: Path, text: str) -> None:
-    (tmp_path / DESCRIPTION).write_text(text.replace("S", "bellcrank/training/1"))
+    (tmp_path / DESCRIPTION).write_text(text.replace("S", "bellcrank/training/2"))
     with pytest.raises(InvalidFile, match=r"training\.json"):
         resume(tmp_path, data, device="cpu")
 
@@ -361,7 +351,7 @@ def test_a_log_lost_between_checkpoint_and_end_is_written_again(
 
 def test_what_cannot_be_learnt_from_is_refused(data: Dataset) -> None:
     level = replace(data, efficiency=np.full(len(data), 0.1))
-    with pytest.raises(InvalidSettings, match=r"all efficiencies are 0\.1: there is nothing to"):
+    with pytest.raises(InvalidSettings, match=r"all training efficiencies are 0\.1"):
         begin(level, TINY, device="cpu")
     with pytest.raises(UnknownName, match="unknown model 'vgg'"):
         begin(data, replace(TINY, model="vgg"), device="cpu")
@@ -383,7 +373,7 @@ def test_what_cannot_be_learnt_from_is_refused(data: Dataset) -> None:
 def test_recipes_that_make_no_sense_are_refused(given: dict[str, Any]) -> None:
     with pytest.raises(InvalidSettings, match=rf"^{next(iter(given))}: "):
         recipe_of("paper", **given)
-    with pytest.raises(InvalidSettings, match="color: no such key in a recipe"):
+    with pytest.raises(InvalidSettings, match=r"^color: "):
         Recipe.from_dict({"color": 1})
 
 
@@ -394,79 +384,6 @@ def test_the_paper_s_recipe_is_the_paper_s(whole: tuple[Path, Training]) -> None
     assert read_description(whole[0]).recipe == AVERAGED
 
 
-@pytest.mark.parametrize("stopped_at", [0, 7])
-def test_going_on_from_a_network_survives_a_stop_too(
-    data: Dataset, tmp_path: Path, stopped_at: int
-) -> None:
-    first = to_the_end(begin(data, AVERAGED, device="cpu"))
-    recipe = replace(AVERAGED, seed=5, differences=0.5)
-    whole = to_the_end(begin(data, recipe, device="cpu", initial=first))
-    training = begin(data, recipe, tmp_path / "on", device="cpu", initial=first)
-    if stopped_at:
-        list(training.run(after(stopped_at)))
-    again = to_the_end(resume(tmp_path / "on", data, device="cpu"))
-    assert same_weights(again, whole)
-    assert (again.mean, again.deviation) == (first.mean, first.deviation)
-    assert again.record["before"]["designs"] == first.record["designs"]
-    assert again.seen["designs"] == 2 * first.record["designs"]
-
-
-def test_going_on_from_a_network_survives_the_loss_of_all_but_its_copy(
-    data: Dataset, tmp_path: Path
-) -> None:
-    first = to_the_end(begin(data, AVERAGED, device="cpu"))
-    whole = to_the_end(begin(data, AVERAGED, device="cpu", initial=first))
-    training = begin(data, AVERAGED, tmp_path / "on", device="cpu", initial=first)
-    list(training.run(after(7)))
-    (tmp_path / "on" / CHECKPOINT).unlink()
-    again = resume(tmp_path / "on", data, device="cpu")
-    assert again.step == 0
-    assert same_weights(to_the_end(again), whole)
-    for name in (DESCRIPTION, CHECKPOINT, LOG, MODEL):  # killed before it said what it is
-        (tmp_path / "on" / name).unlink()
-    begin(data, AVERAGED, tmp_path / "on", device="cpu", initial=first)
-    (tmp_path / "on" / INITIAL).unlink()
-    with pytest.raises(InvalidFile, match=r"initial\.safetensors: cannot be read"):
-        resume(tmp_path / "on", data, device="cpu")
-
-
-def test_what_a_network_looks_through_is_kept_when_it_goes_on(
-    problem: Problem, tmp_path: Path
-) -> None:
-    data = random_dataset(problem, runs=4, steps=10)
-    recipe = replace(TINY, model="resnet18-w16", batch=2, epoch_size=6, epochs=1, tested=4)
-    first = untrained(problem, "resnet18-w16", width=64, height=48)
-    whole = to_the_end(begin(data, recipe, device="cpu", initial=first))
-    begin(data, recipe, tmp_path / "on", device="cpu", initial=first)
-    again = to_the_end(resume(tmp_path / "on", data, device="cpu"))
-    assert again.view.shape == (1, 48, 64)
-    assert same_weights(again, whole)
-
-
-def test_a_network_goes_on_only_with_beams_as_it_knows_them(problem: Problem) -> None:
-    other, _ = moved(problem)
-    with pytest.raises(InvalidModel, match="not those of 'moved' in their order"):
-        begin(random_dataset(other), TINY, device="cpu", initial=untrained(problem))
-
-
-def test_a_split_of_one_s_own_is_set_up_again_or_refused(data: Dataset, tmp_path: Path) -> None:
-    held_out = np.flatnonzero(data.run == 3)
-    training = np.flatnonzero(data.run != 3)
-    split = Split(np.concatenate([training, training[:40]]), held_out)
-    whole = to_the_end(begin(data, TINY, device="cpu", split=split))
-    assert not same_weights(whole, to_the_end(begin(data, TINY, device="cpu")))
-    assert whole.mean == data.efficiency[split.training].mean()
-    list(begin(data, TINY, tmp_path / "t", device="cpu", split=split).run(after(7)))
-    for other in (None, Split(training, held_out), Split(split.training, training)):
-        with pytest.raises(InvalidSettings, match="holds out other designs"):
-            resume(tmp_path / "t", data, device="cpu", split=other)
-    again = to_the_end(resume(tmp_path / "t", data, device="cpu", split=split))
-    assert same_weights(again, whole)
-    list(begin(data, TINY, tmp_path / "usual", device="cpu").run(after(7)))
-    with pytest.raises(InvalidSettings, match="holds out other designs"):
-        resume(tmp_path / "usual", data, device="cpu", split=split)
-
-
 def test_what_a_killed_training_was_writing_is_removed(data: Dataset, tmp_path: Path) -> None:
     folder = half(data, tmp_path / "t")
     for name in (".checkpoint.safetensors.0123abcd", ".mine.0123abcd", "note"):
@@ -475,38 +392,6 @@ def test_what_a_killed_training_was_writing_is_removed(data: Dataset, tmp_path: 
     assert sorted(path.name for path in folder.iterdir()) == sorted(
         [".mine.0123abcd", "note", CHECKPOINT, LOG, DESCRIPTION]
     )
-
-
-def test_a_network_goes_on_only_from_its_own_kind(data: Dataset) -> None:
-    first = begin(data, TINY, device="cpu").model
-    with pytest.raises(InvalidSettings, match="cannot go on from the weights of a 'mlp'"):
-        begin(data, replace(TINY, model="grid"), device="cpu", initial=first)
-
-
-def test_minding_differences_tells_neighbours_apart(problem: Problem) -> None:
-    # Runs of single flips, labelled by how many beams there are and, much more, by their run:
-    # what a flip does is a small part of what there is to learn.
-    rng = np.random.default_rng(2)
-    masks, labels, runs = [], [], []
-    weight = rng.normal(size=problem.lattice.beam_count)
-    for run in range(24):
-        mask = rng.random(len(weight)) < rng.uniform(0.2, 0.8)
-        for _ in range(150):
-            mask[rng.integers(len(mask))] ^= True
-            masks.append(np.packbits(mask))
-            labels.append(0.02 * float(weight @ mask) + 2.0 * math.sin(0.1 * mask.sum()))
-            runs.append(run)
-    data = Dataset(problem, np.array(masks), np.array(labels), np.array(runs))
-    told = []
-    for weighted in (0.0, 0.3):
-        recipe = replace(
-            TINY, epochs=25, epoch_size=None, batch=32, resampling=False, differences=weighted
-        )
-        training = begin(data, recipe, device="cpu")
-        model, rows = to_the_end(training), np.sort(training.split.training)
-        change, said = np.diff(data.efficiency[rows]), np.diff(model.predict(data.packed[rows]))
-        told.append(1.0 - correlation(change, said))
-    assert told[1] < 0.6 * told[0]
 
 
 def test_short_epochs_go_through_all_designs_before_any_comes_again() -> None:
@@ -524,7 +409,7 @@ def test_nothing_to_test_with_is_refused(data: Dataset) -> None:
     split = split_by_run(data, TINY.held_out, TINY.split_seed)
     flat = data.efficiency.copy()
     flat[split.held_out] = 0.1
-    with pytest.raises(InvalidSettings, match=r"all efficiencies that are held out are 0\.1"):
+    with pytest.raises(InvalidSettings, match=r"all held-out efficiencies are 0\.1"):
         begin(replace(data, efficiency=flat), TINY, device="cpu")
 
 

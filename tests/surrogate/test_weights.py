@@ -23,8 +23,7 @@ from bellcrank.errors import (
 )
 from bellcrank.model import problem_to_dict
 from bellcrank.surrogate.backend import find_precision
-from bellcrank.surrogate.identity import METADATA_KEY, lattice_hash
-from bellcrank.surrogate.trained import read_model
+from bellcrank.surrogate.trained_model import METADATA_KEY, lattice_hash, read_model
 
 from .helpers import random_masks, same_weights, untrained
 
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.model import Problem
-    from bellcrank.surrogate.trained import TrainedModel
+    from bellcrank.surrogate.trained_model import TrainedModel
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +45,7 @@ def rewritten(model: TrainedModel, **changes: Any) -> bytes:
     return save(model.network.state_dict(), {METADATA_KEY: json.dumps(told)})
 
 
-@pytest.mark.parametrize("name", ["mlp", "grid", "resnet18-w16"])
+@pytest.mark.parametrize("name", ["mlp", "resnet18-w16"])
 def test_a_model_comes_back_with_all_that_it_knows(
     problem: Problem, tmp_path: Path, name: str
 ) -> None:
@@ -65,14 +64,6 @@ def test_a_model_comes_back_with_all_that_it_knows(
     assert expected.std() > 0.0
     with pytest.raises(OutputExists):
         model.write(path)
-
-
-def test_a_model_of_before_views_were_named_can_be_read(
-    model: TrainedModel, tmp_path: Path
-) -> None:
-    path = tmp_path / "old.safetensors"
-    path.write_bytes(rewritten(model, looks_at=None))
-    assert same_weights(read_model(path), model)
 
 
 def test_no_designs_have_no_efficiencies_and_wrong_masks_are_refused(model: TrainedModel) -> None:
@@ -104,7 +95,7 @@ def test_truncated_and_other_files_are_refused(
             read_model(path)
     for other in (save({"a": torch.zeros(3)}), save({"a": torch.zeros(3)}, {"by": "others"})):
         path.write_bytes(other)
-        with pytest.raises(InvalidModel, match="not a model of bellcrank: it does not say"):
+        with pytest.raises(InvalidModel, match="not a model of bellcrank"):
             read_model(path)
     with pytest.raises(InvalidFile, match="cannot be read"):
         read_model(tmp_path / "absent.safetensors")
@@ -119,7 +110,7 @@ def test_weights_that_are_no_numbers_are_refused(model: TrainedModel, tmp_path: 
         weights.view(-1)[0] = math.nan
     path = tmp_path / "model.safetensors"
     path.write_bytes(replace(model, network=broken).to_bytes())
-    with pytest.raises(InvalidModel, match=f"not all weights in '{name}' are numbers"):
+    with pytest.raises(InvalidModel, match=f"'{name}'"):
         read_model(path)
 
 
@@ -127,13 +118,13 @@ def test_weights_that_are_no_numbers_are_refused(model: TrainedModel, tmp_path: 
     ("changes", "message"),
     [
         ({"schema": "bellcrank/model/9"}, "expected schema 'bellcrank/model/1', got 'bellcrank/m"),
-        ({"lattice": "0123456789abcdef"}, "the lattice in it is not the one that it was trained"),
+        ({"lattice": "0123456789abcdef"}, "0123456789abcdef"),
         ({"architecture": "vgg"}, "unknown model 'vgg'"),
-        ({"architecture": "grid", "looks_at": "grid"}, "its weights are not those of 'grid'"),
+        ({"architecture": "resnet18-w16", "looks_at": "picture"}, "not those of 'resnet18-w16'"),
         ({"problem": {"schema": "nothing"}}, "model.safetensors"),
         ({"problem": None}, "damaged"),
-        ({"mean": "nan"}, "mean nan and deviation 0.5 make no efficiencies"),
-        ({"deviation": 0.0}, "make no efficiencies"),
+        ({"mean": "nan"}, "got nan and 0.5"),
+        ({"deviation": 0.0}, "got 0.25 and 0.0"),
         ({"view": {"colour": 3}}, "damaged"),
         ({"record": 5}, "damaged"),
     ],

@@ -11,12 +11,12 @@ from bellcrank.campaign.dataset import reverse
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Input, Output, Problem, Supports, lattices
 from bellcrank.search import MetropolisSettings, chain_blocks
-from bellcrank.surrogate.beginning import begin
 from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.recipes import Recipe
+from bellcrank.surrogate.training_setup import begin
 
 if TYPE_CHECKING:
-    from bellcrank.surrogate.trained import TrainedModel
+    from bellcrank.surrogate.trained_model import TrainedModel
 
 RECIPE = Recipe(model="mlp", epochs=2, batch=64, tested=500, held_out=0.25, precision="float32")
 RUNS = 8

@@ -1,3 +1,5 @@
+"""Attribution by a network and by mechanics, against direct evaluation."""
+
 from __future__ import annotations
 
 import json
@@ -5,33 +7,35 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from scipy.stats import pearsonr, spearmanr
 
-from bellcrank.errors import InvalidDataset, InvalidModel, InvalidProblem, InvalidSettings
+from bellcrank.errors import InvalidModel, InvalidSettings, OutputExists
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.model import Design, Lattice, find_problem, human_design
-from bellcrank.surrogate.agreement import agreement, rank_correlation
-from bellcrank.surrogate.dataset import Dataset
-from bellcrank.surrogate.explaining import SUBSETS, explain
-from bellcrank.surrogate.flips import (
-    compare_flips,
-    flip_accuracy,
-    flip_effects,
-    held_out_designs,
-    screening_accuracy,
-)
 from bellcrank.surrogate.models import models
-from bellcrank.surrogate.occlusion import BLACK, WHITE, Block, occlude, sample_map
-from bellcrank.surrogate.regions import Region, Thresholds, overlap_of_regions, regions_of
-from bellcrank.surrogate.relaxing import relaxations, value_and_gradient
-from bellcrank.surrogate.trained import TrainedModel
+from bellcrank.surrogate.trained_model import TrainedModel
 from bellcrank.surrogate.views import views
+from reproduction.networks.attribution import (
+    BLACK,
+    SUBSETS,
+    WHITE,
+    Block,
+    Region,
+    agreement,
+    attribute,
+    occlude,
+    overlap_of_regions,
+    regions_of,
+    sample_map,
+)
+from reproduction.networks.attribution_picture import draw_attribution, symmetric_ticks
 
 torch = pytest.importorskip("torch")
 
 CANVAS = {"width": 72, "height": 48, "line": 1.5}
 SHIFT = np.array([3.0, -2.0])
-KINDS = ("mlp", "grid", "resnet18-w16")
+KINDS = ("mlp", "resnet18-w16")
 
 
 def random_model(problem, kind, seed=0):
@@ -46,7 +50,10 @@ def random_model(problem, kind, seed=0):
             if isinstance(module, torch.nn.BatchNorm1d | torch.nn.BatchNorm2d):
                 module.running_mean.normal_(0.0, 0.1)
                 module.running_var.uniform_(0.5, 1.5)
-    return TrainedModel(kind, problem, view, 0.3, 2.0, network=network.eval())
+    return TrainedModel(
+        architecture=kind, problem=problem, view=view, mean=0.3, deviation=2.0,
+        network=network.eval(),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -66,61 +73,7 @@ def by_kind(crane):
 
 @pytest.fixture(scope="module")
 def explained(by_kind, human):
-    return explain(by_kind["resnet18-w16"], human, device="cpu")
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_gradient_is_that_of_finite_differences(crane, kind):
-    model = random_model(crane, kind)
-    model.network.double()
-    rng = np.random.default_rng(5)
-    presence = rng.uniform(0.1, 0.9, crane.lattice.beam_count)
-    _, gradient = value_and_gradient(model, presence, device="cpu")
-    step = 1e-6
-    for beam in rng.choice(crane.designable, 8, replace=False):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = presence.copy()
-            moved[beam] += sign * step
-            ends.append(value_and_gradient(model, moved, device="cpu")[0])
-        slope = (ends[0] - ends[1]) / (2.0 * step)
-        # Differences of values of order 1 in float64 leave 1e-16 / 1e-6; a kink of a rectifier
-        # between the two ends is as unlikely as the step is small.
-        assert gradient[beam] == pytest.approx(slope, rel=1e-4, abs=1e-7)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_gradient_at_a_design_is_one_sided_and_starts_at_its_prediction(by_kind, human, kind):
-    model = by_kind[kind]
-    value, _ = value_and_gradient(model, human.mask, device="cpu")
-    said = model.predict(np.packbits(human.mask)[None], device="cpu")[0]
-    # Pictures of designs are rounded to 256 greys, those of parts of beams are not.
-    assert value == pytest.approx(said, abs=0.03 if kind == "resnet18-w16" else 1e-4)
-
-
-def test_a_relaxed_picture_of_a_design_is_its_picture(by_kind, human):
-    view = by_kind["resnet18-w16"].view
-    relaxed = relaxations["picture"](view).see(human.mask.astype(np.float64))
-    drawn = view.look(np.packbits(human.mask)[None])[0] * view.scale
-    assert np.abs(relaxed - drawn).max() < 0.51 / 255 + 1e-5
-
-
-def test_a_pixel_that_one_beam_covers_shows_what_lies_below_when_that_beam_goes(by_kind):
-    relaxed = relaxations["picture"](by_kind["resnet18-w16"].view)
-    relaxed.beam = np.array([0, 1, 2, 0])
-    relaxed.pixel = np.array([0, 0, 1, 1])
-    relaxed.coverage = np.array([1.0, 0.25, 1.0, 1.0])
-    relaxed.beams = 3
-    slope = np.ones(relaxed.shape)
-    found = relaxed.trace_back(np.ones(3), slope)
-    # Pixel 0: beam 0 covers all, beam 1 a quarter; pixel 1: two beams cover all of it.
-    assert found.tolist() == [0.75, 0.0, 0.0]
-
-
-@pytest.mark.parametrize("wrong", [np.full(352, 1.5), np.full(352, np.nan), np.zeros(10)])
-def test_presence_is_a_number_from_0_to_1_for_each_beam(by_kind, wrong):
-    with pytest.raises(InvalidSettings, match="expected 352 numbers from 0 to 1"):
-        value_and_gradient(by_kind["mlp"], wrong)
+    return attribute(by_kind["resnet18-w16"], human, device="cpu")
 
 
 def test_a_white_block_on_white_paper_changes_nothing(by_kind, crane):
@@ -129,8 +82,8 @@ def test_a_white_block_on_white_paper_changes_nothing(by_kind, crane):
     mask[crane.designable] = False
     block = Block(size=6, stride=3)
     found = occlude(model, np.packbits(mask), block, ink=WHITE, device="cpu")
-    picture = model.view.look(np.packbits(mask)[None])[0, 0]
-    rows, columns = block.middles(48), block.middles(72)
+    picture = model.view.arrays(np.packbits(mask)[None])[0, 0]
+    rows, columns = block.centres(48), block.centres(72)
     empty = np.array(
         [[not picture[block.span(r, 48), block.span(c, 72)].any() for c in columns] for r in rows]
     )
@@ -145,7 +98,7 @@ def test_a_map_is_what_the_network_says_of_each_altered_picture(by_kind, human, 
     model, block = by_kind["resnet18-w16"], Block(size=9, stride=8)
     packed = np.packbits(human.mask)
     found = occlude(model, packed, block, ink=ink, device="cpu")
-    picture = model.view.look(packed[None]).astype(np.float32) / 255.0
+    picture = model.view.arrays(packed[None]).astype(np.float32) / 255.0
 
     def ask(values):
         with torch.inference_mode():
@@ -162,7 +115,7 @@ def test_a_map_is_what_the_network_says_of_each_altered_picture(by_kind, human, 
 def test_maps_are_read_at_the_places_of_the_block(by_kind):
     block = Block(size=4, stride=4)
     values = np.arange(12.0).reshape(3, 4)
-    x, y = np.meshgrid(block.middles(16), 12 - block.middles(12))
+    x, y = np.meshgrid(block.centres(16), 12 - block.centres(12))
     places = np.stack([x.ravel(), y.ravel()], axis=1)
     assert np.allclose(sample_map(values, block, places, 12), values.ravel())
 
@@ -182,11 +135,10 @@ def test_maps_lie_where_the_lattice_is(explained, crane):
 
 
 def test_networks_that_see_no_pictures_cannot_be_occluded(by_kind, human):
-    for kind in ("mlp", "grid"):
-        with pytest.raises(InvalidSettings, match="blocks can hide parts of pictures only"):
-            occlude(by_kind[kind], np.packbits(human.mask))
-        with pytest.raises(InvalidSettings, match=r"looks at (bits|grid)"):
-            explain(by_kind[kind], human, Block())
+    with pytest.raises(InvalidSettings, match="'mlp'"):
+        occlude(by_kind["mlp"], np.packbits(human.mask), Block())
+    with pytest.raises(InvalidSettings, match="'mlp'"):
+        attribute(by_kind["mlp"], human, Block())
 
 
 @pytest.mark.parametrize(("size", "stride"), [(0, 4), (12, 0), (-1, 1)])
@@ -214,7 +166,7 @@ def test_exact_effects_are_those_of_the_evaluator(explained, human):
         else:
             assert np.isnan(explained.exact[place])
     evaluator.evaluate(human.mask)
-    assert np.array_equal(explained.screened, evaluator.predict_flips(human.mask).change)
+    assert np.array_equal(explained.low_rank, evaluator.predict_flips(human.mask).change)
 
 
 def test_what_the_network_says_of_flips_is_what_it_predicts(explained, by_kind, human):
@@ -228,7 +180,7 @@ def test_what_the_network_says_of_flips_is_what_it_predicts(explained, by_kind, 
 
 def test_correlations_agree_with_scipy(explained):
     told = explained.correlations()
-    assert set(told) == {"screening", "network", "gradient", "occlusion", "white", "black"}
+    assert set(told) == {"low_rank", "network", "occlusion", "white", "black"}
     chosen = {"all": slice(None), "present": explained.present, "absent": ~explained.present}
     for name, values in explained.measures().items():
         for subset in SUBSETS:
@@ -250,38 +202,23 @@ def test_recall_counts_the_best_flips_that_were_named():
     assert np.isnan(agreement(exact[:1], exact[:1]).pearson)
 
 
-def test_ranks_of_equals_are_shared():
-    rng = np.random.default_rng(1)
-    first, second = rng.integers(0, 5, (2, 60)).astype(float)
-    assert rank_correlation(first, second) == pytest.approx(spearmanr(first, second)[0])
-
-
 def test_the_fitting_block_is_white_on_beams_and_black_beside_them(explained):
     seen, fitting = explained.occlusion, explained.measures()["occlusion"]
     assert np.array_equal(fitting[explained.present], seen.white_at[explained.present])
     assert np.array_equal(fitting[~explained.present], seen.black_at[~explained.present])
 
 
-def test_flips_of_present_beams_go_against_the_gradient(explained):
-    assert np.array_equal(
-        explained.slope[explained.present], -explained.gradient[explained.present]
-    )
-    assert np.array_equal(
-        explained.slope[~explained.present], explained.gradient[~explained.present]
-    )
-
-
 def test_an_explanation_is_plain_data(explained, by_kind, human):
     told = json.loads(json.dumps(explained.to_dict(), allow_nan=False))
     assert told["mask"] == human.mask_hex
-    assert len(told["exact"]) == len(told["gradient"]) == len(told["beams"]) == 203
+    assert len(told["exact"]) == len(told["measures"]["network"]) == len(told["beams"]) == 203
     assert len(told["occlusion"]["white"]) == 12
     assert set(told["correlations"]["network"]["all"]) == {
         "pearson", "spearman", "recall", "count",
     }  # fmt: skip
-    without = explain(by_kind["mlp"], human, device="cpu").to_dict()
+    without = attribute(by_kind["mlp"], human, device="cpu").to_dict()
     assert without["occlusion"] is None
-    assert "white" not in without["foreseen"]
+    assert "white" not in without["measures"]
 
 
 def test_numbering_and_place_of_the_lattice_do_not_matter(explained, by_kind, crane, human):
@@ -295,11 +232,10 @@ def test_numbering_and_place_of_the_lattice_do_not_matter(explained, by_kind, cr
         initial=crane.initial[order],
         designable=np.sort(number[crane.designable]),
     )
-    found = explain(by_kind["resnet18-w16"], Design(other, human.mask[order]), device="cpu")
+    found = attribute(by_kind["resnet18-w16"], Design(other, human.mask[order]), device="cpu")
     there = np.searchsorted(explained.beams, order[found.beams])
     assert np.allclose(found.exact, explained.exact[there], atol=1e-7)
     assert np.allclose(found.network, explained.network[there], atol=1e-5)
-    assert np.allclose(found.gradient, explained.gradient[there], atol=1e-5)
     assert np.allclose(found.occlusion.black_at, explained.occlusion.black_at[there], atol=1e-5)
     assert np.allclose(found.occlusion.low, explained.occlusion.low + SHIFT)
 
@@ -309,21 +245,12 @@ def test_regions_are_fractions_of_the_function_that_is_there():
     expected = ["vital", "vital", "useful", "neutral", "neutral", "adverse", "unstable"]
     assert [Region(each).label for each in regions_of(change, 2.0)] == expected
     assert np.array_equal(regions_of(-change, -2.0), regions_of(change, 2.0))
-    strict = regions_of(change, 2.0, Thresholds(vital=0.9, neutral=0.001))
-    assert [Region(each).label for each in strict[:4]] == ["vital", "useful", "useful", "useful"]
 
 
 def test_a_design_that_does_nothing_has_regions_too():
     assert regions_of(np.array([0.0, 0.001, -0.1]), 0.0).tolist() == [
         Region.NEUTRAL, Region.NEUTRAL, Region.VITAL,
     ]  # fmt: skip
-
-
-def test_thresholds_are_in_order():
-    with pytest.raises(InvalidSettings, match="0 < neutral < vital"):
-        Thresholds(vital=0.1, neutral=0.2)
-    with pytest.raises(InvalidSettings, match="least"):
-        Thresholds(least=0.0)
 
 
 def test_overlap_of_regions_is_that_of_sets():
@@ -333,62 +260,52 @@ def test_overlap_of_regions_is_that_of_sets():
     assert found["adverse"] is None
 
 
-def test_flips_of_several_designs_are_judged_one_by_one(by_kind, crane, human):
-    masks = np.array([crane.initial, human.mask])
-    effects = flip_effects(crane, masks)
-    found = flip_accuracy(by_kind["mlp"], crane, masks, effects)
-    alone = flip_accuracy(by_kind["mlp"], crane, masks[1:])
-    assert found.designs == 2
-    assert found.spearman[1] == pytest.approx(alone.spearman[0])
-    told = found.to_dict()
-    assert told["pearson"]["mean"] == pytest.approx(np.mean(found.pearson))
-    assert told["pearson"]["spread"] == pytest.approx(np.std(found.pearson, ddof=1))
-    screening = screening_accuracy(effects)
-    assert screening.spearman.min() > 0.95
-    assert screening.recall.min() > 0.9
-
-
-def test_a_perfect_forecast_is_told_so(crane):
-    effects = flip_effects(crane, crane.initial[None])
-    found = compare_flips(effects.exact, effects.exact)
-    assert found.pearson[0] == found.spearman[0] == pytest.approx(1.0)
-    assert found.recall[0] == 1.0
-    assert found.flips == 203
-
-
-def test_masks_must_fit_the_problem(crane):
-    with pytest.raises(InvalidProblem, match=r"expected shape \(designs, 352\)"):
-        flip_effects(crane, np.ones((2, 351), bool))
-
-
 def test_a_design_without_a_response_cannot_be_explained(by_kind, crane, monkeypatch):
-    real = SpringEvaluator.respond
+    real = SpringEvaluator.evaluate
 
-    def snapping(self, mask, largest_increment=1.0):
-        return replace(real(self, mask, largest_increment), status=Status.SNAPPED)
+    def snapping(self, mask, largest_increment=1.0, **options):
+        found = real(self, mask, largest_increment, **options)
+        return replace(found, status=Status.SNAPPED)
 
-    monkeypatch.setattr(SpringEvaluator, "respond", snapping)
-    with pytest.raises(InvalidSettings, match="design 0 of 'crane' has no efficiency"):
-        explain(by_kind["mlp"], crane.full_design())
+    monkeypatch.setattr(SpringEvaluator, "evaluate", snapping)
+    with pytest.raises(InvalidSettings, match="'crane'"):
+        attribute(by_kind["mlp"], crane.full_design(), device="cpu")
 
 
 def test_another_problem_is_refused(by_kind):
-    with pytest.raises(InvalidModel, match="the model has learnt 'crane'"):
-        explain(by_kind["mlp"], find_problem("anti-parallel").full_design())
+    with pytest.raises(InvalidModel, match="'crane'"):
+        attribute(by_kind["mlp"], find_problem("anti-parallel").full_design())
 
 
-def test_held_out_designs_are_accepted_and_of_as_many_runs_as_there_are(crane):
-    rng = np.random.default_rng(0)
-    masks = np.repeat(crane.initial[None], 40, axis=0)
-    masks[:, crane.designable[:40]] ^= np.eye(40, dtype=bool)
-    run = np.repeat(np.arange(4), 10)
-    accepted = np.arange(40) % 2 == 0
-    data = Dataset(crane, np.packbits(masks, axis=1), np.zeros(40), run, accepted=accepted)
-    rows = np.arange(10, 40)
-    drawn = held_out_designs(data, rows, 3, rng)
-    which = [int(np.flatnonzero((masks == mask).all(axis=1))[0]) for mask in drawn]
-    assert sorted(run[which]) == [1, 2, 3]
-    assert accepted[which].all()
-    assert len(held_out_designs(data, rows, 99, rng)) == 15
-    with pytest.raises(InvalidDataset, match="no accepted design"):
-        held_out_designs(data, rows[~accepted[rows]], 3, rng)
+def test_changes_of_zero_can_be_drawn_and_nothing_is_cut_off(explained, tmp_path):
+    draw_attribution(explained, tmp_path / "all.png")
+    flat = np.zeros(len(explained.beams))
+    still = replace(explained, exact=flat, network=flat, occlusion=None)
+    draw_attribution(still, tmp_path / "flat.svg")
+    assert (tmp_path / "flat.svg").read_bytes().startswith(b"<?xml")
+    picture = imread(tmp_path / "all.png")[..., :3]
+    assert picture.min() < 0.2
+    for edge in (picture[:8], picture[-8:], picture[:, :8], picture[:, -8:]):
+        assert edge.min() == 1.0
+
+
+def test_pictures_are_neither_misnamed_nor_replaced(explained, tmp_path):
+    with pytest.raises(InvalidSettings, match="ending in"):
+        draw_attribution(explained, tmp_path / "a.jpg")
+    taken = tmp_path / "a.png"
+    taken.write_text("mine")
+    with pytest.raises(OutputExists):
+        draw_attribution(explained, taken)
+    assert taken.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("largest", "least", "expected"),
+    [
+        (2.0, 0.02, [-1.0, -0.1, 0.0, 0.1, 1.0]),
+        (1.0, 0.01, [-1.0, -0.1, -0.01, 0.0, 0.01, 0.1, 1.0]),
+        (3e-4, 3e-6, [-1e-4, -1e-5, 0.0, 1e-5, 1e-4]),
+    ],
+)
+def test_ticks_are_powers_of_ten_on_both_sides(largest, least, expected):
+    assert symmetric_ticks(largest, least) == pytest.approx(expected)

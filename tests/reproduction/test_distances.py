@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reproduction import distances
-from reproduction.distances import smallest_distances
+from reproduction.networks import distances
+from reproduction.networks.distances import smallest_distances
 
 
 @pytest.mark.parametrize("beams", [3, 64, 203, 352])
