@@ -52,16 +52,18 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         pymoto()
 
 
+@pytest.mark.slow
 def test_topology_optimisation_finds_an_inverter() -> None:
     try:
         pymoto()
     except InvalidSettings:
         pytest.skip("pyMOTO is not installed")
     box = box_of("inverter", 4, 7, 0.2, 0.01)
-    told = optimise(box, 2.0, 0.4, (0.1, 0.01), 1.5, 25)
-    assert told["output_over_input"] > 0.3
+    result = optimise(box, 2.0, 0.4, (0.1, 0.01), 1.5, 25)
+    assert result["output_over_input"] > 0.3
 
 
+@pytest.mark.slow
 def test_the_analysis_of_an_outline_agrees_with_plane_validation() -> None:
     pytest.importorskip("ngsolve")
     from bellcrank.fem import FemSettings
@@ -69,8 +71,8 @@ def test_the_analysis_of_an_outline_agrees_with_plane_validation() -> None:
 
     box = box_of("inverter", 4, 3, 0.05, 0.01)
     part = box.spec.of(box.problem.full_design())
-    told = analyse_outline(box, part, polygon_of(part), 2.0, "neo-hookean")
+    result = analyse_outline(box, part, polygon_of(part), 2.0, "neo-hookean")
     known = levels["plane"](part, FemSettings(size=2.0))
-    assert told["status"] == "converged"
-    assert told["efficiency"] == pytest.approx(known.efficiency, abs=0.02)
-    assert told["input_force_N"] == pytest.approx(known.last.push, rel=0.02)
+    assert result["status"] == "converged"
+    assert result["efficiency"] == pytest.approx(known.efficiency, abs=0.02)
+    assert result["input_force_N"] == pytest.approx(known.last.push, rel=0.02)

@@ -95,9 +95,9 @@ def test_stored_results_are_not_computed_again(tmp_path: Path) -> None:
         raise AssertionError
 
     again = ResultStore.for_study(tmp_path, "some", {"n": 1})
-    assert again.all("piece", {"a": never, "b": never, "c": lambda: 3})["c"] == 3
+    assert again.compute_all("piece", {"a": never, "b": never, "c": lambda: 3})["c"] == 3
     other = ResultStore.for_study(tmp_path, "some", {"n": 2})
-    assert other.one("piece-a", lambda: 7) == 7
+    assert other.compute("piece-a", lambda: 7) == 7
 
 
 def test_results_before_an_error_are_stored(tmp_path: Path) -> None:
