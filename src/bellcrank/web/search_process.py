@@ -179,7 +179,7 @@ def _number(value: float | None) -> float:
 
 def _current_mask(state: Any) -> str:
     """Return the current design of a chain, during a climb that of the climb."""
-    for name in ("climbing", "walker"):
+    for name in ("search_mask", "phase_mask"):
         if getattr(state, name, None):
             return str(getattr(state, name))
     return _best_mask(state)
