@@ -1,34 +1,40 @@
-"""One way to compile a kernel, and a cache folder that cannot go stale.
+"""Compilation of kernels by numba: deferred to the first call, and cached on disk.
 
-numba keys its on-disk cache by the file of the compiled function alone: when a
-callee in another file changes, the caller's old machine code is used without a
-word. The cache folder is therefore named by a hash of the sources of all
-kernels, of the package version and of the versions of numba and Python: any
-change means a new folder, and old folders are cleared away.
+numba names its cache files after the file of the compiled function alone: when a callee in
+another file changes, outdated machine code of the caller is used. The cache folder is therefore
+named by a hash of the sources of all kernels, of the package version and of the versions of
+numba and Python. Any change leads to a new folder; old folders are removed.
+
+numba takes a third of a second to import, which commands that only refuse their input need not
+spend. The decorators below therefore return a `_Deferred` function; the first call imports numba
+and replaces all of them in the modules of the kernels by compiled functions.
 """
 
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import os
 import shutil
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
-
-import numba
 
 from bellcrank import __version__
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-KEPT_CACHES = 4
+MAX_CACHES = 4
+"""Number of old cache folders that are left in place."""
 
 
 def _source_hash() -> str:
-    digest = hashlib.sha256(f"{__version__} {numba.__version__} {sys.version}".encode())
+    numba_version = importlib.metadata.version("numba")
+    digest = hashlib.sha256(f"{__version__} {numba_version} {sys.version}".encode())
     package = Path(__file__).resolve().parents[2]
     for path in sorted(package.rglob("kernels/*.py")):
         digest.update(str(path.relative_to(package)).encode())
@@ -36,7 +42,7 @@ def _source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _usable(folder: Path) -> bool:
+def _is_writable(folder: Path) -> bool:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -45,48 +51,101 @@ def _usable(folder: Path) -> bool:
         return False
 
 
-def _cache_folder() -> Path:
+@cache
+def cache_folder() -> Path:
+    """Return the folder of the compiled kernels, and create it if it is missing."""
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     candidates = [base / "bellcrank", Path(tempfile.gettempdir()) / f"bellcrank-{os.getuid()}"]
     if chosen := os.environ.get("BELLCRANK_CACHE"):
         candidates.insert(0, Path(chosen))
     for candidate in candidates:
         folder = candidate / "kernels" / _source_hash()
-        if _usable(folder):
-            _forget_old_caches(folder)
+        if _is_writable(folder):
+            _remove_old_caches(folder)
             return folder
     return Path(tempfile.mkdtemp(prefix="bellcrank-"))
 
 
-def _forget_old_caches(current: Path) -> None:
+def _remove_old_caches(current: Path) -> None:
     """Remove all but the most recently used caches; another process may do the same."""
     try:
         others = [folder for folder in current.parent.iterdir() if folder != current]
         others.sort(key=lambda folder: folder.stat().st_mtime, reverse=True)
-        for folder in others[KEPT_CACHES:]:
+        for folder in others[MAX_CACHES:]:
             shutil.rmtree(folder, ignore_errors=True)
     except OSError:
         return
 
 
-CACHE_FOLDER = _cache_folder()
+_lock = threading.RLock()
+_pending: list[_Deferred] = []
 
 
-def _compile(function: F, **options: Any) -> F:
-    """Compile with numba: cached on disk, without the interpreter lock.
+class _Deferred:
+    """A function that is compiled, together with all others, when one of them is called.
 
-    Strict floating point (no re-association, no contraction), so that the same
-    machine always gives the same bits; divisions follow IEEE 754 instead of raising.
-    Kernels allocate nothing, so numba's counting of references, a sixth of the
-    compilation, is left out.
+    Parameters
+    ----------
+    function
+        Python function.
+    options
+        Of `numba.njit`; None for an intrinsic, a function that generates machine code.
     """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any] | None) -> None:
+        self.function = function
+        self.options = options
+        self.compiled: Callable[..., Any] | None = None
+        self.__doc__ = function.__doc__
+        with _lock:
+            _pending.append(self)
+
+    def __call__(self, *args: Any) -> Any:
+        """Call the compiled function."""
+        if self.compiled is None:
+            _compile_pending()
+        return self.compiled(*args)  # type: ignore[misc]
+
+
+def _compile_pending() -> None:
+    """Create the compiled function of each pending one, and enter it into the kernel modules.
+
+    numba looks up the names that a kernel uses in the globals of its module when it compiles the
+    kernel, and expects compiled functions there.
+    """
+    with _lock:
+        if not _pending:
+            return
+        for each in _pending:
+            each.compiled = _compiled(each)
+        for namespace in {id(each.function.__globals__): each.function.__globals__  # type: ignore[attr-defined]
+                          for each in _pending}.values():  # fmt: skip
+            for name, value in list(namespace.items()):
+                if isinstance(value, _Deferred):
+                    namespace[name] = value.compiled
+        _pending.clear()
+
+
+def _compiled(deferred: _Deferred) -> Callable[..., Any]:
+    """Return the compiled function: cached on disk, without the interpreter lock.
+
+    Strict floating point (no re-association, no contraction), so that the same machine always
+    gives the same bits; divisions follow IEEE 754 instead of raising. Kernels allocate nothing,
+    so numba's reference counting, a sixth of the compilation time, is omitted.
+    """
+    import numba
+    from numba.extending import intrinsic as make_intrinsic
+
+    if deferred.options is None:
+        return cast("Callable[..., Any]", make_intrinsic(deferred.function))
     config: Any = numba.config
-    options["_nrt"] = False
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(CACHE_FOLDER)
+    config.CACHE_DIR = str(cache_folder())
     try:
-        compiler = numba.njit(cache=True, nogil=True, error_model="numpy", **options)
-        return cast("F", compiler(function))
+        compiler = numba.njit(
+            cache=True, nogil=True, error_model="numpy", _nrt=False, **deferred.options
+        )
+        return cast("Callable[..., Any]", compiler(deferred.function))
     finally:
         config.CACHE_DIR = before
 
@@ -94,10 +153,10 @@ def _compile(function: F, **options: Any) -> F:
 def kernel(function: F) -> F:
     """Compile a function that only other kernels call.
 
-    It gets no wrapper for calls from Python: unpacking sixty arrays a call would
-    take a third of the compilation.
+    It gets no wrapper for calls from Python: unpacking sixty arrays for each call would take a
+    third of the compilation time.
     """
-    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return cast("F", _Deferred(function, {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}))
 
 
 def inlined(function: F) -> F:
@@ -105,14 +164,20 @@ def inlined(function: F) -> F:
 
     For outer layers: numba optimises everything below a kernel again at each level.
     """
-    return _compile(function, inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    options = {"inline": "always", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return cast("F", _Deferred(function, options))
 
 
 def entry(function: F) -> F:
     """Compile a function that Python calls."""
-    return _compile(function, no_cfunc_wrapper=True)
+    return cast("F", _Deferred(function, {"no_cfunc_wrapper": True}))
+
+
+def intrinsic(function: F) -> F:
+    """Define a function that generates machine code, by numba's protocol."""
+    return cast("F", _Deferred(function, None))
 
 
 def kernels_are_compiled() -> bool:
-    """Whether an earlier process on this machine left compiled kernels behind."""
-    return any(CACHE_FOLDER.rglob("*.nbc"))
+    """Return whether an earlier process on this machine has compiled the kernels."""
+    return any(cache_folder().rglob("*.nbc"))

@@ -1,20 +1,19 @@
 """Population count and trailing zeros of a 64-bit word, as single instructions."""
-# numba's intrinsic protocol hands over its own untyped objects.
+# The arguments of numba's intrinsic protocol are untyped.
 # mypy: disable-error-code="no-untyped-def, call-arg, return-value"
 # ruff: noqa: ARG001
 
 from __future__ import annotations
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
-from bellcrank.mechanics.kernels._compile import kernel
+from bellcrank.mechanics.kernels._compile import intrinsic, kernel
 
 
 @intrinsic
 def _popcount(_typing, word):
     """Count the set bits of a uint64."""
+    from numba import types
 
     def generate(context, builder, _signature, arguments):
         return builder.ctpop(arguments[0])
@@ -25,6 +24,7 @@ def _popcount(_typing, word):
 @intrinsic
 def _trailing_zeros(_typing, word):
     """Find the lowest set bit of a uint64 that is not zero."""
+    from numba import types
 
     def generate(context, builder, _signature, arguments):
         return builder.cttz(arguments[0], context.get_constant(types.boolean, True))
