@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csc_matrix, identity
-from scipy.sparse.linalg import splu
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.sparse import csc_matrix
 
     from bellcrank.mechanics.kernels.arrays import Ints
 
@@ -31,6 +30,8 @@ def coupled_nodes(beams: Ints, held: NDArray[np.bool_]) -> csc_matrix:
     (n, n) sparse matrix of ones
         Over the n free nodes.
     """
+    from scipy.sparse import csc_matrix
+
     nodes, free = np.arange(len(held)), np.flatnonzero(~held)
     index = np.full(len(held), -1)
     index[free] = np.arange(len(free))
@@ -63,6 +64,9 @@ def elimination_order(beams: Ints, held: NDArray[np.bool_]) -> Ints:
     (N,) int64
         Elimination index of each free node, -1 for held nodes.
     """
+    from scipy.sparse import csc_matrix, identity
+    from scipy.sparse.linalg import splu
+
     block = np.full(len(held), -1)
     pattern = coupled_nodes(beams, held)
     count = pattern.shape[0]
