@@ -142,9 +142,8 @@ def _compiled(deferred: _Deferred) -> Callable[..., Any]:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder())
     try:
-        compiler = numba.njit(
-            cache=True, nogil=True, error_model="numpy", _nrt=False, **deferred.options
-        )
+        options = {**deferred.options, "error_model": "numpy", "_nrt": False}
+        compiler = numba.njit(cache=True, nogil=True, **options)  # type: ignore[call-overload]
         return cast("Callable[..., Any]", compiler(deferred.function))
     finally:
         config.CACHE_DIR = before

@@ -1,6 +1,6 @@
 """Population count and trailing zeros of a 64-bit word, as single instructions."""
 # The arguments of numba's intrinsic protocol are untyped.
-# mypy: disable-error-code="no-untyped-def, call-arg, return-value"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, call-arg, return-value"
 # ruff: noqa: ARG001
 
 from __future__ import annotations
