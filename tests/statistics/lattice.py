@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import SpringEvaluator
+from bellcrank.mechanics import FlipPrediction, Response, SpringEvaluator
 from bellcrank.model import Input, Output, Problem, Supports, lattices
-from bellcrank.search import SearchSettings, chain_blocks
+from bellcrank.search import Evaluator, SearchSettings, chain_blocks
+
+if TYPE_CHECKING:
+    from bellcrank.mechanics import UnloadedBeams
 
 CHAINS = 24
 BURN_IN = 250
@@ -32,15 +36,41 @@ def ten_beams() -> Problem:
     return Problem(name="ten beams", lattice=lattice, designable=chosen, **regions)
 
 
-def all_efficiencies(problem: Problem, unloaded_beams: str) -> np.ndarray:
-    """Efficiency of every design, indexed by its designable bits."""
-    evaluator = SpringEvaluator(problem, unloaded_beams=unloaded_beams)
-    efficiency = []
-    for bits in itertools.product([False, True], repeat=10):
-        mask = problem.initial.copy()
-        mask[problem.designable] = bits
-        efficiency.append(evaluator.evaluate(mask).efficiency)
-    return np.array(efficiency)
+def all_designs(problem: Problem) -> np.ndarray:
+    """Return (1024, M) all designs, in the order of their designable bits."""
+    masks = np.repeat(problem.initial[None], 1024, axis=0)
+    masks[:, problem.designable] = list(itertools.product([False, True], repeat=10))
+    return masks
+
+
+class Enumerated:
+    """Evaluator that looks up the responses and the flip predictions of all 1024 designs."""
+
+    def __init__(self, problem: Problem, unloaded_beams: UnloadedBeams) -> None:
+        self.problem = problem
+        evaluator = SpringEvaluator(problem, unloaded_beams=unloaded_beams)
+        self._responses: list[Response] = []
+        self._predictions: list[FlipPrediction | None] = []
+        for mask in all_designs(problem):
+            self._responses.append(evaluator.evaluate(mask))
+            self._predictions.append(evaluator.predict_flips(mask))
+        self.efficiency = np.array([response.efficiency for response in self._responses])
+
+    def evaluate(
+        self,
+        mask: np.ndarray,
+        _largest_increment: float = 1.0,
+        *,
+        warm_start: bool = False,  # noqa: ARG002
+        lower_bound: float = -np.inf,  # noqa: ARG002
+    ) -> Response:
+        return self._responses[index_of(self.problem, mask)]
+
+    def set_reference(self) -> None:
+        pass
+
+    def predict_flips(self, mask: np.ndarray) -> FlipPrediction | None:
+        return self._predictions[index_of(self.problem, mask)]
 
 
 def boltzmann(cost: np.ndarray, temperature: float) -> np.ndarray:
@@ -54,11 +84,11 @@ def index_of(problem: Problem, mask: np.ndarray) -> int:
     return int(mask[problem.designable] @ POWERS)
 
 
-def visited(problem: Problem, settings: SearchSettings, chain: int) -> np.ndarray:
-    """Index of the current design after each step of one chain."""
+def visited(evaluator: Evaluator, settings: SearchSettings, chain: int) -> np.ndarray:
+    """Index of the current design after each step of one chain, without the first steps."""
+    problem = evaluator.problem
     mask = problem.initial.copy()
     indices = []
-    evaluator = SpringEvaluator(problem, unloaded_beams=settings.unloaded_beams)
     for _, proposals in chain_blocks(evaluator, settings, chain):
         proposed = np.unpackbits(proposals.mask, axis=1)[:, : len(mask)].astype(bool)
         for row, accepted in zip(proposed, proposals.accepted, strict=True):

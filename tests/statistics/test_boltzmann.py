@@ -16,17 +16,18 @@ import pytest
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Problem, unpack_mask
 from bellcrank.search import (
+    Evaluator,
     MetropolisSettings,
     TemperingSettings,
     chain_blocks,
     moves,
 )
-from bellcrank.search.markov import metropolis, steps, tempering
+from bellcrank.search.markov import steps, tempering
 
 from .lattice import (
     CHAINS,
     LARGEST_DEVIATION,
-    all_efficiencies,
+    Enumerated,
     boltzmann,
     deviations,
     index_of,
@@ -45,51 +46,48 @@ TEMPERATURE = 0.03
 @dataclass(frozen=True)
 class Exact:
     problem: Problem
-    counted: np.ndarray
-    ignored: np.ndarray
+    literal: Enumerated
+    pruned: Enumerated
 
 
 @pytest.fixture(scope="module")
 def exact() -> Exact:
     problem = ten_beams()
-    return Exact(
-        problem, all_efficiencies(problem, "keep"), all_efficiencies(problem, "prune_dead_ends")
-    )
+    return Exact(problem, Enumerated(problem, "keep"), Enumerated(problem, "prune_dead_ends"))
 
 
-def deviation_of_the_paper(exact: Exact, steps: int) -> float:
+def deviation_of_the_paper(exact: Exact, evaluator: Evaluator, steps: int) -> float:
     settings = MetropolisSettings(steps=steps, schedule="constant", cold=PAPER_TEMPERATURE)
-    samples = [visited(exact.problem, settings, chain) for chain in range(CHAINS)]
-    probability = boltzmann(np.exp(-exact.counted), PAPER_TEMPERATURE)
-    return float(deviations(samples, exact.counted, probability).max())
+    samples = [visited(evaluator, settings, chain) for chain in range(CHAINS)]
+    probability = boltzmann(np.exp(-exact.literal.efficiency), PAPER_TEMPERATURE)
+    return float(deviations(samples, exact.literal.efficiency, probability).max())
 
 
 def deviation_of_moves(exact: Exact, *names: str, steps: int = 1000) -> float:
     settings = MetropolisSettings(
-        steps=steps, schedule="constant", cold=TEMPERATURE, cost="negative", moves=names,
-        unloaded_beams="prune_dead_ends",
-    )  # fmt: skip
-    samples = [visited(exact.problem, settings, chain) for chain in range(CHAINS)]
-    probability = boltzmann(-exact.ignored, TEMPERATURE)
-    return float(deviations(samples, exact.ignored, probability).max())
+        steps=steps, schedule="constant", cold=TEMPERATURE, cost="negative", moves=names
+    )
+    samples = [visited(exact.pruned, settings, chain) for chain in range(CHAINS)]
+    probability = boltzmann(-exact.pruned.efficiency, TEMPERATURE)
+    return float(deviations(samples, exact.pruned.efficiency, probability).max())
 
 
 def test_the_distributions_are_neither_flat_nor_frozen(exact: Exact) -> None:
     for probability in (
-        boltzmann(np.exp(-exact.counted), PAPER_TEMPERATURE),
-        boltzmann(-exact.ignored, TEMPERATURE),
+        boltzmann(np.exp(-exact.literal.efficiency), PAPER_TEMPERATURE),
+        boltzmann(-exact.pruned.efficiency, TEMPERATURE),
     ):
         assert probability.max() < 0.2
         assert probability.max() > 10 * probability.min()
 
 
-def test_visits_match_the_enumerated_distribution(exact: Exact) -> None:
-    assert deviation_of_the_paper(exact, steps=8000) < LARGEST_DEVIATION
+def test_visits_of_the_compiled_chain_match_the_enumerated_distribution(exact: Exact) -> None:
+    evaluator = SpringEvaluator(exact.problem)
+    assert deviation_of_the_paper(exact, evaluator, steps=8000) < LARGEST_DEVIATION
 
 
-def test_visits_of_the_python_loop_match_too(exact: Exact, monkeypatch: pytest.MonkeyPatch) -> None:
-    python_loop(monkeypatch)
-    assert deviation_of_the_paper(exact, steps=1500) < LARGEST_DEVIATION
+def test_visits_of_the_python_loop_match_too(exact: Exact) -> None:
+    assert deviation_of_the_paper(exact, exact.literal, steps=1500) < LARGEST_DEVIATION
 
 
 @pytest.mark.parametrize("name", list(moves))
@@ -99,23 +97,6 @@ def test_visits_by_every_move_match_the_enumerated_distribution(exact: Exact, na
 
 def test_visits_by_a_mixture_of_moves_match_too(exact: Exact) -> None:
     assert deviation_of_moves(exact, *moves) < LARGEST_DEVIATION
-
-
-def python_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run chains of flips in Python."""
-
-    def advance(evaluator, settings, chain, state):
-        rng = metropolis.random_numbers(settings.seed, chain, state.step // metropolis.BLOCK)
-        count = metropolis.steps_in_block(settings, state.step)
-        return metropolis.advance_in_python(evaluator, settings, state, rng, count)
-
-    monkeypatch.setattr(metropolis, "_advance_compiled", None)
-    paper = metropolis.searches["paper"]
-    monkeypatch.setitem(
-        metropolis.searches._entries,
-        "paper",
-        metropolis.Search(paper.settings, paper.state, paper.start, advance, paper.is_done),
-    )
 
 
 def doubled_temperature(log_ratio: float, uniform: float) -> bool:
@@ -134,9 +115,8 @@ def heat_bath_of_a_third(log_ratio: float, uniform: float) -> bool:
 def test_a_wrong_acceptance_rule_is_noticed(
     exact: Exact, monkeypatch: pytest.MonkeyPatch, rule: Callable[[float, float], bool]
 ) -> None:
-    python_loop(monkeypatch)
     monkeypatch.setattr(steps, "metropolis_accepts", rule)
-    assert deviation_of_the_paper(exact, steps=1500) > LARGEST_DEVIATION
+    assert deviation_of_the_paper(exact, exact.literal, steps=1500) > LARGEST_DEVIATION
 
 
 @pytest.mark.parametrize("name", [name for name in moves if name != "flip"])
@@ -156,22 +136,20 @@ def deviation_of_tempering(exact: Exact, monkeypatch: pytest.MonkeyPatch, replic
     """Compare the designs of one replica, at the start of each of its turns."""
     take_turn, seen = tempering._take_turn, []
 
-    def watched(evaluator, settings, state, turn, *rest):
+    def recorded(evaluator, settings, state, turn, *rest):
         if turn == replica:
             mask = unpack_mask(state.mask[replica], exact.problem.lattice.beam_count)
             seen[-1].append(index_of(exact.problem, mask))
         return take_turn(evaluator, settings, state, turn, *rest)
 
-    monkeypatch.setattr(tempering, "_take_turn", watched)
+    monkeypatch.setattr(tempering, "_take_turn", recorded)
     for chain in range(CHAINS):
         seen.append([])
-        for _ in chain_blocks(
-            SpringEvaluator(exact.problem, unloaded_beams="prune_dead_ends"), REPLICAS, chain
-        ):
+        for _ in chain_blocks(exact.pruned, REPLICAS, chain):
             pass
     samples = [np.array(states[5:]) for states in seen]
-    probability = boltzmann(-exact.ignored, REPLICAS.temperatures[replica])
-    return float(deviations(samples, exact.ignored, probability).max())
+    probability = boltzmann(-exact.pruned.efficiency, REPLICAS.temperatures[replica])
+    return float(deviations(samples, exact.pruned.efficiency, probability).max())
 
 
 @pytest.mark.parametrize("replica", [0, 1])

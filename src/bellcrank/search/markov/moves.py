@@ -88,39 +88,9 @@ class Balanced:
 
     def _log_weights(self, design: EvaluatedDesign) -> NDArray[np.float64]:
         weights: NDArray[np.float64] = np.clip(
-            0.5 * design.predicted_log_ratio(slice(None)), self.MIN_LOG_WEIGHT, self.MAX_LOG_WEIGHT
+            0.5 * design.predicted_log_ratios(), self.MIN_LOG_WEIGHT, self.MAX_LOG_WEIGHT
         )
         return weights
-
-
-class Delayed:
-    """Flip one beam that passes Metropolis' rule with its predicted cost: delayed acceptance.
-
-    A uniform proposal is first accepted or rejected by its prediction; a second rule, with the
-    response, corrects the errors of the first (Christen and Fox, J. Comput. Graph. Stat. 14,
-    795, 2005). A proposal that the first rule rejects is not evaluated.
-    """
-
-    MIN_PROBABILITY = 0.02
-    """Probability with which any flip passes the first rule."""
-
-    def propose(
-        self, current: EvaluatedDesign, rng: np.random.Generator
-    ) -> NDArray[np.int64] | None:
-        """Select a beam; None if the first rule rejects it."""
-        designable = current.problem.designable
-        index = int(rng.random() * len(designable))
-        if rng.random() >= math.exp(self._log_pass(current, index)):
-            return None
-        return designable[index : index + 1]
-
-    def log_probability(self, design: EvaluatedDesign, beams: NDArray[np.int64]) -> float:
-        """Return the logarithm of the probability of passing the first rule."""
-        return self._log_pass(design, int(np.searchsorted(design.problem.designable, beams[0])))
-
-    def _log_pass(self, design: EvaluatedDesign, index: int) -> float:
-        predicted = float(design.predicted_log_ratio(index)[0])
-        return max(math.log(self.MIN_PROBABILITY), min(0.0, predicted))
 
 
 class Node:
@@ -173,5 +143,4 @@ def _designable_beams_of_nodes(problem: Problem) -> dict[int, NDArray[np.int64]]
 
 moves.register("flip")(Flip())
 moves.register("balanced")(Balanced())
-moves.register("delayed")(Delayed())
 moves.register("node")(Node())

@@ -71,16 +71,9 @@ class EvaluatedDesign:
             self._prediction = self.evaluator.predict_flips(self.mask) or unknown
         return self._prediction
 
-    def predicted_log_ratio(self, index: int | slice) -> NDArray[np.float64]:
-        """Return the predicted logarithm of the ratio of probabilities of flips.
-
-        Parameters
-        ----------
-        index
-            Index or indices into the designable beams.
-        """
-        change = np.atleast_1d(self.flip_prediction().change[index])
-        increase = self.cost_function.change(self.response.score, change)
+    def predicted_log_ratios(self) -> NDArray[np.float64]:
+        """Return (D,) the predicted logarithm of the ratio of probabilities of each flip."""
+        increase = self.cost_function.change(self.response.score, self.flip_prediction().change)
         ratio: NDArray[np.float64] = np.clip(-increase / self.temperature, -1e3, 1e3)
         return ratio
 

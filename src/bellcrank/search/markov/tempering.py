@@ -67,7 +67,7 @@ class TemperingSettings(SearchSettings):
     replicas: int = 6
     hot: float = 0.2
     cold: float = 0.005
-    moves: tuple[str, ...] = ("balanced", "balanced", "delayed", "node")
+    moves: tuple[str, ...] = ("balanced", "balanced", "node")
     cost: str = "negative"
 
     def __post_init__(self) -> None:
