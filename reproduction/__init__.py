@@ -19,7 +19,7 @@ from reproduction import disorder
 from reproduction import amplitude
 from reproduction import angular_springs
 from reproduction import learning
-from reproduction import seeing
+from reproduction import regions
 from reproduction import rivals
 from reproduction.result_store import ResultStore
 from reproduction.records import draw_record, read_record, read_records, run_study
@@ -38,10 +38,10 @@ __all__ = [
     "paths",
     "read_record",
     "read_records",
+    "regions",
     "rivals",
     "run_study",
     "scaling",
-    "seeing",
     "structure",
     "studies",
 ]

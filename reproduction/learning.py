@@ -1,8 +1,10 @@
-"""What networks learn: accuracy along the training, predictions, designs they make."""
+"""Accuracy of networks during training, their predictions, and designs found with them."""
 
 from __future__ import annotations
 
+import json
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,23 +12,25 @@ import numpy as np
 from bellcrank.plots import style
 from reproduction import published
 from reproduction.formatting import count, number, percent
-from reproduction.longer import longer_jobs
 from reproduction.pictures.charts import Chart, Density, Level, Series
 from reproduction.pictures.sheets import Sheet, draw_sheet
-from reproduction.predicting import BINS, Settings, shipped, trained
+from reproduction.predictions import BINS, Settings, bundled, trained
 from reproduction.registry import Claim, Figures, Study, register
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from reproduction.result_store import ResultStore
 
 
+RECORDS = Path(__file__).parents[1] / "docs" / "surrogate"
+"""Records of longer trainings and searches."""
+
+
 def run(settings: Settings, store: ResultStore) -> Figures:
-    """Make runs, predict them, and let the network search."""
+    """Run searches, and predict their designs by a network."""
     store.progress("network", 0, 1)
-    found = store.compute("predicted", partial(trained if settings.train else shipped, settings))
+    found = store.compute("predicted", partial(trained if settings.train else bundled, settings))
     store.progress("network", 1, 1)
     return {
         "problem": settings.problem,
@@ -34,49 +38,99 @@ def run(settings: Settings, store: ResultStore) -> Figures:
         "steps": settings.steps,
         "trained_here": settings.train,
         **found,
-        "records": {} if settings.train else longer_jobs(),
+        "records": {} if settings.train else _training_records(),
+    }
+
+
+def _training_records() -> dict[str, Any]:
+    """Return the results of longer trainings and searches from their records."""
+    found: dict[str, Any] = {}
+    for name, read in (("resnet50", _resnet50), ("driven", _search), ("costs", _costs)):
+        path = RECORDS / f"{name}.json"
+        if path.is_file():
+            record = json.loads(path.read_text(encoding="utf-8"))
+            found[name] = {**read(record), "commit": record["provenance"]["commit"]}
+    return found
+
+
+def _resnet50(record: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "designs": record["data"]["designs"],
+        "looks": record["designs"],
+        "r_squared": record["held_out"]["r_squared"],
+        "epochs": [
+            {"designs": each["designs"], "r_squared": each["r_squared"]}
+            for each in record["epochs"]
+        ],
+    }
+
+
+def _search(record: Mapping[str, Any]) -> dict[str, Any]:
+    medians = record["medians"]["final"]
+    rows = {
+        by: [each for each in record[f"by_{by}"] if each["offer"] == "final"]
+        for by in ("network", "mechanics")
+    }
+    return {
+        "chains": record["settings"]["chains"],
+        "distance": medians["distance"],
+        "distances": [each["distance"] for each in rows["network"]],
+        "median_network": medians["network"],
+        "median_mechanics": medians["mechanics"],
+        **{by: [each["efficiency"] for each in rows[by]] for by in rows},
+    }
+
+
+def _costs(record: Mapping[str, Any]) -> dict[str, Any]:
+    rows = [row for row in record["costs"] if row["where"] == "one core"]
+    single = {row["what"]: row["microseconds"] for row in rows if row["batch"] == 1}
+    return {
+        "fire": single["`fire` response"],
+        "newton": single["Newton response (default)"],
+        "resnet18": min(
+            row["microseconds"] for row in rows if row["what"].startswith("resnet18-w16")
+        ),
     }
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
-    """Draw accuracy along the training, predictions, and what a search by the network makes."""
-    charts = [_course(figures), _density(figures), _designs(figures)]
-    small = "trained here" if figures["trained_here"] else "that comes along"
+    """Draw accuracy during training, predictions, and designs of searches with the network."""
+    charts = [_training_chart(figures), _density_chart(figures), _designs_chart(figures)]
     sheet = Sheet(
-        title=f"{figures['problem']}: what a network learns",
-        note=f"{figures['network']} {small}, {figures['looks']:,.0f} looks; tested on "
-        f"{count(figures['accuracy']['count'], 'design')} of runs that it has not seen",
+        title=f"{figures['problem']}: accuracy of a network and designs found with it",
+        note=f"{_network(figures)}, {figures['looks']:,.0f} training samples; tested on "
+        f"{count(figures['accuracy']['count'], 'design')} of unseen runs",
         charts=charts,
         height=3.0,
     )
     draw_sheet(sheet, path, overwrite=True)
 
 
-def _course(figures: Mapping[str, Any]) -> Chart:
+def _training_chart(figures: Mapping[str, Any]) -> Chart:
     series = []
     rows = [(figures["network"], figures["epochs"], style.BEST)]
     if "resnet50" in figures["records"]:
         rows.append(("resnet50", figures["records"]["resnet50"]["epochs"], style.BUILT))
     for name, epochs, colour in rows:
-        across = np.array([each["designs"] for each in epochs], dtype=float)
-        up = np.array([each["r_squared"] or np.nan for each in epochs], dtype=float)
-        series.append(Series(across, up, name=name, kind="both", colour=colour))
+        samples = np.array([each["designs"] for each in epochs], dtype=float)
+        accuracy = np.array([each["r_squared"] or np.nan for each in epochs], dtype=float)
+        series.append(Series(samples, accuracy, name=name, kind="both", colour=colour))
     level = Level(published.R_SQUARED, f"the paper, {published.R_SQUARED}")
     return Chart(
-        "R² along the training", "designs seen", "R² on held-out runs", series, [level],
+        "Accuracy during training", "training samples", "R² on held-out runs", series, [level],
         log_x=True, limits_y=(0.0, 1.02), legend="lower right",
     )  # fmt: skip
 
 
-def _density(figures: Mapping[str, Any]) -> Chart:
+def _density_chart(figures: Mapping[str, Any]) -> Chart:
     low, high = figures["ends"]
     slope, offset = figures["fit"]
     ends = np.array([low, high])
-    told = figures["accuracy"]
+    accuracy = figures["accuracy"]
     return Chart(
-        "Predicted against actual",
-        "efficiency by mechanics",
-        "efficiency predicted",
+        "Predicted and simulated efficiency",
+        "simulated efficiency",
+        "predicted efficiency",
         [
             Series(ends, ends, name="equal", colour=style.IDLE, width=1.0, level=2.5),
             Series(ends, slope * ends + offset, name=f"fit, slope {slope:.2f}",
@@ -84,12 +138,14 @@ def _density(figures: Mapping[str, Any]) -> Chart:
         ],
         density=Density(np.array(figures["grid"], dtype=float), low, high),
         limits_x=(low, high), limits_y=(low, high), legend="lower right",
-        note=[f"R² {told['r_squared']:.3f}", f"determination {told['determination']:.3f}"],
+        note=[
+            f"R² {accuracy['r_squared']:.3f}", f"determination {accuracy['determination']:.3f}"
+        ],
     )  # fmt: skip
 
 
-def _designs(figures: Mapping[str, Any]) -> Chart:
-    """Draw designs made by the network, or where there are none the spread of predictions."""
+def _designs_chart(figures: Mapping[str, Any]) -> Chart:
+    """Chart the designs found with the network or, without a record, all predictions."""
     groups = [("mechanics", style.INPUT), ("network", style.BEST)]
     made = figures["records"].get("driven")
     if made is None:
@@ -100,7 +156,7 @@ def _designs(figures: Mapping[str, Any]) -> Chart:
                    name=f"by {name}", colour=colour)
             for name, colour in groups
         ]  # fmt: skip
-        return Chart("The same designs", "efficiency", "designs, %", spread, legend="upper left")
+        return Chart("Distribution", "efficiency", "designs, %", spread, legend="upper left")
     known = {
         name: np.array([value for value in made[name] if value is not None]) for name, _ in groups
     }
@@ -114,86 +170,89 @@ def _designs(figures: Mapping[str, Any]) -> Chart:
         for name, colour in groups
     ]  # fmt: skip
     return Chart(
-        f"Designs made in {made['chains']} chains", "true efficiency", "designs, %", series,
+        f"Designs of {made['chains']} chains", "simulated efficiency", "designs, %", series,
         legend="upper left",
     )  # fmt: skip
 
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
     """Compare with the paper."""
-    told, records = figures["accuracy"], figures["records"]
-    what = "trained here" if figures["trained_here"] else "that comes along"
+    accuracy, records = figures["accuracy"], figures["records"]
     found = [
         Claim(
-            "a network predicts efficiencies from pictures: R² on designs held out",
+            "R² of predicted efficiencies on held-out designs",
             f"{published.R_SQUARED} (ResNet50, {published.PICTURES:,} pictures)",
-            f"{number(told['r_squared'], 3)} ({figures['network']} {what}, "
-            f"{count(told['count'], 'design')} of runs that it has not seen); "
-            f"determination {number(told['determination'], 3)}",
+            f"{number(accuracy['r_squared'], 3)} ({_network(figures)}, "
+            f"{count(accuracy['count'], 'design')} of unseen runs); coefficient of determination "
+            f"{number(accuracy['determination'], 3)}",
         ),
     ]
-    for name, claimed in (("resnet50", _by_recipe), ("driven", _made), ("costs", _speed)):
+    for name, rows in (("resnet50", _recipe_claims), ("driven", _design_claims), ("costs", _speed)):
         if name in records:
-            found += claimed(records[name])
+            found += rows(records[name])
     return found
 
 
-def _by_recipe(row: Mapping[str, Any]) -> list[Claim]:
-    """Say what the paper's own network and recipe came to."""
+def _network(figures: Mapping[str, Any]) -> str:
+    """Return the name and the origin of the network."""
+    return f"{figures['network']}, {'trained here' if figures['trained_here'] else 'bundled'}"
+
+
+def _recipe_claims(row: Mapping[str, Any]) -> list[Claim]:
+    """Compare the training with the network and recipe of the paper."""
     return [
         Claim(
-            "the same by the paper's own recipe",
+            "R² with the network and recipe of the paper",
             f"{published.R_SQUARED}",
-            f"{number(row['r_squared'], 3)} after {row['looks']:,} looks at "
+            f"{number(row['r_squared'], 3)} after {row['looks']:,} training samples of "
             f"{row['designs']:,} designs",
-            "10 epochs would be 8.7 million looks: no GPU was at hand",
+            "the 10 epochs of the paper are 8.7 million samples and need a GPU",
         )
     ]
 
 
-def _made(row: Mapping[str, Any]) -> list[Claim]:
-    """Say what designs a network makes."""
+def _design_claims(row: Mapping[str, Any]) -> list[Claim]:
+    """Compare the designs of searches with the network and with the mechanics."""
     return [
         Claim(
-            "efficiency of designs that the network makes, and that simulation makes",
+            "efficiency of designs found with the network and with the mechanics",
             "",
-            f"medians {number(row['median_network'])} by the network, "
-            f"{number(row['median_mechanics'])} by mechanics; "
-            f"{count(row['chains'], 'chain')} each, efficiencies by mechanics",
+            f"medians {number(row['median_network'])} and {number(row['median_mechanics'])}, "
+            f"{count(row['chains'], 'chain')} each; simulated efficiencies",
         ),
         Claim(
-            "beams that tell a design made by the network from the nearest it has learnt from",
+            "differing beams between a design by the network and the nearest training design",
             f"about {published.BEAMS_APART}",
-            f"{number(row['distance'], 0)} in the median",
+            f"median {number(row['distance'], 0)}",
         ),
     ]
 
 
 def _speed(row: Mapping[str, Any]) -> list[Claim]:
-    """Say how fast the network is beside two ways to simulate."""
+    """Compare the speed of the network with that of two simulations."""
     return [
         Claim(
-            "how many times faster the network is than simulation",
+            "ratio of the times of a simulation and of a prediction",
             f"about {published.SPEED_UP}",
-            f"{row['fire'] / row['resnet18']:.0f} against first-order relaxation, "
-            f"{row['newton'] / row['resnet18']:.2f} against Newton's method",
-            "one core each; the smaller network that comes along, in batches",
+            f"{row['fire'] / row['resnet18']:.0f} for first-order relaxation, "
+            f"{row['newton'] / row['resnet18']:.2f} for Newton's method",
+            "one core; bundled network, in batches",
         )
     ]
 
 
 def runs(figures: Mapping[str, Any]) -> str:
-    """Say how much was computed."""
+    """Return the computed amount as text."""
     return (
         f"{count(figures['runs'], 'run')} of {count(figures['steps'], 'proposal')}, "
-        f"{percent(1.0) if not figures['trained_here'] else percent(0.25)} of them for the test"
+        f"{percent(0.25 if figures['trained_here'] else 1.0)} of them for the test"
     )
 
 
 STUDY = register(
     Study(
         name="learning",
-        title="What a network learns, and the designs it makes",
+        title="Accuracy of a network, and designs found with it",
         after="figure 6",
         full=Settings(),
         quick=Settings(runs=32, steps=250, epochs=8, train=True),
@@ -203,12 +262,13 @@ STUDY = register(
         runs=runs,
         deviations=(
             (
-                "The network that comes along is smaller than the paper's ResNet50; a training of "
-                "that by the paper's recipe went 0.3 % of its way (`docs/surrogate/resnet50.json`)."
+                "The bundled network is smaller than the paper's ResNet50. A training of a ResNet50 "
+                "by the paper's recipe reached 0.3 % of its length "
+                "(`docs/surrogate/resnet50.json`)."
             ),
             (
-                "Designs made by networks, distances and costs are those of "
-                "`docs/surrogate/driven.json` and `costs.json`, where a checkout has them."
+                "Designs found with the network, distances and times are taken from "
+                "`docs/surrogate/driven.json` and `docs/surrogate/costs.json`."
             ),
         ),
     )

@@ -1,4 +1,4 @@
-"""Which regions of a design matter: occlusion maps of a network against exact sensitivities."""
+"""Functional regions of a design: occlusion maps of a network and exact sensitivities."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.model import Design, find_problem
 from reproduction.formatting import number, percent
-from reproduction.predicting import one_thread
+from reproduction.predictions import one_thread
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import design_of, run_chain
 
@@ -24,16 +24,18 @@ MEASURES = ("low_rank", "network", "occlusion", "white", "black")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Which designs are looked at: the best ones of so many short chains of the paper's search.
+    """The analysed designs, the best of short chains of the paper's search.
 
     Parameters
     ----------
+    problem
+        Bundled problem.
     chains
-        How many; the first is drawn.
+        Number of chains; the design of the first is drawn.
     steps
-        As long as the runs that the network has learnt from.
+        Length of the chains, as in the training set of the network.
     stride
-        Pixels between places of the blocks that hide parts of the picture.
+        Distance between the positions of the occluding block, pixels.
     """
 
     problem: str = "crane"
@@ -43,19 +45,21 @@ class Settings:
 
 
 def run(settings: Settings, store: ResultStore) -> Figures:
-    """Explain each design."""
+    """Compute the attribution of each design."""
     from bellcrank.search import read_settings
 
     problem = find_problem(settings.problem)
-    told = {"search": "paper", "steps": settings.steps, "seed": 2_000_000}
-    search = read_settings({**told, "chains": settings.chains})
+    values = {"search": "paper", "steps": settings.steps, "seed": 2_000_000}
+    search = read_settings({**values, "chains": settings.chains})
     rows = []
     store.progress("designs", 0, settings.chains)
     for chain in range(settings.chains):
         found = store.compute(f"chain-{chain}", partial(run_chain, problem, search, chain))
         mask = found["offered"][0]["mask"]
         rows.append(
-            store.compute(f"seen-{chain}", partial(_told, settings.problem, mask, settings.stride))
+            store.compute(
+                f"attribution-{chain}", partial(_agreement, settings.problem, mask, settings.stride)
+            )
         )
         store.progress("designs", chain + 1, settings.chains)
     names = [name for name in MEASURES if name in rows[0]["agreement"]]
@@ -81,8 +85,8 @@ def _mean(values: list[float | None]) -> float | None:
 
 
 @cache
-def explained(name: str, mask: str, stride: int) -> Attribution:
-    """Return what the network that comes along makes of a design, and what is there."""
+def attribution_of(name: str, mask: str, stride: int) -> Attribution:
+    """Return the attribution of the bundled network and the exact sensitivities of a design."""
     from bellcrank.surrogate.predictor import load_model
     from reproduction.networks.attribution import Block, attribute
 
@@ -91,9 +95,9 @@ def explained(name: str, mask: str, stride: int) -> Attribution:
         return attribute(load_model(design.problem), design, Block(stride=stride))
 
 
-def _told(name: str, mask: str, stride: int) -> dict[str, Any]:
-    """Return the figures of an explanation."""
-    found = explained(name, mask, stride).to_dict()
+def _agreement(name: str, mask: str, stride: int) -> dict[str, Any]:
+    """Return the agreement of an attribution with the exact sensitivities."""
+    found = attribution_of(name, mask, stride).to_dict()
     subset = {"white": "present", "black": "absent"}
     return {
         "mask": mask,
@@ -101,49 +105,50 @@ def _told(name: str, mask: str, stride: int) -> dict[str, Any]:
         "predicted": found["predicted"],
         "agreement": {
             measure: {
-                kind: told[subset.get(measure, "all")][kind]
+                kind: values[subset.get(measure, "all")][kind]
                 for kind in ("pearson", "spearman", "recall")
             }
-            for measure, told in found["correlations"].items()
+            for measure, values in found["correlations"].items()
         },
         "vital_shared": found["regions"]["overlap"].get("vital"),
     }
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
-    """Draw what the network sees in the first design, beside what is there."""
+    """Draw the attribution and the exact sensitivities of the first design."""
     from reproduction.networks.attribution_picture import draw_attribution
 
     first = figures["designs"][0]
-    found = explained(figures["problem"], first["mask"], figures["stride"])
+    found = attribution_of(figures["problem"], first["mask"], figures["stride"])
     draw_attribution(found, path, overwrite=True)
 
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
     """Compare with the paper."""
-    told = figures["mean"]
+    means = figures["mean"]
     ranks = ", ".join(
-        f"{words} {number(told[name]['spearman'])}"
-        for name, words in (
-            ("white", "a white block"), ("black", "a black block"), ("network", ("the network's "
-            "own flips")), ("low_rank", "low-rank update"),
+        f"{label} {number(means[name]['spearman'])}"
+        for name, label in (
+            ("white", "white block"), ("black", "black block"),
+            ("network", "flips predicted by the network"),
+            ("low_rank", "flips predicted by low-rank updates"),
         )
-        if name in told
+        if name in means
     )  # fmt: skip
     return [
         Claim(
-            "hiding parts of the picture shows the regions that matter",
-            "shown in pictures",
-            f"rank correlation with the exact change of efficiency by each flip: {ranks}",
-            f"means over {len(figures['designs'])} designs; white blocks are judged by beams that "
-            "are there, black ones by absent ones",
+            "occlusion maps show functional regions",
+            "shown as pictures",
+            f"rank correlation with the exact change of efficiency by flips: {ranks}",
+            f"means over {len(figures['designs'])} designs; white blocks are compared for present "
+            "beams, black blocks for absent beams",
         ),
         Claim(
-            "regions that the network takes for vital are",
+            "agreement on vital beams",
             "",
-            f"{percent(figures['vital_shared'])} of the beams that either calls vital are so for "
-            "both",
-            "Jaccard's index, mean over the designs",
+            f"{percent(figures['vital_shared'])} of the beams that are vital for the network or "
+            "for the mechanics are vital for both",
+            "Jaccard index, mean over the designs",
         ),
     ]
 
@@ -151,17 +156,17 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
 STUDY = register(
     Study(
         name="regions",
-        title="What a network sees, against exact sensitivities",
+        title="Functional regions: occlusion maps and exact sensitivities",
         after="maps of functional regions",
         full=Settings(),
         quick=Settings(chains=1, stride=8),
         run=run,
         draw=draw,
         claims=claims,
-        runs=lambda told: f"{len(told['designs'])} designs",
+        runs=lambda figures: f"{len(figures['designs'])} designs",
         deviations=(
-            "The network is the ResNet-18 that comes along, not the paper's ResNet50.",
-            "The exact change of the efficiency by each flip stands beside the maps.",
+            "The network is the bundled ResNet-18, not the paper's ResNet50.",
+            "The exact change of the efficiency by each flip is computed for comparison.",
         ),
     )
 )

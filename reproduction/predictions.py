@@ -1,4 +1,4 @@
-"""Networks and what they predict of runs that they have not seen, as plain records."""
+"""Predictions of a network for designs of unseen runs, as plain records."""
 
 from __future__ import annotations
 
@@ -20,23 +20,25 @@ if TYPE_CHECKING:
     from bellcrank.surrogate.dataset import Dataset
 
 BINS = 64
-FIRST = 3_000_000
-"""Seed of the runs that the network which comes along is tested with: it has learnt from others."""
+FIRST_SEED = 3_000_000
+"""Seed of the first run; the training set of the bundled network has other seeds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """A network, and what it is tested with.
+    """The network, and the runs on which it is tested.
 
     Parameters
     ----------
+    problem
+        Bundled problem.
     runs, steps
-        Searches whose proposals are predicted, half of them backwards.
+        Number and length of the searches; every second one maximises the negative efficiency.
     train
-        Whether a small network is trained on them first, and tested on a quarter of the runs;
-        else the one that comes along predicts all of them.
+        Whether a small network is trained on these runs and tested on a quarter of them.
+        Otherwise the bundled network is tested on all of them.
     model, epochs
-        Of that training.
+        Architecture and number of epochs of that training.
     """
 
     problem: str = "crane"
@@ -48,44 +50,37 @@ class Settings:
 
 
 def dataset(settings: Settings) -> Dataset:
-    """Return all that searches there and back proposed."""
+    """Return all proposals of searches in both directions."""
     from bellcrank.surrogate.dataset import Dataset
 
     problem = find_problem(settings.problem)
     packed, efficiency, run_of = [], [], []
-    for number_of in range(settings.runs):
-        sign = -1.0 if number_of % 2 else 1.0
+    for run in range(settings.runs):
+        sign = -1.0 if run % 2 else 1.0
         searched = problem if sign > 0.0 else reverse(problem)
-        told = {"search": "paper", "steps": settings.steps, "seed": FIRST + number_of}
-        search = read_settings({**told, "chains": 1})
+        values = {"search": "paper", "steps": settings.steps, "seed": FIRST_SEED + run}
+        search = read_settings({**values, "chains": 1})
         for _, rows in chain_blocks(make_evaluator(searched, search), search, 0):
-            sound = rows.status == Status.CONVERGED
-            packed.append(rows.mask[sound])
-            efficiency.append(sign * rows.efficiency[sound])
-            run_of.append(np.full(int(sound.sum()), number_of))
+            converged = rows.status == Status.CONVERGED
+            packed.append(rows.mask[converged])
+            efficiency.append(sign * rows.efficiency[converged])
+            run_of.append(np.full(int(converged.sum()), run))
     return Dataset(problem, np.vstack(packed), np.concatenate(efficiency), np.concatenate(run_of))
 
 
-def shipped(settings: Settings) -> dict[str, Any]:
-    """Predict with the network that comes along."""
+def bundled(settings: Settings) -> dict[str, Any]:
+    """Predict by the bundled network."""
     from bellcrank.surrogate.predictor import load_model
 
     data = dataset(settings)
     model: Any = load_model(data.problem)
     with one_thread():
         predicted = model.predict(data.packed)
-    told = _tested(predicted, data.efficiency)
-    epochs = [
-        {"designs": each["designs"], "r_squared": each["r_squared"]}
-        for each in model.record["epochs"]
-    ]
     before = model.record.get("before", {}).get("designs", 0)
     return {
-        "network": model.architecture,
-        "looks": model.record["designs"],
-        "epochs": [{**each, "designs": each["designs"] + before} for each in epochs],
+        **_network(model, before),
         "held_out_by_its_record": model.record["held_out"],
-        **told,
+        **_comparison(predicted, data.efficiency),
     }
 
 
@@ -101,23 +96,26 @@ def trained(settings: Settings) -> dict[str, Any]:
         for _ in training.run():
             pass
         model = training.finish()
-    held_out = training.split.held_out
-    told = _tested(model.predict(data.packed[held_out]), data.efficiency[held_out])
-    epochs = [
-        {"designs": each["designs"], "r_squared": each["r_squared"]}
-        for each in model.record["epochs"]
-    ]
+        held_out = training.split.held_out
+        predicted = model.predict(data.packed[held_out])
+    return {**_network(model), **_comparison(predicted, data.efficiency[held_out])}
+
+
+def _network(model: Any, before: int = 0) -> dict[str, Any]:
+    """Return architecture, number of training samples and accuracy per epoch."""
     return {
         "network": model.architecture,
         "looks": model.record["designs"],
-        "epochs": epochs,
-        **told,
+        "epochs": [
+            {"designs": each["designs"] + before, "r_squared": each["r_squared"]}
+            for each in model.record["epochs"]
+        ],
     }
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Keep small networks from waiting for threads."""
+    """Run PyTorch in one thread, which is faster for small networks."""
     torch = import_torch()
     before = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -127,8 +125,8 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _tested(predicted: np.ndarray, actual: np.ndarray) -> dict[str, Any]:
-    """Return how predictions agree, as figures and as counts on a grid."""
+def _comparison(predicted: np.ndarray, actual: np.ndarray) -> dict[str, Any]:
+    """Return accuracy, linear fit, and counts on a grid of predicted and actual values."""
     from bellcrank.surrogate.metrics import accuracy
 
     low = float(min(predicted.min(), actual.min()))
