@@ -262,8 +262,8 @@ STUDY = register(
         runs=runs,
         deviations=(
             (
-                "The bundled network is smaller than the paper's ResNet50. A training of a ResNet50 "
-                "by the paper's recipe reached 0.3 % of its length "
+                "The bundled network is smaller than the paper's ResNet50. A training of the "
+                "paper's network by its recipe reached 0.3 % of its length "
                 "(`docs/surrogate/resnet50.json`)."
             ),
             (
