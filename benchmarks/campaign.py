@@ -20,15 +20,15 @@ from typing import TYPE_CHECKING
 
 from bellcrank.campaign import (
     EngineOptions,
+    StatusReader,
     Store,
-    Watcher,
     best_designs,
     compact,
     complete,
     engines,
     read_spec,
     verify,
-    write_harvest,
+    write_results,
 )
 from bellcrank.campaign.spec import SEGMENT
 from bellcrank.model import problem_from_dict
@@ -137,7 +137,7 @@ def overhead(place: Path, effort: Effort) -> Overhead:
     serial = (time.perf_counter() - start) / effort.short_runs
     searching = sum(map(search_alone, store.spec.runs())) / effort.short_runs
     start = time.perf_counter()
-    with engines["local"](store, EngineOptions(workers=2)) as engine:
+    with engines["processes"](store, EngineOptions(workers=2)) as engine:
         starting = time.perf_counter() - start
         dispatch = dispatch_all(engine, store.spec.run_count)
     print("| a run of 250 steps | milliseconds |")
@@ -203,17 +203,17 @@ def large(place: Path, effort: Effort) -> Weight:
     segments = store.files()
     size = {"segments": (len(segments), sum(path.stat().st_size for path in segments))}
     with timed(told, "status, from segments"):
-        assert Watcher(store).look().steps_done == effort.rows
+        assert StatusReader(store).read().steps_done == effort.rows
     with timed(told, "top 1000, from segments"):
         from_segments = best_designs(store, 1000)
     with timed(told, "compaction"):
         compact(store)
     with timed(told, "status, from the table"):
-        assert Watcher(store).look().steps_done == effort.rows
+        assert StatusReader(store).read().steps_done == effort.rows
     with timed(told, "top 1000, from the table"):
         assert best_designs(store, 1000) == from_segments
     with timed(told, "harvest: the best one, cleaned and checked"):
-        write_harvest(store, place / "designs")
+        write_results(store, place / "designs")
     with timed(told, "every byte verified"):
         assert verify(store).damage == []
     parts = store.files()

@@ -13,12 +13,12 @@ survives any kill.
 from pathlib import Path
 
 from bellcrank.campaign import (
+    StatusReader,
     Store,
-    Watcher,
     best_designs,
     complete,
     read_spec,
-    write_harvest,
+    write_results,
 )
 from bellcrank.plots import draw_comparison
 from bellcrank.workflows import motion_of
@@ -61,7 +61,7 @@ store = Store.create(Path("sizes"), read_spec(Path("sizes.toml")))
 # and ``bellcrank campaign watch sizes`` shows from anywhere how it stands (:doc:`/campaigns`).
 
 complete(store, "serial")
-status = Watcher(store).look()
+status = StatusReader(store).read()
 print(status.runs_done, "runs,", status.steps_done, "steps")
 
 # %%
@@ -74,7 +74,7 @@ for best in best_designs(store, 4):
 # %%
 # The best of each task, cleaned of what bears no load and followed again from rest:
 
-small, large = write_harvest(store, Path("designs"))
+small, large = write_results(store, Path("designs"))
 draw_comparison(
     motion_of(small.design, name=small.task),
     motion_of(large.design, name=large.task),

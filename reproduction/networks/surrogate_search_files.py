@@ -10,7 +10,7 @@ import numpy as np
 from bellcrank.model import write_design
 from bellcrank.model.storage import write_text
 from bellcrank.plots import style
-from bellcrank.storage import check_free
+from bellcrank.storage import require_new_folder
 from bellcrank.storage.files import make_folder
 from reproduction.networks.surrogate_search import OFFERS
 from reproduction.pictures.charts import Chart, Level, Series
@@ -46,7 +46,7 @@ def write_surrogate_search(result: SurrogateSearchResult, folder: Path) -> None:
     StorageError
         If it cannot be written.
     """
-    check_free(folder)
+    require_new_folder(folder)
     make_folder(folder)
     write_text(folder / RECORD, json.dumps(result.to_dict(), indent=1) + "\n")
     if (design := result.best_design()) is not None:

@@ -297,7 +297,7 @@ def main() -> None:
             f"drivers were killed: {tally.phases}\n"
         )
         try:
-            failures = fill_disk(place, spec, expected, "local", 150)
+            failures = fill_disk(place, spec, expected, "processes", 150)
             say(f"a disk full {failures} times: no bit differs\n")
         except OSError as error:
             say(f"full disk: left out ({error})\n")

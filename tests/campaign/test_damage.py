@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bellcrank.campaign import Watcher, complete, repair, verify, work
+from bellcrank.campaign import StatusReader, complete, repair, verify, work
 from bellcrank.errors import CorruptRun, RunFailed
 
 from .helpers import everything, rotten
@@ -148,6 +148,6 @@ def test_what_is_whole_in_a_damaged_table_is_not_computed_again(
 
 
 def _pending(store: Store) -> list[object]:
-    watcher = Watcher(store)
-    watcher.look()
+    watcher = StatusReader(store)
+    watcher.read()
     return list(watcher.pending())

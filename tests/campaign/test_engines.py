@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bellcrank.campaign import EngineOptions, Shard, Store, complete, engines
-from bellcrank.campaign.engines import on_dask
-from bellcrank.campaign.engines.versions import software
+from bellcrank.campaign.engines import cluster as on_dask
+from bellcrank.campaign.engines.cluster import software
 from bellcrank.errors import ClusterError, InvalidSettings, UnknownName
 
 from .helpers import everything, write_spec
@@ -80,7 +80,7 @@ def test_a_campaign_on_a_running_cluster_is_the_serial_one(
 ) -> None:
     store = Store.create(tmp_path / "store", spec)
     notes: list[str] = []
-    assert complete(store, "address", EngineOptions(scheduler=cluster), announce=notes.append)
+    assert complete(store, "dask", EngineOptions(scheduler=cluster), announce=notes.append)
     assert notes == [f"scheduler: {cluster}"]
     assert everything(store.path) == everything(tabled)
 
@@ -92,7 +92,7 @@ def test_workers_with_other_versions_are_refused_before_any_work(
     ours = {**software(), "numpy": "1.0"}
     monkeypatch.setattr(on_dask, "software", lambda: ours)
     with pytest.raises(ClusterError, match=r"worker tcp://.*: has other versions.*numpy .* there"):
-        complete(store, "address", EngineOptions(scheduler=cluster))
+        complete(store, "dask", EngineOptions(scheduler=cluster))
     assert segment_count(store.path) == 0
 
 
@@ -105,7 +105,7 @@ def test_a_worker_that_sees_another_store_is_refused_before_any_work(
     monkeypatch.setattr(type(other), "compacted", False)
     monkeypatch.setattr(other, "path", store.path)
     with pytest.raises(ClusterError, match=r"does not see this campaign in .*; choose a folder"):
-        complete(other, "address", EngineOptions(scheduler=cluster))
+        complete(other, "dask", EngineOptions(scheduler=cluster))
 
 
 def test_an_unreachable_scheduler_is_said_in_time(tmp_path: Path, spec: Spec) -> None:
@@ -115,7 +115,7 @@ def test_an_unreachable_scheduler_is_said_in_time(tmp_path: Path, spec: Spec) ->
         options = EngineOptions(scheduler=where, timeout=1.0)
         begin = time.monotonic()
         with pytest.raises(ClusterError, match=rf"scheduler {where}: cannot be reached within 1 s"):
-            complete(Store.create(tmp_path / "store", spec), "address", options)
+            complete(Store.create(tmp_path / "store", spec), "dask", options)
         assert time.monotonic() - begin < 20.0
 
 
@@ -126,12 +126,12 @@ def test_an_engine_is_refused_what_it_cannot_use(tmp_path: Path, spec: Spec) -> 
     with pytest.raises(InvalidSettings, match="the serial engine is one; got 2"):
         complete(store, "serial", EngineOptions(workers=2))
     with pytest.raises(InvalidSettings, match="expected an address like tcp://host:8786"):
-        complete(store, "address", EngineOptions(scheduler="localhost:8786"))
+        complete(store, "dask", EngineOptions(scheduler="localhost:8786"))
     with pytest.raises(InvalidSettings, match="--tls-ca: expected a file, as tls:// needs it"):
-        complete(store, "address", EngineOptions(scheduler="tls://127.0.0.1:1"))
+        complete(store, "dask", EngineOptions(scheduler="tls://127.0.0.1:1"))
     with pytest.raises(InvalidSettings, match="--tls-key: only for a scheduler at tls://"):
-        complete(store, "address", EngineOptions(scheduler="tcp://127.0.0.1:1", tls_key=tmp_path))
-    assert set(engines) == {"local", "address", "slurm", "serial"}
+        complete(store, "dask", EngineOptions(scheduler="tcp://127.0.0.1:1", tls_key=tmp_path))
+    assert set(engines) == {"processes", "dask", "slurm", "serial"}
 
 
 def test_a_campaign_over_tls_is_the_serial_one(tmp_path: Path, spec: Spec, tabled: Path) -> None:
@@ -145,11 +145,11 @@ def test_a_campaign_over_tls_is_the_serial_one(tmp_path: Path, spec: Spec, table
         assert address.startswith("tls://")
         store = Store.create(tmp_path / "store", spec)
         options = EngineOptions(scheduler=address, tls_ca=cert, tls_cert=cert, tls_key=key)
-        assert complete(store, "address", options)
+        assert complete(store, "dask", options)
         assert everything(store.path) == everything(tabled)
         plain = EngineOptions(scheduler=address.replace("tls", "tcp"), timeout=2.0)
         with pytest.raises(ClusterError, match="cannot be reached within 2 s"):
-            complete(Store.create(tmp_path / "other", spec), "address", plain)
+            complete(Store.create(tmp_path / "other", spec), "dask", plain)
 
 
 def self_signed(folder: Path) -> tuple[Path, Path]:

@@ -41,7 +41,7 @@ def test_kills_of_workers_and_drivers_change_nothing(tmp_path: Path, short: Refe
 
 
 @pytest.mark.parametrize(
-    ("engine", "number"), [("serial", signal.SIGTERM), ("local", signal.SIGINT)]
+    ("engine", "number"), [("serial", signal.SIGTERM), ("processes", signal.SIGINT)]
 )
 def test_a_campaign_stops_on_request_and_says_how_to_go_on(
     tmp_path: Path, short: Reference, engine: str, number: signal.Signals

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bellcrank.campaign import Spec, Store, read_spec
-from bellcrank.campaign.store import changed
+from bellcrank.campaign.spec import spec_difference
 from bellcrank.errors import CorruptRun, InvalidFile, InvalidSettings, OutputExists
 from bellcrank.model import find_problem, write_problem
 
@@ -100,8 +100,11 @@ def test_another_spec_in_the_same_folder_is_refused_and_said_where_it_differs(
 
 
 def test_a_task_that_is_gone_is_named(spec: Spec) -> None:
-    assert changed(spec, Spec(spec.name, 250, spec.tasks[:1])) == "task 'large' is not here"
-    assert changed(spec, Spec(spec.name, 250, spec.tasks[::-1])) == "the tasks are in another order"
+    assert spec_difference(spec, Spec(spec.name, 250, spec.tasks[:1])) == "task 'large' is not here"
+    assert (
+        spec_difference(spec, Spec(spec.name, 250, spec.tasks[::-1]))
+        == "the tasks are in another order"
+    )
 
 
 def test_a_description_changed_by_hand_is_refused(tmp_path: Path, finished: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from bellcrank.campaign import Store, Watcher, best_designs, complete, verify, work
+from bellcrank.campaign import StatusReader, Store, best_designs, complete, verify, work
 from bellcrank.campaign.compaction import compact, expand, read_parts
 from bellcrank.errors import CorruptRun, InvalidSettings
 from bellcrank.mechanics import SpringEvaluator
@@ -131,8 +131,8 @@ def whole_story(folder: Path, spec: Spec) -> None:
 @pytest.mark.parametrize("where", ["finished", "tabled"])
 def test_status_counts_what_is_there(where: str, request: pytest.FixtureRequest) -> None:
     store = Store.open(request.getfixturevalue(where))
-    watcher = Watcher(store)
-    status = watcher.look()
+    watcher = StatusReader(store)
+    status = watcher.read()
     assert status.done
     assert (status.runs, status.runs_done) == (RUNS, RUNS)
     assert (status.steps, status.steps_done) == (ROWS, ROWS)
@@ -149,14 +149,14 @@ def test_a_watcher_sees_segments_come_and_the_table_replace_them(
     tmp_path: Path, spec: Spec
 ) -> None:
     store = Store.create(tmp_path / "store", spec)
-    watcher = Watcher(store)
-    assert watcher.look().steps_done == 0
+    watcher = StatusReader(store)
+    assert watcher.read().steps_done == 0
     work(str(store.path), 2)
-    assert watcher.look().steps_done == 600
+    assert watcher.read().steps_done == 600
     assert [run.number for run in watcher.pending()] == [0, 1, 3]
     complete(store, "serial")
-    assert watcher.look().compacted
-    assert watcher.look().done
+    assert watcher.read().compacted
+    assert watcher.read().done
 
 
 @pytest.mark.parametrize("where", ["finished", "tabled"])

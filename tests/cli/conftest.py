@@ -39,7 +39,7 @@ def half_done(tmp_path_factory: pytest.TempPathFactory, whole: Path) -> Path:
     """The folder of a job that a full disk stopped with some shards of each chain stored."""
     folder = tmp_path_factory.mktemp("half") / "run"
     with (
-        mock.patch.object(parallel, "SHARD", BLOCK),
+        mock.patch.object(parallel, "SEGMENT_STEPS", BLOCK),
         # Two for the description, two for each shard: the chains end with one or more each.
         failing_from("fsync", 12, errno.ENOSPC),
     ):

@@ -52,11 +52,11 @@ def test_the_best_designs_can_be_evaluated(campaign: Path, tmp_path: Path) -> No
 
 
 def test_a_harvest_is_written_and_can_be_evaluated(campaign: Path, tmp_path: Path) -> None:
-    told = call("campaign", "harvest", campaign, "--out", tmp_path / "designs")
+    told = call("campaign", "results", campaign, "--out", tmp_path / "designs")
     assert told.code == 0, told.err
     assert f"written to {tmp_path / 'designs'}/" in told.out
     assert call("evaluate", tmp_path / "designs" / "large.json").code == 0
-    again = call("campaign", "harvest", campaign, "--out", tmp_path / "designs")
+    again = call("campaign", "results", campaign, "--out", tmp_path / "designs")
     assert again.code == 2
     assert "exists already" in again.err
 
@@ -85,13 +85,13 @@ def test_damage_is_named_mended_and_computed_again(tmp_path: Path) -> None:
         (("run", "{spec}", "--workers", "0"), "workers: expected at least 1, got 0"),
         (("run", "{spec}", "--engine", "ray"), "unknown engine 'ray'"),
         (("run", "{spec}", "--shard", "3/2"), "shard: expected i/N"),
-        (("run", "{spec}", "--scheduler", "tcp://a:1", "--engine", "local"), "only for engine"),
+        (("run", "{spec}", "--scheduler", "tcp://a:1", "--engine", "processes"), "only for engine"),
         (("run", "{spec}", "--engine", "slurm", "--slurm", "queue"), "--slurm queue: expected KEY"),
         (("resume", "{place}"), "not the folder of a campaign"),
         (("status", "{place}/nowhere"), "no such folder"),
         (("watch", "{place}", "--interval", "0"), "interval: expected seconds above 0"),
         (("top", "{place}"), "not the folder of a campaign"),
-        (("harvest", "{place}"), "not the folder of a campaign"),
+        (("results", "{place}"), "not the folder of a campaign"),
         (("verify", "{place}"), "not the folder of a campaign"),
     ],
 )

@@ -90,7 +90,7 @@ def test_an_unfinished_run_points_to_the_option_that_resumes_it(half: Path) -> N
 
 
 def test_an_error_in_one_chain_is_told_though_another_was_stopped_by_it(half: Path) -> None:
-    (half / "chains/001/00000000.parquet").write_bytes(b"")
+    (half / "segments/001/00000000.parquet").write_bytes(b"")
     failed = threading.Event()
     real = parallel.run_chain
 

@@ -45,7 +45,7 @@ import os
 from bellcrank.cli import main
 from bellcrank.search import parallel
 
-parallel.SHARD = {BLOCK}
+parallel.SEGMENT_STEPS = {BLOCK}
 advance = parallel.advance_chain
 
 def advance_at_the_gate(*words):
@@ -70,7 +70,7 @@ def wait_until(happened: Callable[[], bool], job: subprocess.Popen[bytes]) -> No
 
 
 def shards(folder: Path) -> int:
-    return len(list(folder.glob("chains/*/*.parquet")))
+    return len(list(folder.glob("segments/*/*.parquet")))
 
 
 @contextlib.contextmanager
@@ -203,7 +203,7 @@ def assert_failed(outcome: Outcome, message: str) -> None:
 def test_a_job_goes_on_after_a_full_disk(tmp_path: Path, whole: Path, instant: int) -> None:
     folder = tmp_path / "run"
     with (
-        mock.patch.object(parallel, "SHARD", 2 * BLOCK),
+        mock.patch.object(parallel, "SEGMENT_STEPS", 2 * BLOCK),
         failing_from("fsync", instant, errno.ENOSPC),
     ):
         outcome = call("design", PROBLEM, *SETTINGS, "--out", folder)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bellcrank.storage.layout import LOCK
-from bellcrank.storage.locking import locked
+from bellcrank.storage.locking import LOCK, locked
 
 from .helpers import LIFT, PROBLEM, SETTINGS, SMALL, call, files, refusal, write
 

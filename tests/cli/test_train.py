@@ -108,7 +108,7 @@ def test_an_interrupted_training_resumes_to_the_same_network(
         def stopping() -> Iterator[StopAfter]:
             yield StopAfter(10)
 
-        patch.setattr("bellcrank.cli.design.stopping_on_interrupt", stopping)
+        patch.setattr("bellcrank.cli.stopping.stopping_on_interrupt", stopping)
         outcome = call("train", data, *TRAINING, "--out", folder)
     assert outcome.code == 130
     assert f"bellcrank train {data} --resume {folder}" in outcome.err

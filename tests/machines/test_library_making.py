@@ -21,8 +21,7 @@ from bellcrank.machines.library.making import SEARCHES, InputStiffnessCheck, mak
 from bellcrank.machines.library.tasks import EntryTask, MakeSettings
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.search import Verdict
-from bellcrank.storage.layout import LOCK
-from bellcrank.storage.locking import locked
+from bellcrank.storage.locking import LOCK, locked
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -161,7 +160,7 @@ def test_making_anew_goes_on_after_a_stop(whole: Path, tmp_path: Path) -> None:
 
 
 def test_one_process_at_a_time_makes_entries_in_a_folder(whole: Path) -> None:
-    with locked(whole / LOCK), pytest.raises(StorageError, match="another process makes entries"):
+    with locked(whole / LOCK), pytest.raises(StorageError, match="is working in this folder"):
         list(make(SETTINGS, whole))
     assert not (whole / LOCK).exists()
 

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from bellcrank.storage import RunFolder
 
 SETTINGS = {"steps": 40, "chains": 2, "seed": 3, "objective": None, "hot": 0.06}
-SHARD = 10
+SEGMENT = 10
 
 
-def proposals(problem: Problem, chain: int, first: int, count: int = SHARD) -> Proposals:
+def proposals(problem: Problem, chain: int, first: int, count: int = SEGMENT) -> Proposals:
     """Make proposals that depend on chain and step alone, like those of a real chain."""
     parts = []
     for step in range(first, first + count):
@@ -39,7 +39,7 @@ def fill(run: RunFolder, steps: int = 40, chains: int = 2) -> None:
         step, state = run.progress(chain)
         assert state == ({"step": step, "chain": chain} if step else None)
         while step < steps:
-            count = min(SHARD, steps - step)
+            count = min(SEGMENT, steps - step)
             run.append(
                 chain, step, proposals(run.problem, chain, step, count),
                 {"step": step + count, "chain": chain},

@@ -18,7 +18,6 @@ import pytest
 
 from bellcrank.errors import OutputExists
 from bellcrank.storage import RunFolder
-from bellcrank.storage.layout import shard_path
 
 from .helpers import SETTINGS, assert_holds, files, fill, proposals
 
@@ -155,7 +154,7 @@ def test_a_real_kill_loses_nothing_that_was_stored(run: RunFolder) -> None:
 def test_the_first_of_two_writers_wins(run: RunFolder) -> None:
     other = RunFolder.open(run.path)
     run.append(0, 0, proposals(run.problem, 0, 0), {"step": 10, "chain": 0})
-    with pytest.raises(OutputExists, match="another process at work"):
+    with pytest.raises(OutputExists, match="another process"):
         other.append(0, 0, proposals(run.problem, 9, 0), {"step": 10, "chain": 0})
     assert_holds(run, 10, chains=1)
 
@@ -163,7 +162,7 @@ def test_the_first_of_two_writers_wins(run: RunFolder) -> None:
 def test_the_first_writer_wins_even_if_both_looked_at_the_same_time(
     run: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = shard_path(run.path / "chains" / "000", 0)
+    path = run.path / "segments" / "000" / "00000000.parquet"
     real = os.fsync
 
     def other_is_faster(descriptor: int) -> None:
@@ -173,7 +172,7 @@ def test_the_first_writer_wins_even_if_both_looked_at_the_same_time(
         )
 
     monkeypatch.setattr(os, "fsync", other_is_faster)
-    with pytest.raises(OutputExists, match="another process at work"):
+    with pytest.raises(OutputExists, match="another process"):
         run.append(0, 0, proposals(run.problem, 9, 0), {"step": 10, "chain": 0})
     assert_holds(run, 10, chains=1)
     assert list(files(path.parent)) == [path.name]
@@ -197,14 +196,14 @@ def test_chains_can_be_written_by_several_threads(run: RunFolder) -> None:
 
 def test_only_the_leftovers_of_writers_are_cleared_away(run: RunFolder) -> None:
     fill(run)
-    folder = run.path / "chains" / "000"
+    folder = run.path / "segments" / "000"
     leftovers = [folder / ".00000040.parquet.5ad0c2e7", folder / ".00000010.parquet.00ff00ff"]
     strangers = [
         folder / "notes.txt", folder / ".00000040.parquet.swp", folder / "copy.parquet",
-        run.path / ".hidden", run.path / "design.json", run.path / "chains" / "README",
-        run.path / "chains" / "misc" / "00000000.parquet",
+        run.path / ".hidden", run.path / "design.json", run.path / "segments" / "README",
+        run.path / "segments" / "misc" / "00000000.parquet",
     ]  # fmt: skip
-    (run.path / "chains" / "misc").mkdir()
+    (run.path / "segments" / "misc").mkdir()
     for path in (*leftovers, *strangers):
         path.write_bytes(b"half")
     assert run.progress(0)[0] == 40

@@ -1,4 +1,4 @@
-"""Locks: one at a time, whoever dies."""
+"""Lock files exclude other processes and end with their holder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bellcrank.errors import StorageError
-from bellcrank.storage.locking import locked
+from bellcrank.storage.locking import lock_holder, locked
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,7 +27,7 @@ with locked(Path(sys.argv[1])):
 
 
 def holder(path: Path) -> subprocess.Popen[str]:
-    """Another process that holds a lock."""
+    """Return another process that holds a lock."""
     process = subprocess.Popen(
         [sys.executable, "-c", HOLD, str(path)], stdout=subprocess.PIPE, text=True
     )
@@ -36,22 +36,27 @@ def holder(path: Path) -> subprocess.Popen[str]:
     return process
 
 
-def test_what_another_process_holds_is_refused_until_it_is_killed(tmp_path: Path) -> None:
+def test_the_lock_of_another_process_is_refused_until_that_is_killed(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / ".lock"
     process = holder(path)
     try:
-        with pytest.raises(StorageError, match="taken"), locked(path, "taken"):
+        number = f"process {process.pid}"
+        assert lock_holder(path) == number
+        with pytest.raises(StorageError, match=f"{number} .*--out"), locked(path, wait=False):
             pass
     finally:
         process.send_signal(signal.SIGKILL)
         process.communicate()
     assert path.exists()
-    with locked(path, "taken"):
+    assert lock_holder(path) is None
+    with locked(path, wait=False):
         pass
     assert list(tmp_path.iterdir()) == []
 
 
-def test_many_that_wait_go_one_at_a_time(tmp_path: Path) -> None:
+def test_waiting_threads_get_the_lock_one_at_a_time(tmp_path: Path) -> None:
     path, inside, seen = tmp_path / ".lock", threading.Lock(), []
 
     def work(number: int) -> None:
@@ -70,14 +75,14 @@ def test_many_that_wait_go_one_at_a_time(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_error_inside_lets_go(tmp_path: Path) -> None:
+def test_an_error_inside_releases_the_lock(tmp_path: Path) -> None:
     path = tmp_path / ".lock"
-    with pytest.raises(KeyError), locked(path, "taken"):
+    with pytest.raises(KeyError), locked(path, wait=False):
         raise KeyError
-    with locked(path, "taken"):
+    with locked(path, wait=False):
         pass
 
 
-def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
+def test_a_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match="cannot be written"), locked(tmp_path / "no" / ".lock"):
         pass

@@ -65,7 +65,7 @@ def test_a_second_call_leaves_the_same_bytes_and_mends_a_damaged_file(
 def test_a_build_that_was_stopped_goes_on_to_the_same_dataset(
     built: Path, spec: DatasetSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, looks: int
 ) -> None:
-    monkeypatch.setattr("bellcrank.campaign.drive.LOOK", 0.0)
+    monkeypatch.setattr("bellcrank.campaign.completion.STATUS_INTERVAL", 0.0)
     stop, seen = threading.Event(), []
 
     def tell(status: object) -> None:
@@ -85,7 +85,7 @@ def test_a_build_that_was_stopped_goes_on_to_the_same_dataset(
 def test_rows_come_in_the_same_order_from_segments_and_from_the_table(
     spec: DatasetSpec, built: Path, tmp_path: Path, problem: Problem, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("bellcrank.campaign.drive.compact", lambda _store: None)
+    monkeypatch.setattr("bellcrank.campaign.completion.compact", lambda _store: None)
     folder = tmp_path / "segments"
     loose = build_dataset(spec, folder, engine="serial")
     store = Store.open(folder / CAMPAIGN)

@@ -88,7 +88,7 @@ def test_a_folder_has_one_server(tmp_path: Path) -> None:
     with serving(tmp_path):
         second = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert second.returncode == 1
-    assert "another server uses it" in second.stderr
+    assert "is working in this folder" in second.stderr
 
 
 def marked(mark: str) -> list[str]:

@@ -1,8 +1,8 @@
-"""Campaigns: many runs, on one core or thousands, in a store that survives anything.
+"""Campaigns: many runs, on one core or thousands, in a store that survives a kill at any instant.
 
 A **spec** names problems, searches and seeds. Each run is one chain; `work` computes one and
-puts what it finds into the **store**, a folder of write-once files. An **engine** only decides
-where that happens, so all of them leave the same bytes.
+writes its proposals to the **store**, a folder of files that are written once. An **engine**
+decides where runs are computed; all engines leave the same bytes.
 
 Examples
 --------
@@ -22,7 +22,7 @@ Examples
 >>> store = Store.create(Path(scratch.name) / "first", read_spec(path))
 >>> complete(store, "serial")
 True
->>> status = Watcher(store).look()
+>>> status = StatusReader(store).read()
 >>> status.runs_done, status.steps_done, status.compacted
 (2, 1000, True)
 >>> best = best_designs(store, 3)
@@ -32,29 +32,28 @@ True
 """
 
 from bellcrank.campaign.compaction import compact
-from bellcrank.campaign.drive import Shard, complete
+from bellcrank.campaign.completion import Shard, complete
 from bellcrank.campaign.engines import EngineOptions, engines
-from bellcrank.campaign.harvest import Harvest, write_harvest
-from bellcrank.campaign.ranking import Ranked, best_designs
+from bellcrank.campaign.results import RankedDesign, TaskResult, best_designs, write_results
 from bellcrank.campaign.spec import Run, Spec, Task, read_spec
-from bellcrank.campaign.status import Status, TaskStatus, Watcher
+from bellcrank.campaign.status import Status, StatusReader, TaskStatus
 from bellcrank.campaign.store import Store
 from bellcrank.campaign.verification import Verification, repair, verify
 from bellcrank.campaign.work import work
 
 __all__ = [
     "EngineOptions",
-    "Harvest",
-    "Ranked",
+    "RankedDesign",
     "Run",
     "Shard",
     "Spec",
     "Status",
+    "StatusReader",
     "Store",
     "Task",
+    "TaskResult",
     "TaskStatus",
     "Verification",
-    "Watcher",
     "best_designs",
     "compact",
     "complete",
@@ -63,5 +62,5 @@ __all__ = [
     "repair",
     "verify",
     "work",
-    "write_harvest",
+    "write_results",
 ]

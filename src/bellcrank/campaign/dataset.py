@@ -16,7 +16,7 @@ from bellcrank.model.storage import check_folder
 from bellcrank.search import read_settings
 from bellcrank.storage.description import plain
 from bellcrank.storage.files import make_folder
-from bellcrank.storage.shards import arrays_of, parquet_file
+from bellcrank.storage.parquet import arrays_of, parquet_file
 from bellcrank.surrogate.dataset import DATASET_FILE, Dataset
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def build_dataset(
     spec: DatasetSpec,
     folder: str | os.PathLike[str],
     *,
-    engine: str = "local",
+    engine: str = "processes",
     workers: int | None = None,
     tell: Callable[[CampaignStatus], None] = lambda _status: None,
     stop: threading.Event | None = None,

@@ -1,4 +1,4 @@
-"""What a campaign is asked to do: a short TOML file, and what it resolves to.
+"""The spec of a campaign: a short TOML file, and its resolved form.
 
 ::
 
@@ -6,8 +6,8 @@
     segment = 4000            # steps in one file of the store; optional
 
     [[tasks]]
-    problem = "crane"         # a built-in name, or a file beside this one
-    search = "paper"          # any search, with any of its settings
+    problem = "crane"         # a bundled problem, or a file relative to this one
+    search = "paper"          # and any other setting of the search
     steps = 20_000
     seeds = 30                # 0 to 29; or [first, last]
     name = "as-published"     # optional; the default is crane-paper
@@ -17,8 +17,6 @@ A run is one chain of one task with one seed.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -35,24 +33,24 @@ from bellcrank.errors import (
 from bellcrank.model import find_problem, problem_to_dict
 from bellcrank.model.builtin import builtin
 from bellcrank.model.parsing import Table, parse, read_toml
-from bellcrank.storage.description import plain, spec_hash
+from bellcrank.storage.description import content_hash, first_difference, plain
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterator
 
 SEGMENT = 4000
-"""Steps in one file of the store: what a kill can cost in time."""
+"""Default number of steps in a file of the store; a kill loses at most these."""
 SEGMENT_UNIT = 250
-"""A chain can be stopped between two blocks of so many steps."""
-MOST_SEED = 2**62
-MOST_RUNS = 10**7
+"""Steps of a block of a search; segments end between two blocks."""
+MAX_SEED = 2**62
+MAX_RUNS = 10**7
 RESERVED = {"seed": "seeds", "chains": "seeds"}
-"""Settings of a search that a campaign sets for each run, and what says so in its spec."""
+"""Settings of a search that a campaign sets for each run, and the key of the spec for them."""
 
 
 class TaskTable(Table):
-    """One entry of ``tasks``; keys not named here are settings of the search."""
+    """One entry of ``tasks``; all other keys are settings of the search."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -72,18 +70,18 @@ class SpecTable(Table):
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One problem, one search, many seeds.
+    """One problem and one search with many seeds.
 
     Parameters
     ----------
     name
-        Unique in its campaign.
+        Name, unique in its campaign.
     problem
-        Schema ``bellcrank/problem/1``.
+        Plain data of schema ``bellcrank/problem/1``.
     settings
-        Of the search, as plain data, without seed and number of chains.
+        Settings of the search, as plain data, without seed and number of chains.
     first_seed, last_seed
-        Both included.
+        First and last seed, both included.
     """
 
     name: str
@@ -94,8 +92,8 @@ class Task:
 
     @property
     def hash(self) -> str:
-        """Identity of problem and settings."""
-        return spec_hash(self.problem, self.settings)
+        """Hash of problem and settings."""
+        return content_hash({"problem": self.problem, "settings": self.settings})
 
     @property
     def run_count(self) -> int:
@@ -125,16 +123,16 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One chain.
+    """One chain of a task.
 
     Parameters
     ----------
     number
-        In its campaign, from 0.
+        Number in its campaign, from 0.
     id
-        Named by content: what the task is, and the seed.
+        Name: the start of the hash of the task, and the seed.
     task, seed
-        What to run.
+        Task and seed.
     """
 
     number: int
@@ -150,16 +148,16 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Spec:
-    """A spec with everything resolved: no file beside it is needed any more.
+    """A resolved spec, which refers to no other file.
 
     Parameters
     ----------
     name
-        Of the campaign.
+        Name of the campaign.
     segment
-        Steps after which a chain's rows are stored.
+        Number of steps in a segment.
     tasks
-        In order; their runs are numbered through.
+        Tasks in order; their runs are numbered consecutively.
 
     Examples
     --------
@@ -178,8 +176,7 @@ class Spec:
     _stems: tuple[str, ...] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        text = json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"))
-        object.__setattr__(self, "hash", hashlib.sha256(text.encode()).hexdigest())
+        object.__setattr__(self, "hash", content_hash(self.to_dict()))
         object.__setattr__(self, "_stems", tuple(task.hash[:12] for task in self.tasks))
 
     @property
@@ -189,7 +186,7 @@ class Spec:
 
     @property
     def mask_bytes(self) -> int:
-        """Bytes of a mask in the store: those of the problem with the most beams."""
+        """Bytes of a mask in the store: those of the largest problem."""
         return max(task.mask_bytes for task in self.tasks)
 
     def task(self, name: str) -> Task:
@@ -239,12 +236,12 @@ class Spec:
 
 
 def read_spec(path: str | os.PathLike[str]) -> Spec:
-    r"""Read a spec, with the problems that it names.
+    r"""Read a spec and the problems that it names.
 
     Raises
     ------
     InvalidFile
-        Naming the file and the first thing in it that is wrong.
+        If it is invalid; the message names the file and the first offending entry.
 
     Examples
     --------
@@ -262,7 +259,7 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
         where = f"{path}: tasks[{index}]"
         try:
             tasks.append(_resolve(entry, where, Path(path).parent))
-        except (InvalidFile, InvalidProblem) as error:  # which name the file themselves
+        except (InvalidFile, InvalidProblem) as error:  # their messages name the file
             raise InvalidFile(str(error) if where in str(error) else f"{where}: {error}") from None
         except BellcrankError as error:
             raise InvalidFile(f"{where}: {error}") from None
@@ -271,13 +268,13 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
 
 
 def _resolve(entry: TaskTable, where: str, folder: Path) -> Task:
-    """Find the problem of a task and complete its settings."""
+    """Load the problem of a task and complete its settings."""
     from bellcrank.search import read_settings
 
     given = dict(entry.model_extra or {})
     for key, instead in RESERVED.items():
         if key in given:
-            raise InvalidFile(f"{where}: {key}: is set for each run; say {instead} instead")
+            raise InvalidFile(f"{where}: {key}: is set for each run; use {instead} instead")
     first, last = _seeds(entry.seeds, where)
     is_name = entry.problem in builtin
     try:
@@ -285,7 +282,7 @@ def _resolve(entry: TaskTable, where: str, folder: Path) -> Task:
     except UnknownName:
         raise InvalidFile(
             f"{where}: problem: unknown problem {entry.problem!r}; known: {', '.join(builtin)}; "
-            f"and there is no such file beside the spec"
+            f"and {folder} has no such file"
         ) from None
     completed = read_settings(given).to_dict()
     of_runs = {key: value for key, value in completed.items() if key not in RESERVED}
@@ -297,28 +294,59 @@ def _resolve(entry: TaskTable, where: str, folder: Path) -> Task:
 def _seeds(seeds: int | list[int], where: str) -> tuple[int, int]:
     """Return the first and the last seed."""
     bounds = [0, seeds - 1] if isinstance(seeds, int) else seeds
-    ordered = len(bounds) == 2 and 0 <= bounds[0] <= bounds[1] <= MOST_SEED
-    if not ordered or bounds[1] - bounds[0] >= MOST_RUNS:
+    ordered = len(bounds) == 2 and 0 <= bounds[0] <= bounds[1] <= MAX_SEED
+    if not ordered or bounds[1] - bounds[0] >= MAX_RUNS:
         raise InvalidFile(
-            f"{where}: seeds: expected a count from 1 to {MOST_RUNS} or [first, last] with "
+            f"{where}: seeds: expected a count from 1 to {MAX_RUNS} or [first, last] with "
             f"0 <= first <= last, got {seeds!r}"
         )
     return bounds[0], bounds[1]
 
 
 def _require_distinct(tasks: list[Task], source: str) -> None:
-    """Refuse two tasks of one name, and two that would make the same run."""
+    """Check that no two tasks have the same name or share a run."""
     names: dict[str, int] = {}
     for index, task in enumerate(tasks):
         if (other := names.setdefault(task.name, index)) != index:
             raise InvalidFile(
-                f"{source}: tasks[{index}]: name {task.name!r} is that of tasks[{other}] already; "
-                f"give one of them another"
+                f"{source}: tasks[{index}]: name {task.name!r} is also that of tasks[{other}]; "
+                f"rename one of them"
             )
         for before in tasks[:index]:
             apart = task.first_seed > before.last_seed or task.last_seed < before.first_seed
             if not apart and task.hash == before.hash:
                 raise InvalidFile(
-                    f"{source}: tasks {before.name!r} and {task.name!r} are the same and share "
-                    f"seed {max(task.first_seed, before.first_seed)}; keep one of them"
+                    f"{source}: tasks {before.name!r} and {task.name!r} are equal and share seed "
+                    f"{max(task.first_seed, before.first_seed)}; remove one of them"
                 )
+
+
+def spec_difference(old: Spec, new: Spec) -> str | None:
+    """Return the first difference between two specs in words, or None.
+
+    Examples
+    --------
+    >>> task = Task("t", {"beams": [[0, 1]]}, {"steps": 10}, 0, 4)
+    >>> old = Spec("a", 4000, (task,))
+    >>> spec_difference(old, Spec("a", 4000, (Task("t", task.problem, {"steps": 20}, 0, 4),)))
+    "task 't': settings: steps is 10 there and 20 here"
+    >>> spec_difference(old, Spec("a", 4000, (task, Task("u", task.problem, {}, 0, 4))))
+    "task 'u' is missing there"
+    """
+    if old.hash == new.hash:
+        return None
+    own = ({"name": spec.name, "segment": spec.segment} for spec in (old, new))
+    if difference := first_difference(*own):
+        return difference
+    before = {task.name: task.to_dict() for task in old.tasks}
+    after = {task.name: task.to_dict() for task in new.tasks}
+    for name, task in after.items():
+        if name not in before:
+            return f"task {name!r} is missing there"
+        for key in ("settings", "problem"):
+            if difference := first_difference(before[name][key], task[key]):
+                return f"task {name!r}: {key}: {difference}"
+        if difference := first_difference(before[name], task):
+            return f"task {name!r}: {difference}"
+    missing = [name for name in before if name not in after]
+    return f"task {missing[0]!r} is missing here" if missing else "the tasks have another order"

@@ -1,4 +1,4 @@
-"""How a campaign stands, read from its folder and nothing else."""
+"""Status of a campaign, read from its folder."""
 
 from __future__ import annotations
 
@@ -7,34 +7,31 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from bellcrank.campaign.compaction import read_parts
-from bellcrank.campaign.layout import foreign, run_folders, segment_files
 from bellcrank.errors import CorruptRun
+from bellcrank.storage.segments import foreign
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from bellcrank.campaign.segments import Segment
     from bellcrank.campaign.spec import Run, Spec
     from bellcrank.campaign.store import Store
+    from bellcrank.storage.segments import Segment
 
 
 @dataclass(frozen=True, slots=True)
 class TaskStatus:
-    """How one task stands.
+    """Status of a task.
 
     Parameters
     ----------
     name
-        Of the task.
+        Name of the task.
     runs, runs_begun, runs_done
-        All of its runs, those with anything stored, and those that have ended.
+        Numbers of all its runs, of those with stored steps, and of those that have ended.
     steps, steps_done
-        Steps that all runs make at most, and those stored.
+        Maximum number of steps of all runs, and number of stored steps.
     best, best_seed
-        Highest efficiency of an accepted design so far, and the seed that found it; None at
-        the start.
+        Highest efficiency of an accepted design so far and its seed; None at the start.
     median
-        Of the highest efficiencies of the runs begun: what one run may hope for.
+        Median over the started runs of their highest efficiencies.
     """
 
     name: str
@@ -50,16 +47,16 @@ class TaskStatus:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How a campaign stands.
+    """Status of a campaign.
 
     Parameters
     ----------
     name
-        Of the campaign.
+        Name of the campaign.
     compacted
         Whether the rows are in the table.
     tasks
-        In the order of the spec.
+        Status of each task, in the order of the spec.
     """
 
     name: str
@@ -78,12 +75,12 @@ class Status:
 
     @property
     def steps(self) -> int:
-        """Steps that all runs make at most."""
+        """Maximum number of steps of all runs."""
         return sum(task.steps for task in self.tasks)
 
     @property
     def steps_done(self) -> int:
-        """Steps stored."""
+        """Number of stored steps."""
         return sum(task.steps_done for task in self.tasks)
 
     @property
@@ -92,48 +89,47 @@ class Status:
         return self.runs == self.runs_done
 
 
-class Watcher:
-    """Looks at a store again and again, and reads only what is new. Changes nothing.
+class StatusReader:
+    """Reads the status of a store repeatedly, each time only the new files. Changes nothing.
 
     Parameters
     ----------
     store
-        To look at.
+        Store to read.
     """
 
     def __init__(self, store: Store) -> None:
         self._store = store
         self._last: dict[str, Segment] = {}
-        self._seen: dict[str, int] = {}
         self._compacted = False
 
-    def look(self) -> Status:
-        """Return how the campaign stands now.
+    def read(self) -> Status:
+        """Return the current status.
 
         Raises
         ------
         CorruptRun
-            If a file is damaged, missing or not the campaign's own.
+            If a file is damaged, missing or foreign.
         """
         try:
-            self._read()
+            self._update()
         except (CorruptRun, FileNotFoundError):
-            if not self._store.compacted:  # or the segments went while we were reading them
+            if not self._store.compacted:  # otherwise the segments were deleted meanwhile
                 raise
-            self._read()
+            self._update()
         return status_of(self._store.spec, self._last, compacted=self._compacted)
 
     def pending(self) -> list[Run]:
-        """Return the runs that had not ended when we looked last, in order."""
+        """Return the runs that had not ended at the last `read`, in order."""
         ended = {run for run, segment in self._last.items() if segment.done}
         return [run for run in self._store.spec.runs() if run.id not in ended]
 
     def steps_of(self, run: Run) -> int:
-        """Return the steps of a run that are stored now, as its file names tell."""
-        files = segment_files(self._store.folder_of(run))
+        """Return a number that grows with the stored steps of a run."""
+        files = self._store.segments.listed(run.id)
         return files[-1][0] + 1 if files else 0
 
-    def _read(self) -> None:
+    def _update(self) -> None:
         if self._compacted:
             return
         if self._store.compacted:
@@ -141,45 +137,40 @@ class Watcher:
             self._last = {segment.run: segment for part in parts for segment in part.segments}
             self._compacted = True
             return
-        runs = {run.id: run for run in self._store.spec.runs()}
-        for folder in run_folders(self._store.path):
-            run = runs.get(folder.name)
-            if run is None:
-                raise foreign(folder)
-            if run.id in self._last and self._last[run.id].done:
+        files = self._store.segments
+        known = {run.id for run in self._store.spec.runs()}
+        for run in files.runs():
+            if run not in known:
+                raise foreign(files.folder_of(run))
+            last = self._last.get(run)
+            if last is not None and last.done:
                 continue
-            files = segment_files(folder)
-            if files and self._seen.get(run.id) != files[-1][0]:
-                segment = self._store.last_segment(run)
-                if segment is not None:
-                    self._last[run.id] = segment
-                    self._seen[run.id] = segment.first_step
+            listed = files.listed(run)
+            if listed and (last is None or last.first_step != listed[-1][0]):
+                self._last[run] = files.read(run, listed[-1][1], thorough=False)
 
 
 def status_of(spec: Spec, last: dict[str, Segment], *, compacted: bool) -> Status:
-    """Count what the last segments of the runs say."""
+    """Return the status that follows from the last segments of the runs."""
     tasks = []
     number = 0
     for task in spec.tasks:
         runs = [spec.run(k) for k in range(number, number + task.run_count)]
         number += task.run_count
         begun = [(run, last[run.id]) for run in runs if run.id in last]
-        best = max(begun, key=lambda pair: (pair[1].best, -pair[0].seed), default=None)
+        efficiencies = [(segment.best or 0.0, -run.seed) for run, segment in begun]
+        best, seed = max(efficiencies, default=(None, None))
         tasks.append(
             TaskStatus(
                 name=task.name,
                 runs=task.run_count,
                 runs_begun=len(begun),
-                runs_done=_count(segment.done for _, segment in begun),
+                runs_done=sum(segment.done for _, segment in begun),
                 steps=task.run_count * int(task.settings["steps"]),
                 steps_done=sum(segment.last_step + 1 for _, segment in begun),
-                best=best[1].best if best else None,
-                best_seed=best[0].seed if best else None,
-                median=median(segment.best for _, segment in begun) if begun else None,
+                best=best,
+                best_seed=None if seed is None else -seed,
+                median=median(value for value, _ in efficiencies) if efficiencies else None,
             )
         )
     return Status(spec.name, compacted, tasks)
-
-
-def _count(flags: Iterable[bool]) -> int:
-    return sum(map(int, flags))

@@ -1,100 +1,131 @@
-"""The store of a campaign: a folder that many processes write to and that survives them.
+"""The store of a campaign: a folder that many processes write to, and that survives a kill.
 
-What lies in the folder is the only truth. Nobody needs to know about anybody else: a segment
-written twice is the same to the last byte, and takes its name once.
+::
+
+    campaign.json                                  resolved spec
+    segments/3f2a91c40b77-12/00004000.parquet      proposals of one run from step 4000 on
+    table/part-00000.parquet                       all proposals, once all runs are done
+    proposals -> segments | table                  link for readers
+
+The link is switched in one step, so that a reader of ``proposals/**/*.parquet`` finds each row
+once at any time. ``segments`` and ``table`` may hold no other files. Writers need no
+coordination: a segment that is computed twice has the same bytes, and gets its name once.
 """
 
 from __future__ import annotations
 
-import json
-from contextlib import suppress
+import contextlib
+import io
+import os
+import re
+import secrets
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.campaign.layout import (
-    DESCRIPTION,
-    SEGMENTS,
-    TABLE,
-    part_files,
-    prepare_folder,
-    segment_files,
-    segment_path,
-    shown,
-)
-from bellcrank.campaign.segments import Segment, read_segment, segment_content, store_content
-from bellcrank.campaign.spec import Spec
-from bellcrank.errors import CorruptRun, InvalidFile, InvalidSettings, OutputExists
-from bellcrank.model.parsing import read_json
-from bellcrank.model.storage import write_text
+from bellcrank.campaign.spec import Spec, spec_difference
+from bellcrank.errors import CorruptRun, InvalidSettings, OutputExists
+from bellcrank.model.storage import sync_folder
 from bellcrank.provenance import provenance
-from bellcrank.storage.description import first_difference, plain
+from bellcrank.storage.description import Description, plain, read_description, write_description
+from bellcrank.storage.files import make_folder, require_new_folder, storage_error, whole_file
+from bellcrank.storage.parquet import check_seal, seal_of, write_sealed
 from bellcrank.storage.records import checked_proposals
+from bellcrank.storage.segments import (
+    SEGMENTS,
+    Segment,
+    SegmentFiles,
+    our_files,
+    proposal_schema,
+    segment_table,
+)
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
-    from bellcrank.campaign.spec import Run, Task
+    from bellcrank.campaign.spec import Run
     from bellcrank.storage import ProposalColumns
 
 CAMPAIGN_SCHEMA = "bellcrank/campaign/1"
+DESCRIPTION = "campaign.json"
+TABLE = "table"
+VISIBLE = "proposals"
+PART_NAME = re.compile(r"part-\d{5}\.parquet")
+TOP_NAME = re.compile(re.escape(DESCRIPTION) + "|" + VISIBLE)
+OURS = (DESCRIPTION, SEGMENTS, TABLE, VISIBLE)
+SEGMENT_ADVICE = (
+    "bellcrank campaign verify --repair deletes the damaged and all later segments of the run, "
+    "and resume computes them again"
+)
+TABLE_ADVICE = (
+    "bellcrank campaign verify --repair turns the other parts back into segments, and resume "
+    "computes the rest again"
+)
+SPEC_KEYS = ("name", "segment", "tasks")
+CONVERGED = 0
+"""Status of a proposal whose efficiency is that of a stable equilibrium."""
 
 
 class Store:
-    """A campaign on disk. Made by `create` or `open`, not directly.
+    """A campaign on disk, made by `create` or `open`.
 
     Parameters
     ----------
     path
-        Of the folder, absolute.
+        Path of the folder, absolute.
     spec
-        What its ``campaign.json`` says.
-    provenance
+        Content of its ``campaign.json``.
+    origin
         Versions, machine and time of its start.
+
+    Attributes
+    ----------
+    segments
+        Access to its segments.
     """
 
-    __slots__ = ("path", "provenance", "spec")
+    __slots__ = ("path", "provenance", "segments", "spec")
 
     def __init__(self, path: Path, spec: Spec, origin: dict[str, Any]) -> None:
         self.path = path
         self.spec = spec
         self.provenance = origin
+        self.segments = SegmentFiles(path / SEGMENTS, spec.hash, SEGMENT_ADVICE, exclusive=True)
 
     @classmethod
     def create(cls, path: str | os.PathLike[str], spec: Spec) -> Store:
-        """Begin a campaign in a new or empty folder, or open the same one if it is there.
+        """Start a campaign in a new or empty folder, or open the same one if it is there.
 
         Raises
         ------
         OutputExists
-            If something else lies there.
+            If the folder holds anything else.
         InvalidSettings
-            If another campaign lies there; says where they differ.
+            If it holds another campaign; the message names the first difference.
         StorageError
-            If the folder cannot be made or written.
+            If the folder cannot be written.
         """
         folder = Path(path).absolute()
         if not (folder / DESCRIPTION).exists():
-            prepare_folder(folder)
-            data = {
-                "schema": CAMPAIGN_SCHEMA,
-                "hash": spec.hash,
-                "provenance": provenance(),
-                **spec.to_dict(),
-            }
-            with suppress(OutputExists):  # another process of the same campaign was faster
-                write_text(folder / DESCRIPTION, json.dumps(data, indent=1) + "\n")
+            require_new_folder(folder, OURS.__contains__)
+            make_folder(folder / SEGMENTS)
+            if not os.path.lexists(folder / VISIBLE):
+                switch_link(folder, SEGMENTS)
+            description = Description(spec.to_dict(), provenance())
+            # Another process of the same campaign may be faster.
+            with contextlib.suppress(OutputExists):
+                write_description(folder / DESCRIPTION, CAMPAIGN_SCHEMA, description)
         store = cls.open(folder)
-        if difference := changed(store.spec, spec):
+        if difference := spec_difference(store.spec, spec):
             raise InvalidSettings(
-                f"{folder}: the campaign there has another spec: {difference}; undo the change, "
-                f"or choose another folder (--out)"
+                f"{folder}: the campaign in this folder has another spec: {difference}; undo the "
+                f"change, or choose another folder (--out)"
             )
         return store
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> Store:
-        """Open the campaign in a folder, to read it or to go on with it.
+        """Open the campaign in a folder, to read or to continue it.
 
         Raises
         ------
@@ -103,86 +134,63 @@ class Store:
         CorruptRun
             If its description is damaged or was changed.
         """
-        folder = Path(path).absolute()
-        file = folder / DESCRIPTION
-        if not folder.is_dir():
-            raise InvalidFile(f"{path}: no such folder; expected that of a campaign")
-        if not file.exists():
-            raise InvalidFile(f"{path}: not the folder of a campaign: it has no {DESCRIPTION}")
-        data = read_json(file)
-        if data.get("schema") != CAMPAIGN_SCHEMA:
-            raise InvalidFile(
-                f"{file}: expected schema {CAMPAIGN_SCHEMA!r}, got {data.get('schema')!r}"
-            )
-        try:
-            spec, origin = Spec.from_dict(data), dict(data["provenance"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise CorruptRun(f"{file}: damaged ({error!r}); restore it from a copy") from None
-        if spec.hash != data.get("hash"):
-            raise CorruptRun(
-                f"{file}: was changed after the campaign had begun; undo that, or start another "
-                f"campaign in another folder"
-            )
-        return cls(folder, spec, origin)
+        file = Path(path).absolute() / DESCRIPTION
+        found = read_description(file, CAMPAIGN_SCHEMA, "campaign", SPEC_KEYS)
+        return cls(file.parent, Spec.from_dict(found.content), found.provenance)
 
     @property
     def compacted(self) -> bool:
-        """Whether the rows are in the table: all runs are done then.
+        """Whether readers see the table; all runs are done then.
 
         Raises
         ------
         CorruptRun
-            If the link that says so is broken.
+            If the link is missing or has another target.
         """
-        return shown(self.path) == TABLE
+        link = self.path / VISIBLE
+        target = ""
+        with contextlib.suppress(OSError):
+            target = str(link.readlink())
+        if target not in (SEGMENTS, TABLE):
+            raise CorruptRun(
+                f"{link}: expected a link to {SEGMENTS} or {TABLE}; restore it with: "
+                f"ln -s {SEGMENTS} {link}"
+            )
+        return target == TABLE
 
     def folder_of(self, run: Run) -> Path:
-        """Return where the segments of a run lie."""
-        return self.path / SEGMENTS / run.id
+        """Return the folder of the segments of a run."""
+        return self.segments.folder_of(run.id)
+
+    def parts(self) -> list[Path]:
+        """Return the parts of the table, in order.
+
+        Raises
+        ------
+        CorruptRun
+            If the folder holds other files.
+        """
+        return sorted(our_files(self.path / TABLE, PART_NAME, exclusive=True))
 
     def files(self) -> list[Path]:
-        """Return the files that hold all rows stored so far, each row once.
+        """Return the files that hold all stored rows, each row once.
 
         Raises
         ------
         CorruptRun
-            If there are files of others among them.
+            If there are other files among them.
         """
         if self.compacted:
-            return part_files(self.path)
-        return [path for run in self.spec.runs() for _, path in segment_files(self.folder_of(run))]
+            return self.parts()
+        return [path for run in self.spec.runs() for _, path in self.segments.listed(run.id)]
 
-    def segments_of(self, run: Run) -> list[Segment]:
-        """Read the segments of a run, every byte of them, and check that none is missing.
+    @property
+    def schema(self) -> Any:
+        """Arrow schema of every file."""
+        import pyarrow as pa
 
-        Raises
-        ------
-        CorruptRun
-            If one is damaged, missing or not its own.
-        """
-        segments: list[Segment] = []
-        for first_step, path in segment_files(self.folder_of(run)):
-            next_step = segments[-1].last_step + 1 if segments else 0
-            missing = segment_path(path.parent, next_step)
-            if first_step != next_step:
-                raise CorruptRun(
-                    f"{missing}: missing, though later ones of its run are there; bellcrank "
-                    f"campaign verify --repair deletes those, and resume computes them again"
-                )
-            segments.append(read_segment(path, self.spec, run, thoroughly=True))
-        return segments
-
-    def last_segment(self, run: Run) -> Segment | None:
-        """Read the last segment of a run, its footer only; None before the first.
-
-        Raises
-        ------
-        CorruptRun
-        """
-        files = segment_files(self.folder_of(run))
-        if not files:
-            return None
-        return read_segment(files[-1][1], self.spec, run, thoroughly=False)
+        keys = {"task": pa.string(), "run": pa.string(), "seed": pa.int64()}
+        return proposal_schema(keys, self.spec.mask_bytes)
 
     def append(
         self,
@@ -193,17 +201,19 @@ class Store:
         *,
         best: float,
         done: bool,
-    ) -> Segment:
-        """Add the next segment of a run. Adding it again changes nothing.
+    ) -> None:
+        """Store the next segment of a run. Storing it again changes nothing.
 
         Parameters
         ----------
+        run
+            Run that it belongs to.
         first_step
-            Of the first row.
+            Step of the first row.
         rows
-            The columns of `Proposals`.
+            Columns of `Proposals`.
         state
-            To go on from, as plain data.
+            State from which the chain continues, as plain data.
         best
             Highest efficiency of an accepted design so far.
         done
@@ -212,50 +222,60 @@ class Store:
         Raises
         ------
         StorageError
-            If there is no room; nothing that was there is touched.
+            If there is no space; stored data stays intact.
         CorruptRun
-            If the segment is there with another content.
+            If the segment exists with another content.
         """
         cast = checked_proposals(rows, run.task.mask_bytes)
         last_step = first_step + len(cast.efficiency) - 1
         segment = Segment(run.id, first_step, last_step, plain("state", state), best, done)
-        content = segment_content(self.spec, run, segment, cast)
-        store_content(segment_path(self.folder_of(run), first_step), content)
-        return segment
+        schema = self.schema
+        keys = {"task": run.task.name, "run": run.id, "seed": run.seed}
+        table = segment_table(schema, keys, first_step, cast)
+        path = self.segments.path_of(run.id, first_step)
+        self.write(path, partial(iter, (table,)), self.segments.header(segment))
+
+    def write(
+        self, path: Path, tables: Callable[[], Iterable[Any]], header: Mapping[str, Any]
+    ) -> None:
+        """Write a file once; a second writer of the file must have the same content.
+
+        Raises
+        ------
+        CorruptRun
+            If the file exists with another content.
+        StorageError
+        """
+        make_folder(path.parent)
+        with contextlib.suppress(OutputExists):
+            if not path.exists():
+                with whole_file(path) as file:
+                    write_sealed(file, tables(), self.schema, header)
+                return
+        computed = io.BytesIO()
+        write_sealed(computed, tables(), self.schema, header)
+        if check_seal(path, SEGMENT_ADVICE) != seal_of(computed):
+            raise CorruptRun(
+                f"{path}: exists with another content than was computed now; different versions "
+                f"or kinds of machine may have worked on this campaign: use one kind, and start "
+                f"the campaign anew"
+            )
 
 
-def changed(old: Spec, new: Spec) -> str | None:
-    """Say where two specs differ first, or None.
+def switch_link(folder: Path, target: str) -> None:
+    """Make ``segments`` or ``table`` visible to readers, in one step.
 
-    Examples
-    --------
-    >>> from bellcrank.campaign.spec import Task
-    >>> task = Task("t", {"beams": [[0, 1]]}, {"steps": 10}, 0, 4)
-    >>> old = Spec("a", 4000, (task,))
-    >>> changed(old, Spec("a", 4000, (Task("t", task.problem, {"steps": 20}, 0, 4),)))
-    "task 't': settings: steps is 10 there and 20 here"
-    >>> changed(old, Spec("a", 4000, (task, Task("u", task.problem, {}, 0, 4))))
-    "task 'u' is not there"
+    Raises
+    ------
+    StorageError
     """
-    if old.hash == new.hash:
-        return None
-    own = ({"name": spec.name, "segment": spec.segment} for spec in (old, new))
-    if difference := first_difference(*own):
-        return difference
-    before = {task.name: task for task in old.tasks}
-    after = {task.name: task for task in new.tasks}
-    for name, task in after.items():
-        if name not in before:
-            return f"task {name!r} is not there"
-        if difference := _task_difference(before[name], task):
-            return f"task {name!r}: {difference}"
-    gone = [name for name in before if name not in after]
-    return f"task {gone[0]!r} is not here" if gone else "the tasks are in another order"
-
-
-def _task_difference(old: Task, new: Task) -> str | None:
-    for what in ("settings", "problem"):
-        if difference := first_difference(getattr(old, what), getattr(new, what)):
-            return f"{what}: {difference}"
-    seeds = ({"seeds": [task.first_seed, task.last_seed]} for task in (old, new))
-    return first_difference(*seeds)
+    temporary = folder / f".{VISIBLE}.{secrets.token_hex(4)}"
+    try:
+        temporary.symlink_to(target, target_is_directory=True)
+        try:
+            temporary.replace(folder / VISIBLE)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise storage_error(folder, error) from error
+    sync_folder(folder)

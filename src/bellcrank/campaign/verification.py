@@ -1,44 +1,42 @@
-"""Checking every byte of a store, and clearing away what is damaged."""
+"""Check of every byte of a store, and removal of what is damaged."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from bellcrank.campaign.compaction import Part, expand, read_part, read_parts
-from bellcrank.campaign.layout import foreign, part_files, run_folders, segment_files, segment_path
-from bellcrank.campaign.segments import read_segment
+from bellcrank.campaign.compaction import expand, read_parts, read_table_part
 from bellcrank.errors import BellcrankError, CorruptRun
 from bellcrank.storage.files import storage_error
+from bellcrank.storage.segments import foreign
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bellcrank.campaign.spec import Run
     from bellcrank.campaign.store import Store
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Verification:
-    """What a check of a store has found.
+    """Result of the check of a store.
 
     Parameters
     ----------
     files
-        Number of files that are as they were written.
+        Number of intact files.
     rows
-        In these.
+        Number of rows in these.
     damage
-        What is wrong, one sentence for each file.
+        One message for each file that is damaged, missing or foreign.
     doomed
-        Files to delete before the rest can be computed again: those damaged, and the later
-        ones of their runs. Files of others are never among them.
+        Files to delete before the rest can be computed again: the damaged ones, and the later
+        ones of their runs. Foreign files are never among them.
     """
 
-    files: int
-    rows: int
-    damage: list[str]
-    doomed: list[Path]
+    files: int = 0
+    rows: int = 0
+    damage: list[str] = field(default_factory=list)
+    doomed: list[Path] = field(default_factory=list)
 
 
 def verify(store: Store) -> Verification:
@@ -47,7 +45,7 @@ def verify(store: Store) -> Verification:
     Raises
     ------
     CorruptRun
-        If the store is such that its files cannot even be found.
+        If the files cannot even be listed.
     """
     return _verify_table(store) if store.compacted else _verify_segments(store)
 
@@ -55,7 +53,7 @@ def verify(store: Store) -> Verification:
 def repair(store: Store, found: Verification) -> None:
     """Delete what is damaged, so that resuming computes it again.
 
-    Of a table, the parts that are whole become segments again.
+    The intact parts of a damaged table become segments again.
 
     Raises
     ------
@@ -64,9 +62,9 @@ def repair(store: Store, found: Verification) -> None:
     if not found.damage:
         return
     if store.compacted:
-        whole = [path for path in part_files(store.path) if path not in found.doomed]
-        expand(store, [read_part(path, store, thoroughly=True) for path in whole])
-        found = _verify_segments(store)  # a run whose beginning was lost has to start again
+        intact = [path for path in store.parts() if path not in found.doomed]
+        expand(store, [read_table_part(store, path, thorough=True) for path in intact])
+        found = _verify_segments(store)  # a run whose first segments are lost starts again
     try:
         for path in found.doomed:
             path.unlink(missing_ok=True)
@@ -75,67 +73,61 @@ def repair(store: Store, found: Verification) -> None:
 
 
 def _verify_segments(store: Store) -> Verification:
-    files = rows = 0
-    damage: list[str] = []
-    doomed: list[Path] = []
-    runs = {run.id: run for run in store.spec.runs()}
+    found = Verification()
+    known = {run.id for run in store.spec.runs()}
     try:
-        folders = sorted(run_folders(store.path))
+        runs = store.segments.runs()
     except CorruptRun as error:
-        return Verification(0, 0, [str(error)], [])
-    for folder in folders:
-        if folder.name not in runs:
-            damage.append(str(foreign(folder)))
-            continue
-        found = _verify_run(store, runs[folder.name])
-        files += found.files
-        rows += found.rows
-        damage += found.damage
-        doomed += found.doomed
-    return Verification(files, rows, damage, doomed)
+        return Verification(damage=[str(error)])
+    for run in runs:
+        if run in known:
+            _verify_run(store, run, found)
+        else:
+            found.damage.append(str(foreign(store.segments.folder_of(run))))
+    return found
 
 
-def _verify_run(store: Store, run: Run) -> Verification:
-    """Check the segments of a run; from the first that is damaged on, all are doomed."""
-    folder = store.folder_of(run)
+def _verify_run(store: Store, run: str, found: Verification) -> None:
+    """Check the segments of a run; the first damaged one and all later ones are doomed."""
     try:
-        listed = segment_files(folder)
+        listed = store.segments.listed(run)
     except CorruptRun as error:
-        return Verification(0, 0, [str(error)], [])
-    rows = 0
-    damage: list[str] = []
-    whole = 0
+        found.damage.append(str(error))
+        return
+    next_step = intact = 0
     ended = False
     for first_step, path in listed:
-        if first_step != rows or ended:
-            missing = segment_path(folder, rows)
-            damage.append(f"{missing}: missing, though {path.name} is there")
+        if first_step != next_step or ended:
+            missing = store.segments.path_of(run, next_step)
+            found.damage.append(f"{missing}: missing, although {path.name} exists")
             break
         try:
-            segment = read_segment(path, store.spec, run, thoroughly=True)
+            segment = store.segments.read(run, path, thorough=True)
         except BellcrankError as error:
-            damage.append(str(error))
+            found.damage.append(str(error))
             break
-        rows = segment.last_step + 1
+        next_step = segment.last_step + 1
         ended = segment.done
-        whole += 1
-    return Verification(whole, rows, damage, [path for _, path in listed[whole:]])
+        intact += 1
+    found.files += intact
+    found.rows += next_step
+    found.doomed += [path for _, path in listed[intact:]]
 
 
 def _verify_table(store: Store) -> Verification:
-    parts: list[Part] = []
-    damage: list[str] = []
-    doomed: list[Path] = []
-    for path in part_files(store.path):
+    found = Verification()
+    for path in store.parts():
         try:
-            parts.append(read_part(path, store, thoroughly=True))
+            part = read_table_part(store, path, thorough=True)
         except BellcrankError as error:
-            damage.append(str(error))
-            doomed.append(path)
-    if not damage:
+            found.damage.append(str(error))
+            found.doomed.append(path)
+        else:
+            found.files += 1
+            found.rows += sum(segment.rows for segment in part.segments)
+    if not found.damage:
         try:
             read_parts(store)
-        except CorruptRun as error:  # one is missing
-            damage.append(str(error))
-    rows = sum(segment.rows for part in parts for segment in part.segments)
-    return Verification(len(parts), rows, damage, doomed)
+        except CorruptRun as error:  # a part is missing
+            found.damage.append(str(error))
+    return found

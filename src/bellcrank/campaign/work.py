@@ -1,6 +1,6 @@
-"""One run, wherever it is computed: the only place that knows how to search.
+"""Computation of one run, wherever it takes place.
 
-Every engine calls `work`. What it computes goes to the store; all it returns is a name.
+Every engine calls `work`, which writes to the store and returns only a name.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.campaign.layout import DESCRIPTION
-from bellcrank.campaign.store import Store
+from bellcrank.campaign.store import DESCRIPTION, Store
 from bellcrank.errors import BellcrankError, InvalidSettings
 from bellcrank.model import problem_from_dict
 from bellcrank.storage import Proposals
@@ -21,52 +20,51 @@ if TYPE_CHECKING:
     from bellcrank.campaign.spec import Run, Spec
 
 _stopping: set[str] = set()
-"""Stores whose runs this process is to leave off."""
+"""Stores on which this process stops to work."""
 
 
 def request_stop(store_path: str) -> None:
-    """Let the runs of a store end in this process after the segment at hand."""
+    """Let the runs of a store end in this process after the current segment."""
     _stopping.add(store_path)
 
 
 def allow_work(store_path: str) -> None:
-    """Take back `request_stop`."""
+    """Revoke `request_stop`."""
     _stopping.discard(store_path)
 
 
 def work(store_path: str, run_number: int) -> str:
-    """Take up one run where its segments end, and advance it to its end.
+    """Advance one run from its last segment to its end, or until `request_stop`.
 
-    May be called by anybody, anywhere, several times at once: the store comes out the same.
+    May be called several times at once, on any machine: the resulting store is the same.
 
     Parameters
     ----------
     store_path
-        Folder of the campaign, as this machine sees it.
+        Folder of the campaign on this machine.
     run_number
-        In its campaign.
+        Number of the run in its campaign.
 
     Returns
     -------
     str
-        Id of the run.
+        Name of the run.
 
     Raises
     ------
     InvalidFile
-        If this machine sees no such store.
+        If there is no such store on this machine.
     StorageError, CorruptRun
         If the store cannot be written, or is damaged.
     """
     store = _store_at(store_path)
     run = store.spec.run(run_number)
     if not store.compacted:
-        advance(store, run)
+        _advance(store, run)
     return run.id
 
 
-def advance(store: Store, run: Run) -> None:
-    """Advance a run from its last segment to its end, or until `request_stop`."""
+def _advance(store: Store, run: Run) -> None:
     from bellcrank.search import (
         advance_chain,
         is_done,
@@ -76,7 +74,7 @@ def advance(store: Store, run: Run) -> None:
         start_chain,
     )
 
-    segments = store.segments_of(run)
+    segments = store.segments.read_all(run.id, thorough=True)
     if segments and segments[-1].done:
         return
     settings = read_settings(run.settings)
@@ -102,21 +100,21 @@ def _open(store_path: str, _stamp: tuple[int, int]) -> Store:
 
 
 def _store_at(store_path: str) -> Store:
-    """Open a store; only once in a process, unless its description is another one."""
+    """Open a store, again only if its description has changed."""
     try:
-        told = (Path(store_path) / DESCRIPTION).stat()
+        file = (Path(store_path) / DESCRIPTION).stat()
     except OSError:
-        return Store.open(store_path)  # which says what is wrong
-    return _open(store_path, (told.st_ino, told.st_mtime_ns))
+        return Store.open(store_path)  # raises the appropriate error
+    return _open(store_path, (file.st_ino, file.st_mtime_ns))
 
 
 def check_tasks(spec: Spec) -> None:
-    """Refuse tasks that cannot start, before any machine is asked to; compiles the kernels.
+    """Check that every task can start, before any worker is started; compiles the kernels.
 
     Raises
     ------
     InvalidSettings
-        Naming the task.
+        If a task cannot start; the message names it.
     """
     from bellcrank.search import advance_chain, make_evaluator, read_settings, start_chain
 
@@ -133,7 +131,7 @@ def check_tasks(spec: Spec) -> None:
 
 
 def describe_store(store_path: str) -> str | None:
-    """Return the identity of the campaign that this machine sees in a folder, if any."""
+    """Return the hash of the campaign that this machine finds in a folder, if any."""
     try:
         return Store.open(store_path).spec.hash
     except BellcrankError:

@@ -1,4 +1,4 @@
-"""`bellcrank campaign`: many runs, from a laptop to a cluster."""
+"""`bellcrank campaign`: many runs, on a laptop or a cluster."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bellcrank.cli.app import FAILED, INTERRUPTED, app
+from bellcrank.cli.app import FAILED, app
 from bellcrank.cli.arguments import settings_of
 from bellcrank.cli.console import (
     announce_compilation,
@@ -30,42 +30,48 @@ if TYPE_CHECKING:
 
 campaign = typer.Typer(
     name="campaign",
-    help="Many runs: described by a short file, on one core or thousands, safe from any kill.",
+    help="Many runs described by a short file, on one core or thousands; safe against kills.",
     rich_markup_mode="rich",
 )
 app.add_typer(campaign)
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the campaign.")]
 Workers = Annotated[
-    int | None, typer.Option(help="Processes, or SLURM jobs; changes no result. \\[all cores]")
+    int | None,
+    typer.Option(help="Processes or SLURM jobs; the results do not depend on it. \\[all cores]"),
 ]
 Engine = Annotated[
-    str | None, typer.Option(help="local, address, slurm or serial (no Dask). \\[local]")
+    str | None,
+    typer.Option(help="processes, serial, or (extra 'cluster') dask, slurm. \\[processes]"),
 ]
-Host = Annotated[str | None, typer.Option(help="Address to listen on. [127.0.0.1; slurm: any]")]
+Host = Annotated[str | None, typer.Option(help="Address on which engine slurm listens. [any]")]
 Scheduler = Annotated[
-    str | None, typer.Option(help="A running Dask scheduler, tcp://host:port or tls://host:port.")
+    str | None,
+    typer.Option(help="Address of a running Dask scheduler, tcp://host:port or tls://host:port."),
 ]
-TlsCa = Annotated[Path | None, typer.Option(help="For tls://: certificate of the authority.")]
-TlsCert = Annotated[Path | None, typer.Option(help="For tls://: our certificate.")]
-TlsKey = Annotated[Path | None, typer.Option(help="For tls://: our key.")]
+TlsCa = Annotated[Path | None, typer.Option(help="Certificate of the authority, for tls://.")]
+TlsCert = Annotated[Path | None, typer.Option(help="Certificate of the client, for tls://.")]
+TlsKey = Annotated[Path | None, typer.Option(help="Key of the client, for tls://.")]
 Slurm = Annotated[
     list[str] | None,
-    typer.Option(help="KEY=VALUE for dask-jobqueue's SLURMCluster; repeatable."),
+    typer.Option(help="KEY=VALUE for SLURMCluster of dask-jobqueue; repeatable."),
 ]
 ShardText = Annotated[
-    str | None, typer.Option("--shard", help="i/N: only each N-th run, for job arrays. i from 1.")
+    str | None,
+    typer.Option("--shard", help="i/N: only every N-th run, for job arrays; i starts at 1."),
 ]
 KeepSegments = Annotated[
-    bool, typer.Option("--keep-segments", help="Make no table when all is done.")
+    bool, typer.Option("--keep-segments", help="Do not make the table at the end.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 @campaign.command()
 def run(
-    spec: Annotated[Path, typer.Argument(help="The TOML file that describes the campaign.")],
-    out: Annotated[Path | None, typer.Option(help="Its folder; default: its name.")] = None,
+    spec: Annotated[Path, typer.Argument(help="TOML file that describes the campaign.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the campaign; default: its name.")
+    ] = None,
     workers: Workers = None,
     engine: Engine = None,
     host: Host = None,
@@ -77,14 +83,14 @@ def run(
     shard: ShardText = None,
     keep_segments: KeepSegments = False,
 ) -> None:
-    """Begin a campaign, or join one that is under way."""
+    """Start a campaign, continue it, or join one that is running."""
     from bellcrank.campaign import Store, read_spec
 
     options = _options(workers, host, scheduler, tls_ca, tls_cert, tls_key, slurm)
     wanted = _engine_name(engine, scheduler, shard)
     found = read_spec(spec)
     store = Store.create(out or Path(found.name), found)
-    _complete(store, wanted, options, shard, compacting=not keep_segments)
+    _complete(store, wanted, options, shard, keep_segments=keep_segments)
 
 
 @campaign.command()
@@ -101,24 +107,24 @@ def resume(
     shard: ShardText = None,
     keep_segments: KeepSegments = False,
 ) -> None:
-    """Go on with a campaign after Ctrl-C, a kill or a full disk."""
+    """Continue a campaign after Ctrl-C, a kill or a full disk."""
     from bellcrank.campaign import Store
 
     options = _options(workers, host, scheduler, tls_ca, tls_cert, tls_key, slurm)
     wanted = _engine_name(engine, scheduler, shard)
-    _complete(Store.open(folder), wanted, options, shard, compacting=not keep_segments)
+    _complete(Store.open(folder), wanted, options, shard, keep_segments=keep_segments)
 
 
 def _engine_name(engine: str | None, scheduler: str | None, shard: str | None) -> str:
-    """Return the engine that the options ask for, by its name or otherwise."""
+    """Return the name of the engine that follows from the options."""
     from bellcrank.campaign import Shard, engines
 
     if shard is not None:
         Shard.parse(shard)
-    if scheduler is not None and engine not in (None, "address"):
-        raise InvalidSettings(f"scheduler: only for engine 'address', not {engine!r}")
-    name = engine or ("address" if scheduler else "serial" if shard else "local")
-    engines[name]  # an unknown name explains itself
+    if scheduler is not None and engine not in (None, "dask"):
+        raise InvalidSettings(f"scheduler: only for engine 'dask', not {engine!r}")
+    name = engine or ("dask" if scheduler else "serial" if shard else "processes")
+    engines[name]  # raises if the name is unknown
     return name
 
 
@@ -145,43 +151,42 @@ def _options(
 
 
 def _complete(
-    store: Store, engine: str, options: EngineOptions, shard: str | None, *, compacting: bool
+    store: Store, engine: str, options: EngineOptions, shard: str | None, *, keep_segments: bool
 ) -> None:
-    """Compute what is left, show how it goes, and say how it ended."""
-    from bellcrank.campaign import Shard, Watcher, complete
+    """Compute the remaining runs, show the progress and print the status."""
+    from bellcrank.campaign import Shard, StatusReader, complete
     from bellcrank.cli.campaign_view import CampaignProgress, status_table
-    from bellcrank.cli.design import stopping_on_interrupt
+    from bellcrank.cli.stopping import stopping_on_interrupt
 
-    announce_compilation()
-    warn_of_another_version(store.provenance, "campaign")
     part = Shard.parse(shard) if shard else None
-    with stopping_on_interrupt() as stop, CampaignProgress() as progress:
-        done = complete(
-            store,
-            engine,
-            options,
-            shard=part,
-            compacting=compacting,
-            tell=progress,
-            announce=lambda note: notes.print(plain(note)),
-            stop=stop,
-        )
-    folder = shlex.quote(str(store.path))
-    if not done:
-        notes.print(
-            f"Stopped; what is done is kept. Go on with: bellcrank campaign resume {plain(folder)}"
-        )
-        sys.exit(INTERRUPTED)
-    results.print(status_table(Watcher(store).look()))
+    command = f"bellcrank campaign resume {shlex.quote(str(store.path))}"
+    with stopping_on_interrupt(resumable=True) as stop:
+        stop.hint = f"Stopped. To continue: {plain(command)}"
+        announce_compilation()
+        warn_of_another_version(store.provenance, "campaign")
+        with CampaignProgress() as progress:
+            done = complete(
+                store,
+                engine,
+                options,
+                shard=part,
+                compacting=not keep_segments,
+                tell=progress,
+                announce=lambda note: notes.print(plain(note)),
+                stop=stop,
+            )
+        if not done:
+            stop.exit()  # a thread may still compute a segment, which delays a usual exit
+    results.print(status_table(StatusReader(store).read()))
 
 
 @campaign.command()
 def status(folder: Folder, as_json: AsJson = False) -> None:
-    """Show how a campaign stands."""
-    from bellcrank.campaign import Store, Watcher
+    """Show the status of a campaign."""
+    from bellcrank.campaign import StatusReader, Store
     from bellcrank.cli.campaign_view import status_table
 
-    found = Watcher(Store.open(folder)).look()
+    found = StatusReader(Store.open(folder)).read()
     if not as_json:
         results.print(status_table(found))
         return
@@ -197,23 +202,23 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
 @campaign.command()
 def watch(
     folder: Folder,
-    interval: Annotated[float, typer.Option(help="Seconds between two looks.")] = 2.0,
+    interval: Annotated[float, typer.Option(help="Seconds between two updates.")] = 2.0,
 ) -> None:
-    """Show how a campaign stands, until it is done; changes nothing, from anywhere."""
+    """Show the status of a campaign until it is done."""
     from rich.live import Live
 
-    from bellcrank.campaign import Store, Watcher
+    from bellcrank.campaign import StatusReader, Store
     from bellcrank.cli.campaign_view import one_line, status_table
 
     if not interval > 0.0:
         raise InvalidSettings(f"interval: expected seconds above 0, got {interval}")
-    watcher = Watcher(Store.open(folder))
-    found = watcher.look()
+    reader = StatusReader(Store.open(folder))
+    found = reader.read()
     if notes.is_terminal:
         with Live(status_table(found), console=notes, auto_refresh=False) as live:
             while not found.done:
                 time.sleep(interval)
-                found = watcher.look()
+                found = reader.read()
                 live.update(status_table(found), refresh=True)
     else:
         last = ""
@@ -222,7 +227,7 @@ def watch(
                 notes.print(plain(line))
                 last = line
             time.sleep(interval)
-            found = watcher.look()
+            found = reader.read()
     results.print(status_table(found))
 
 
@@ -230,26 +235,26 @@ def watch(
 def verify(
     folder: Folder,
     repair: Annotated[
-        bool, typer.Option("--repair", help="Delete what is damaged; resume computes it again.")
+        bool, typer.Option("--repair", help="Delete damaged files; resume computes them again.")
     ] = False,
 ) -> None:
-    """Check every byte of a campaign's store."""
+    """Check every byte of the files of a campaign."""
     from bellcrank.campaign import Store
     from bellcrank.campaign import repair as repair_store
     from bellcrank.campaign import verify as verify_store
 
     store = Store.open(folder)
     found = verify_store(store)
-    results.print(f"{number_of(found.files, 'file')} with {found.rows} rows as written.")
+    results.print(f"{number_of(found.files, 'file')} with {found.rows} rows intact.")
     if not found.damage:
         return
     for line in found.damage:
         results.print(plain(line))
-    if repair and found.damage:
+    if repair:
         repair_store(store, found)
         results.print(
             f"Deleted {number_of(len(found.doomed), 'file')}; "
-            f"bellcrank campaign resume {plain(shlex.quote(str(folder)))} computes what is missing."
+            f"bellcrank campaign resume {plain(shlex.quote(str(folder)))} computes them again."
         )
     left = verify_store(store).damage if repair else found.damage
     if left:
@@ -262,8 +267,8 @@ def verify(
 @campaign.command()
 def top(
     folder: Folder,
-    n: Annotated[int, typer.Option("-n", help="How many.")] = 10,
-    task: Annotated[str | None, typer.Option(help="Of this task only.")] = None,
+    n: Annotated[int, typer.Option("-n", help="Number of designs.")] = 10,
+    task: Annotated[str | None, typer.Option(help="Only this task.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """List the best distinct designs; `evaluate --designs` reads the JSON."""
@@ -277,21 +282,21 @@ def top(
         results.print(ranking_table(designs))
 
 
-@campaign.command()
-def harvest(
+@campaign.command("results")
+def write_best(
     folder: Folder,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the designs; default: FOLDER-designs.")
     ] = None,
-    task: Annotated[str | None, typer.Option(help="Of this task only.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files.")] = False,
+    task: Annotated[str | None, typer.Option(help="Only this task.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
 ) -> None:
-    """Write the best design of each task, cleaned and checked, as a file of its own."""
-    from bellcrank.campaign import Store, write_harvest
-    from bellcrank.cli.campaign_view import harvest_table
+    """Write the best design of each task, cleaned and verified, to a file."""
+    from bellcrank.campaign import Store, write_results
+    from bellcrank.cli.campaign_view import results_table
 
     announce_compilation()
     target = out or Path(f"{folder if folder.name else folder.absolute()}-designs")
-    found = write_harvest(Store.open(folder), target, task, overwrite=overwrite)
-    results.print(harvest_table(found))
+    found = write_results(Store.open(folder), target, task, overwrite=overwrite)
+    results.print(results_table(found))
     results.print(f"written to {plain(target)}/")

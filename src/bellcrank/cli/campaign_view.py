@@ -1,4 +1,4 @@
-"""How a campaign looks in a terminal."""
+"""Tables and progress of a campaign in a terminal."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from bellcrank.cli.live import Live
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bellcrank.campaign import Harvest, Ranked, Status
+    from bellcrank.campaign import RankedDesign, Status, TaskResult
 
 
 def status_table(status: Status) -> Table:
-    """Return one row for each task, and one for all."""
+    """Return a table with one row for each task, and one for all."""
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("task")
     for name in ("runs done", "steps", "median", "best", "seed"):
@@ -39,8 +39,8 @@ def status_table(status: Status) -> Table:
     return table
 
 
-def ranking_table(designs: Sequence[Ranked]) -> Table:
-    """Return one row for each design; masks, too long for a line, are in the JSON only."""
+def ranking_table(designs: Sequence[RankedDesign]) -> Table:
+    """Return a table of designs, without the masks, which are too long for a line."""
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("efficiency", justify="right")
     table.add_column("task")
@@ -52,39 +52,39 @@ def ranking_table(designs: Sequence[Ranked]) -> Table:
     return table
 
 
-def harvest_table(harvests: Sequence[Harvest]) -> Table:
-    """Return one row for each design, with the file that it was written to."""
+def results_table(found: Sequence[TaskResult]) -> Table:
+    """Return a table of the designs of the tasks, with their files."""
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("task")
     for name in ("efficiency", "beams", "seed", "step"):
         table.add_column(name, justify="right")
     table.add_column("file", overflow="fold")
-    for found in harvests:
+    for result in found:
         table.add_row(
-            plain(found.task),
-            f"{found.design.efficiency:.4f}",
-            str(found.design.beam_count),
-            str(found.seed),
-            str(found.step),
-            plain(found.path.name),
+            plain(result.task),
+            f"{result.design.efficiency:.4f}",
+            str(result.design.beam_count),
+            str(result.seed),
+            str(result.step),
+            plain(result.path.name),
         )
     return table
 
 
 def one_line(status: Status) -> str:
-    """Return how a campaign stands in one line."""
+    """Return the status of a campaign in one line."""
     best = max((task.best for task in status.tasks if task.best is not None), default=None)
-    told = "" if best is None else f"  best {best:.3f}"
-    return f"runs {status.runs_done} / {status.runs}  steps {status.steps_done}{told}"
+    efficiency = "" if best is None else f"  best {best:.3f}"
+    return f"runs {status.runs_done} / {status.runs}  steps {status.steps_done}{efficiency}"
 
 
 class CampaignProgress(Live):
-    """Shows how a campaign goes."""
+    """Progress of a campaign."""
 
     def __init__(self) -> None:
         super().__init__("campaign", None)
 
     def __call__(self, status: Status) -> None:
-        """Take in how the campaign stands."""
+        """Show the status."""
         line = one_line(status)
         self._show(status.steps_done, status.steps, line, plain(line))

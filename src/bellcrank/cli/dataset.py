@@ -49,7 +49,7 @@ def build(
     """Run many short searches, and keep all that they proposed."""
     from bellcrank.campaign.dataset import DatasetSpec, build_dataset
     from bellcrank.cli.campaign_view import CampaignProgress
-    from bellcrank.cli.design import stopping_on_interrupt
+    from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import find_problem
 
     found = find_problem(problem)

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import shlex
-import signal
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
-from bellcrank.cli.app import INTERRUPTED, NOT_MET, app
+from bellcrank.cli.app import NOT_MET, app
 from bellcrank.cli.arguments import design_named, settings_of
 from bellcrank.cli.console import (
     announce_compilation,
@@ -103,6 +98,7 @@ def design(
 ) -> None:
     """Design an actuator: search, clean up, verify, and see what was designed."""
     from bellcrank.cli.progress import SearchProgress
+    from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import find_problem
     from bellcrank.search import read_settings
     from bellcrank.workflows import complete_design, reopen_design, start_design
@@ -125,37 +121,47 @@ def design(
         **settings_of("--set", more),
     }  # fmt: skip
     chosen = {key: value for key, value in given.items() if value is not None}
-    if resume is not None:
-        if chosen or out is not None:
-            what = next(iter(chosen), "out").replace("_", "-")
-            raise InvalidSettings(
-                f"{what} is kept from the run's start, and cannot be changed with --resume; to "
-                f"search on from its design, begin a new run with --from {resume}"
+    if resume is not None and (chosen or out is not None):
+        what = next(iter(chosen), "out").replace("_", "-")
+        raise InvalidSettings(
+            f"--{what} cannot be changed with --resume; to continue from the design of that run, "
+            f"start a new one with --from {resume}"
+        )
+    with stopping_on_interrupt(resumable=True) as stop:
+        announce_compilation()
+        if resume is not None:
+            folder = reopen_design(resume)
+            warn_of_another_version(folder.provenance, "run")
+        else:
+            settings = read_settings({"search": search, **chosen})
+            if problem is not None:
+                task = find_problem(problem)
+            else:
+                task = _task_from(design_named(str(begin)))
+            folder = start_design(task, settings, out or _new_folder(task), part)
+        command = f"bellcrank design --resume {shlex.quote(str(folder.path))}"
+        stop.hint = f"Stopped. To continue: {plain(command)}"
+        with SearchProgress(read_settings(folder.settings)) as progress:
+            report = complete_design(
+                folder, workers=workers, tell=progress, trying=progress.trying, stop=stop
             )
-        announce_compilation()
-        folder = reopen_design(resume)
-        warn_of_another_version(folder.provenance, "run")
-    else:
-        settings = read_settings({"search": search, **chosen})
-        task = (
-            find_problem(problem) if problem is not None else _task_from(design_named(str(begin)))
-        )
-        announce_compilation()
-        folder = start_design(task, settings, out or Path(Path(task.name).name), part)
-    progress = SearchProgress(read_settings(folder.settings))
-    with stopping_on_interrupt() as stop, progress:
-        report = complete_design(
-            folder, workers=workers, tell=progress, trying=progress.trying, stop=stop,
-        )  # fmt: skip
-    if report is None:
-        notes.print(
-            "Stopped; what is done is kept. Go on with: "
-            f"bellcrank design --resume {plain(shlex.quote(str(folder.path)))}"
-        )
-        sys.exit(INTERRUPTED)
+        if report is None:
+            stop.exit()  # a thread may still compute a block, which delays a usual exit
+    assert report is not None
     _print_report(report)
     if report.failures:
         sys.exit(NOT_MET)
+
+
+def _new_folder(task: Problem) -> Path:
+    """Return a folder that is not in use, named after a task."""
+    from bellcrank.storage import unused_folder
+
+    wanted = Path(Path(task.name).name)
+    folder = unused_folder(wanted)
+    if folder != wanted:
+        notes.print(f"{plain(wanted)}/ exists; the results are written to {plain(folder)}/")
+    return folder
 
 
 def _task_from(design: Design) -> Problem:
@@ -181,26 +187,6 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
         return tuple(map(float, text.split(",")))
     except ValueError:
         raise InvalidSettings(f"{option} {text}: expected numbers with commas between") from None
-
-
-@contextmanager
-def stopping_on_interrupt() -> Iterator[threading.Event]:
-    """Turn the first Ctrl-C, or a polite kill, into a request to stop; the second insists."""
-    stop = threading.Event()
-
-    def ask(number: int, _frame: FrameType | None) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
-        stop.set()
-        notes.print("Stopping after the steps at hand ...")
-        signal.signal(number, signal.default_int_handler)
-
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _print_report(report: DesignReport) -> None:

@@ -169,7 +169,7 @@ def make(
     ] = None,
 ) -> None:
     """Search for entries and measure them; rerun the same command to resume."""
-    from bellcrank.cli.design import stopping_on_interrupt
+    from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.machines.library import user_folder
     from bellcrank.machines.library.making import make as make_entries
     from bellcrank.machines.library.tasks import MakeSettings

@@ -57,9 +57,9 @@ def surrogate_search(
 ) -> None:
     """Search with a network in place of the mechanics, and verify the designs by the mechanics."""
     require_reproduction()
-    from bellcrank.cli.design import stopping_on_interrupt
+    from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import find_problem
-    from bellcrank.storage import check_free
+    from bellcrank.storage import require_new_folder
     from bellcrank.surrogate.dataset import read_dataset
     from bellcrank.surrogate.predictor import load_predictor
     from reproduction.networks.surrogate_search import SurrogateSearchSettings, run_surrogate_search
@@ -71,7 +71,7 @@ def surrogate_search(
         search=settings_of("--set", settings),
     )  # fmt: skip
     folder = out or Path(f"{task.name}-surrogate-search")
-    check_free(folder)
+    require_new_folder(folder)
     predictor = load_predictor(task, model, device=device)
     training = None if dataset is None else read_dataset(dataset)
     announce_compilation()

@@ -48,7 +48,7 @@ def train(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Train a network, and test it on runs that are held out."""
-    from bellcrank.cli.design import stopping_on_interrupt
+    from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.surrogate.dataset import read_dataset
     from bellcrank.surrogate.recipes import recipe_of
     from bellcrank.surrogate.training_setup import begin

@@ -103,8 +103,8 @@ def open_temporary(target: Path) -> tuple[Path, BinaryIO]:
     permissions without a race between threads.
     """
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-    return temporary, os.fdopen(handle, "wb")
+    handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+    return temporary, os.fdopen(handle, "w+b")
 
 
 def already_exists(target: Path) -> OutputExists:

@@ -33,7 +33,7 @@ from bellcrank.search.markov import (
     moves,
     schedules,
 )
-from bellcrank.search.parallel import Progress, default_workers, run_chain, run_chains
+from bellcrank.search.parallel import Progress, default_workers, run_chains
 from bellcrank.search.registry import (
     DEFAULT_SEARCH,
     Search,
@@ -103,7 +103,6 @@ __all__ = [
     "plateaus",
     "read_settings",
     "read_state",
-    "run_chain",
     "run_chains",
     "schedules",
     "searches",

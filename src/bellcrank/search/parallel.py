@@ -1,19 +1,21 @@
-"""Many chains of one run on the cores of this machine, kept on disk as they go.
+"""Several chains of one run in parallel threads, stored as they advance.
 
-Threads are enough: the compiled loop runs without the interpreter lock. Results do not
-depend on how many there are.
+The compiled loop releases the interpreter lock, so threads use all cores. The results do not
+depend on their number.
 """
 
 from __future__ import annotations
 
 import os
 import threading
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+import time
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.errors import BellcrankError
 from bellcrank.mechanics import evaluators_that_fit
 from bellcrank.search.evaluator import make_evaluator
 from bellcrank.search.registry import (
@@ -26,28 +28,32 @@ from bellcrank.search.registry import (
 from bellcrank.storage import Proposals, RunFolder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from bellcrank.search.settings import SearchSettings
 
-SHARD = 4000
-"""Steps that are kept in memory before they are written: what a kill can cost in time."""
+SEGMENT_STEPS = 4000
+"""Steps after which the proposals of a chain are written to disk."""
+POLL_INTERVAL = 0.05
+"""Seconds between two checks for a request to stop."""
+STOP_TIMEOUT = 0.5
+"""Seconds in which a chain can end its block after a request to stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How a chain is doing, told after each block.
+    """Progress of a chain, reported after each block.
 
     Parameters
     ----------
     chain
-        Its number.
+        Number of the chain.
     state
-        Where it stands.
+        State of the chain after the block.
     temperature
-        Of its last proposal.
+        Temperature of its last proposal.
     steps, accepted
-        Proposals made and accepted in the block.
+        Number of proposals made and accepted in the block.
     """
 
     chain: int
@@ -58,50 +64,79 @@ class Progress:
 
 
 def default_workers() -> int:
-    """Return the number of cores this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def run_chain(
-    folder: RunFolder,
-    settings: SearchSettings,
-    chain: int,
-    stop: threading.Event,
-    tell: Callable[[Progress], None],
-) -> bool:
-    """Advance one chain from where its files end; return whether it is done.
+class ChainRunner:
+    """Advances one chain from its last stored state and stores what it proposes.
 
-    Every so many steps, at the end and when `stop` is set, what was done is written
-    together with the state to go on from.
+    A compiled block cannot be interrupted. `close` therefore stores the complete blocks from
+    another thread and makes `run` discard the block that it is still computing.
+
+    Parameters
+    ----------
+    folder
+        Run that the chain belongs to.
+    settings
+        Settings of the search.
+    chain
+        Number of the chain.
+
+    Attributes
+    ----------
+    done
+        Whether the chain has reached its end.
     """
-    next_step, stored = folder.progress(chain)
-    evaluator = make_evaluator(folder.problem, settings)
-    state = read_state(settings, stored) if stored else start_chain(evaluator, settings, chain)
-    pending: list[Proposals] = []
-    while not is_done(state, settings) and not stop.is_set():
-        state, proposals = advance_chain(evaluator, settings, chain, state)
-        pending.append(proposals)
-        tell(
-            Progress(
-                chain,
-                state,
-                float(proposals.temperature[-1]),
-                len(proposals.accepted),
-                int(proposals.accepted.sum()),
-            )
-        )
-        if state.step - next_step >= SHARD:
-            folder.append(chain, next_step, _joined(pending), state.to_dict())
-            next_step, pending = state.step, []
-    if pending:
-        folder.append(chain, next_step, _joined(pending), state.to_dict())
-    return is_done(state, settings)
 
+    def __init__(self, folder: RunFolder, settings: SearchSettings, chain: int) -> None:
+        self.done = False
+        self._folder = folder
+        self._settings = settings
+        self._chain = chain
+        self._lock = threading.Lock()
+        self._closed = False
+        self._pending: list[Proposals] = []
+        self._stored_steps = 0
+        self._state: State | None = None
 
-def _joined(parts: list[Proposals]) -> Proposals:
-    return Proposals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    def run(self, stopped: Callable[[], bool], tell: Callable[[Progress], None]) -> None:
+        """Advance the chain to its end, or until `stopped()` or `close`."""
+        folder, settings, chain = self._folder, self._settings, self._chain
+        self._stored_steps, stored = folder.progress(chain)
+        evaluator = make_evaluator(folder.problem, settings)
+        state = read_state(settings, stored) if stored else start_chain(evaluator, settings, chain)
+        while not is_done(state, settings) and not stopped():
+            state, proposals = advance_chain(evaluator, settings, chain, state)
+            with self._lock:
+                if self._closed:
+                    return
+                self._state = state
+                self._pending.append(proposals)
+                if state.step - self._stored_steps >= SEGMENT_STEPS:
+                    self._store()
+            temperature = float(proposals.temperature[-1])
+            accepted = int(proposals.accepted.sum())
+            tell(Progress(chain, state, temperature, len(proposals.accepted), accepted))
+        self.done = is_done(state, settings)
+        self.close()
+
+    def close(self) -> None:
+        """Store the complete blocks; whatever `run` computes afterwards is discarded."""
+        with self._lock:
+            self._closed = True
+            self._store()
+
+    def _store(self) -> None:
+        if self._pending:
+            assert self._state is not None
+            columns = zip(*self._pending, strict=True)
+            self._pending = []
+            rows = Proposals(*map(np.concatenate, columns))
+            self._folder.append(self._chain, self._stored_steps, rows, self._state.to_dict())
+            self._stored_steps = self._state.step
 
 
 def run_chains(
@@ -114,29 +149,70 @@ def run_chains(
 ) -> bool:
     """Run all chains of a run to their end, or until `stop` is set.
 
-    An error in one chain stops the others after their block, so that nothing already
-    computed is lost, and is raised then. Ctrl-C does the same.
+    After a request to stop, an error in a chain or Ctrl-C, the other chains may end their block
+    within `STOP_TIMEOUT`; complete blocks are stored, incomplete ones are discarded.
+
+    Parameters
+    ----------
+    folder
+        Run that the chains belong to.
+    settings
+        Settings of the search.
+    workers
+        Number of threads; by default one for each core.
+    tell
+        Called with the progress of a chain after each block, from the thread of that chain.
+    stop
+        Event that requests a stop.
 
     Returns
     -------
     bool
-        Whether every chain is done.
+        Whether every chain has reached its end.
     """
     stop = stop or threading.Event()
-    threads = evaluators_that_fit(
+    runners = [ChainRunner(folder, settings, chain) for chain in range(settings.chains)]
+    waiting = deque(runners)
+    errors: list[BaseException] = []
+
+    def stopped() -> bool:
+        return bool(errors) or stop.is_set()
+
+    def work() -> None:
+        while not stopped():
+            try:
+                runner = waiting.popleft()
+            except IndexError:
+                return
+            try:
+                runner.run(stopped, tell)
+            except BaseException as error:  # raised again below
+                errors.append(error)
+
+    count = evaluators_that_fit(
         folder.problem, workers or default_workers(), predict_flips=settings.predicts_flips
     )
-    with ThreadPoolExecutor(threads) as pool:
-        futures = [
-            pool.submit(run_chain, folder, settings, chain, stop, tell)
-            for chain in range(settings.chains)
-        ]
-        try:
-            _, unfinished = wait(futures, return_when=FIRST_EXCEPTION)
-            if unfinished:
-                stop.set()
-        except BaseException:
-            stop.set()
-            raise
-    done = [future.result() for future in futures]  # all of them: one may hold an error
-    return all(done)
+    # Daemon threads do not delay the end of the process while they compute a block.
+    threads = [threading.Thread(target=work, daemon=True) for _ in range(min(count, len(runners)))]
+    for thread in threads:
+        thread.start()
+    try:
+        while any(thread.is_alive() for thread in threads) and not stopped():
+            _join(threads, POLL_INTERVAL)
+        _join(threads, STOP_TIMEOUT)
+    finally:
+        for runner in runners:
+            try:
+                runner.close()
+            except BellcrankError as error:
+                errors.append(error)
+    if errors:
+        raise errors[0]
+    return all(runner.done for runner in runners)
+
+
+def _join(threads: Sequence[threading.Thread], timeout: float) -> None:
+    """Wait until all threads have ended, or for `timeout` seconds."""
+    end = time.monotonic() + timeout
+    for thread in threads:
+        thread.join(max(0.0, end - time.monotonic()))

@@ -1,9 +1,9 @@
-"""Runs: what a search proposed, kept on disk so that a kill loses nothing.
+"""Storage of runs: all proposals of a search on disk, safe against a kill at any instant.
 
-A run is a folder. Its description (``run.json``) says what was asked for; each chain
-adds write-once Parquet shards, each with the state to go on from in its footer, so that
-rows and state take effect together or not at all. `RunFolder.finish` merges them into
-one ``history.parquet``.
+A run is a folder. Its description (``run.json``) holds problem and settings. Each chain adds
+Parquet files that are written once, each with the state from which the chain continues in its
+footer, so that rows and state become valid together or not at all. `RunFolder.finish` merges them
+into one ``history.parquet``. `bellcrank.campaign` stores its runs in the same segments.
 
 Examples
 --------
@@ -26,16 +26,18 @@ Examples
 >>> scratch.cleanup()
 """
 
-from bellcrank.storage.files import remove_temporaries
-from bellcrank.storage.folder import RunFolder
-from bellcrank.storage.layout import check_free
+from bellcrank.storage.files import remove_temporaries, require_new_folder, unused_folder
 from bellcrank.storage.records import COLUMNS, ProposalColumns, Proposals
+from bellcrank.storage.run_folder import RunFolder, check_no_run, is_unfinished_run
 
 __all__ = [
     "COLUMNS",
     "ProposalColumns",
     "Proposals",
     "RunFolder",
-    "check_free",
+    "check_no_run",
+    "is_unfinished_run",
     "remove_temporaries",
+    "require_new_folder",
+    "unused_folder",
 ]

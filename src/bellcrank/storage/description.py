@@ -1,4 +1,4 @@
-"""The description of a run, ``run.json``: what was asked for, and how far it is."""
+"""The description of a run or campaign: a JSON file with what identifies it."""
 
 from __future__ import annotations
 
@@ -8,94 +8,66 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import CorruptRun, InvalidFile, InvalidSettings
-from bellcrank.model import problem_to_dict
 from bellcrank.model.storage import read_text, write_text
-from bellcrank.storage.layout import DESCRIPTION
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
-
-    from bellcrank.model import Problem
-
-RUN_SCHEMA = "bellcrank/run/1"
-STATUSES = ("running", "stopped", "finished")
 
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What ``run.json`` says.
+    """Content of a description file.
 
     Parameters
     ----------
-    problem
-        Schema ``bellcrank/problem/1``.
-    settings
-        Of the search, as plain data.
+    content
+        Plain data that identifies the run or campaign; it never changes.
     provenance
-        Of the start of the run.
+        Versions, machine and time of its start.
     status
-        One of ``running``, ``stopped``, ``finished``.
+        State of the work, if the file keeps it.
     """
 
-    problem: dict[str, Any]
-    settings: dict[str, Any]
+    content: dict[str, Any]
     provenance: dict[str, Any]
-    status: str = "running"
+    status: str | None = None
 
     @property
-    def spec(self) -> str:
-        """Identity of what was asked for; every shard carries it."""
-        return spec_hash(self.problem, self.settings)
-
-    @property
-    def mask_bytes(self) -> int:
-        """Bytes of a packed mask over the problem's beams."""
-        return (len(self.problem["beams"]) + 7) // 8
+    def hash(self) -> str:
+        """Hash of the content; every file of the store carries it."""
+        return content_hash(self.content)
 
 
-def spec_hash(problem: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
-    """Hash of problem and settings: SHA-256 of their canonical JSON.
+def content_hash(content: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of the canonical JSON of plain data.
 
     Examples
     --------
-    >>> spec_hash({"a": 1, "b": 2}, {}) == spec_hash({"b": 2, "a": 1}, {})
+    >>> content_hash({"a": 1, "b": 2}) == content_hash({"b": 2, "a": 1})
     True
     """
-    text = json.dumps(
-        {"problem": problem, "settings": settings}, sort_keys=True, separators=(",", ":")
-    )
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def plain(what: str, data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return data as it will come back from JSON (lists for tuples).
+    """Return data as JSON restores it (lists in place of tuples).
 
     Raises
     ------
     InvalidSettings
-        If JSON cannot hold it exactly.
+        If JSON cannot represent it exactly.
     """
     try:
         copied: dict[str, Any] = json.loads(json.dumps(dict(data), allow_nan=False))
     except (TypeError, ValueError) as error:
-        raise InvalidSettings(f"{what}: expected plain data that JSON can hold: {error}") from None
+        raise InvalidSettings(f"{what}: expected data that JSON can represent: {error}") from None
     return copied
 
 
-def describe(
-    problem: Problem, settings: Mapping[str, Any], provenance: Mapping[str, Any]
-) -> Description:
-    """Describe a new run."""
-    return Description(
-        plain("problem", problem_to_dict(problem)),
-        plain("settings", settings),
-        plain("provenance", provenance),
-    )
-
-
 def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str | None:
-    """Say where two settings differ, or None.
+    """Return the first key at which two tables differ, with both values, or None.
 
     Examples
     --------
@@ -114,93 +86,73 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def require_same(
-    folder: Path,
-    description: Description,
-    problem: Problem | None,
-    settings: Mapping[str, Any] | None,
+def write_description(
+    path: Path, schema: str, description: Description, *, overwrite: bool = False
 ) -> None:
-    """Check problem and settings, where given, against those of a run.
+    """Write a description file in one step.
 
     Raises
     ------
-    InvalidSettings
-        Naming the first difference.
-    """
-    told = []
-    if problem is not None:
-        told.append(("problem", description.problem, problem_to_dict(problem)))
-    if settings is not None:
-        told.append(("settings", description.settings, dict(settings)))
-    for what, old, new in told:
-        if difference := first_difference(old, plain(what, new)):
-            raise InvalidSettings(
-                f"{folder}: the run began with other {what}: {difference}; go on with those "
-                f"it has, or start another run in another folder"
-            )
-
-
-def write_description(folder: Path, description: Description) -> None:
-    """Write ``run.json``, replacing the one that is there in one step.
-
-    Raises
-    ------
+    OutputExists
+        If the file exists and `overwrite` is not set.
     StorageError
     """
+    status = {} if description.status is None else {"status": description.status}
     data = {
-        "schema": RUN_SCHEMA,
-        "status": description.status,
-        "spec": description.spec,
+        "schema": schema,
+        **status,
+        "hash": description.hash,
         "provenance": description.provenance,
-        "settings": description.settings,
-        "problem": description.problem,
+        **description.content,
     }
-    write_text(folder / DESCRIPTION, json.dumps(data, indent=1) + "\n", overwrite=True)
+    write_text(path, json.dumps(data, indent=1) + "\n", overwrite=overwrite)
 
 
-def read_description(folder: Path) -> Description:
-    """Read ``run.json``.
+def read_description(path: Path, schema: str, what: str, keys: Sequence[str]) -> Description:
+    """Read a description file.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+    schema
+        Schema that it must have.
+    what
+        What it describes, such as ``run``.
+    keys
+        Keys of its content.
 
     Raises
     ------
     InvalidFile
-        If the folder does not exist or is not that of a run.
+        If the folder or the file does not exist, or has another schema.
     CorruptRun
-        If the file is damaged, or was changed after the run had begun.
+        If the file is damaged, or its content was changed.
     """
-    path = folder / DESCRIPTION
+    folder = path.parent
     try:
         present, described = folder.is_dir(), path.exists()
     except OSError as error:
         raise InvalidFile(f"{folder}: cannot be read ({error.strerror})") from None
     if not present:
-        raise InvalidFile(f"{folder}: no such folder; expected the folder of a run")
+        raise InvalidFile(f"{folder}: no such folder; expected the folder of a {what}")
     if not described:
-        raise InvalidFile(
-            f"{folder}: not the folder of a run: it has no {DESCRIPTION}; nothing to go on from"
-        )
+        raise InvalidFile(f"{folder}: not the folder of a {what}: it has no {path.name}")
+    text = read_text(path)
     try:
-        data = json.loads(read_text(path))
-    except ValueError as error:
-        if isinstance(error, InvalidFile):
-            raise
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise CorruptRun(f"{path}: not valid JSON ({error}); restore it from a copy") from None
-    schema = data.get("schema") if isinstance(data, dict) else None
-    if schema != RUN_SCHEMA:
-        raise InvalidFile(f"{path}: expected schema {RUN_SCHEMA!r}, got {schema!r}")
-    for key in ("problem", "settings", "provenance"):
-        if not isinstance(data.get(key), dict):
-            raise CorruptRun(f"{path}: {key}: expected a table, got {data.get(key)!r}")
-    if not isinstance(data["problem"].get("beams"), list):
-        raise CorruptRun(f"{path}: problem: it has no list of beams")
-    if data.get("status") not in STATUSES:
+    found = data.get("schema") if isinstance(data, dict) else None
+    if found != schema:
+        raise InvalidFile(f"{path}: expected schema {schema!r}, got {found!r}")
+    for key in ("provenance", *keys):
+        if key not in data:
+            raise CorruptRun(f"{path}: key {key!r} is missing; restore the file from a copy")
+    content = {key: data[key] for key in keys}
+    if content_hash(content) != data.get("hash") or not isinstance(data["provenance"], dict):
         raise CorruptRun(
-            f"{path}: status: expected one of {', '.join(STATUSES)}, got {data.get('status')!r}"
+            f"{path}: was changed after the {what} had started; undo the change, or start another "
+            f"{what} in another folder"
         )
-    description = Description(data["problem"], data["settings"], data["provenance"], data["status"])
-    if description.spec != data.get("spec"):
-        raise CorruptRun(
-            f"{path}: problem or settings were changed after the run had begun; undo that, "
-            f"or start another run in another folder"
-        )
-    return description
+    return Description(content, data["provenance"], data.get("status"))

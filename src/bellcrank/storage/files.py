@@ -1,9 +1,10 @@
-"""Files that appear whole or not at all, and the names of those still being written."""
+"""Files that appear complete or not at all, and folders for new results."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import itertools
 import os
 import re
 from typing import IO, TYPE_CHECKING
@@ -12,25 +13,25 @@ from bellcrank.errors import BellcrankError, OutputExists, StorageError
 from bellcrank.model.storage import open_temporary, sync_folder, take_name
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{8}")
-"""Names of files on their way, as `bellcrank.model.storage` makes them."""
+"""Names of incomplete files, as `bellcrank.model.storage` makes them."""
 
 
 @contextlib.contextmanager
 def whole_file(target: Path) -> Iterator[IO[bytes]]:
-    """Yield a file to write into that takes the name `target` once it is safe on disk.
+    """Yield a file to write into, which gets the name `target` once it is safe on disk.
 
-    It never replaces anything: of two writers of the same name the first wins. Whatever
-    goes wrong, nothing stays behind, short of a kill (see `remove_temporaries`).
+    An existing file is never replaced: of two writers of the same name the first one succeeds.
+    After an error nothing remains; after a kill an incomplete file may (`remove_temporaries`).
 
     Raises
     ------
     OutputExists
-        If the name is taken.
+        If the file exists.
     StorageError
         If the folder cannot be written or the disk is full.
     """
@@ -50,28 +51,27 @@ def whole_file(target: Path) -> Iterator[IO[bytes]]:
         raise
     except FileExistsError:
         raise OutputExists(
-            f"{target}: exists already; is another process at work on this run?"
+            f"{target}: exists already; another process may be working in this folder"
         ) from None
     except OSError as error:
         raise storage_error(target.parent, error) from error
 
 
 def storage_error(folder: Path, error: OSError) -> StorageError:
-    """Say that a folder could not be written, why, and what to do."""
+    """Return the error for a folder that cannot be written, with the reason and the remedy."""
     if error.errno in FULL:
-        what_to_do = "make room and resume: what was stored before is intact"
+        remedy = "free some space and resume: all stored data is intact"
     else:
-        what_to_do = "make it writable, or choose another folder"
-    return StorageError(f"{folder}: cannot be written ({error.strerror or error}); {what_to_do}")
+        remedy = "make it writable, or choose another folder"
+    return StorageError(f"{folder}: cannot be written ({error.strerror or error}); {remedy}")
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, if they are not there.
+    """Make a folder and its parents if they do not exist.
 
     Raises
     ------
     StorageError
-        If that is impossible.
     """
     if folder.is_dir():
         return
@@ -82,8 +82,64 @@ def make_folder(folder: Path) -> None:
     sync_folder(folder.parent)
 
 
+def require_new_folder(folder: Path, ours: Callable[[str], bool] = lambda _name: False) -> None:
+    """Check that a folder can take new results: it does not exist, or it is empty.
+
+    Nothing is created. Incomplete files of a killed process do not count.
+
+    Parameters
+    ----------
+    folder
+        Folder to check.
+    ours
+        Whether a file of the given name is acceptable.
+
+    Raises
+    ------
+    OutputExists
+        If it is a file or holds anything else.
+    StorageError
+        If it cannot be read.
+    """
+    try:
+        is_folder = folder.is_dir()
+        is_file = folder.exists() and not is_folder
+        names = sorted(path.name for path in folder.iterdir()) if is_folder else []
+    except OSError as error:
+        raise storage_error(folder, error) from error
+    if is_file:
+        raise OutputExists(f"{folder}: is a file; choose another folder (--out)")
+    if others := [name for name in names if not ours(name) and not target_of(name)]:
+        raise OutputExists(
+            f"{folder}: exists already and is not empty (it holds {others[0]}); choose another "
+            f"folder (--out)"
+        )
+
+
+def unused_folder(folder: Path) -> Path:
+    """Return the first of `folder`, ``folder-2``, ``folder-3``, ... that can take new results.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as place:
+    ...     (Path(place) / "crane" / "results").mkdir(parents=True)
+    ...     unused_folder(Path(place) / "crane").name
+    'crane-2'
+    """
+    for number in itertools.count(1):
+        candidate = folder if number == 1 else folder.with_name(f"{folder.name}-{number}")
+        try:
+            require_new_folder(candidate)
+        except OutputExists:
+            continue
+        return candidate
+    raise AssertionError
+
+
 def target_of(name: str) -> str | None:
-    """Return the name that a file was on its way to take when it was left, if it was.
+    """Return the final name of an incomplete file; None for any other file.
 
     Examples
     --------
@@ -95,12 +151,11 @@ def target_of(name: str) -> str | None:
 
 
 def remove_temporaries(folder: Path, ours: re.Pattern[str]) -> None:
-    """Remove what killed writers left of files whose names match `ours`.
+    """Remove the incomplete files of killed writers whose final names match `ours`.
 
     Raises
     ------
     StorageError
-        If they cannot be removed.
     """
     try:
         for path in folder.iterdir() if folder.is_dir() else ():
@@ -108,3 +163,20 @@ def remove_temporaries(folder: Path, ours: re.Pattern[str]) -> None:
                 path.unlink(missing_ok=True)
     except OSError as error:
         raise storage_error(folder, error) from error
+
+
+def remove_files(folder: Path, ours: re.Pattern[str]) -> None:
+    """Remove the files whose names match `ours`, complete or not, and the folder if empty then.
+
+    Raises
+    ------
+    StorageError
+    """
+    try:
+        for path in list(folder.iterdir()) if folder.is_dir() else ():
+            if ours.fullmatch(path.name) or ours.fullmatch(target_of(path.name) or ""):
+                path.unlink(missing_ok=True)
+    except OSError as error:
+        raise storage_error(folder, error) from error
+    with contextlib.suppress(OSError):
+        folder.rmdir()

@@ -1,4 +1,4 @@
-"""Locks that keep other processes out of a folder, and that end with whoever holds them."""
+"""Lock files, which one process holds at a time and which end with that process."""
 
 from __future__ import annotations
 
@@ -14,55 +14,61 @@ if TYPE_CHECKING:
     from io import FileIO
     from pathlib import Path
 
+LOCK = ".lock"
+"""Name of the lock file of a folder with results."""
+
 
 @contextlib.contextmanager
-def locked(path: Path, busy: str | None = None) -> Iterator[None]:
+def locked(path: Path, *, wait: bool = True, option: str = "--out") -> Iterator[None]:
     """Hold a lock file, which no other process can hold at the same time.
 
-    However the process ends, its lock ends with it. Where the system has no such locks, or the
-    file system does not keep them, nobody is kept out.
+    The lock ends with the process, however that ends. It has no effect where the operating
+    system or the file system does not support locks.
 
     Parameters
     ----------
     path
-        Of the file; made, and removed in the end. What a kill leaves of it locks nobody out.
-    busy
-        What to say if it is held; by default that is waited for.
+        Path of the lock file; it is created, and removed at the end. A file that a killed process
+        left does not block.
+    wait
+        Whether to wait while another process holds the lock.
+    option
+        Option of the command that chooses the folder, for the message.
 
     Raises
     ------
     StorageError
-        If it is held and `busy` says so, or the folder cannot be written.
+        If another process holds the lock and `wait` is False, or the folder cannot be written.
 
     Examples
     --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     with locked(Path(folder) / ".lock"):
-    ...         try:
-    ...             with locked(Path(folder) / ".lock", "somebody is at work here"):
-    ...                 pass
-    ...         except StorageError as error:
-    ...             print(error)
-    somebody is at work here
+    ...     with locked(Path(folder) / LOCK):
+    ...         print(lock_holder(Path(folder) / LOCK) == f"process {os.getpid()}")
+    ...     print(lock_holder(Path(folder) / LOCK))
+    True
+    None
     """
     try:
         import fcntl
     except ImportError:
         yield
         return
-    wait = fcntl.LOCK_EX if busy is None else fcntl.LOCK_EX | fcntl.LOCK_NB
     while True:
         with _opened(path) as file:
             try:
-                fcntl.flock(file, wait)
+                fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise StorageError(busy) from None
+                raise busy(path.parent, _holder(file), option) from None
             except OSError:
-                pass  # the file system keeps no locks
-            if not _is_there(path, file):
-                continue  # whoever held it has removed it meanwhile
+                pass  # the file system does not support locks
+            if not _is_current(path, file):
+                continue  # the previous holder has removed it meanwhile
+            with contextlib.suppress(OSError):
+                file.truncate(0)
+                file.write(str(os.getpid()).encode())
             try:
                 yield
             finally:
@@ -71,14 +77,44 @@ def locked(path: Path, busy: str | None = None) -> Iterator[None]:
             return
 
 
+def lock_holder(path: Path) -> str | None:
+    """Return the process that holds a lock file, such as ``process 4711``; None if none does."""
+    try:
+        import fcntl
+
+        with path.open("rb", buffering=0) as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return _holder(file)
+    except (ImportError, OSError):
+        pass
+    return None
+
+
+def busy(folder: Path, holder: str, option: str = "--out") -> StorageError:
+    """Return the error for a folder in which another process is working."""
+    return StorageError(
+        f"{folder}: {holder} is working in this folder; wait until it ends, or choose another "
+        f"folder ({option})"
+    )
+
+
+def _holder(file: FileIO) -> str:
+    """Return the process that has written its number into a lock file."""
+    file.seek(0)
+    number = (file.read(20) or b"").decode(errors="replace").strip()
+    return f"process {number}" if number.isdigit() else "another process"
+
+
 def _opened(path: Path) -> FileIO:
     try:
-        return path.open("wb", buffering=0)
+        return path.open("ab+", buffering=0)
     except OSError as error:
         raise storage_error(path.parent, error) from error
 
 
-def _is_there(path: Path, file: FileIO) -> bool:
+def _is_current(path: Path, file: FileIO) -> bool:
     """Whether an open file is still the one of that name."""
     try:
         return os.path.samestat(path.stat(), os.fstat(file.fileno()))

@@ -1,4 +1,4 @@
-"""The record of a search: one row for each proposal, accepted or not."""
+"""Records of a search: one row for each proposal, accepted or not."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COLUMNS = ("step", "mask", "efficiency", "cost", "temperature", "accepted", "status")
-"""What can be read back of a chain, in the order of the files."""
+"""Columns of a chain, in the order of the files."""
 
 
 class Proposals(NamedTuple):
@@ -23,17 +23,17 @@ class Proposals(NamedTuple):
     Parameters
     ----------
     mask : (n, ceil(M / 8)) uint8
-        The proposed designs, packed by `numpy.packbits` over the M beams.
+        Proposed designs, packed by `numpy.packbits` over the M beams.
     efficiency : (n,) float64
-        Of the proposed design, accepted or not; NaN where there is none.
+        Efficiency of the proposed design, accepted or not; NaN if it has none.
     cost : (n,) float64
-        What the search compared.
+        Cost that the search minimises.
     temperature : (n,) float64
-        At which the proposal was judged, in units of the cost.
+        Temperature of the acceptance rule, in units of the cost.
     accepted : (n,) bool
-        Whether the chain moved there.
+        Whether the proposal was accepted.
     status : (n,) int8
-        How the computation of the response ended.
+        Status of the evaluation.
     """
 
     mask: NDArray[np.uint8]
@@ -45,7 +45,7 @@ class Proposals(NamedTuple):
 
 
 class ProposalColumns(Protocol):
-    """Whatever has the columns of `Proposals`; values are cast when they are stored."""
+    """Object with the columns of `Proposals`, whose values are cast when they are stored."""
 
     @property
     def mask(self) -> NDArray[Any]:
@@ -53,27 +53,27 @@ class ProposalColumns(Protocol):
 
     @property
     def efficiency(self) -> NDArray[Any]:
-        """(n,) of the proposed design."""
+        """(n,) efficiencies of the proposed designs."""
 
     @property
     def cost(self) -> NDArray[Any]:
-        """(n,) what the search compared."""
+        """(n,) costs."""
 
     @property
     def temperature(self) -> NDArray[Any]:
-        """(n,) at which the proposal was judged."""
+        """(n,) temperatures."""
 
     @property
     def accepted(self) -> NDArray[Any]:
-        """(n,) whether the chain moved there."""
+        """(n,) whether each proposal was accepted."""
 
     @property
     def status(self) -> NDArray[Any]:
-        """(n,) how the response ended."""
+        """(n,) statuses of the evaluations."""
 
 
 def checked_proposals(records: ProposalColumns, mask_bytes: int) -> Proposals:
-    """Cast the columns of `records` and check that they fit together.
+    """Cast the columns of `records` and check their shapes.
 
     Parameters
     ----------
@@ -106,12 +106,12 @@ def checked_proposals(records: ProposalColumns, mask_bytes: int) -> Proposals:
 
 
 def checked_columns(columns: Sequence[str] | None) -> list[str]:
-    """Return the names of the columns to read; all where none are named.
+    """Return the names of the columns to read; all columns by default.
 
     Raises
     ------
     InvalidSettings
-        If one does not exist.
+        If there is no such column.
 
     Examples
     --------
@@ -130,7 +130,7 @@ efficiency, cost, temperature, accepted, status
 
 
 def empty_columns(columns: Sequence[str], mask_bytes: int) -> dict[str, NDArray[Any]]:
-    """Return the columns of a chain that has not begun."""
+    """Return the columns of a chain without proposals."""
     dtypes = {"step": np.int64, "mask": np.uint8, "accepted": np.bool_, "status": np.int8}
     return {
         name: np.empty((0, mask_bytes) if name == "mask" else 0, dtypes.get(name, np.float64))

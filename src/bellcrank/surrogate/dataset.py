@@ -36,7 +36,7 @@ import numpy as np
 from bellcrank.errors import CorruptRun, InvalidDataset, InvalidFile, first_line
 from bellcrank.model import problem_from_dict, problem_to_dict
 from bellcrank.model.storage import write_bytes
-from bellcrank.storage.shards import arrays_of, parquet_file, parquet_writer
+from bellcrank.storage.parquet import arrays_of, parquet_file, parquet_writer
 
 if TYPE_CHECKING:
     import os

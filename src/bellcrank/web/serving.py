@@ -90,8 +90,7 @@ def serve(settings: ServerSettings, announce: Callable[[str], None]) -> None:
 
     token = settings.needed_token
     make_folder(settings.folder)
-    busy = f"{settings.folder}: another server uses it; close that first"
-    lock = locked(settings.folder / "server.lock", busy)
+    lock = locked(settings.folder / "server.lock", wait=False, option="--folder")
     with _exit_on_sigterm(), lock, _listening(settings) as listener:
         app = make_app(settings.folder, token=token, searches=settings.searches)
         config = uvicorn.Config(

@@ -27,9 +27,8 @@ from bellcrank.search import (
     select,
     start_chain,
 )
-from bellcrank.storage import RunFolder, check_free, remove_temporaries
-from bellcrank.storage.layout import LOCK
-from bellcrank.storage.locking import locked
+from bellcrank.storage import RunFolder, check_no_run, remove_temporaries
+from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows.choosing import FINE, LEVEL, PartChoice, stands
 from bellcrank.workflows.outcome import DesignReport
 from bellcrank.workflows.record import begin_record
@@ -75,7 +74,7 @@ def start_design(
     StorageError
         If the folder cannot be written.
     """
-    check_free(out)
+    check_no_run(out)
     notes = {}
     if part is not None:
         part.of(problem.full_design())
@@ -132,8 +131,7 @@ def complete_design(
         If the folder cannot be written, is damaged, or another process is at work on it.
     """
     settings = read_settings(folder.settings)
-    busy = f"{folder.path}: another process is at work on this run; let it end, or stop it first"
-    with locked(folder.path / LOCK, busy):
+    with locked(folder.path / LOCK, wait=False):
         folder.status = "running"
         try:
             done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)

@@ -10,7 +10,7 @@ from typing import cast, get_args
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.model import Design, builtin, find_problem, gallery_design, read_design
 from bellcrank.model.gallery import Kind
-from bellcrank.storage.layout import DESCRIPTION
+from bellcrank.storage import is_unfinished_run
 
 DESIGN_FILE = "design.json"
 """Name of the design in a result folder."""
@@ -23,7 +23,7 @@ def find_design(name_or_path: str) -> Design:
 
     1. ``human:NAME`` and ``machine:NAME``, the bundled designs of a bundled problem; or
        ``machine:NAME``, a bundled machine,
-    2. a result folder, which holds a ``design.json``,
+    2. a result folder, which holds a ``design.json``; the folder of an unfinished run is an error,
     3. a bundled problem: its initial design,
     4. a design file,
     5. an entry of the library, a bundled machine or a strut (``strut-6``), unless a file of that
@@ -58,13 +58,13 @@ def find_design(name_or_path: str) -> Design:
     path = Path(name_or_path)
     if (path / DESIGN_FILE).exists():
         return read_design(path / DESIGN_FILE)
-    if name_or_path in builtin:
-        return find_problem(name_or_path).full_design()
-    if (path / DESCRIPTION).exists():
+    if is_unfinished_run(path):
         raise InvalidSettings(
             f"{path}: this run is not finished and has no {DESIGN_FILE} yet; finish it with "
             f"bellcrank design --resume {path}"
         )
+    if name_or_path in builtin:
+        return find_problem(name_or_path).full_design()
     if path.suffix == ".json" and path.is_file() and _is_design(path):
         return read_design(path)
     if not path.exists():

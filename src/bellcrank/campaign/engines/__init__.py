@@ -1,27 +1,18 @@
-"""Where runs are computed: here, on this machine's cores, or on machines elsewhere.
+"""Engines: where the runs of a campaign are computed.
 
 Importing this package does not import Dask; entering one of its engines does.
 """
 
-from bellcrank.campaign.engines import address, local, serial, slurm
-from bellcrank.campaign.engines.base import (
-    LOOPBACK,
-    Engine,
-    EngineOptions,
-    Outcome,
-    WorkerDied,
-    engines,
-)
+from bellcrank.campaign.engines import cluster, processes, serial
+from bellcrank.campaign.engines.base import Engine, EngineOptions, Outcome, WorkerDied, engines
 
 __all__ = [
-    "LOOPBACK",
     "Engine",
     "EngineOptions",
     "Outcome",
     "WorkerDied",
-    "address",
+    "cluster",
     "engines",
-    "local",
+    "processes",
     "serial",
-    "slurm",
 ]

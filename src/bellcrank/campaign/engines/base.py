@@ -1,6 +1,6 @@
-"""What an engine is: somewhere to compute runs, and nothing else.
+"""The protocol of an engine, its options and the registry.
 
-All engines call `bellcrank.campaign.work.work`; none carries data. Each is a context manager
+All engines call `bellcrank.campaign.work.work`; none transports data. Each is a context manager
 that leaves no process behind.
 """
 
@@ -19,22 +19,20 @@ if TYPE_CHECKING:
 
     from bellcrank.campaign.store import Store
 
-LOOPBACK = "127.0.0.1"
-
 
 class WorkerDied(BellcrankError, RuntimeError):
-    """A worker ended in the middle of a run: killed, out of memory, or out of time."""
+    """A worker ended during a run: killed, out of memory, or out of time."""
 
 
 class Outcome(NamedTuple):
-    """How an attempt at a run ended.
+    """Result of an attempt at a run.
 
     Parameters
     ----------
     number
-        Of the run.
+        Number of the run.
     error
-        What went wrong, if anything did.
+        Error of the attempt, if it failed.
     """
 
     number: int
@@ -42,19 +40,19 @@ class Outcome(NamedTuple):
 
 
 class Engine(Protocol):
-    """Somewhere to compute runs."""
+    """Place where runs are computed."""
 
     note: str | None
-    """What to tell whoever started it, such as where to look."""
+    """Note for the user, such as the address of a dashboard."""
 
     def capacity(self) -> int:
-        """Return how many runs it should have in hand."""
+        """Return the number of runs that it can compute at the same time."""
 
     def submit(self, number: int) -> None:
-        """Take a run in hand."""
+        """Start to compute a run."""
 
     def collect(self, timeout: float) -> list[Outcome]:
-        """Return the attempts that ended since, waiting some seconds for the first.
+        """Return the attempts that have ended, after waiting up to `timeout` seconds for one.
 
         Raises
         ------
@@ -63,32 +61,32 @@ class Engine(Protocol):
         """
 
     def request_stop(self) -> None:
-        """Let all runs end after the segment at hand."""
+        """Let all runs end after the current segment."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineOptions:
-    """What engines are told; each looks at what concerns it.
+    """Options of the engines; each uses those that apply to it.
 
     Parameters
     ----------
     workers
-        Processes of one thread each; by default one for each core, or for ``slurm`` each job.
+        Number of worker processes; by default one for each core, or one SLURM job.
     host
-        Address to listen on. Loopback, unless told otherwise.
+        Address on which the scheduler of ``slurm`` listens.
     scheduler
-        Address of one that is running, ``tcp://host:port`` or ``tls://host:port``.
+        Address of a running Dask scheduler, ``tcp://host:port`` or ``tls://host:port``.
     tls_ca, tls_cert, tls_key
-        Files that prove to each other who scheduler and client are.
+        Files of the certificates and the key for ``tls://``.
     timeout
         Seconds to wait for a connection.
     slurm
-        Options of dask-jobqueue's ``SLURMCluster``.
+        Options of ``SLURMCluster`` of dask-jobqueue.
 
     Raises
     ------
     InvalidSettings
-        If there is to be no worker.
+        If the number of workers is less than 1.
     """
 
     workers: int | None = None

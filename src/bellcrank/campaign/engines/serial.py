@@ -1,9 +1,9 @@
-"""One run after the other in this process: for job arrays, and wherever Dask is not."""
+"""Engine that computes one run after another in this process."""
 
 from __future__ import annotations
 
 import queue
-from concurrent.futures import ThreadPoolExecutor
+import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -18,57 +18,58 @@ if TYPE_CHECKING:
 
 
 class SerialEngine:
-    """A thread that does one run at a time, so that the main one can listen to signals."""
+    """Computes one run at a time in a thread, so that the main thread can react to signals."""
 
     note: str | None = None
 
-    def __init__(self, store_path: str, pool: ThreadPoolExecutor) -> None:
+    def __init__(self, store_path: str) -> None:
         self._path = store_path
-        self._pool = pool
         self._ended: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
 
     def capacity(self) -> int:
-        """Return one: the next run is taken when this one has ended."""
+        """Return 1."""
         return 1
 
     def submit(self, number: int) -> None:
-        """Take a run in hand."""
-        future = self._pool.submit(work, self._path, number)
-        future.add_done_callback(lambda done: self._ended.put(Outcome(number, done.exception())))
+        """Start to compute a run."""
+
+        def run() -> None:
+            try:
+                work(self._path, number)
+            except BaseException as error:  # reported as the outcome
+                self._ended.put(Outcome(number, error))
+            else:
+                self._ended.put(Outcome(number, None))
+
+        threading.Thread(target=run, daemon=True).start()
 
     def collect(self, timeout: float) -> list[Outcome]:
-        """Return the attempts that ended since."""
+        """Return the attempts that have ended."""
         try:
             return [self._ended.get(timeout=timeout)]
         except queue.Empty:
             return []
 
     def request_stop(self) -> None:
-        """Let the run end after the segment at hand."""
+        """Let the run end after the current segment."""
         request_stop(self._path)
 
 
 @engines.register("serial")
 @contextmanager
 def serial(store: Store, options: EngineOptions) -> Iterator[Engine]:
-    """Compute in this process, without any engine.
+    """Compute one run after another in this process.
 
     Raises
     ------
     InvalidSettings
-        If more than one worker is asked for.
+        If more than one worker is requested.
     """
     if options.workers not in (None, 1):
-        raise InvalidSettings(f"workers: the serial engine is one; got {options.workers}")
+        raise InvalidSettings(f"workers: engine 'serial' has one worker; got {options.workers}")
     path = str(store.path)
     allow_work(path)
-    pool = ThreadPoolExecutor(1)
     try:
-        yield SerialEngine(path, pool)
-    except BaseException:
-        # Whoever insists does not wait for the segment at hand.
+        yield SerialEngine(path)
+    finally:
         request_stop(path)
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    pool.shutdown()
-    allow_work(path)

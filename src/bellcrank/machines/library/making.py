@@ -19,8 +19,7 @@ from bellcrank.machines.library.measurement import MIN_INPUT_STIFFNESS, measure
 from bellcrank.mechanics import Response, Status
 from bellcrank.search import Verdict, read_settings, run_chains, select
 from bellcrank.storage.files import make_folder
-from bellcrank.storage.layout import LOCK
-from bellcrank.storage.locking import locked
+from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows import reopen_design, start_design
 from bellcrank.workflows.design import accepted_candidates, verification_evaluator
 
@@ -107,7 +106,7 @@ def make(
         If an existing entry is damaged.
     """
     make_folder(folder)
-    with locked(folder / LOCK, f"{folder}: another process makes entries there; wait for its end"):
+    with locked(folder / LOCK, wait=False):
         for number, task in enumerate(settings.tasks):
             start = time.monotonic()
             path = folder / SEARCHES / task.name

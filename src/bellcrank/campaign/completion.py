@@ -1,21 +1,21 @@
-"""Driving a campaign: hand out the runs that are not done, until they are."""
+"""Completion of a campaign: submit the runs that are not done until all are."""
 
 from __future__ import annotations
 
+import threading
 import time
+from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from bellcrank.campaign.compaction import compact
 from bellcrank.campaign.engines import EngineOptions, Outcome, WorkerDied, engines
-from bellcrank.campaign.status import Watcher
+from bellcrank.campaign.status import StatusReader
 from bellcrank.campaign.work import check_tasks
 from bellcrank.errors import BellcrankError, ClusterError, InvalidSettings, RunFailed, StorageError
 
 if TYPE_CHECKING:
-    import threading
-    from collections import deque
     from collections.abc import Callable
 
     from bellcrank.campaign.engines import Engine
@@ -23,22 +23,24 @@ if TYPE_CHECKING:
     from bellcrank.campaign.status import Status
     from bellcrank.campaign.store import Store
 
-MOST_DEATHS = 4
-"""Workers that a run may kill without storing anything new, before it is given up."""
-WAIT = 0.2
-"""Seconds between two looks at what has ended."""
-LOOK = 2.0
-"""Seconds between two looks at the store."""
+MAX_DEATHS = 4
+"""Workers that may die during a run without a new segment, before the run fails."""
+COLLECT_TIMEOUT = 0.1
+"""Seconds to wait for the end of a run before requests to stop are checked."""
+STATUS_INTERVAL = 2.0
+"""Seconds between two reports of the status."""
+STOP_TIMEOUT = 1.0
+"""Seconds in which runs can end their segment after a request to stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """One of several equal parts of a campaign's runs.
+    """One of several equal parts of the runs of a campaign.
 
     Parameters
     ----------
     index
-        From 1 to `count`.
+        Number of the part, from 1 to `count`.
     count
         Number of parts.
 
@@ -71,53 +73,52 @@ class Shard:
 
 
 @dataclass(slots=True)
-class _Drive:
-    """One stretch of work on a campaign."""
+class _Progress:
+    """State of the completion of a campaign."""
 
-    store: Store
-    watcher: Watcher
+    reader: StatusReader
     engine: Engine
     waiting: deque[Run]
-    hand: dict[int, Run] = field(default_factory=dict)
+    running: dict[int, Run] = field(default_factory=dict)
     deaths: dict[int, tuple[int, int]] = field(default_factory=dict)
     failures: list[tuple[Run, BaseException]] = field(default_factory=list)
 
-    def hand_out(self) -> None:
-        """Let the engine have as many runs as it can use."""
-        room = self.engine.capacity() - len(self.hand)
+    def submit(self) -> None:
+        """Submit as many runs as the engine can compute."""
+        room = self.engine.capacity() - len(self.running)
         for _ in range(min(room, len(self.waiting))):
             run = self.waiting.popleft()
-            self.hand[run.number] = run
+            self.running[run.number] = run
             self.engine.submit(run.number)
 
-    def take_in(self, outcome: Outcome) -> None:
-        """Note how an attempt ended.
+    def record(self, outcome: Outcome) -> None:
+        """Record the end of an attempt.
 
         Raises
         ------
         StorageError, ClusterError
-            What no other run would escape either.
+            Errors that would occur in every other run too.
         """
-        run = self.hand.pop(outcome.number)
+        run = self.running.pop(outcome.number)
         error = outcome.error
         if isinstance(error, (StorageError, ClusterError)):
             raise error
         if isinstance(error, WorkerDied):
-            steps = self.watcher.steps_of(run)
+            steps = self.reader.steps_of(run)
             before, count = self.deaths.get(run.number, (-1, 0))
             count = count + 1 if steps == before else 1
             self.deaths[run.number] = (steps, count)
-            if count < MOST_DEATHS:
+            if count < MAX_DEATHS:
                 self.waiting.append(run)
                 return
-            error = WorkerDied(f"{count} workers died at it in a row; the last: {error}")
+            error = WorkerDied(f"{count} workers died during this run; the last: {error}")
         if error is not None:
             self.failures.append((run, error))
 
 
 def complete(
     store: Store,
-    engine: str = "local",
+    engine: str = "processes",
     options: EngineOptions | None = None,
     *,
     shard: Shard | None = None,
@@ -126,22 +127,27 @@ def complete(
     announce: Callable[[str], None] = lambda _note: None,
     stop: threading.Event | None = None,
 ) -> bool:
-    """Compute what is left of a campaign, or of a part of it.
+    """Compute the remaining runs of a campaign, or of a part of it.
 
     Parameters
     ----------
+    store
+        Store of the campaign.
     engine
         Name in the registry of engines.
+    options
+        Options of the engine.
     shard
         Part of the runs to compute; all by default.
     compacting
-        Make the table when all runs of the campaign are done.
+        Whether to make the table when all runs of the campaign are done.
     tell
-        Called now and then with how the campaign stands.
+        Called regularly with the status of the campaign.
     announce
-        Called with what the engine has to say, such as where its dashboard is.
+        Called with the note of the engine, such as the address of a dashboard.
     stop
-        Set it to end after the segments at hand; what is done is kept.
+        Event that requests a stop. Segments that are not complete after `STOP_TIMEOUT` are
+        discarded; complete ones are stored.
 
     Returns
     -------
@@ -157,57 +163,49 @@ def complete(
     CorruptRun
         If it is damaged.
     RunFailed
-        If runs could not be brought to their end, after all others were.
+        If runs failed; all others are completed before.
     """
     enter = engines[engine]
     part = shard or Shard()
-    watcher = Watcher(store)
-    tell(watcher.look())
-    waiting = [run for run in watcher.pending() if part.holds(run.number)]
+    stop = stop or threading.Event()
+    reader = StatusReader(store)
+    tell(reader.read())
+    waiting = deque(run for run in reader.pending() if part.holds(run.number))
     if waiting:
         check_tasks(store.spec)
         with enter(store, options or EngineOptions()) as entered:
             if entered.note:
                 announce(entered.note)
-            _drive(store, watcher, entered, waiting, tell, stop)
-    status = watcher.look()
+            _compute(_Progress(reader, entered, waiting), tell, stop)
+    status = reader.read()
     tell(status)
-    if status.done and compacting and not (stop and stop.is_set()):
+    if status.done and compacting and not stop.is_set():
         compact(store)
-    return not any(part.holds(run.number) for run in watcher.pending())
+    return not any(part.holds(run.number) for run in reader.pending())
 
 
-def _drive(
-    store: Store,
-    watcher: Watcher,
-    engine: Engine,
-    waiting: list[Run],
-    tell: Callable[[Status], None],
-    stop: threading.Event | None,
-) -> None:
-    """Hand out runs and take in how they end."""
-    from collections import deque
-
-    drive = _Drive(store, watcher, engine, deque(waiting))
-    looked = time.monotonic()
-    stopping = False
-    while drive.hand or (drive.waiting and not stopping):
-        if not stopping and stop is not None and stop.is_set():
-            stopping = True
-            engine.request_stop()
-        if not stopping:
-            drive.hand_out()
-        for outcome in engine.collect(WAIT):
-            drive.take_in(outcome)
-        if time.monotonic() - looked > LOOK:
-            tell(watcher.look())
-            looked = time.monotonic()
-    if drive.failures:
-        raise _failed(drive.failures)
+def _compute(progress: _Progress, tell: Callable[[Status], None], stop: threading.Event) -> None:
+    """Submit runs and record their ends, until all have ended or `stop` is set."""
+    reported = time.monotonic()
+    while (progress.running or progress.waiting) and not stop.is_set():
+        progress.submit()
+        for outcome in progress.engine.collect(COLLECT_TIMEOUT):
+            progress.record(outcome)
+        if time.monotonic() - reported > STATUS_INTERVAL:
+            tell(progress.reader.read())
+            reported = time.monotonic()
+    if progress.running:
+        progress.engine.request_stop()
+        end = time.monotonic() + STOP_TIMEOUT
+        while progress.running and time.monotonic() < end:
+            for outcome in progress.engine.collect(COLLECT_TIMEOUT):
+                progress.record(outcome)
+    if progress.failures:
+        raise _failed(progress.failures)
 
 
 def _failed(failures: list[tuple[Run, BaseException]]) -> BellcrankError:
-    """Make one error of all runs that failed."""
+    """Return one error for all runs that failed."""
     run, error = failures[0]
     what = str(error) if isinstance(error, BellcrankError) else repr(error)
     others = f"; {len(failures) - 1} more runs failed" if len(failures) > 1 else ""

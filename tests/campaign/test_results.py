@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from bellcrank.campaign import Store, work, write_harvest
+from bellcrank.campaign import Store, work, write_results
 from bellcrank.errors import InvalidSettings, OutputExists
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import Design, read_design
@@ -24,7 +24,7 @@ def test_each_task_gives_its_best_design_cleaned_and_checked(
     tmp_path: Path, finished: Path
 ) -> None:
     store = Store.open(finished)
-    found = write_harvest(store, tmp_path / "designs")
+    found = write_results(store, tmp_path / "designs")
     assert [entry.task for entry in found] == ["scaling-8-paper", "large"]
     for entry in found:
         design = read_design(entry.path)
@@ -37,7 +37,7 @@ def test_each_task_gives_its_best_design_cleaned_and_checked(
 
 
 def test_the_design_is_the_best_that_the_runs_offer(tmp_path: Path, finished: Path) -> None:
-    entry = write_harvest(Store.open(finished), tmp_path, "scaling-8-paper")[0]
+    entry = write_results(Store.open(finished), tmp_path, "scaling-8-paper")[0]
     problem = entry.design.problem
     rows = pq.read_table(finished / "proposals").to_pandas()
     rows = rows[(rows["task"] == entry.task) & rows["accepted"] & (rows["status"] == 0)]
@@ -58,7 +58,7 @@ def test_segments_and_table_give_the_same_designs(
     tmp_path: Path, finished: Path, tabled: Path
 ) -> None:
     one, two = (
-        write_harvest(Store.open(folder), tmp_path / folder.parent.name)
+        write_results(Store.open(folder), tmp_path / folder.parent.name)
         for folder in (finished, tabled)
     )
     for a, b in zip(one, two, strict=True):
@@ -69,9 +69,9 @@ def test_segments_and_table_give_the_same_designs(
 def test_a_campaign_under_way_gives_what_it_has(tmp_path: Path, spec: Spec) -> None:
     store = Store.create(tmp_path / "store", spec)
     with pytest.raises(InvalidSettings, match="task 'large': no accepted design is stored yet"):
-        write_harvest(store, tmp_path / "designs", "large")
+        write_results(store, tmp_path / "designs", "large")
     work(str(store.path), 1)
-    assert [entry.seed for entry in write_harvest(store, tmp_path, "scaling-8-paper")] == [1]
+    assert [entry.seed for entry in write_results(store, tmp_path, "scaling-8-paper")] == [1]
 
 
 def test_files_that_are_there_are_kept_unless_told_otherwise(
@@ -80,9 +80,9 @@ def test_files_that_are_there_are_kept_unless_told_otherwise(
     store = Store.open(finished)
     (tmp_path / "large.json").write_text("mine")
     with pytest.raises(OutputExists, match=r"large\.json"):
-        write_harvest(store, tmp_path)
+        write_results(store, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["large.json"]
-    write_harvest(store, tmp_path, overwrite=True)
+    write_results(store, tmp_path, overwrite=True)
     assert read_design(tmp_path / "large.json").efficiency is not None
     with pytest.raises(InvalidSettings, match="no task 'lerge' in this campaign; it has: scaling"):
-        write_harvest(store, tmp_path, "lerge")
+        write_results(store, tmp_path, "lerge")
