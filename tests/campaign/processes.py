@@ -56,11 +56,11 @@ def session(leader: int) -> list[int]:
 
 
 def workers_of(leader: int) -> list[int]:
-    """Return the worker processes of a command with a local cluster."""
+    """Return the worker processes of a command."""
     found = []
     for pid in session(leader):
         with contextlib.suppress(OSError):
-            if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes():
+            if b"engines.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
                 found.append(pid)
     return found
 

@@ -90,7 +90,7 @@ def test_a_missing_segment_is_named_and_computed_again(segments: Store, finished
     with pytest.raises(CorruptRun, match=r"00000250\.parquet: missing"):
         work(str(segments.path), 0)
     found = verify(segments)
-    assert found.damage == [f"{path}: missing, though 00000500.parquet is there"]
+    assert found.damage == [f"{path}: missing, although 00000500.parquet exists"]
     repair(segments, found)
     assert complete(segments, "serial", compacting=False)
     assert everything(segments.path) == everything(finished)
@@ -98,7 +98,7 @@ def test_a_missing_segment_is_named_and_computed_again(segments: Store, finished
 
 def test_a_segment_in_the_wrong_place_is_named(segments: Store) -> None:
     first_segment(segments, 1).write_bytes(first_segment(segments, 0).read_bytes())
-    with pytest.raises(CorruptRun, match=r"-1/00000000\.parquet: says it holds steps 0 to 249"):
+    with pytest.raises(CorruptRun, match=r"-1/00000000\.parquet: contains steps 0 to 249"):
         work(str(segments.path), 1)
 
 

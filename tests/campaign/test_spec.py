@@ -29,7 +29,7 @@ TASK = '\n[[tasks]]\nproblem = "scaling-8"\nsearch = "paper"\nseeds = 2\n'
         ("name = 'a'\nsegment = 300" + TASK, "segment: expected a multiple of 250, got 300"),
         ("name = 'a'" + TASK + "stepz = 5", "tasks[0]: search 'paper' has no setting 'stepz'"),
         ("name = 'a'" + TASK + "steps = 0", "tasks[0]: steps: expected a whole number of at"),
-        ("name = 'a'" + TASK + "seed = 0", "tasks[0]: seed: is set for each run; say seeds"),
+        ("name = 'a'" + TASK + "seed = 0", "tasks[0]: seed: is set for each run; use seeds"),
         ("name = 'a'" + TASK + "chains = 2", "tasks[0]: chains: is set for each run"),
         ("name = 'a'" + TASK.replace("= 2", "= 0"), "tasks[0]: seeds: expected a count from 1"),
         ("name = 'a'" + TASK.replace("= 2", "= [5, 4]"), "tasks[0]: seeds: expected a count"),
@@ -37,8 +37,8 @@ TASK = '\n[[tasks]]\nproblem = "scaling-8"\nsearch = "paper"\nseeds = 2\n'
         ("name = 'a'" + TASK.replace("= 2", "= true"), "tasks[0].seeds"),
         ("name = 'a'" + TASK.replace("paper", "pape"), "tasks[0]: unknown search 'pape'; known"),
         ("name = 'a'" + TASK.replace("scaling-8", "crain"), "tasks[0]: problem: unknown problem"),
-        ("name = 'a'" + TASK + TASK, "tasks[1]: name 'scaling-8-paper' is that of tasks[0]"),
-        ("name = 'a'" + TASK + TASK + "name = 'b'", "are the same and share seed 0; keep one"),
+        ("name = 'a'" + TASK + TASK, "tasks[1]: name 'scaling-8-paper' is also that of tasks[0]"),
+        ("name = 'a'" + TASK + TASK + "name = 'b'", "are equal and share seed 0; remove one"),
         ("name = ", "not valid TOML"),
     ],
 )
@@ -84,7 +84,7 @@ def test_runs_are_named_by_what_they_compute(spec: Spec, tmp_path: Path) -> None
         ("steps = 600", "steps = 700", "task 'scaling-8-paper': settings: steps is 600 there and"),
         ("seeds = 3", "seeds = 4", "task 'scaling-8-paper': seeds is [0, 2] there and [0, 3]"),
         ("segment = 250", "segment = 500", "segment is 250 there and 500 here"),
-        ('name = "large"', 'name = "great"', "task 'great' is not there"),
+        ('name = "large"', 'name = "great"', "task 'great' is missing there"),
         ('"crane"', '"anti-parallel"', "task 'large': problem: name is crane there and anti-"),
     ],
 )
@@ -94,16 +94,21 @@ def test_another_spec_in_the_same_folder_is_refused_and_said_where_it_differs(
     Store.create(tmp_path / "store", spec)
     assert Store.create(tmp_path / "store", spec).spec == spec
     other = read_spec(write_spec(tmp_path, SPEC.replace(old, new)))
-    with pytest.raises(InvalidSettings, match="the campaign there has another spec: ") as raised:
+    with pytest.raises(
+        InvalidSettings, match="the campaign in this folder has another spec: "
+    ) as raised:
         Store.create(tmp_path / "store", other)
     assert message in str(raised.value)
 
 
 def test_a_task_that_is_gone_is_named(spec: Spec) -> None:
-    assert spec_difference(spec, Spec(spec.name, 250, spec.tasks[:1])) == "task 'large' is not here"
+    assert (
+        spec_difference(spec, Spec(spec.name, 250, spec.tasks[:1]))
+        == "task 'large' is missing here"
+    )
     assert (
         spec_difference(spec, Spec(spec.name, 250, spec.tasks[::-1]))
-        == "the tasks are in another order"
+        == "the tasks have another order"
     )
 
 

@@ -77,7 +77,7 @@ def test_an_unequal_second_result_is_an_error(segments: Store) -> None:
         np.zeros(250, np.bool_), np.zeros(250, np.int8),
     )  # fmt: skip
     before = everything(segments.path)
-    with pytest.raises(CorruptRun, match=r"00000000\.parquet: is there already and holds some"):
+    with pytest.raises(CorruptRun, match=r"00000000\.parquet: exists with another content"):
         segments.append(run, 0, rows, {}, best=0.0, done=False)
     assert everything(segments.path) == before
 

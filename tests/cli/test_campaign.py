@@ -66,7 +66,7 @@ def test_damage_is_named_mended_and_computed_again(tmp_path: Path) -> None:
     words = (write_spec(tmp_path), "--out", store, "--engine", "serial")
     assert call("campaign", "run", *words, "--keep-segments").code == 0
     whole = call("campaign", "verify", store)
-    assert (whole.code, whole.out) == (0, f"10 files with {ROWS} rows as written.\n")
+    assert (whole.code, whole.out) == (0, f"10 files with {ROWS} rows intact.\n")
     rotten(next(store.glob("segments/*-7/*.parquet")), 700)
     named = call("campaign", "verify", store)
     assert named.code == 1
@@ -75,7 +75,7 @@ def test_damage_is_named_mended_and_computed_again(tmp_path: Path) -> None:
     assert mended.code == 0
     assert "Deleted 1 file; bellcrank campaign resume" in mended.out
     assert call("campaign", "resume", store, "--engine", "serial").code == 0
-    assert call("campaign", "verify", store).out == f"1 file with {ROWS} rows as written.\n"
+    assert call("campaign", "verify", store).out == f"1 file with {ROWS} rows intact.\n"
 
 
 @pytest.mark.parametrize(
