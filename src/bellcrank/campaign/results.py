@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.campaign.store import CONVERGED, SEGMENT_ADVICE
+from bellcrank.campaign.store import SEGMENT_ADVICE
 from bellcrank.errors import InvalidSettings
 from bellcrank.model import problem_from_dict, write_design
 from bellcrank.model.storage import already_exists
 from bellcrank.provenance import provenance
+from bellcrank.search import Verdict
 from bellcrank.storage.files import make_folder
 from bellcrank.storage.parquet import arrays_of, parquet_file
 
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from bellcrank.search import Candidate
 
 COLUMNS = ["seed", "step", "mask", "efficiency"]
+CONVERGED = int(Verdict.CONVERGED)
+"""Status of a proposal whose efficiency is that of a stable equilibrium."""
 PER_RUN = 10
 """Number of candidates of each run."""
 PER_TASK = 120

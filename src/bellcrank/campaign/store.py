@@ -62,8 +62,6 @@ TABLE_ADVICE = (
     "computes the rest again"
 )
 SPEC_KEYS = ("name", "segment", "tasks")
-CONVERGED = 0
-"""Status of a proposal whose efficiency is that of a stable equilibrium."""
 
 
 class Store:
