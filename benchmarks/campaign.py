@@ -1,8 +1,7 @@
-"""What campaigns cost: ``python -m benchmarks.campaign [--quick]``.
+"""Cost of campaigns: ``python -m benchmarks.campaign [--quick]``.
 
-Four questions, each answered in one run: how much faster are two workers than one, what does a
-run cost beside its search, what do ten million proposals weigh and how fast are they searched,
-and what would ten thousand cores do. The last is an estimate from the others.
+Measures the speed-up by a second worker, the cost of a run beside its search, and the size of ten
+million proposals with the time to search them; estimates the limits for ten thousand cores.
 """
 
 from __future__ import annotations
@@ -45,16 +44,16 @@ CORES = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much of everything to measure.
+    """Sizes of the measurements.
 
     Parameters
     ----------
     steps, seeds
-        Of the campaign for the speed-up.
+        Steps and number of runs of the campaign for the speed-up.
     short_runs
-        Of one segment of 250 steps each, for the overhead.
+        Number of runs of one segment of 250 steps, for the overhead.
     rows, row_seeds
-        Of the large store, and runs that it consists of.
+        Rows and number of runs of the large store.
     """
 
     steps: int
@@ -80,14 +79,14 @@ seeds = {seeds}
 
 
 def new_store(place: Path, name: str, **values: object) -> Store:
-    """Begin a campaign of one task."""
+    """Create a campaign of one task."""
     path = place / f"{name}.toml"
     path.write_text(SPEC.format(name=name, **{"segment": 4000, **values}))
     return Store.create(place / name, read_spec(path))
 
 
 def run(store: Store, *words: str) -> float:
-    """Complete a campaign by the command, as users do; return the seconds that took."""
+    """Complete a campaign by the command line; return the seconds."""
     start = time.perf_counter()
     command = [sys.executable, "-m", "bellcrank", "campaign", "resume", str(store.path), *words]
     subprocess.run(command, check=True, capture_output=True)
@@ -95,7 +94,7 @@ def run(store: Store, *words: str) -> float:
 
 
 def speed_up(place: Path, effort: Effort) -> float:
-    """One worker, two, and again: the same campaign each time; return seconds of a run."""
+    """Compute the same campaign with one and two workers, twice; return the seconds of a run."""
     print("| workers | seconds | speed-up |")
     print("|---|---|---|")
     values = {"problem": "crane", "search": "basin-hopping"}
@@ -119,9 +118,9 @@ class Overhead:
     Parameters
     ----------
     worker
-        Where it is computed: problem, kernels, files.
+        Seconds in the worker, for problem and files.
     dispatch
-        Of scheduler and driver, for handing it out and taking in that it has ended.
+        Seconds to submit a run and to record its end.
     """
 
     worker: float
@@ -129,7 +128,7 @@ class Overhead:
 
 
 def overhead(place: Path, effort: Effort) -> Overhead:
-    """Time runs so short that what is around them shows."""
+    """Measure runs that are so short that the overhead dominates."""
     values = {"problem": "scaling-8", "search": "paper", "steps": 250, "segment": 250}
     store = new_store(place, "short", seeds=effort.short_runs, **values)
     start = time.perf_counter()
@@ -144,13 +143,13 @@ def overhead(place: Path, effort: Effort) -> Overhead:
     print("|---|---|")
     print(f"| the search alone | {1e3 * searching:.1f} |")
     print(f"| with its problem, its segment and that on disk | {1e3 * serial:.1f} |")
-    print(f"| Dask, for handing it out | {1e3 * dispatch:.1f} |")
+    print(f"| submission to a worker process | {1e3 * dispatch:.1f} |")
     print(f"\nTwo workers take {starting:.1f} s to start.\n")
     return Overhead(serial - searching, dispatch)
 
 
 def search_alone(chosen: Run) -> float:
-    """Return the seconds that the steps of a run take, and nothing else."""
+    """Return the seconds of the steps of a run alone."""
     settings = read_settings(chosen.settings)
     evaluator = make_evaluator(problem_from_dict(chosen.task.problem, "it"), settings)
     start = time.perf_counter()
@@ -159,7 +158,7 @@ def search_alone(chosen: Run) -> float:
 
 
 def dispatch_all(engine: Engine, count: int) -> float:
-    """Hand out runs that have ended already; return the seconds for each."""
+    """Submit runs that are done already; return the seconds for each."""
     engine.submit(0)
     while not engine.collect(1.0):
         pass
@@ -177,44 +176,44 @@ def dispatch_all(engine: Engine, count: int) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Weight:
-    """What a large store costs.
+    """Cost of a large store.
 
     Parameters
     ----------
     row
         Bytes of a proposal in segments.
-    look
-        Seconds to look once at a run of the store.
+    status
+        Seconds to read the status of a run.
     compaction
-        Seconds for each row.
+        Seconds of compaction per row.
     """
 
     row: float
-    look: float
+    status: float
     compaction: float
 
 
 def large(place: Path, effort: Effort) -> Weight:
-    """Fill a store on all cores, compact it and search it."""
+    """Fill a store on all cores, compact and search it."""
     steps = effort.rows // effort.row_seeds
     values = {"problem": "crane", "search": "paper", "steps": steps, "seeds": effort.row_seeds}
     store = new_store(place, "large", **values)
-    told = {"filling it, on all cores": run(store, "--keep-segments")}
+    seconds = {"filling it, on all cores": run(store, "--keep-segments")}
     segments = store.files()
     size = {"segments": (len(segments), sum(path.stat().st_size for path in segments))}
-    with timed(told, "status, from segments"):
+    with timed(seconds, "status, from segments"):
         assert StatusReader(store).read().steps_done == effort.rows
-    with timed(told, "top 1000, from segments"):
+    with timed(seconds, "top 1000, from segments"):
         from_segments = best_designs(store, 1000)
-    with timed(told, "compaction"):
+    with timed(seconds, "compaction"):
         compact(store)
-    with timed(told, "status, from the table"):
+    with timed(seconds, "status, from the table"):
         assert StatusReader(store).read().steps_done == effort.rows
-    with timed(told, "top 1000, from the table"):
+    with timed(seconds, "top 1000, from the table"):
         assert best_designs(store, 1000) == from_segments
-    with timed(told, "harvest: the best one, cleaned and checked"):
+    with timed(seconds, "results: the best design, cleaned and verified"):
         write_results(store, place / "designs")
-    with timed(told, "every byte verified"):
+    with timed(seconds, "every byte verified"):
         assert verify(store).damage == []
     parts = store.files()
     size["table"] = (len(parts), sum(path.stat().st_size for path in parts))
@@ -223,8 +222,8 @@ def large(place: Path, effort: Effort) -> Weight:
     for name, (count, total) in size.items():
         print(f"| {name} | {count} | {total / 1e6:.1f} | {total / effort.rows:.1f} |")
     print("\n| on it | seconds |\n|---|---|")
-    for name, seconds in told.items():
-        print(f"| {name} | {seconds:.2f} |")
+    for name, value in seconds.items():
+        print(f"| {name} | {value:.2f} |")
     here, below = (
         resource.getrusage(who).ru_maxrss / 1024
         for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
@@ -232,21 +231,21 @@ def large(place: Path, effort: Effort) -> Weight:
     print(f"\nMemory at most: {here:.0f} MB here, {below:.0f} MB in the largest other process.\n")
     return Weight(
         size["segments"][1] / effort.rows,
-        told["status, from segments"] / effort.row_seeds,
-        told["compaction"] / effort.rows,
+        seconds["status, from segments"] / effort.row_seeds,
+        seconds["compaction"] / effort.rows,
     )
 
 
 @contextmanager
-def timed(told: dict[str, float], what: str) -> Iterator[None]:
-    """Note how long something takes."""
+def timed(seconds: dict[str, float], what: str) -> Iterator[None]:
+    """Record the seconds that a block takes."""
     start = time.perf_counter()
     yield
-    told[what] = time.perf_counter() - start
+    seconds[what] = time.perf_counter() - start
 
 
 def estimate(effort: Effort, seconds: float, beside: Overhead, weight: Weight) -> None:
-    """Say what many cores would do with runs like those of the speed-up, if nothing broke."""
+    """Print an estimate for many cores with runs like those of the speed-up."""
     segments = -(-effort.steps // SEGMENT)
     ends = CORES / (seconds + beside.worker)
     files = ends * segments
@@ -254,22 +253,22 @@ def estimate(effort: Effort, seconds: float, beside: Overhead, weight: Weight) -
     print(f"| {CORES} cores, runs of {effort.steps} steps of the crane | |")
     print("|---|---|")
     print(f"| seconds of a run | {seconds:.1f} |")
-    print(f"| lost beside the search | {beside.worker / seconds:.2%} |")
+    print(f"| overhead in the worker | {beside.worker / seconds:.2%} |")
     print(f"| runs that end in a second | {ends:.0f} |")
-    print(f"| that one scheduler and driver can hand out | {1.0 / beside.dispatch:.0f} |")
-    print(f"| cores that these keep busy | {seconds / beside.dispatch:.0f} |")
+    print(f"| runs that one command can submit in a second | {1.0 / beside.dispatch:.0f} |")
+    print(f"| cores that one command can supply | {seconds / beside.dispatch:.0f} |")
     print(f"| files written in a second | {files:.0f} |")
     print(f"| MB written in a second | {rows * weight.row / 1e6:.0f} |")
     print(f"| rows in an hour | {3600 * rows:.1e} |")
     print(f"| GB in an hour | {3600 * rows * weight.row / 1e9:.0f} |")
     print(f"| compaction of that hour on one core, hours | {rows * weight.compaction:.1f} |")
-    print(f"| seconds of a look at the runs of that hour | {3600 * ends * weight.look:.0f} |")
+    print(f"| seconds to read the status of that hour | {3600 * ends * weight.status:.0f} |")
 
 
 def main() -> None:
-    """Measure, and print tables."""
+    """Measure and print tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="A fiftieth of it.")
+    parser.add_argument("--quick", action="store_true", help="A fiftieth of the work.")
     effort = QUICK if parser.parse_args().quick else FULL
     with tempfile.TemporaryDirectory() as scratch:
         place = Path(scratch)

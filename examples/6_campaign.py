@@ -2,8 +2,7 @@
 A campaign on a cluster
 =======================
 
-One search is an anecdote. A campaign makes as many as wanted, on one core or a cluster, and
-survives any kill.
+A campaign runs many searches, on one core or a cluster, and survives a kill at any instant.
 """
 
 # %%
@@ -44,21 +43,22 @@ store = Store.create(Path("sizes"), read_spec(Path("sizes.toml")))
 # %%
 # Where to run
 # ------------
-# An engine only decides where: in this process (``serial``), on all cores (``local``), or on a
-# cluster by Dask. All leave the same bytes, so that a campaign may begin here and end there.
-# This page is made in one process; on a cluster whose machines share the folder, it is
+# An engine decides where runs are computed: in this process (``serial``), on all cores
+# (``processes``), or on a cluster (``dask``, ``slurm``). All leave the same bytes, so a campaign
+# may start on one machine and end on another. This example uses one process; on a cluster whose
+# machines share the folder, the command is
 #
 # .. code-block:: console
 #
 #     $ bellcrank campaign run sizes.toml --engine slurm --workers 200 --slurm queue=short
 #
-# or, as a job array without Dask, in each job
+# or, in each job of a job array,
 #
 # .. code-block:: console
 #
 #     $ bellcrank campaign run sizes.toml --shard $SLURM_ARRAY_TASK_ID/100
 #
-# and ``bellcrank campaign watch sizes`` shows from anywhere how it stands (:doc:`/campaigns`).
+# and ``bellcrank campaign watch sizes`` shows the status (:doc:`/campaigns`).
 
 complete(store, "serial")
 status = StatusReader(store).read()
@@ -72,11 +72,11 @@ for best in best_designs(store, 4):
     print(f"{best.task}, seed {best.seed}, step {best.step}: {best.efficiency:.3f}")
 
 # %%
-# The best of each task, cleaned of what bears no load and followed again from rest:
+# The best design of each task, without unloaded beams and evaluated again from rest:
 
 small, large = write_results(store, Path("designs"))
 draw_comparison(
     motion_of(small.design, name=small.task),
     motion_of(large.design, name=large.task),
-    "harvest.png",
+    "results.png",
 )

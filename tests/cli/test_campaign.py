@@ -51,7 +51,7 @@ def test_the_best_designs_can_be_evaluated(campaign: Path, tmp_path: Path) -> No
         assert one["efficiency"] == pytest.approx(other["efficiency"], abs=1e-8)
 
 
-def test_a_harvest_is_written_and_can_be_evaluated(campaign: Path, tmp_path: Path) -> None:
+def test_results_are_written_and_can_be_evaluated(campaign: Path, tmp_path: Path) -> None:
     told = call("campaign", "results", campaign, "--out", tmp_path / "designs")
     assert told.code == 0, told.err
     assert f"written to {tmp_path / 'designs'}/" in told.out

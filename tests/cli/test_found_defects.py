@@ -89,21 +89,20 @@ def test_an_unfinished_run_points_to_the_option_that_resumes_it(half: Path) -> N
     assert "--resume" in message
 
 
-def test_an_error_in_one_chain_is_told_though_another_was_stopped_by_it(half: Path) -> None:
+def test_an_error_in_one_chain_is_reported_though_another_was_stopped_by_it(half: Path) -> None:
     (half / "segments/001/00000000.parquet").write_bytes(b"")
     failed = threading.Event()
-    real = parallel.run_chain
+    real = parallel.ChainRunner.run
 
-    def run_chain(folder: Any, settings: Any, chain: int, stop: threading.Event, tell: Any) -> bool:
-        if chain == 0:
+    def run(self: parallel.ChainRunner, stopped: Any, tell: Any) -> None:
+        if self.chain == 0:
             failed.wait(10.0)
-            stop.wait(10.0)
         try:
-            return real(folder, settings, chain, stop, tell)
+            real(self, stopped, tell)
         finally:
             failed.set()
 
-    with mock.patch.object(parallel, "run_chain", run_chain):
+    with mock.patch.object(parallel.ChainRunner, "run", run):
         outcome = call("design", "--resume", half, "--workers", "2")
     assert outcome.code == 1
     assert "error:" in outcome.err

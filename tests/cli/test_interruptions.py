@@ -1,9 +1,10 @@
-"""A job goes on after Ctrl-C, a kill or a full disk, to the same end to the last bit."""
+"""A job resumes after Ctrl-C, a kill or a full disk, and ends with the same bits."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import json
 import os
 import random
@@ -11,6 +12,7 @@ import resource
 import signal
 import subprocess
 import sys
+import termios
 import time
 from typing import TYPE_CHECKING
 from unittest import mock
@@ -31,6 +33,7 @@ from .helpers import (
     design_of,
     failing_from,
     files,
+    refusal,
     table,
 )
 
@@ -42,9 +45,10 @@ if TYPE_CHECKING:
 
 GATED = f"""
 import os
-from bellcrank.cli import main
+from bellcrank.cli import main, stopping
 from bellcrank.search import parallel
 
+stopping.EXIT_TIMEOUT = 30.0  # however busy the machine is, the complete blocks are stored
 parallel.SEGMENT_STEPS = {BLOCK}
 advance = parallel.advance_chain
 
@@ -56,6 +60,21 @@ parallel.advance_chain = advance_at_the_gate
 main()
 """
 """The command, whose chains wait for a byte before each block, or for the end of input."""
+
+GATED_END = """
+import os, sys
+from bellcrank.cli import main
+from bellcrank.workflows import design
+
+def compare(*words, **options):
+    print("comparing", file=sys.stderr, flush=True)
+    while os.read(0, 1):
+        pass
+
+design.conclude = compare
+main()
+"""
+"""The command, which waits for the end of input when it compares the best designs."""
 
 DEADLINE = 60.0
 
@@ -69,14 +88,14 @@ def wait_until(happened: Callable[[], bool], job: subprocess.Popen[bytes]) -> No
         time.sleep(0.001)
 
 
-def shards(folder: Path) -> int:
+def segments(folder: Path) -> int:
     return len(list(folder.glob("segments/*/*.parquet")))
 
 
 @contextlib.contextmanager
-def job(folder: Path, *words: object) -> Iterator[subprocess.Popen[bytes]]:
+def job(folder: Path, *words: object, program: str = GATED) -> Iterator[subprocess.Popen[bytes]]:
     """Run `bellcrank design` at the gate, in a process group of its own; end it afterwards."""
-    command = [sys.executable, "-c", GATED, "design", *map(str, words)]
+    command = [sys.executable, "-c", program, "design", *map(str, words)]
     log = folder.with_name("log")
     with (
         log.open("wb") as told,
@@ -91,6 +110,14 @@ def job(folder: Path, *words: object) -> Iterator[subprocess.Popen[bytes]]:
                 os.killpg(started.pid, signal.SIGKILL)
 
 
+def waiting(running: subprocess.Popen[bytes]) -> int:
+    """Return the number of bytes that no chain has read yet."""
+    assert running.stdin is not None
+    count = bytearray(4)
+    fcntl.ioctl(running.stdin, termios.FIONREAD, count)
+    return int.from_bytes(count, sys.byteorder)
+
+
 def let_through(running: subprocess.Popen[bytes], blocks: int) -> None:
     assert running.stdin is not None
     running.stdin.write(b"." * blocks)
@@ -102,68 +129,129 @@ def open_gate(running: subprocess.Popen[bytes]) -> None:
     running.stdin.close()
 
 
-# Ctrl-C.
+# Ctrl-C and SIGTERM.
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "kill"])
-def test_a_search_stops_on_request_says_how_to_go_on_and_ends_the_same(
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "sigterm"])
+def test_a_search_stops_in_the_middle_of_a_block_and_resumes_to_the_same_end(
     tmp_path: Path, whole: Path, number: signal.Signals
 ) -> None:
     folder, log = tmp_path / "run", tmp_path / "log"
     with job(folder, PROBLEM, *SETTINGS, "--out", folder, "--workers", 2) as running:
         let_through(running, 3)
-        wait_until(lambda: shards(folder) == 3, running)
+        wait_until(lambda: segments(folder) == 3, running)
+        # Both chains wait for ever in their next block.
         os.killpg(running.pid, number)
-        wait_until(lambda: b"Stopping" in log.read_bytes(), running)
-        open_gate(running)
         assert running.wait(DEADLINE) == 130
     said = log.read_text()
-    assert said.startswith("Stopping after the steps at hand ...\n")
     assert f"bellcrank design --resume {folder}" in said
     assert "Traceback" not in said
-    assert json.loads((folder / "run.json").read_text())["status"] == "stopped"
-    assert 3 <= shards(folder) < BLOCKS
+    assert 3 <= segments(folder) < BLOCKS
     outcome = call("design", "--resume", folder)
     assert outcome.code == 0, outcome.err
     assert_same_run(folder, whole)
 
 
-def test_a_second_ctrl_c_insists_and_what_was_done_is_kept_even_then(
+def test_complete_blocks_that_are_not_stored_yet_survive_a_stop(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    rare = GATED.replace(f"SEGMENT_STEPS = {BLOCK}", f"SEGMENT_STEPS = {100 * BLOCK}")
+    words = (PROBLEM, *SETTINGS, "--out", folder, "--workers", 1)
+    with job(folder, *words, program=rare) as running:
+        let_through(running, 2)
+        wait_until(lambda: waiting(running) == 0, running)
+        os.killpg(running.pid, signal.SIGTERM)
+        assert running.wait(DEADLINE) == 130
+    assert json.loads((folder / "run.json").read_text())["status"] == "stopped"
+    assert segments(folder) == 1
+
+
+@pytest.mark.slow
+def test_a_stop_while_the_best_designs_are_compared_ends_the_process(
     tmp_path: Path, whole: Path
 ) -> None:
     folder, log = tmp_path / "run", tmp_path / "log"
-    with job(folder, PROBLEM, *SETTINGS, "--out", folder, "--workers", 2) as running:
-        let_through(running, 3)
-        wait_until(lambda: shards(folder) == 3, running)
-        os.killpg(running.pid, signal.SIGINT)
-        wait_until(lambda: b"Stopping" in log.read_bytes(), running)
-        os.killpg(running.pid, signal.SIGINT)
-        open_gate(running)
+    words = (PROBLEM, *SETTINGS, "--out", folder, "--workers", 2)
+    with job(folder, *words, program=GATED_END) as running:
+        wait_until(lambda: segments(folder) == 2 and b"comparing" in log.read_bytes(), running)
+        os.killpg(running.pid, signal.SIGTERM)
         assert running.wait(DEADLINE) == 130
-    assert "Traceback" not in log.read_text()
-    assert shards(folder) >= 3
+    assert f"bellcrank design --resume {folder}" in log.read_text()
     assert call("design", "--resume", folder).code == 0
     assert_same_run(folder, whole)
+
+
+@pytest.mark.slow
+def test_a_second_ctrl_c_ends_the_process_at_once(tmp_path: Path, whole: Path) -> None:
+    folder, log = tmp_path / "run", tmp_path / "log"
+    with job(folder, PROBLEM, *SETTINGS, "--out", folder, "--workers", 2) as running:
+        let_through(running, 3)
+        wait_until(lambda: segments(folder) == 3, running)
+        os.killpg(running.pid, signal.SIGINT)
+        wait_until(lambda: b"Stopping" in log.read_bytes(), running)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(running.pid, signal.SIGINT)
+        assert running.wait(DEADLINE) == 130
+    assert "Traceback" not in log.read_text()
+    assert segments(folder) >= 3
+    assert call("design", "--resume", folder).code == 0
+    assert_same_run(folder, whole)
+
+
+# Two runs in one folder, and names of folders.
+
+
+def test_a_second_run_in_the_same_folder_names_the_process_that_works_there(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "run"
+    with job(folder, PROBLEM, *SETTINGS, "--out", folder) as running:
+        let_through(running, 1)
+        wait_until(lambda: segments(folder) == 1, running)
+        for words in ((PROBLEM, "--out", folder), ("--resume", folder)):
+            line = refusal("design", *words, code=1, folder=folder)
+            assert f"{folder}: process {running.pid} is working in this folder" in line
+            assert "--out" in line
+
+
+def test_a_second_design_of_the_same_name_goes_into_a_numbered_folder(here: Path) -> None:
+    words = ("design", PROBLEM, "--steps", "20", "--chains", "1", "--search", "paper")
+    assert call(*words).code == 0
+    outcome = call(*words, "--goal", "mass <= 0.99")
+    assert outcome.code == 0, outcome.err
+    assert f"{PROBLEM}-2/" in outcome.err
+    assert f"{PROBLEM}-2/" in outcome.out
+    assert (here / f"{PROBLEM}-2" / "design.json").exists()
+
+
+@pytest.mark.parametrize("command", ["export", "validate", "evaluate"])
+def test_an_unfinished_run_is_refused_with_the_command_that_finishes_it(
+    here: Path, half: Path, command: str
+) -> None:
+    half.rename(here / PROBLEM)
+    words = (command, PROBLEM, "part.stl") if command == "export" else (command, PROBLEM)
+    line = refusal(*words)
+    assert f"bellcrank design --resume {PROBLEM}" in line
 
 
 # kill -9.
 
 
+@pytest.mark.slow
 def test_a_job_killed_again_and_again_ends_the_same(tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "run"
     words: tuple[object, ...] = (PROBLEM, *SETTINGS, "--out", folder)
     chance = random.Random(20)
     for _ in range(3):
-        before = shards(folder)
+        before = segments(folder)
         with job(folder, *words, "--workers", 2) as running:
             blocks = chance.randint(1, 3)
             let_through(running, blocks)
             seen = before + chance.randint(0, blocks)
-            wait_until(lambda seen=seen: seen <= shards(folder) and has_begun(folder), running)
+            wait_until(lambda seen=seen: seen <= segments(folder) and has_begun(folder), running)
             os.killpg(running.pid, signal.SIGKILL)
             assert running.wait(DEADLINE) == -signal.SIGKILL
         assert not (folder / "history.parquet").exists()
-        assert shards(folder) >= seen
+        assert segments(folder) >= seen
         words = ("--resume", folder)
     for last in ("motion.png", "design.json", "history.parquet"):
         with job(folder, *words, "--workers", 2) as running:
@@ -198,7 +286,8 @@ def assert_failed(outcome: Outcome, message: str) -> None:
     assert outcome.complaints.count("\n") == 1
 
 
-# Two calls for each file: its content and its name. The description; six shards; ...
+# Two calls for each file: its content and its name. The description; six segments; ...
+@pytest.mark.slow
 @pytest.mark.parametrize("instant", [0, 2, 7, 14])
 def test_a_job_goes_on_after_a_full_disk(tmp_path: Path, whole: Path, instant: int) -> None:
     folder = tmp_path / "run"
@@ -225,6 +314,7 @@ def no_file_larger_than(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["run.json", "history.parquet", "efficiency.png"])
 def test_a_job_goes_on_where_the_system_refused_to_write(
     tmp_path: Path, whole: Path, name: str
@@ -251,7 +341,7 @@ def test_results_survive_a_full_disk_while_they_are_written_again(copy: Path, wh
 # Not interrupted at all.
 
 
-@pytest.mark.parametrize("workers", [1, 2, 3])
+@pytest.mark.parametrize("workers", [1, 3])
 def test_the_number_of_workers_changes_nothing(tmp_path: Path, whole: Path, workers: int) -> None:
     folder = tmp_path / "run"
     outcome = call("design", PROBLEM, *SETTINGS, "--out", folder, "--workers", workers)
@@ -287,6 +377,6 @@ def test_a_job_resumed_with_another_version_says_so(copy: Path, whole: Path) -> 
 
 
 def test_a_half_done_job_is_resumed_to_the_same_end(half: Path, whole: Path) -> None:
-    assert 0 < shards(half) < BLOCKS
+    assert 0 < segments(half) < BLOCKS
     assert call("design", "--resume", half, "--workers", 3).code == 0
     assert_same_run(half, whole)

@@ -87,6 +87,8 @@ class ChainRunner:
 
     Attributes
     ----------
+    chain
+        Number of the chain.
     done
         Whether the chain has reached its end.
     """
@@ -95,7 +97,7 @@ class ChainRunner:
         self.done = False
         self._folder = folder
         self._settings = settings
-        self._chain = chain
+        self.chain = chain
         self._lock = threading.Lock()
         self._closed = False
         self._pending: list[Proposals] = []
@@ -104,7 +106,7 @@ class ChainRunner:
 
     def run(self, stopped: Callable[[], bool], tell: Callable[[Progress], None]) -> None:
         """Advance the chain to its end, or until `stopped()` or `close`."""
-        folder, settings, chain = self._folder, self._settings, self._chain
+        folder, settings, chain = self._folder, self._settings, self.chain
         self._stored_steps, stored = folder.progress(chain)
         evaluator = make_evaluator(folder.problem, settings)
         state = read_state(settings, stored) if stored else start_chain(evaluator, settings, chain)
@@ -135,7 +137,7 @@ class ChainRunner:
             columns = zip(*self._pending, strict=True)
             self._pending = []
             rows = Proposals(*map(np.concatenate, columns))
-            self._folder.append(self._chain, self._stored_steps, rows, self._state.to_dict())
+            self._folder.append(self.chain, self._stored_steps, rows, self._state.to_dict())
             self._stored_steps = self._state.step
 
 
