@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from bellcrank.campaign import Spec
 
+pytestmark = pytest.mark.slow
+
 Reference = tuple["Path", dict[str, "bytes | str"]]
 
 
