@@ -56,7 +56,7 @@ def test_a_full_disk_at_any_instant_is_one_error_and_touches_nothing(
     before = files(run.path)
     with full_from(instant), pytest.raises(StorageError) as caught:
         run.append(1, 0, proposals(run.problem, 1, 0), {"step": 10, "chain": 1})
-    assert f"{run.path}/segments/001: " in str(caught.value)
+    assert f"{run.path}/segments/001" in str(caught.value)
     assert "No space left on device" in str(caught.value)
     assert files(run.path) == before
     fill(run)
@@ -106,7 +106,7 @@ def test_a_disk_that_is_really_full_is_one_error_and_the_run_goes_on_later(
             assert files(run.path) == before
         else:
             break
-    assert f"{run.path}: cannot be written (No space left on device)" in message
+    assert f"{run.path}/history.parquet: cannot be written (No space left on device)" in message
     assert kilobytes > 256
     assert_holds(run, step, chains=1)
     assert RunFolder.open(run.path).status == "finished"
@@ -128,7 +128,7 @@ def test_a_folder_that_may_not_be_written_is_one_error(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(os, "open", closed)
-    with pytest.raises(StorageError, match=r"\(Permission denied\); make it writable, or choose"):
+    with pytest.raises(StorageError, match=r"\(Permission denied\); make the folder writable"):
         run.append(0, 0, proposals(run.problem, 0, 0), {})
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import heapq
 import re
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -256,14 +255,14 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
     settings = read_settings(task.settings)
     problem = problem_from_dict(task.problem, f"task {task.name!r}")
     offers = searches[settings.name].offers
-    candidates = (
+    candidates = [
         candidate
         for seed, rows in _accepted(store, task)
         for candidate in candidates_of(
             seed, rows["step"], rows["mask"][:, : task.mask_bytes], rows["efficiency"], offers,
             PER_RUN,
         )
-    )  # fmt: skip
+    ]  # fmt: skip
     chosen = heapq.nlargest(PER_TASK, candidates, key=lambda candidate: candidate.efficiency)
     if not chosen:
         raise InvalidSettings(f"task {task.name!r}: no accepted design is stored yet")
@@ -284,38 +283,21 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
 
 
 def _accepted(store: Store, task: Task) -> Iterator[tuple[int, dict[str, NDArray[Any]]]]:
-    """Yield seed and accepted, converged rows of each run of a task, one run at a time."""
-    seed = -1
-    parts: list[dict[str, NDArray[Any]]] = []
-    for part in _accepted_parts(store, task):
-        seeds = part["seed"]
-        bounds = [0, *(np.flatnonzero(np.diff(seeds)) + 1).tolist(), len(seeds)]
-        for first, last in pairwise(bounds):
-            if first == last:
-                continue
-            if parts and seeds[first] != seed:
-                yield seed, _joined(parts)
-                parts = []
-            seed = int(seeds[first])
-            parts.append({name: column[first:last] for name, column in part.items()})
-    if parts:
-        yield seed, _joined(parts)
-
-
-def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def _accepted_parts(store: Store, task: Task) -> Iterator[dict[str, NDArray[Any]]]:
-    """Yield the accepted, converged rows of a task, in the order of runs and steps."""
+    """Yield seed and accepted, converged rows of each run of a task."""
+    import pyarrow as pa
     import pyarrow.compute as pc
 
     columns = [*COLUMNS, "task", "accepted", "status"]
+    tables = []
     for path in store.files():
         for group in _row_groups(path, task.name):
             with parquet_file(path, SEGMENT_ADVICE) as (file, _):
                 table = file.read_row_group(group.number, columns=columns, use_threads=False)
             converged = pc.equal(table["status"], CONVERGED)
             of_task = pc.equal(table["task"], task.name)
-            kept = pc.and_(pc.and_(table["accepted"], converged), of_task)
-            yield arrays_of(table.filter(kept), COLUMNS)
+            tables.append(table.filter(pc.and_(pc.and_(table["accepted"], converged), of_task)))
+    if tables:
+        rows = arrays_of(pa.concat_tables(tables), COLUMNS)
+        seeds, starts = np.unique(rows["seed"], return_index=True)
+        for seed, first, last in zip(seeds, starts, [*starts[1:], len(rows["seed"])], strict=True):
+            yield int(seed), {name: column[first:last] for name, column in rows.items()}

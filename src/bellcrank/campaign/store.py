@@ -25,10 +25,10 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.campaign.spec import Spec, spec_difference
 from bellcrank.errors import CorruptRun, InvalidSettings, OutputExists
-from bellcrank.model.storage import sync_folder
+from bellcrank.model.storage import storage_error, sync_folder, whole_file
 from bellcrank.provenance import provenance
 from bellcrank.storage.description import Description, plain, read_description, write_description
-from bellcrank.storage.files import make_folder, require_new_folder, storage_error, whole_file
+from bellcrank.storage.files import make_folder, require_new_folder
 from bellcrank.storage.parquet import check_seal, seal_of, write_sealed
 from bellcrank.storage.records import checked_proposals
 from bellcrank.storage.segments import (
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from bellcrank.campaign.spec import Run
-    from bellcrank.storage import ProposalColumns
 
 CAMPAIGN_SCHEMA = "bellcrank/campaign/1"
 DESCRIPTION = "campaign.json"
@@ -194,7 +193,7 @@ class Store:
         self,
         run: Run,
         first_step: int,
-        rows: ProposalColumns,
+        rows: Any,
         state: Mapping[str, Any],
         *,
         best: float,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from bellcrank.campaign.compaction import expand, read_parts, read_table_part
 from bellcrank.errors import BellcrankError, CorruptRun
-from bellcrank.storage.files import storage_error
+from bellcrank.model.storage import storage_error
 from bellcrank.storage.segments import foreign
 
 if TYPE_CHECKING:

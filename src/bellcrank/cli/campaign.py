@@ -49,9 +49,6 @@ Scheduler = Annotated[
     str | None,
     typer.Option(help="Address of a running Dask scheduler, tcp://host:port or tls://host:port."),
 ]
-TlsCa = Annotated[Path | None, typer.Option(help="Certificate of the authority, for tls://.")]
-TlsCert = Annotated[Path | None, typer.Option(help="Certificate of the client, for tls://.")]
-TlsKey = Annotated[Path | None, typer.Option(help="Key of the client, for tls://.")]
 Slurm = Annotated[
     list[str] | None,
     typer.Option(help="KEY=VALUE for SLURMCluster of dask-jobqueue; repeatable."),
@@ -76,9 +73,6 @@ def run(
     engine: Engine = None,
     host: Host = None,
     scheduler: Scheduler = None,
-    tls_ca: TlsCa = None,
-    tls_cert: TlsCert = None,
-    tls_key: TlsKey = None,
     slurm: Slurm = None,
     shard: ShardText = None,
     keep_segments: KeepSegments = False,
@@ -86,7 +80,7 @@ def run(
     """Start a campaign, continue it, or join one that is running."""
     from bellcrank.campaign import Store, read_spec
 
-    options = _options(workers, host, scheduler, tls_ca, tls_cert, tls_key, slurm)
+    options = _options(workers, host, scheduler, slurm)
     wanted = _engine_name(engine, scheduler, shard)
     found = read_spec(spec)
     store = Store.create(out or Path(found.name), found)
@@ -100,9 +94,6 @@ def resume(
     engine: Engine = None,
     host: Host = None,
     scheduler: Scheduler = None,
-    tls_ca: TlsCa = None,
-    tls_cert: TlsCert = None,
-    tls_key: TlsKey = None,
     slurm: Slurm = None,
     shard: ShardText = None,
     keep_segments: KeepSegments = False,
@@ -110,7 +101,7 @@ def resume(
     """Continue a campaign after Ctrl-C, a kill or a full disk."""
     from bellcrank.campaign import Store
 
-    options = _options(workers, host, scheduler, tls_ca, tls_cert, tls_key, slurm)
+    options = _options(workers, host, scheduler, slurm)
     wanted = _engine_name(engine, scheduler, shard)
     _complete(Store.open(folder), wanted, options, shard, keep_segments=keep_segments)
 
@@ -132,9 +123,6 @@ def _options(
     workers: int | None,
     host: str | None,
     scheduler: str | None,
-    tls_ca: Path | None,
-    tls_cert: Path | None,
-    tls_key: Path | None,
     slurm: list[str] | None,
 ) -> EngineOptions:
     from bellcrank.campaign import EngineOptions
@@ -143,9 +131,6 @@ def _options(
         workers=workers,
         host=host,
         scheduler=scheduler,
-        tls_ca=tls_ca,
-        tls_cert=tls_cert,
-        tls_key=tls_key,
         slurm=settings_of("--slurm", slurm),
     )
 

@@ -1,14 +1,20 @@
-"""Reading text from disk, and writing it so that no half file is ever left."""
+"""Reading and writing of files, which appear completely or not at all."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
-from bellcrank.errors import InvalidFile, OutputExists, StorageError
+from bellcrank.errors import BellcrankError, InvalidFile, OutputExists, StorageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
@@ -33,11 +39,11 @@ def read_text(path: str | os.PathLike[str]) -> str:
 
 
 def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool = False) -> None:
-    """Write a text file whole or not at all.
+    """Write a text file completely or not at all.
 
-    The text goes to a temporary file in the same folder, is forced to disk and
-    then takes its name in one step, so that neither a kill nor a full disk
-    leaves half a file under it.
+    The text is written to a temporary file in the same folder, is forced to disk and
+    then gets its name in one step, so that neither a kill nor a full disk leaves an
+    incomplete file under that name.
 
     Raises
     ------
@@ -59,16 +65,33 @@ def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool = Fal
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes, *, overwrite: bool = False) -> None:
-    """As `write_text`, with bytes."""
-    target = Path(path)
-    # Asked early for a cheap refusal; `take_name` asks again without a race.
+    """Write a binary file completely or not at all; see `write_text`."""
+    with whole_file(Path(path), overwrite=overwrite) as file:
+        file.write(content)
+
+
+@contextlib.contextmanager
+def whole_file(target: Path, *, overwrite: bool = False) -> Iterator[BinaryIO]:
+    """Yield a file to read and write, which gets the name `target` once it is safe on disk.
+
+    Of two writers of the same name the first one succeeds, unless `overwrite` is set. After an
+    error nothing remains; after a kill an incomplete file may.
+
+    Raises
+    ------
+    OutputExists
+        If the file exists and `overwrite` is not set.
+    StorageError
+        If the folder does not exist or cannot be written, or the disk is full.
+    """
+    # Checked early, before any work; `take_name` checks again without a race.
     if not overwrite and os.path.lexists(target):
         raise already_exists(target)
     try:
         temporary, file = open_temporary(target)
         try:
             with file:
-                file.write(content)
+                yield file
                 file.flush()
                 os.fsync(file.fileno())
             take_name(temporary, target, overwrite=overwrite)
@@ -76,14 +99,25 @@ def write_bytes(path: str | os.PathLike[str], content: bytes, *, overwrite: bool
             with contextlib.suppress(OSError):
                 temporary.unlink()
         sync_folder(target.parent)
+    except BellcrankError:
+        raise
     except FileExistsError:
         raise already_exists(target) from None
     except OSError as error:
-        raise StorageError(f"{target}: cannot be written ({error.strerror or error})") from error
+        raise storage_error(target, error) from error
+
+
+def storage_error(path: Path, error: OSError) -> StorageError:
+    """Return the error for a file or folder that cannot be written, with reason and remedy."""
+    if error.errno in FULL:
+        remedy = "free some space; all stored data is intact"
+    else:
+        remedy = "make the folder writable, or choose another one"
+    return StorageError(f"{path}: cannot be written ({error.strerror or error}); {remedy}")
 
 
 def check_folder(target: Path) -> None:
-    """Refuse a file in a folder that is not there or may not be written, before long work.
+    """Check that the folder of a file exists and can be written, before long work.
 
     Raises
     ------
@@ -97,10 +131,10 @@ def check_folder(target: Path) -> None:
 
 
 def open_temporary(target: Path) -> tuple[Path, BinaryIO]:
-    """Open a new file beside `target`, hidden until it takes its name.
+    """Open a new hidden file in the folder of `target`.
 
-    Not by `tempfile`, whose files are private: only the system can apply the user's file
-    permissions without a race between threads.
+    Files of `tempfile` are private: only the system can apply the user's file permissions without
+    a race between threads.
     """
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
     handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
@@ -108,29 +142,29 @@ def open_temporary(target: Path) -> tuple[Path, BinaryIO]:
 
 
 def already_exists(target: Path) -> OutputExists:
-    """Make the error that refuses to write over something."""
-    return OutputExists(f"{target}: exists already; remove it, or ask for it to be overwritten")
+    """Return the error for a file that would be overwritten."""
+    return OutputExists(f"{target}: exists already; remove it, or request that it is overwritten")
 
 
 def take_name(temporary: Path, target: Path, *, overwrite: bool) -> None:
-    """Give a finished file its name; FileExistsError if that is taken and not to be replaced."""
+    """Give a complete file its name; FileExistsError if that exists and is not to be replaced."""
     if not overwrite:
         try:
-            # Unlike a rename, a link fails if somebody else was faster.
+            # Unlike a rename, a link fails if another process was faster.
             os.link(temporary, target)
         except FileExistsError:
             raise
         except OSError:
             if os.path.lexists(target):
                 raise FileExistsError from None
-            # Some file systems know no hard links: rename below.
+            # Some file systems have no hard links: rename below.
         else:
             return
     temporary.replace(target)
 
 
 def sync_folder(folder: Path) -> None:
-    """Force a new name to disk too, where the system allows it."""
+    """Force the names in a folder to disk, where the system allows it."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:

@@ -27,12 +27,11 @@ Examples
 """
 
 from bellcrank.storage.files import remove_temporaries, require_new_folder, unused_folder
-from bellcrank.storage.records import COLUMNS, ProposalColumns, Proposals
+from bellcrank.storage.records import COLUMNS, Proposals
 from bellcrank.storage.run_folder import RunFolder, check_no_run, is_unfinished_run
 
 __all__ = [
     "COLUMNS",
-    "ProposalColumns",
     "Proposals",
     "RunFolder",
     "check_no_run",

@@ -1,69 +1,21 @@
-"""Files that appear complete or not at all, and folders for new results."""
+"""Folders for new results, and the files that killed writers leave."""
 
 from __future__ import annotations
 
 import contextlib
-import errno
 import itertools
-import os
 import re
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
-from bellcrank.errors import BellcrankError, OutputExists, StorageError
-from bellcrank.model.storage import open_temporary, sync_folder, take_name
+from bellcrank.errors import OutputExists
+from bellcrank.model.storage import storage_error, sync_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
-FULL = (errno.ENOSPC, errno.EDQUOT)
 TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{8}")
 """Names of incomplete files, as `bellcrank.model.storage` makes them."""
-
-
-@contextlib.contextmanager
-def whole_file(target: Path) -> Iterator[IO[bytes]]:
-    """Yield a file to write into, which gets the name `target` once it is safe on disk.
-
-    An existing file is never replaced: of two writers of the same name the first one succeeds.
-    After an error nothing remains; after a kill an incomplete file may (`remove_temporaries`).
-
-    Raises
-    ------
-    OutputExists
-        If the file exists.
-    StorageError
-        If the folder cannot be written or the disk is full.
-    """
-    try:
-        temporary, file = open_temporary(target)
-        try:
-            with file:
-                yield file
-                file.flush()
-                os.fsync(file.fileno())
-            take_name(temporary, target, overwrite=False)
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
-        sync_folder(target.parent)
-    except BellcrankError:
-        raise
-    except FileExistsError:
-        raise OutputExists(
-            f"{target}: exists already; another process may be working in this folder"
-        ) from None
-    except OSError as error:
-        raise storage_error(target.parent, error) from error
-
-
-def storage_error(folder: Path, error: OSError) -> StorageError:
-    """Return the error for a folder that cannot be written, with the reason and the remedy."""
-    if error.errno in FULL:
-        remedy = "free some space and resume: all stored data is intact"
-    else:
-        remedy = "make it writable, or choose another folder"
-    return StorageError(f"{folder}: cannot be written ({error.strerror or error}); {remedy}")
 
 
 def make_folder(folder: Path) -> None:

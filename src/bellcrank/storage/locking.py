@@ -7,7 +7,7 @@ import os
 from typing import TYPE_CHECKING
 
 from bellcrank.errors import StorageError
-from bellcrank.storage.files import storage_error
+from bellcrank.model.storage import storage_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

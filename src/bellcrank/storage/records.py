@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -44,39 +44,13 @@ class Proposals(NamedTuple):
     status: NDArray[np.int8]
 
 
-class ProposalColumns(Protocol):
-    """Object with the columns of `Proposals`, whose values are cast when they are stored."""
-
-    @property
-    def mask(self) -> NDArray[Any]:
-        """(n, bytes) packed designs."""
-
-    @property
-    def efficiency(self) -> NDArray[Any]:
-        """(n,) efficiencies of the proposed designs."""
-
-    @property
-    def cost(self) -> NDArray[Any]:
-        """(n,) costs."""
-
-    @property
-    def temperature(self) -> NDArray[Any]:
-        """(n,) temperatures."""
-
-    @property
-    def accepted(self) -> NDArray[Any]:
-        """(n,) whether each proposal was accepted."""
-
-    @property
-    def status(self) -> NDArray[Any]:
-        """(n,) statuses of the evaluations."""
-
-
-def checked_proposals(records: ProposalColumns, mask_bytes: int) -> Proposals:
+def checked_proposals(records: Any, mask_bytes: int) -> Proposals:
     """Cast the columns of `records` and check their shapes.
 
     Parameters
     ----------
+    records
+        Object with the columns of `Proposals`, of any types.
     mask_bytes
         Bytes of a packed design of the run's problem.
 
@@ -112,16 +86,6 @@ def checked_columns(columns: Sequence[str] | None) -> list[str]:
     ------
     InvalidSettings
         If there is no such column.
-
-    Examples
-    --------
-    >>> checked_columns(["step", "cost"])
-    ['step', 'cost']
-    >>> checked_columns(["energy"])
-    Traceback (most recent call last):
-        ...
-    bellcrank.errors.InvalidSettings: no column 'energy' in a run; known: step, mask, \
-efficiency, cost, temperature, accepted, status
     """
     names = list(COLUMNS if columns is None else columns)
     if wrong := next((name for name in names if name not in COLUMNS), None):

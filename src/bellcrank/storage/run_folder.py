@@ -21,18 +21,17 @@ import numpy as np
 
 from bellcrank.errors import CorruptRun, InvalidSettings, OutputExists
 from bellcrank.model import problem_from_dict, problem_to_dict
+from bellcrank.model.storage import whole_file
 from bellcrank.provenance import provenance
 from bellcrank.storage.description import Description, plain, read_description, write_description
 from bellcrank.storage.files import (
     make_folder,
     remove_temporaries,
     require_new_folder,
-    whole_file,
 )
 from bellcrank.storage.locking import LOCK, busy, lock_holder
 from bellcrank.storage.parquet import arrays_of, parquet_file, write_sealed
 from bellcrank.storage.records import (
-    ProposalColumns,
     checked_columns,
     checked_proposals,
     empty_columns,
@@ -234,9 +233,7 @@ class RunFolder:
             names = {name for name in self._chain_names() if self._files.listed(name)}
         return sorted(map(int, names))
 
-    def append(
-        self, chain: int, first_step: int, records: ProposalColumns, state: Mapping[str, Any]
-    ) -> None:
+    def append(self, chain: int, first_step: int, records: Any, state: Mapping[str, Any]) -> None:
         """Store the next proposals of a chain, with the state from which it continues.
 
         Parameters

@@ -15,7 +15,6 @@ from bellcrank.registry import Registry
 if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
-    from pathlib import Path
 
     from bellcrank.campaign.store import Store
 
@@ -76,8 +75,6 @@ class EngineOptions:
         Address on which the scheduler of ``slurm`` listens.
     scheduler
         Address of a running Dask scheduler, ``tcp://host:port`` or ``tls://host:port``.
-    tls_ca, tls_cert, tls_key
-        Files of the certificates and the key for ``tls://``.
     timeout
         Seconds to wait for a connection.
     slurm
@@ -92,9 +89,6 @@ class EngineOptions:
     workers: int | None = None
     host: str | None = None
     scheduler: str | None = None
-    tls_ca: Path | None = None
-    tls_cert: Path | None = None
-    tls_key: Path | None = None
     timeout: float = 15.0
     slurm: dict[str, Any] = field(default_factory=dict)
 

@@ -7,7 +7,6 @@ import logging
 import os
 import platform
 import queue
-import shutil
 import threading
 import time
 from contextlib import contextmanager
@@ -17,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.campaign.engines.base import Engine, EngineOptions, Outcome, WorkerDied, engines
 from bellcrank.campaign.work import allow_work, describe_store, request_stop, work
-from bellcrank.errors import ClusterError, InvalidSettings, StorageError, first_line
+from bellcrank.errors import ClusterError, InvalidSettings, first_line
 from bellcrank.provenance import provenance
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from distributed import Client, Future, Security
+    from distributed import Client, Future
 
     from bellcrank.campaign.store import Store
 
@@ -32,7 +31,6 @@ RECOUNT_INTERVAL = 5.0
 LOGGERS = ("distributed", "tornado", "asyncio", "dask_jobqueue")
 """Loggers that write to standard error."""
 CLOSE_TIMEOUT = 10.0
-ROLES = ("client", "scheduler", "worker")
 
 
 def require(engine: str, *modules: str) -> None:
@@ -248,7 +246,6 @@ def _connected(
     where: Any,
     *,
     timeout: float,
-    security: Security | None = None,
     note: str | None = None,
     renew: Callable[[], object] = lambda: None,
 ) -> Iterator[Engine]:
@@ -262,7 +259,7 @@ def _connected(
     from distributed import Client
 
     try:
-        client = Client(where, timeout=timeout, security=security, set_as_default=False)
+        client = Client(where, timeout=timeout, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ClusterError(
             f"scheduler {where}: cannot be reached within {timeout:g} s "
@@ -282,6 +279,8 @@ def _connected(
 def dask(store: Store, options: EngineOptions) -> Iterator[Engine]:
     """Compute on the workers of a running Dask scheduler, which keeps running afterwards.
 
+    For ``tls://`` the certificates are those of Dask's configuration (``distributed.comm.tls``).
+
     Raises
     ------
     InvalidSettings
@@ -296,44 +295,9 @@ def dask(store: Store, options: EngineOptions) -> Iterator[Engine]:
             f"{address!r}"
         )
     require("dask", "distributed")
-    security = _security(options)
     note = f"scheduler: {address}"
-    with (
-        _quiet(),
-        _connected(store, address, timeout=options.timeout, security=security, note=note) as engine,
-    ):
+    with _quiet(), _connected(store, address, timeout=options.timeout, note=note) as engine:
         yield engine
-
-
-def _security(options: EngineOptions) -> Security | None:
-    """Return the certificates for ``tls://``.
-
-    Raises
-    ------
-    InvalidSettings
-        If a file is missing, or given although it is not used.
-    """
-    from distributed import Security
-
-    files = {
-        "--tls-ca": options.tls_ca,
-        "--tls-cert": options.tls_cert,
-        "--tls-key": options.tls_key,
-    }
-    encrypted = (options.scheduler or "").startswith("tls://")
-    if not encrypted:
-        if given := [name for name, path in files.items() if path is not None]:
-            raise InvalidSettings(f"{given[0]}: only for a scheduler at tls://")
-        return None
-    for name, path in files.items():
-        if path is None or not path.is_file():
-            raise InvalidSettings(f"{name}: expected a file, as tls:// needs it; got {path}")
-    return Security(
-        require_encryption=True,
-        tls_ca_file=str(options.tls_ca),
-        tls_client_cert=str(options.tls_cert),
-        tls_client_key=str(options.tls_key),
-    )
 
 
 @engines.register("slurm")
@@ -341,8 +305,8 @@ def _security(options: EngineOptions) -> Security | None:
 def slurm(store: Store, options: EngineOptions) -> Iterator[Engine]:
     """Compute in SLURM jobs of one core each, which end with this process.
 
-    The scheduler listens on the network, so all connections are encrypted, with temporary keys
-    that are kept in the store meanwhile.
+    The scheduler listens on the network, so all connections are encrypted with temporary keys,
+    which are kept in the store meanwhile.
 
     Raises
     ------
@@ -352,16 +316,16 @@ def slurm(store: Store, options: EngineOptions) -> Iterator[Engine]:
     require("slurm", "distributed", "dask_jobqueue", "cryptography")
     from dask_jobqueue import SLURMCluster
 
-    with _quiet(), _temporary_keys(store) as security:
-        chosen: dict[str, Any] = {
-            "cores": 1, "processes": 1, "memory": "2GB", "nanny": True, "death_timeout": 60,
-            "protocol": "tls://", "security": security,
-            "scheduler_options": {
-                "host": options.host, "allowed_failures": 0,
-                "dashboard_address": f"{options.host or ''}:0",
-            },
-            **options.slurm,
-        }  # fmt: skip
+    chosen: dict[str, Any] = {
+        "cores": 1, "processes": 1, "memory": "2GB", "nanny": True, "death_timeout": 60,
+        "protocol": "tls://", "security": True, "shared_temp_directory": str(store.path),
+        "scheduler_options": {
+            "host": options.host, "allowed_failures": 0,
+            "dashboard_address": f"{options.host or ''}:0",
+        },
+        **options.slurm,
+    }  # fmt: skip
+    with _quiet():
         try:
             cluster = SLURMCluster(**chosen)
         except (TypeError, ValueError, ImportError, OSError) as error:
@@ -378,36 +342,3 @@ def slurm(store: Store, options: EngineOptions) -> Iterator[Engine]:
                 renew=lambda: cluster.scale(jobs=count),
             ) as engine:
                 yield engine
-
-
-@contextmanager
-def _temporary_keys(store: Store) -> Iterator[Security]:
-    """Make keys that only this user can read, on the file system that all machines share.
-
-    Raises
-    ------
-    StorageError
-    """
-    from distributed import Security
-
-    made = Security.temporary()
-    texts = {
-        "ca.pem": made.tls_ca_file, "cert.pem": made.tls_worker_cert, "key.pem": made.tls_worker_key
-    }  # fmt: skip
-    folder = store.path / f".keys.{os.urandom(4).hex()}"
-    try:
-        folder.mkdir(mode=0o700)
-        for name, text in texts.items():
-            (folder / name).write_text(text)
-    except OSError as error:
-        raise StorageError(f"{folder}: cannot be written ({error.strerror})") from None
-    ca, cert, key = (str(folder / name) for name in texts)
-    both = {"cert": cert, "key": key}
-    try:
-        yield Security(
-            require_encryption=True,
-            tls_ca_file=ca,
-            **{f"tls_{role}_{what}": path for role in ROLES for what, path in both.items()},
-        )
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
