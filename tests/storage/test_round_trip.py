@@ -132,7 +132,7 @@ def test_a_run_without_proposals_can_be_finished_and_read(run: RunFolder) -> Non
 def test_only_the_columns_asked_for_are_read(run: RunFolder) -> None:
     fill(run)
     assert list(run.read(0, ["accepted", "step"])) == ["accepted", "step"]
-    with pytest.raises(InvalidSettings, match="no column 'energy' in a run; known: step, mask"):
+    with pytest.raises(InvalidSettings, match="no column 'energy'; known: step, mask"):
         run.read(0, ["energy"])
 
 

@@ -24,7 +24,8 @@ from bellcrank.campaign.store import (
 from bellcrank.errors import CorruptRun, StorageError
 from bellcrank.storage.files import remove_files, remove_temporaries
 from bellcrank.storage.parquet import parquet_file
-from bellcrank.storage.segments import SEGMENTS, Segment, TablePart, read_part
+from bellcrank.storage.segments import SEGMENTS, Segment
+from bellcrank.storage.tables import TablePart, read_part
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -139,6 +140,6 @@ def expand(store: Store, parts: Sequence[TablePart]) -> None:
             rows = table.slice(first_row, segment.rows)
             first_row += segment.rows
             path = store.segments.path_of(segment.run, segment.first_step)
-            store.write(path, partial(iter, (rows,)), store.segments.header(segment))
+            store.write(path, partial(iter, (rows,)), store.segments.header_of(segment))
     switch_link(store.path, SEGMENTS)
     remove_files(store.path / TABLE, PART_NAME)

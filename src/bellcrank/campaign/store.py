@@ -230,7 +230,7 @@ class Store:
         keys = {"task": run.task.name, "run": run.id, "seed": run.seed}
         table = segment_table(schema, keys, first_step, cast)
         path = self.segments.path_of(run.id, first_step)
-        self.write(path, partial(iter, (table,)), self.segments.header(segment))
+        self.write(path, partial(iter, (table,)), self.segments.header_of(segment))
 
     def write(
         self, path: Path, tables: Callable[[], Iterable[Any]], header: Mapping[str, Any]

@@ -9,8 +9,6 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
 COLUMNS = ("step", "mask", "efficiency", "cost", "temperature", "accepted", "status")
@@ -77,26 +75,3 @@ def checked_proposals(records: Any, mask_bytes: int) -> Proposals:
                 f"proposals: {name}: expected shape {expected}, got {column.shape}"
             )
     return cast
-
-
-def checked_columns(columns: Sequence[str] | None) -> list[str]:
-    """Return the names of the columns to read; all columns by default.
-
-    Raises
-    ------
-    InvalidSettings
-        If there is no such column.
-    """
-    names = list(COLUMNS if columns is None else columns)
-    if wrong := next((name for name in names if name not in COLUMNS), None):
-        raise InvalidSettings(f"no column {wrong!r} in a run; known: {', '.join(COLUMNS)}")
-    return names
-
-
-def empty_columns(columns: Sequence[str], mask_bytes: int) -> dict[str, NDArray[Any]]:
-    """Return the columns of a chain without proposals."""
-    dtypes = {"step": np.int64, "mask": np.uint8, "accepted": np.bool_, "status": np.int8}
-    return {
-        name: np.empty((0, mask_bytes) if name == "mask" else 0, dtypes.get(name, np.float64))
-        for name in columns
-    }

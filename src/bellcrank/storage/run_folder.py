@@ -31,20 +31,15 @@ from bellcrank.storage.files import (
 )
 from bellcrank.storage.locking import LOCK, busy, lock_holder
 from bellcrank.storage.parquet import arrays_of, parquet_file, write_sealed
-from bellcrank.storage.records import (
-    checked_columns,
-    checked_proposals,
-    empty_columns,
-)
+from bellcrank.storage.records import COLUMNS, checked_proposals
 from bellcrank.storage.segments import (
     SEGMENTS,
     Segment,
     SegmentFiles,
-    TablePart,
     proposal_schema,
-    read_part,
     segment_table,
 )
+from bellcrank.storage.tables import TablePart, read_part
 
 if TYPE_CHECKING:
     import os
@@ -278,7 +273,7 @@ class RunFolder:
         schema = self._schema()
         table = segment_table(schema, {"chain": chain}, first_step, rows)
         with whole_file(path) as file:
-            write_sealed(file, [table], schema, self._files.header(segment))
+            write_sealed(file, [table], schema, self._files.header_of(segment))
 
     def progress(self, chain: int) -> tuple[int, dict[str, Any] | None]:
         """Return where a chain continues, and remove the incomplete files of a killed process.
@@ -325,30 +320,32 @@ class RunFolder:
         InvalidSettings
             If there is no such column.
         """
-        names = checked_columns(columns)
-        parts = list(self._parts(chain, names))
-        if not parts:
-            return empty_columns(names, self._mask_bytes)
-        return {name: np.concatenate([part[name] for part in parts]) for name in names}
+        import pyarrow as pa
 
-    def _parts(self, chain: int, names: list[str]) -> Iterator[dict[str, NDArray[Any]]]:
+        names = list(COLUMNS if columns is None else columns)
+        if unknown := [name for name in names if name not in COLUMNS]:
+            raise InvalidSettings(f"no column {unknown[0]!r}; known: {', '.join(COLUMNS)}")
+        none = self._schema().empty_table().select(names)
+        return arrays_of(pa.concat_tables([none, *self._tables(chain, names)]), names)
+
+    def _tables(self, chain: int, names: list[str]) -> Iterator[Any]:
         import pyarrow.compute as pc
 
         history = self._history()
         if history is None:
-            name = _name_of(chain)
-            for segment in self._files.read_all(name, thorough=False):
-                path = self._files.path_of(name, segment.first_step)
+            for segment in self._files.read_all(_name_of(chain), thorough=False):
+                path = self._files.path_of(segment.run, segment.first_step)
                 with parquet_file(path, SEGMENT_ADVICE) as (file, _):
-                    yield arrays_of(file.read(columns=names, use_threads=False), names)
+                    yield file.read(columns=names, use_threads=False)
             return
         with parquet_file(history.path, HISTORY_ADVICE) as (file, _):
             order = file.schema_arrow.get_field_index("chain")
             for group in range(file.metadata.num_row_groups):
                 numbers = file.metadata.row_group(group).column(order).statistics
                 if numbers.min <= chain <= numbers.max:
-                    table = file.read_row_group(group, columns=["chain", *names], use_threads=False)
-                    yield arrays_of(table.filter(pc.equal(table["chain"], chain)), names)
+                    columns = ["chain", *names]
+                    table = file.read_row_group(group, columns=columns, use_threads=False)
+                    yield table.filter(pc.equal(table["chain"], chain)).select(names)
 
     def finish(self) -> None:
         """Merge all chains into ``history.parquet``, delete the segments, mark as finished.
