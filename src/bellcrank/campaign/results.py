@@ -250,23 +250,25 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
         If a file that has to be read is damaged.
     """
     from bellcrank.search import candidates_of, read_settings, searches, select
-    from bellcrank.workflows.design import judge_for
+    from bellcrank.workflows.design import verification_evaluator
 
     settings = read_settings(task.settings)
     problem = problem_from_dict(task.problem, f"task {task.name!r}")
-    offers = searches[settings.name].offers
+    rule = searches[settings.name].candidate_rule
     candidates = [
         candidate
         for seed, rows in _accepted(store, task)
         for candidate in candidates_of(
-            seed, rows["step"], rows["mask"][:, : task.mask_bytes], rows["efficiency"], offers,
+            seed, rows["step"], rows["mask"][:, : task.mask_bytes], rows["efficiency"], rule,
             PER_RUN,
         )
     ]  # fmt: skip
     chosen = heapq.nlargest(PER_TASK, candidates, key=lambda candidate: candidate.efficiency)
     if not chosen:
         raise InvalidSettings(f"task {task.name!r}: no accepted design is stored yet")
-    selection = select(problem, chosen, settings.objective, judge_for(problem, settings))
+    selection = select(
+        problem, chosen, settings.objective, verification_evaluator(problem, settings)
+    )
     found = selection.found
     origin = provenance(
         kind="machine",
