@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidFile, InvalidSettings, UnknownName
-from bellcrank.machines import elementary, mean_ports, two_port_at
+from bellcrank.machines import mean_ports, two_port_at
 from bellcrank.machines.elementary import DIRECTIONS
 from bellcrank.machines.library import (
     Library,
@@ -19,22 +19,24 @@ from bellcrank.machines.library import (
     write_entry,
 )
 from bellcrank.machines.library.catalogue import SORTS, entry_files
-from bellcrank.machines.library.measurement import MIN_INPUT_STIFFNESS, lever_result, measure
+from bellcrank.machines.library.measurement import MIN_INPUT_STIFFNESS, lever_result
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Conditions, SpringEvaluator, Status
 from bellcrank.search.constraints import ConstrainedEvaluator, LoadCase
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from bellcrank.machines.library import Entry
+
 SHIPPED = Library((bundled_folder(),))
 NAMES = SHIPPED.names()
 
 
 @pytest.fixture
-def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own_entry: Entry) -> Path:
     """A folder of the user with one entry."""
     monkeypatch.setenv("BELLCRANK_LIBRARY", str(tmp_path))
-    write_entry(measure(elementary(7, "left").full_design(), points=2), tmp_path)
+    write_entry(own_entry, tmp_path)
     return tmp_path
 
 
@@ -52,7 +54,13 @@ def test_what_comes_along_is_small() -> None:
     assert sum(sizes) < 4_000_000
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if number % 6 == 0 else pytest.param(name, marks=pytest.mark.slow)
+        for number, name in enumerate(NAMES)
+    ],
+)
 def test_an_entry_that_comes_along_is_sound(name: str) -> None:
     entry = SHIPPED.find(name)
     problem, mask = entry.design.problem, entry.design.mask
@@ -81,7 +89,13 @@ def test_an_entry_that_comes_along_is_sound(name: str) -> None:
     assert entry.provenance["settings"]["steps"] > 0
 
 
-@pytest.mark.parametrize("name", NAMES[::12])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[] if "-7-" in name else pytest.mark.slow)
+        for name in (*NAMES[3::24], *NAMES[::12])
+    ],
+)
 def test_the_lever_of_an_entry_is_that_of_its_task(name: str) -> None:
     entry = SHIPPED.find(name)
     fresh = lever_result(entry.design.problem, kinds[entry.kind].goals)

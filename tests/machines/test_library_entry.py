@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture(scope="module")
-def entry() -> Entry:
-    """A full lattice of seven columns, measured as somebody's own design."""
-    return measure(elementary(7, "left").full_design(), points=3, notes={"seed": 1})
+def entry(own_entry: Entry) -> Entry:
+    """Return an entry of the user."""
+    return own_entry
 
 
 def test_what_is_written_is_read(entry: Entry, tmp_path: Path) -> None:

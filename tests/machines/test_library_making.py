@@ -65,6 +65,7 @@ def told(folder: Path) -> dict[str, object]:
     }
 
 
+@pytest.mark.slow
 def test_each_task_makes_one_entry_and_leaves_nothing_else(whole: Path) -> None:
     names = sorted(path.name for path in whole.iterdir())
     assert len(names) == 2
@@ -80,6 +81,7 @@ def test_each_task_makes_one_entry_and_leaves_nothing_else(whole: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_what_is_there_is_not_made_again(whole: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in whole.iterdir()}
     made = list(make(SETTINGS, whole, workers=1))
@@ -87,6 +89,7 @@ def test_what_is_there_is_not_made_again(whole: Path) -> None:
     assert {path: path.stat().st_mtime_ns for path in whole.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_after_a_stop_it_ends_with_the_same_entries(whole: Path, tmp_path: Path) -> None:
     stop = threading.Event()
     seen: list[EntryTask] = []
@@ -102,6 +105,7 @@ def test_after_a_stop_it_ends_with_the_same_entries(whole: Path, tmp_path: Path)
     assert told(tmp_path) == told(whole)
 
 
+@pytest.mark.slow
 def test_after_a_kill_it_ends_with_the_same_entries(whole: Path, tmp_path: Path) -> None:
     process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(tmp_path)])
     deadline = time.monotonic() + 120.0
@@ -115,6 +119,7 @@ def test_after_a_kill_it_ends_with_the_same_entries(whole: Path, tmp_path: Path)
     assert not (tmp_path / SEARCHES).exists()
 
 
+@pytest.mark.slow
 def test_a_search_with_other_settings_is_not_mixed_in(tmp_path: Path) -> None:
     stop = threading.Event()
     list(make(SETTINGS, tmp_path, workers=1, report=lambda *_: stop.set(), stop=stop))
@@ -122,6 +127,7 @@ def test_a_search_with_other_settings_is_not_mixed_in(tmp_path: Path) -> None:
         list(make(replace(SETTINGS, seed=1), tmp_path))
 
 
+@pytest.mark.slow
 def test_what_is_better_takes_the_place_of_what_was_there(whole: Path, tmp_path: Path) -> None:
     short = replace(SETTINGS, kinds=("free",), steps=2, chains=1)
     (first,) = make(short, tmp_path)
@@ -140,6 +146,7 @@ def test_what_is_better_takes_the_place_of_what_was_there(whole: Path, tmp_path:
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_making_anew_goes_on_after_a_stop(whole: Path, tmp_path: Path) -> None:
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     stop, searched = threading.Event(), []
@@ -159,6 +166,7 @@ def test_making_anew_goes_on_after_a_stop(whole: Path, tmp_path: Path) -> None:
     assert not (tmp_path / SEARCHES).exists()
 
 
+@pytest.mark.slow
 def test_one_process_at_a_time_makes_entries_in_a_folder(whole: Path) -> None:
     with locked(whole / LOCK), pytest.raises(StorageError, match="is working in this folder"):
         list(make(SETTINGS, whole))

@@ -11,8 +11,7 @@ import pytest
 
 from bellcrank.errors import OutputExists
 from bellcrank.machines import elementary
-from bellcrank.machines.library import Library, bundled_folder, write_entry
-from bellcrank.machines.library.measurement import measure
+from bellcrank.machines.library import Library, bundled_folder
 from bellcrank.machines.library.pages import PAGE, draw, page, write_page
 from bellcrank.machines.library.thumbnails import UNITS, thumbnail
 
@@ -22,10 +21,12 @@ NUMBER = re.compile(r"-?\d+")
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """Two entries of somebody's own."""
+    """Two entries of another folder."""
     folder = tmp_path_factory.mktemp("entries")
-    for direction in ("left", "down"):
-        write_entry(measure(elementary(7, direction).full_design(), points=2), folder)
+    known = Library((bundled_folder(),))
+    for name in ("left-7-free", "down-7-light"):
+        path = known.path(name)
+        (folder / path.name).write_bytes(path.read_bytes())
     return Library((folder,))
 
 

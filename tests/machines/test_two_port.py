@@ -125,7 +125,6 @@ def test_figures_of_a_lever_with_springs_by_hand() -> None:
     # Against a spring of 5 the output goes half as far.
     assert lever.efficiency_against(5.0) == pytest.approx(1.0)
     assert lever.input_stiffness_against(5.0) == pytest.approx(3.0 + 5.0 * 2.0)
-    assert lever.output_under(1.0, -5.0) == pytest.approx(1.0)
 
 
 def test_the_matched_spring_takes_the_largest_share_of_the_work() -> None:

@@ -151,10 +151,6 @@ class TwoPort:
         """Return F_in / u_in against an output spring: k + eta^2 k_s / (1 + k_s C)."""
         return self.input_stiffness + self.efficiency * spring * self.efficiency_against(spring)
 
-    def output_under(self, motion: float, force: float) -> float:
-        """Return u_out for an input motion and a dead force on the output."""
-        return self.efficiency * motion + (self.output_compliance * force if force else 0.0)
-
 
 def two_port_at(element: Superelement, state: State) -> TwoPort:
     """Return the linear two-port of an actuator around one of its equilibria.

@@ -17,7 +17,6 @@ is compared with. In some directions every lever is poor, with an efficiency nea
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -53,8 +52,6 @@ LINK_LENGTHS = (2, 8)
 """Smallest and largest number of struts of a link."""
 MIN_ALIGNMENT = 0.35
 """Smallest cosine of the angle between a link and the input direction."""
-DEAD_POINT = 1e-9
-"""Lever arm of a link, relative to its length, below which the lever is at a dead point."""
 MAX_PIVOTS = 24
 """Largest number of pivots; more supported nodes are sampled evenly."""
 
@@ -187,41 +184,6 @@ def lever_of(problem: Problem, shape: Shape) -> Design:
         "link": list(shape.link),
     }
     return Design(problem, mask, provenance=provenance)
-
-
-def lever_law(problem: Problem, shape: Shape) -> float:
-    """Return the efficiency of a lever with rigid arms, a rigid link and free joints.
-
-    The efficiency is infinite at a dead point, where the link points at the pivot.
-
-    Raises
-    ------
-    InvalidSettings
-        If the shape has no link.
-
-    Examples
-    --------
-    >>> from bellcrank.machines import elementary
-    >>> problem = elementary(9, "up")
-    >>> shape = next(each for each in shapes(problem) if each.link)
-    >>> bool(np.isfinite(lever_law(problem, shape)))
-    True
-    """
-    if shape.pivot is None or not shape.link:
-        raise InvalidSettings(f"{shape.label}: expected a shape with a pivot and a link")
-    positions = problem.lattice.positions
-    pivot, first, knee = positions[[shape.pivot, shape.link[0], shape.link[-1]]]
-    along = knee - first
-    output = positions[problem.output.nodes].mean(axis=0)
-    given = along @ problem.input.direction.mean(axis=0)
-    wanted = _rotated(output - pivot) @ problem.output.direction.mean(axis=0)
-    arm = along @ _rotated(knee - pivot)
-    return float(given * wanted / arm) if abs(arm) > DEAD_POINT * float(along @ along) else math.inf
-
-
-def _rotated(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2,) a vector rotated by 90 degrees: its velocity in a unit rotation."""
-    return np.array([-vector[1], vector[0]])
 
 
 def _at_ports(problem: Problem) -> NDArray[np.bool_]:
