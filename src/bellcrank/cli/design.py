@@ -30,73 +30,83 @@ if TYPE_CHECKING:
 
 @app.command()
 def design(
-    problem: Annotated[
-        str | None, typer.Argument(help="A built-in problem or a problem file.")
+    problem: Annotated[str | None, typer.Argument(help="Bundled problem or problem file.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Number of proposals per chain. [20000]")
     ] = None,
-    steps: Annotated[int | None, typer.Option(help="Proposals of each chain. [20000]")] = None,
-    chains: Annotated[int | None, typer.Option(help="Independent chains. [4]")] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Determines everything, with the chain's number. [0]")
-    ] = None,
+    chains: Annotated[int | None, typer.Option(help="Number of independent chains. [4]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers. [0]")] = None,
     objective: Annotated[
         str | None,
-        typer.Option(help="displacement, directional:N or force; default: by the drive."),
+        typer.Option(
+            help="Objective: displacement, directional:N or force; default: by the drive."
+        ),
     ] = None,
     search: Annotated[
         str,
         typer.Option(
-            help="basin-hopping, tempering or paper (Bonfanti et al. 2020).",
+            help="Search method: basin-hopping, tempering or paper (Bonfanti et al. 2020).",
         ),
     ] = "basin-hopping",
     unloaded_beams: Annotated[
         str | None,
         typer.Option(
-            help="stripped (what bears no load), ignored (dead ends) or counted (as in 'paper')."
+            help="Beams without load: keep (the literal model), prune_dead_ends or prune_all."
         ),
     ] = None,
     cost: Annotated[
-        str | None, typer.Option(help="exponential (the paper) or negative; for chains.")
+        str | None,
+        typer.Option(help="Cost of a Markov chain: exponential (the paper) or negative."),
     ] = None,
     schedule: Annotated[
-        str | None, typer.Option(help="linear (the paper), geometric, constant; for chains.")
+        str | None,
+        typer.Option(
+            help="Temperature schedule of a Markov chain: linear (the paper) or constant."
+        ),
     ] = None,
     minimum_degree: Annotated[
-        int | None, typer.Option(help="Least number of beams at a free node; for chains.")
+        int | None, typer.Option(help="Minimum number of beams at a free node (search paper).")
     ] = None,
     patience: Annotated[
-        int | None, typer.Option(help="End a chain after so many rejections in a row.")
+        int | None,
+        typer.Option(help="Consecutive rejections after which a chain ends (search paper)."),
     ] = None,
     goal: Annotated[
         list[str] | None,
-        typer.Option(help="What the design must keep, like 'mass <= 0.6'; repeatable."),
+        typer.Option(help="Constraint on the design, for example 'mass <= 0.6'; repeatable."),
     ] = None,
     strokes: Annotated[
-        str | None, typer.Option(help="Average over these parts of the stroke, like 0.25,0.5,1.")
+        str | None,
+        typer.Option(help="Fractions of the stroke to average over, for example 0.25,0.5,1."),
     ] = None,
     strut_width: Annotated[
-        str | None, typer.Option(help="Search with the stiffness of struts this wide, like 1.6mm.")
+        str | None,
+        typer.Option(help="Strut width of the part, for example 1.6mm; sets the stiffness."),
     ] = None,
     scale: Annotated[
-        str | None, typer.Option(help="Length of a lattice unit of that part. \\[10mm]")
+        str | None, typer.Option(help="Length of a lattice unit of the part. \\[10mm]")
     ] = None,
     material: Annotated[
-        str | None, typer.Option(help="Of that part, kept for validation. \\[ninjaflex]")
+        str | None, typer.Option(help="Material of the part. \\[ninjaflex]")
     ] = None,
     more: Annotated[
         list[str] | None,
-        typer.Option("--set", help="KEY=VALUE: any other setting of the search; repeatable."),
+        typer.Option("--set", help="KEY=VALUE, any other setting of the search; repeatable."),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Chains at the same time; changes no result.")
+        int | None,
+        typer.Option(help="Number of chains that run in parallel; does not change results."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Result folder; default: the name.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Result folder; default: name of the problem.")
+    ] = None,
     begin: Annotated[
         str | None,
-        typer.Option("--from", help="Begin with this design, in place of a whole lattice."),
+        typer.Option("--from", help="Initial design, in place of the full lattice."),
     ] = None,
-    resume: Annotated[Path | None, typer.Option(help="Go on with the run in this folder.")] = None,
+    resume: Annotated[Path | None, typer.Option(help="Folder of a run to resume.")] = None,
 ) -> None:
-    """Design an actuator: search, clean up, verify, and see what was designed."""
+    """Design an actuator: search, clean, verify and report."""
     from bellcrank.cli.progress import SearchProgress
     from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import find_problem
@@ -165,32 +175,34 @@ def _new_folder(task: Problem) -> Path:
 
 
 def _task_from(design: Design) -> Problem:
-    """Return the task of a design, with that to begin with."""
+    """Return the problem of a design, with that design as the initial one."""
     return replace(design.problem, initial=design.mask)
 
 
 def _part(width: str | None, scale: str | None, material: str | None) -> PartSpec | None:
-    """Return what the design will be made as, if anything was said about that."""
+    """Return the part to design, if its options are given."""
     from bellcrank.part import PartSpec, materials
 
     if width is None:
         if scale is not None or material is not None:
-            raise InvalidSettings("--scale and --material belong to a part; give --strut-width too")
+            raise InvalidSettings(
+                "--scale and --material describe a part: give --strut-width as well"
+            )
         return None
     given = {"width": width, "scale": scale, "material": material and materials[material].name}
     return PartSpec().changed({key: value for key, value in given.items() if value is not None})
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:
-    """Read numbers with commas between them."""
+    """Parse numbers separated by commas."""
     try:
         return tuple(map(float, text.split(",")))
     except ValueError:
-        raise InvalidSettings(f"{option} {text}: expected numbers with commas between") from None
+        raise InvalidSettings(f"{option} {text}: expected numbers separated by commas") from None
 
 
 def _print_report(report: DesignReport) -> None:
-    """Say what was designed, in a few lines."""
+    """Print the results in a table, with warnings."""
     from bellcrank.workflows.report import part_rows
 
     selection = report.selection
@@ -199,17 +211,17 @@ def _print_report(report: DesignReport) -> None:
     for name, value in part_rows(report):
         table.add_row(name, value)
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
-    table.add_row("where the search began", f"{report.initial_efficiency:.4f}")
+    table.add_row("initial design", f"{report.initial_efficiency:.4f}")
     if report.human_response is not None:
         table.add_row("human design", f"{report.human_response.efficiency:.4f}")
     if report.settings.goals:
-        table.add_row("goals kept", plain(", ".join(report.settings.goals)))
+        table.add_row("goals satisfied", plain(", ".join(report.settings.goals)))
     table.add_row("beams", f"{selection.design.beam_count}")
     table.add_row(
         "verified",
         f"from rest in {' and '.join(report.checks)}, which differ by {report.agreement:.0e}",
     )
-    table.add_row("designs looked at", f"{report.proposals}")
+    table.add_row("designs evaluated", f"{report.proposals}")
     table.add_row("results", plain(f"{report.folder}/"))
     results.print(table)
     if report.failures:

@@ -82,7 +82,7 @@ def _finite(number: float) -> float | None:
 def summary_text(report: DesignReport) -> str:
     """Return the summary as Markdown (``summary.md``)."""
     selection = report.selection
-    began = ("where the search began", f"{report.initial_efficiency:.6f}")
+    began = ("initial design", f"{report.initial_efficiency:.6f}")
     rows = [
         ("efficiency of the design", f"{selection.efficiency_after:.6f}"),
         *part_rows(report),
@@ -91,10 +91,10 @@ def summary_text(report: DesignReport) -> str:
         *((f"from rest by {name}", f"{value:.9f}") for name, value in report.checks.items()),
         ("beams", str(selection.design.beam_count)),
         ("found by chain, at step", f"{selection.found.chain}, {selection.found.step}"),
-        ("designs looked at", str(report.proposals)),
+        ("designs evaluated", str(report.proposals)),
     ]
     if report.settings.goals:
-        rows.append(("goals kept", ", ".join(report.settings.goals).replace("|", "/")))
+        rows.append(("goals satisfied", ", ".join(report.settings.goals).replace("|", "/")))
     if report.human_response is not None:
         human = ("human-designed counterpart", f"{report.human_response.efficiency:.6f}")
         rows.insert(rows.index(began) + 1, human)
