@@ -22,9 +22,12 @@ import threading
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from bellcrank import __version__
+
+if TYPE_CHECKING:
+    from types import FunctionType
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -87,12 +90,12 @@ class _Deferred:
     Parameters
     ----------
     function
-        Python function.
+        Python function of a module.
     options
         Of `numba.njit`; None for an intrinsic, a function that generates machine code.
     """
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any] | None) -> None:
+    def __init__(self, function: FunctionType, options: dict[str, Any] | None) -> None:
         self.function = function
         self.options = options
         self.compiled: Callable[..., Any] | None = None
@@ -116,13 +119,14 @@ def _compile_pending() -> None:
     with _lock:
         if not _pending:
             return
-        for each in _pending:
-            each.compiled = _compiled(each)
-        for namespace in {id(each.function.__globals__): each.function.__globals__  # type: ignore[attr-defined]
-                          for each in _pending}.values():  # fmt: skip
+        compiled = {each: _compiled(each) for each in _pending}
+        modules = {id(each.function.__globals__): each.function.__globals__ for each in _pending}
+        for namespace in modules.values():
             for name, value in list(namespace.items()):
                 if isinstance(value, _Deferred):
-                    namespace[name] = value.compiled
+                    namespace[name] = compiled.get(value, value.compiled)
+        for each in _pending:  # other threads call it from here on
+            each.compiled = compiled[each]
         _pending.clear()
 
 
@@ -142,11 +146,15 @@ def _compiled(deferred: _Deferred) -> Callable[..., Any]:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder())
     try:
-        options = {**deferred.options, "error_model": "numpy", "_nrt": False}
-        compiler = numba.njit(cache=True, nogil=True, **options)  # type: ignore[call-overload]
+        options: dict[str, Any] = {**deferred.options, "error_model": "numpy", "_nrt": False}
+        compiler = numba.njit(cache=True, nogil=True, **options)
         return cast("Callable[..., Any]", compiler(deferred.function))
     finally:
         config.CACHE_DIR = before
+
+
+def _defer(function: F, options: dict[str, Any] | None) -> F:
+    return cast("F", _Deferred(cast("FunctionType", function), options))
 
 
 def kernel(function: F) -> F:
@@ -155,7 +163,12 @@ def kernel(function: F) -> F:
     It gets no wrapper for calls from Python: unpacking sixty arrays for each call would take a
     third of the compilation time.
     """
-    return cast("F", _Deferred(function, {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}))
+    return cast(
+        "F",
+        _Deferred(
+            cast("FunctionType", function), {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        ),
+    )
 
 
 def inlined(function: F) -> F:
@@ -164,17 +177,17 @@ def inlined(function: F) -> F:
     For outer layers: numba optimises everything below a kernel again at each level.
     """
     options = {"inline": "always", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return cast("F", _Deferred(function, options))
+    return _defer(function, options)
 
 
 def entry(function: F) -> F:
     """Compile a function that Python calls."""
-    return cast("F", _Deferred(function, {"no_cfunc_wrapper": True}))
+    return _defer(function, {"no_cfunc_wrapper": True})
 
 
 def intrinsic(function: F) -> F:
     """Define a function that generates machine code, by numba's protocol."""
-    return cast("F", _Deferred(function, None))
+    return _defer(function, None)
 
 
 def kernels_are_compiled() -> bool:
