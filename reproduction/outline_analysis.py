@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from bellcrank.fem.continuum.mesh import HUB, ContinuumMesh, gripped, triangulated
-from bellcrank.fem.continuum.response import respond
+from bellcrank.fem.continuum.mesh import HUB, ContinuumMesh, hub_nodes, triangulated
+from bellcrank.fem.continuum.response import solve_mesh
 from bellcrank.fem.path import PathStatus
 from bellcrank.mechanics import efficiency_of
 from bellcrank.part.outline import Loop, Outline
@@ -143,7 +143,7 @@ def analyse_outline(
     radius = HUB * part.section.width
     nodes = [
         node
-        for node in gripped(part).tolist()
+        for node in hub_nodes(part).tolist()
         if shape.contains(shapely.Point(part.positions[node]).buffer(1.05 * radius))
     ]
     hubs = {node: part.positions[node] for node in nodes}
@@ -151,7 +151,7 @@ def analyse_outline(
     mesh = ContinuumMesh(
         raw, np.array(nodes), box.problem.lattice.node_count, part.section.thickness
     )
-    found = respond(part, mesh, law)
+    found = solve_mesh(part, mesh, law)
     last = found.states[-1]
     done = found.path.status is PathStatus.CONVERGED
     moved = efficiency_of(box.problem, last.motion / part.scale, load=last.load)
@@ -166,7 +166,9 @@ def analyse_outline(
         "area_mm2": float(shape.area),
         "triangles": found.elements,
         "seconds": round(time.perf_counter() - began, 1),
-        "drawing": drawing(found.field.rest, found.field.displacement, found.field.cells),
+        "drawing": drawing(
+            found.fields[-1].rest, found.fields[-1].displacement, found.fields[-1].cells
+        ),
     }
 
 

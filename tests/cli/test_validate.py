@@ -245,7 +245,6 @@ def test_a_part_that_snaps_is_told_apart_from_a_result(here: Path) -> None:
     assert data["efficiency"] is None
     assert data["mean_output_displacement_mm"] is None
     assert 0.0 < data["reached"] < 1.0
-    assert data["results"][0]["after_snap"]["load"] == 1.0
     words = call("validate", "arch.json", "--width", "1mm")
     assert f"snapped at {data['reached']:.1%}" in words.out
     assert "stability is lost" in words.err

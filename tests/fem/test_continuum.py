@@ -24,14 +24,14 @@ from bellcrank.fem.continuum.equations import ContinuumEquations
 from bellcrank.fem.continuum.fields import surface
 from bellcrank.fem.continuum.laws import lame_of, laws
 from bellcrank.fem.continuum.mesh import plane_mesh, triangulated
-from bellcrank.fem.continuum.modes import negative, softest
-from bellcrank.fem.continuum.response import respond, solve_plane, solve_solid
+from bellcrank.fem.continuum.response import solve_mesh, solve_plane, solve_solid
 from bellcrank.fem.continuum.solid import raised, solid_mesh, solid_of, tetrahedra
+from bellcrank.fem.continuum.stability import count_negative, extreme_compliances
 from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.frame.equilibrium import FrameEquations
 from bellcrank.fem.frame.mesh import frame_mesh
 from bellcrank.fem.frame.system import frame_system
-from bellcrank.fem.path import PathStatus, Stepping, follow
+from bellcrank.fem.path import PathStatus, StepControl, follow_path
 from bellcrank.model import Input, Lattice, Output, Problem, Supports
 from bellcrank.part.materials import Material
 from bellcrank.part.outline import Loop, Outline
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.fem.continuum.mesh import ContinuumMesh
-    from bellcrank.fem.continuum.response import Response
+    from bellcrank.fem.continuum.response import ContinuumResponse
 
 RUBBER = Material(name="rubber", young=12.0, poisson=0.48)
 NONLINEAR = [name for name, law in laws.items() if not law.small]
@@ -98,12 +98,14 @@ def pushed_bar(force: float, direction: tuple[float, float], section: Section) -
     return replace(part, design=problem.full_design())
 
 
-def displacements(part: Part, mesh: ContinuumMesh, law: str) -> tuple[np.ndarray, Response]:
+def displacements(
+    part: Part, mesh: ContinuumMesh, law: str
+) -> tuple[np.ndarray, ContinuumResponse]:
     """Those of the quadratic nodes at the full input."""
-    response = respond(part, mesh, law)
+    response = solve_mesh(part, mesh, law)
     assert response.path.status is PathStatus.CONVERGED
     equations = ContinuumEquations(continuum_system(part, mesh, law))
-    equations.place(response.path.states[-1].unknowns)
+    equations.set_state(response.path.states[-1].unknowns)
     return at_nodes(mesh, quadratic(mesh), equations.state.components[0]), response
 
 
@@ -166,7 +168,7 @@ def test_a_thick_ring_converges_at_the_order_of_curved_quadratic_elements() -> N
         errors.append(math.sqrt(ng.Integrate(gap * gap, mesh, order=8)))
     # Of u = a r + b / r: strain a - b / r^2 along the radius, a + b / r^2 round it.
     a, b = 0.02, 0.03
-    dilation = 0.5 * lame.thin * (2.0 * a) ** 2 * 3.0 * math.pi
+    dilation = 0.5 * lame.plane_stress * (2.0 * a) ** 2 * 3.0 * math.pi
     shape = 2.0 * lame.shear * math.pi * (a**2 * 3.0 + b**2 * (1.0 - 1.0 / 4.0))
     energy_errors = np.abs(np.array(energies) - dilation - shape)
     assert np.log2(errors[-2] / errors[-1]) == pytest.approx(3.0, abs=0.3)
@@ -304,8 +306,8 @@ def test_residuals_are_the_gradient_of_the_energy_and_factors_their_derivative(
     mesh = plane_mesh(part, size=3.0) if dimension == 2 else solid_mesh(part, size=3.0)
     equations = ContinuumEquations(continuum_system(part, mesh, law))
     rng = np.random.default_rng(4)
-    smooth = equations.linearise(np.zeros(equations.count), 0.5).factor
-    state = -smooth.solve(equations.pull(np.zeros(equations.count), 0.5)) * 0.4
+    smooth = equations.linearise(np.zeros(equations.count), 0.5).stiffness
+    state = -smooth.solve(equations.load_derivative(np.zeros(equations.count), 0.5)) * 0.4
     along = smooth.solve(rng.standard_normal(equations.count))
     along /= np.abs(along).max()
     step = 1e-4
@@ -314,10 +316,10 @@ def test_residuals_are_the_gradient_of_the_energy_and_factors_their_derivative(
     work = (equations.potential(ahead, 0.5) - equations.potential(behind, 0.5)) / (2.0 * step)
     assert residual @ along == pytest.approx(work, rel=1e-5)
     change = equations.residual(ahead, 0.5)[0] - equations.residual(behind, 0.5)[0]
-    found = equations.linearise(state, 0.5).factor.solve(change / (2.0 * step))
+    found = equations.linearise(state, 0.5).stiffness.solve(change / (2.0 * step))
     assert np.abs(found - along).max() < 1e-5
     later = (equations.residual(state, 0.6)[0] - residual) / 0.1
-    assert later == pytest.approx(equations.pull(state, 0.5), abs=1e-10)
+    assert later == pytest.approx(equations.load_derivative(state, 0.5), abs=1e-10)
 
 
 def test_a_bar_has_the_stiffness_of_the_textbook() -> None:
@@ -337,7 +339,7 @@ def test_stress_and_strain_of_a_pulled_bar_are_uniform_between_its_hubs() -> Non
     section = Section(2.0, 5.0)
     part = bar("displacement", 0.3, (1.0, 0.0), section)
     response = solve_plane(part, "st-venant-kirchhoff")
-    state, field = response.states[-1], response.field
+    state, field = response.states[-1], response.fields[-1]
     middle = np.abs(field.rest[:, 0] - 30.0) < 5.0
     stretch = 1.0 + (state.motion[2, 0] - state.motion[1, 0]) / part.scale
     inner = RUBBER.young * (stretch**2 - 1.0) / 2.0
@@ -376,7 +378,7 @@ def test_slender_lattices_move_as_frames_do() -> None:
     part = portal(0.8)
     mesh = frame_mesh(part, 8)
     equations = FrameEquations(frame_system(part, mesh))
-    frame = equations.complete(follow(equations).states[-1])
+    frame = equations.complete(follow_path(equations).states[-1])
     sheet = solve_plane(part).states[-1]
     assert sheet.motion[2] == pytest.approx(mesh.at_lattice(frame.displacement)[2], rel=0.03)
     assert sheet.force[1] == pytest.approx(frame.reaction[mesh.node[1], :2], rel=0.05)
@@ -412,8 +414,8 @@ def test_unstable_states_are_found_to_be() -> None:
         # Newton's method stays on the straight path: nothing pushes the column off it.
         for _ in range(6):
             near = equations.linearise(straight, load)
-            straight = straight - near.factor.solve(near.residual)
-        assert near.factor.negative == (load > 0.1)
+            straight = straight - near.stiffness.solve(near.residual)
+        assert near.stiffness.negative_eigenvalues == (load > 0.1)
 
 
 def test_lanczos_finds_the_extreme_compliances() -> None:
@@ -421,9 +423,9 @@ def test_lanczos_finds_the_extreme_compliances() -> None:
     turn = np.linalg.qr(rng.standard_normal((60, 60)))[0]
     stiffness = np.concatenate([[-0.3, 0.1], np.geomspace(1.0, 1e4, 58)])
     inverse = turn @ np.diag(1.0 / stiffness) @ turn.T
-    compliance, mode = softest(lambda force: inverse @ force, np.zeros(60), rng)
+    compliance, mode = extreme_compliances(lambda force: inverse @ force, np.zeros(60), rng)
     assert compliance[[0, -1]] == pytest.approx([-1.0 / 0.3, 10.0], rel=1e-9)
-    assert negative(compliance) == 1
+    assert count_negative(compliance) == 1
     assert abs(mode @ turn[:, 0]) == pytest.approx(1.0, abs=1e-6)
 
 
@@ -488,9 +490,9 @@ def test_results_do_not_depend_on_which_state_was_factorised_last() -> None:
     part = two_cells()
     equations = ContinuumEquations(continuum_system(part, plane_mesh(part, size=2.0)))
     right = np.random.default_rng(7).standard_normal(equations.count)
-    first = equations.linearise(np.zeros(equations.count), 0.5).factor
+    first = equations.linearise(np.zeros(equations.count), 0.5).stiffness
     before = first.solve(right)
-    other = equations.linearise(1e-2 * before / np.abs(before).max(), 0.5).factor
+    other = equations.linearise(1e-2 * before / np.abs(before).max(), 0.5).stiffness
     assert np.abs(other.solve(right) - before).max() > 1e-6 * np.abs(before).max()
     assert first.solve(right) == pytest.approx(before, rel=1e-9, abs=1e-12)
 
@@ -525,8 +527,8 @@ def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_path_is_told_as_it_goes() -> None:
     loads: list[float] = []
-    stepping = Stepping(first=0.5, largest=0.5)
+    control = StepControl(first=0.5, largest=0.5)
     solve_plane(
-        two_cells(), size=2.0, stepping=stepping, tell=lambda state: loads.append(state.load)
+        two_cells(), size=2.0, control=control, report=lambda state: loads.append(state.load)
     )
     assert loads == [0.5, 1.0]

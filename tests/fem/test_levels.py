@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -40,7 +41,17 @@ def test_a_stretched_bar_has_the_stress_and_force_of_hooke_s_law(linear: bool) -
     assert last.energy == pytest.approx(0.5 * last.force[0] * 0.5)
     assert last.output == pytest.approx((0.25, 0.0))
     assert analysis.efficiency == pytest.approx(0.5)
-    assert "beyond the 1% that rubber stands" in " ".join(analysis.warnings)
+    assert re.search(r"strain.*rubber, 1%", " ".join(analysis.warnings))
+
+
+@pytest.mark.parametrize("level", ["plane", "solid"])
+def test_a_stretched_bar_has_nearly_the_same_figures_as_a_continuum(level: str) -> None:
+    pytest.importorskip("ngsolve", reason="NGSolve is not installed")
+    frame = levels["frame"](bar(0.5, (1.0, 0.0)), FemSettings(linear=True)).last
+    last = levels[level](bar(0.5, (1.0, 0.0)), FemSettings(linear=True, size=2.0)).last
+    assert last.force[0] == pytest.approx(frame.force[0], rel=0.05)
+    assert last.output[0] == pytest.approx(frame.output[0], rel=0.05)
+    assert last.energy == pytest.approx(0.5 * last.force[0] * 0.5, rel=1e-6)
 
 
 def test_a_bent_bar_is_stressed_most_where_it_is_clamped() -> None:
@@ -124,14 +135,12 @@ def arch(stroke: float) -> Part:
     return replace(part, design=driven.full_design())
 
 
-def test_an_arch_that_snaps_has_no_efficiency_but_a_place_where_it_ends() -> None:
+def test_an_arch_that_snaps_has_no_efficiency() -> None:
     analysis = levels["frame"](arch(0.05), FemSettings())
     assert analysis.status is PathStatus.SNAPPED
     assert math.isnan(analysis.efficiency)
     assert 0.0 < analysis.last.load < 0.9
-    assert analysis.after is not None
-    assert analysis.after.load == 1.0
-    assert analysis.last.output[1] > -2.25 > analysis.after.output[1]  # below the supports' line
+    assert analysis.last.output[1] > -2.25  # above the line of the supports
     data = analysis.to_dict()
     assert data["efficiency"] is None
     assert data["input_force_N"] is None

@@ -1,4 +1,4 @@
-"""Finite elements, which tell whether a part moves as the model of its design says.
+"""Finite elements of parts: frames of beams, plane stress and solids.
 
 >>> from bellcrank.fem import FemSettings, levels
 >>> from bellcrank.model import human_design
@@ -11,18 +11,21 @@
 
 from bellcrank.fem import frame  # isort: skip
 from bellcrank.fem import continuum  # isort: skip
+from bellcrank.fem.contact import Contacts, find_contacts
 from bellcrank.fem.levels import FemSettings, levels
-from bellcrank.fem.path import Loss, PathStatus
+from bellcrank.fem.path import PathStatus, StabilityLoss
 from bellcrank.fem.results import Analysis, Field, StrokePoint
 
 __all__ = [
     "Analysis",
+    "Contacts",
     "FemSettings",
     "Field",
-    "Loss",
     "PathStatus",
+    "StabilityLoss",
     "StrokePoint",
     "continuum",
+    "find_contacts",
     "frame",
     "levels",
 ]

@@ -1,4 +1,4 @@
-"""Levels of fidelity: a registry, and the settings that they share."""
+"""Levels of analysis: their registry and the settings that they share."""
 
 from __future__ import annotations
 
@@ -17,20 +17,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FemSettings:
-    """How a part is analysed.
+    """Settings of an analysis.
 
     Parameters
     ----------
     theory
-        Of beams: a name in the registry of theories.
+        Beam theory of frames: a name in the registry of theories.
     law
-        Of the material: a name in the registry of laws.
+        Material law of continua: a name in the registry of laws.
     linear
-        Small motions only, whatever the law.
+        Whether displacements are assumed to be small.
     elements
-        In each strut of a frame.
+        Number of beam elements of each strut.
     size
-        Largest edge of triangles or tetrahedra, mm; by the strut width if it is None.
+        Largest edge of triangles and tetrahedra, mm; chosen from the strut width if None.
+
+    Raises
+    ------
+    InvalidSettings
+        If the number of elements or the size is not positive.
     """
 
     theory: str = "euler-bernoulli"
@@ -50,29 +55,32 @@ class FemSettings:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One level of fidelity.
+    """One level of analysis.
 
     Parameters
     ----------
     analyse
-        From a part, settings and a function told the load that is reached, to an analysis.
+        Function of a part, settings and a callback that is called with each load reached.
     check
-        Refuses a part and settings that cannot be analysed, before anything is computed.
+        Function that raises an error for a part and settings that cannot be analysed.
+    missing
+        Function that returns which optional library is missing and how to install it, or None.
     """
 
     analyse: Callable[..., Analysis]
     check: Callable[[Part, FemSettings], None]
+    missing: Callable[[], str | None] = lambda: None
 
     def __call__(
         self,
         part: Part,
         settings: FemSettings,
-        tell: Callable[[float], None] = lambda _load: None,
+        report: Callable[[float], None] = lambda _load: None,
     ) -> Analysis:
-        """Analyse a part."""
+        """Check and analyse a part."""
         self.check(part, settings)
-        return self.analyse(part, settings, tell)
+        return self.analyse(part, settings, report)
 
 
 levels: Registry[Level] = Registry("level")
-"""Levels by name, the coarsest first."""
+"""Levels by name, in order of increasing detail."""

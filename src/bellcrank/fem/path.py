@@ -1,10 +1,10 @@
-"""Along the stroke: equilibria of a part from rest to the full input.
+"""Equilibrium path of a part from rest to the full input.
 
-A step begins with a predictor, the tangent or a cubic, and ends with Newton's method. It is made
-smaller where the corrector ends far from the predictor, so that the path is not left for another
-one, and where stability is lost, so that the load at which it is lost is known. There the softest
-mode tells what happens: if the load pulls along it, the path turns back (a limit point) and the
-part jumps; if not, another path branches off (a bifurcation) and the part buckles into it.
+Each step starts with a predictor, the tangent or a cubic, and ends with Newton's method. The step
+is halved if the corrector ends far from the predictor, which may be another path, and if stability
+is lost, so that the load at which this happens is found. The softest mode there shows what kind of
+loss it is: if the load does work along the mode, the path turns back at a limit point and the part
+snaps through; if not, another path branches off at a bifurcation and the part buckles.
 """
 
 from __future__ import annotations
@@ -24,21 +24,23 @@ if TYPE_CHECKING:
 
 SMALLEST_STEP = 1e-4
 LARGEST_DEPARTURE = 0.5
-"""Of the corrector from the predictor, as a part of the predicted motion."""
-HOPE = 3
-"""Iterations that may raise the residual; one that does later is on its way to nowhere."""
-CURVED = 0.3
-"""Departure of the curved from the straight predictor up to which it is trusted."""
-EASY = 4
-"""Iterations up to which the next step is larger."""
+"""Largest distance of the corrector from the predictor, as a fraction of the predicted motion."""
+MAX_RESIDUAL_INCREASES = 3
+"""Number of first iterations in which the residual may grow; later growth means divergence."""
+LARGEST_CURVATURE = 0.3
+"""Largest departure of the cubic from the tangent predictor, as a fraction of the latter, at which
+the cubic is used."""
+FEW_ITERATIONS = 4
+"""Number of iterations up to which the next step is doubled."""
 SOFT = 0.15
-"""Stiffness of the softest mode, as a part of what it was at rest, that counts as nearly lost."""
-POWERS = 30
-"""Inverse iterations for the softest mode."""
+"""Stiffness of the softest mode, as a fraction of that at rest, below which stability is considered
+nearly lost."""
+INVERSE_ITERATIONS = 30
+"""Number of inverse iterations for the softest mode."""
 
 
 class PathStatus(StrEnum):
-    """How far a path goes."""
+    """How the equilibrium path ends."""
 
     CONVERGED = "converged"
     SNAPPED = "snapped"
@@ -47,7 +49,7 @@ class PathStatus(StrEnum):
 
     @property
     def message(self) -> str:
-        """What it means, as a sentence."""
+        """Meaning of the status as a sentence."""
         return _MESSAGES[self]
 
 
@@ -59,24 +61,24 @@ _MESSAGES = {
 }
 
 
-class Loss(StrEnum):
-    """How stability is lost."""
+class StabilityLoss(StrEnum):
+    """Kind of point at which stability is lost."""
 
     LIMIT_POINT = "limit point"
     BIFURCATION = "bifurcation"
 
 
-class Factor(Protocol):
+class FactorisedStiffness(Protocol):
     """A factorised tangent stiffness."""
 
     @property
-    def negative(self) -> int:
-        """Number of directions in which the state is unstable."""
+    def negative_eigenvalues(self) -> int:
+        """Number of negative eigenvalues: 0 in a stable state."""
         ...
 
     @property
-    def firm(self) -> bool:
-        """Whether everything is held in place, so that solutions mean something."""
+    def nonsingular(self) -> bool:
+        """Whether no rigid-body motion is left."""
         ...
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -85,101 +87,101 @@ class Factor(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Linearised:
-    """Equations near a state.
+class Linearisation:
+    """Equations linearised in a state.
 
     Parameters
     ----------
-    residual : (f,)
-        0 in equilibrium.
-    tolerance : (f,) or number
-        What may be left of each entry of the residual.
-    factor
-        Of the derivative of the residual by the unknowns.
+    residual : (f,) float64
+        Residual, 0 in equilibrium.
+    tolerance : (f,) float64 or float
+        Largest admissible size of each entry of the residual.
+    stiffness
+        Factorised derivative of the residual with respect to the unknowns.
     """
 
     residual: NDArray[np.float64]
     tolerance: NDArray[np.float64] | float
-    factor: Factor
+    stiffness: FactorisedStiffness
 
 
 class Equations(Protocol):
-    """Equilibrium of a part under some of its full input; forces in N, lengths in mm."""
+    """Equilibrium equations of a part under a fraction of its full input, in N and mm."""
 
     @property
     def count(self) -> int:
         """Number of unknowns."""
         ...
 
-    def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearised:
-        """Return the equations near a state; RuntimeError if the stiffness is singular."""
+    def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearisation:
+        """Linearise the equations; raises RuntimeError if the stiffness is singular."""
         ...
 
-    def pull(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
-        """Return (f,) the derivative of the residual by the load."""
+    def load_derivative(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
+        """Return (f,) the derivative of the residual with respect to the load."""
         ...
 
     def distance(self, change: NDArray[np.float64]) -> float:
-        """Return how far a change of the unknowns moves the part."""
+        """Return the norm of a change of the unknowns, mm."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State:
-    """An equilibrium.
+class PathState:
+    """An equilibrium on a path.
 
     Parameters
     ----------
     load
-        Part of the full input, 0 to 1.
-    unknowns : (f,)
-        As the equations number them.
-    negative
-        Directions in which it is unstable.
+        Fraction of the full input, 0 to 1.
+    unknowns : (f,) float64
+        Unknowns in the order of the equations.
+    negative_eigenvalues
+        Number of unstable directions.
     """
 
     load: float
     unknowns: NDArray[np.float64]
-    negative: int = 0
+    negative_eigenvalues: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Path:
-    """Equilibria from rest on.
+class EquilibriumPath:
+    """Stable equilibria from rest on.
 
     Parameters
     ----------
     states
-        In order of the load, all stable.
+        Stable states in order of the load.
     status
-        Whether the last one bears the full input, and if not, why.
-    loss
-        How stability is lost behind the last one, if it is.
+        Whether the last state bears the full input and, if not, why.
     factorisations
-        What it cost.
+        Number of factorisations of the stiffness.
+    loss
+        Kind of the loss of stability beyond the last state; None if there is none.
     """
 
-    states: list[State]
+    states: list[PathState]
     status: PathStatus
     factorisations: int
-    loss: Loss | None = None
+    loss: StabilityLoss | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stepping:
-    """How a path is followed.
+class StepControl:
+    """Step sizes of the continuation.
 
     Parameters
     ----------
     first, largest
-        Parts of the input that steps may take.
+        First and largest step, as fractions of the full input.
     iterations
-        Of Newton's method before a step is halved.
+        Newton iterations after which a step is halved.
 
     Raises
     ------
     InvalidSettings
-        Unless steps are above 0 and at most the whole input.
+        If a step is not above `SMALLEST_STEP` and at most 1.
     """
 
     first: float = 1.0 / 16.0
@@ -191,64 +193,119 @@ class Stepping:
             step = getattr(self, name)
             if not SMALLEST_STEP < step <= 1.0:
                 raise InvalidSettings(
-                    f"{name}: expected a part of the stroke above {SMALLEST_STEP:g}, got {step!r}"
+                    f"{name}: expected a fraction of the stroke above {SMALLEST_STEP:g} and at "
+                    f"most 1, got {step!r}"
                 )
 
 
-@dataclass(slots=True, eq=False)
-class Follower:
-    """Follows one path.
+def follow_path(
+    equations: Equations,
+    control: StepControl | None = None,
+    report: Callable[[PathState], None] = lambda _state: None,
+) -> EquilibriumPath:
+    """Follow the equilibrium path from rest to the full input, as far as it is stable.
 
     Parameters
     ----------
     equations
-        Whose path.
-    stepping
-        With what steps.
-    tell
-        Called with each state that is reached.
+        Equations of the part.
+    control
+        Step sizes.
+    report
+        Called with each state on the path.
     """
+    return _Continuation(equations, control or StepControl(), report).run()
+
+
+@dataclass(slots=True, eq=False)
+class _Continuation:
+    """Continuation of one path."""
 
     equations: Equations
-    stepping: Stepping
-    tell: Callable[[State], None] = lambda _state: None
+    control: StepControl
+    report: Callable[[PathState], None]
     factorisations: int = field(default=0, init=False)
 
-    def correct(self, load: float, guess: NDArray[np.float64]) -> tuple[State, int, Factor] | None:
-        """Return an equilibrium, the iterations to it and the last factor; None if none is found.
+    def run(self) -> EquilibriumPath:
+        """Follow the path from rest."""
+        here = PathState(0.0, np.zeros(self.equations.count))
+        states = [here]
+        start = self._linearise(here.unknowns, here.load)
+        if start is None or not start.stiffness.nonsingular:
+            return EquilibriumPath(states, PathStatus.MECHANISM, self.factorisations)
+        tangent = start.stiffness
+        initial_stiffness = softest_mode(tangent, self.equations.count)[0]
+        rate = self._rate(tangent, here)
+        step = min(self.control.first, self.control.largest)
+        unstable = False
+        before: tuple[PathState, NDArray[np.float64]] | None = None
+        while here.load < 1.0:
+            load = min(1.0, here.load + step)
+            predicted = self._predict(load, here, rate, before)
+            found = self._correct(load, here.unknowns + predicted)
+            # An unstable equilibrium shows that the path ends with a loss of stability, even if
+            # Newton's method does not converge closer to it.
+            unstable |= found is not None and found[0].negative_eigenvalues > 0
+            if (
+                found is None
+                or found[0].negative_eigenvalues
+                or self._departs(found[0], here, predicted)
+            ):
+                step = (load - here.load) / 2.0
+                if step < SMALLEST_STEP:
+                    loss = self._kind_of_loss(tangent, rate, initial_stiffness)
+                    lost = unstable or loss is not None
+                    status = PathStatus.SNAPPED if lost else PathStatus.UNCONVERGED
+                    return EquilibriumPath(states, status, self.factorisations, loss)
+                continue
+            before = here, rate
+            here, iterations, tangent = found
+            states.append(here)
+            self.report(here)
+            rate = self._rate(tangent, here)
+            if iterations <= FEW_ITERATIONS:
+                step = min(self.control.largest, step * 2.0)
+        return EquilibriumPath(states, PathStatus.CONVERGED, self.factorisations)
 
-        The last correction is made although the state before it is settled already: the factor
-        that it needs is needed anyway.
+    def _correct(
+        self, load: float, guess: NDArray[np.float64]
+    ) -> tuple[PathState, int, FactorisedStiffness] | None:
+        """Return an equilibrium, its number of iterations and the last stiffness, or None.
+
+        The last correction is applied although the residual is within the tolerance already,
+        because the stiffness that it needs is computed in any case.
         """
-        unknowns, first = guess, 0.0
-        for iteration in range(self.stepping.iterations):
-            near = self._linearise(unknowns, load)
-            if near is None:
+        unknowns, allowed = guess, 0.0
+        for iteration in range(self.control.iterations):
+            linear = self._linearise(unknowns, load)
+            if linear is None:
                 return None
-            left = float((np.abs(near.residual) / near.tolerance).max(initial=0.0))
-            first = max(first, left) if iteration < HOPE else first
-            if left > first:
+            excess = float((np.abs(linear.residual) / linear.tolerance).max(initial=0.0))
+            if iteration < MAX_RESIDUAL_INCREASES:
+                allowed = max(allowed, excess)
+            if excess > allowed:
                 return None
-            unknowns = unknowns - near.factor.solve(near.residual)
-            if left <= 1.0:
-                return State(load, unknowns, near.factor.negative), iteration, near.factor
+            tangent = linear.stiffness
+            unknowns = unknowns - tangent.solve(linear.residual)
+            if excess <= 1.0:
+                return PathState(load, unknowns, tangent.negative_eigenvalues), iteration, tangent
         return None
 
-    def rate(self, factor: Factor, state: State) -> NDArray[np.float64]:
-        """Return (f,) the motion for all of the input at once, by the tangent at a state."""
-        return -factor.solve(self.equations.pull(state.unknowns, state.load))
+    def _rate(self, tangent: FactorisedStiffness, state: PathState) -> NDArray[np.float64]:
+        """Return (f,) the derivative of the unknowns with respect to the load."""
+        return -tangent.solve(self.equations.load_derivative(state.unknowns, state.load))
 
-    def predict(
+    def _predict(
         self,
         load: float,
-        here: State,
+        here: PathState,
         rate: NDArray[np.float64],
-        before: tuple[State, NDArray[np.float64]] | None,
+        before: tuple[PathState, NDArray[np.float64]] | None,
     ) -> NDArray[np.float64]:
-        """Return (f,) the motion to expect up to a load.
+        """Return (f,) the predicted change of the unknowns up to a load.
 
-        By the cubic through the last two states with their tangents, unless that leads far off
-        the last tangent, where a path bends too sharply for it.
+        The cubic through the last two states and their tangents is used unless it departs far
+        from the last tangent, where the path bends too sharply for it.
         """
         step = load - here.load
         straight = step * rate
@@ -256,100 +313,48 @@ class Follower:
             return straight
         last, slope = before
         taken = here.load - last.load
-        part = step / taken
-        # Hermite's cubic in the part of the last step, continued beyond it.
+        ratio = step / taken
+        # Hermite's cubic in the fraction of the last step, continued beyond it.
         chord, begin, end = here.unknowns - last.unknowns, taken * slope, taken * rate
         second, third = 3.0 * chord - 2.0 * begin - end, begin + end - 2.0 * chord
-        curved = part * (begin + (2.0 + part) * second + (3.0 + part * (3.0 + part)) * third)
-        bend = self.equations.distance(curved - straight)
-        return curved if bend < CURVED * self.equations.distance(straight) else straight
+        curved = ratio * (begin + (2.0 + ratio) * second + (3.0 + ratio * (3.0 + ratio)) * third)
+        departure = self.equations.distance(curved - straight)
+        is_smooth = departure < LARGEST_CURVATURE * self.equations.distance(straight)
+        return curved if is_smooth else straight
 
-    def strays(self, state: State, here: State, ahead: NDArray[np.float64]) -> bool:
-        """Whether a state is so far from where it was expected that it may be another path's."""
-        departure = self.equations.distance(state.unknowns - here.unknowns - ahead)
-        return departure > LARGEST_DEPARTURE * self.equations.distance(ahead)
+    def _departs(self, state: PathState, here: PathState, predicted: NDArray[np.float64]) -> bool:
+        """Return whether a state is so far from its prediction that it may be on another path."""
+        departure = self.equations.distance(state.unknowns - here.unknowns - predicted)
+        return departure > LARGEST_DEPARTURE * self.equations.distance(predicted)
 
-    def follow(self, start: State | None = None) -> Path:
-        """Follow the path on which a state lies; by default that from rest."""
-        here = start or State(0.0, np.zeros(self.equations.count))
-        states = [here]
-        near = self._linearise(here.unknowns, here.load)
-        if near is None or not near.factor.firm:
-            return Path(states, PathStatus.MECHANISM, self.factorisations)
-        factor = near.factor
-        hard = softest_mode(factor, self.equations.count)[0]
-        rate = self.rate(factor, here)
-        step = min(self.stepping.first, self.stepping.largest)
-        unstable = False
-        before: tuple[State, NDArray[np.float64]] | None = None
-        while here.load < 1.0:
-            load = min(1.0, here.load + step)
-            ahead = self.predict(load, here, rate, before)
-            found = self.correct(load, here.unknowns + ahead)
-            # An unstable equilibrium ahead tells that the path ends where stability is lost,
-            # even if Newton's method finds nothing at all closer to it.
-            unstable |= found is not None and found[0].negative > 0
-            if found is None or found[0].negative or self.strays(found[0], here, ahead):
-                step = (load - here.load) / 2.0
-                if step < SMALLEST_STEP:
-                    loss = self._loss(factor, rate, hard)
-                    lost = unstable or loss is not None
-                    status = PathStatus.SNAPPED if lost else PathStatus.UNCONVERGED
-                    return Path(states, status, self.factorisations, loss)
-                continue
-            before = here, rate
-            here, iterations, factor = found
-            states.append(here)
-            self.tell(here)
-            rate = self.rate(factor, here)
-            step = min(self.stepping.largest, step * 2.0) if iterations <= EASY else step
-        return Path(states, PathStatus.CONVERGED, self.factorisations)
-
-    def _loss(self, factor: Factor, rate: NDArray[np.float64], hard: float) -> Loss | None:
-        """Tell how stability is lost near a state; None if it is not."""
-        stiffness, mode = softest_mode(factor, self.equations.count)
-        if stiffness > SOFT * hard:
+    def _kind_of_loss(
+        self, tangent: FactorisedStiffness, rate: NDArray[np.float64], initial_stiffness: float
+    ) -> StabilityLoss | None:
+        """Classify the loss of stability near a state; None if the softest mode is stiff."""
+        stiffness, mode = softest_mode(tangent, self.equations.count)
+        if stiffness > SOFT * initial_stiffness:
             return None
         along = abs(float(mode @ rate)) / float(np.linalg.norm(rate))
-        return Loss.LIMIT_POINT if along > 0.5 else Loss.BIFURCATION
+        return StabilityLoss.LIMIT_POINT if along > 0.5 else StabilityLoss.BIFURCATION
 
-    def _linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearised | None:
+    def _linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearisation | None:
         if not np.isfinite(unknowns).all():
             return None
         self.factorisations += 1
         try:
-            near = self.equations.linearise(unknowns, load)
+            linear = self.equations.linearise(unknowns, load)
         except RuntimeError:
             return None
-        return near if np.isfinite(near.residual).all() else None
+        return linear if np.isfinite(linear.residual).all() else None
 
 
-def softest_mode(factor: Factor, count: int) -> tuple[float, NDArray[np.float64]]:
+def softest_mode(tangent: FactorisedStiffness, count: int) -> tuple[float, NDArray[np.float64]]:
     """Return the eigenvalue nearest to 0 and its (f,) unit vector, by inverse iteration."""
     mode = np.random.default_rng(0).standard_normal(count)
     mode /= np.linalg.norm(mode)
-    size = 1.0
-    for _ in range(POWERS):
-        moved = factor.solve(mode)
-        size = float(mode @ moved)
-        mode = moved / np.linalg.norm(moved)
-    return 1.0 / size, mode
-
-
-def follow(
-    equations: Equations,
-    stepping: Stepping | None = None,
-    tell: Callable[[State], None] = lambda _state: None,
-) -> Path:
-    """Follow the path of a part from rest to its full input, as far as it is stable.
-
-    Parameters
-    ----------
-    equations
-        Of the part.
-    stepping
-        With what steps.
-    tell
-        Called with each state that is reached.
-    """
-    return Follower(equations, stepping or Stepping(), tell).follow()
+    eigenvalue = 1.0
+    for _ in range(INVERSE_ITERATIONS):
+        solved = tangent.solve(mode)
+        eigenvalue = float(mode @ solved)
+        mode = solved / np.linalg.norm(solved)
+    return 1.0 / eigenvalue, mode

@@ -1,4 +1,4 @@
-"""What an analysis by finite elements says about a part, at whatever level."""
+"""Results of an analysis by finite elements, the same at every level."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.fem.contact import Contacts
-    from bellcrank.fem.path import Loss
+    from bellcrank.fem.path import StabilityLoss
     from bellcrank.part.part import Part
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StrokePoint:
-    """An equilibrium along the stroke, in a few numbers.
+    """Figures of one equilibrium along the stroke.
 
     Parameters
     ----------
     load
-        Part of the full input, 0 to 1.
+        Fraction of the full input, 0 to 1.
     efficiency
-        As the problem's objective defines it.
+        Efficiency by the problem's objective.
     output : (2,)
-        Mean motion of the output nodes in x and y, mm.
+        Mean displacement of the output nodes in x and y, mm.
     force : (2,)
-        On all input nodes together, N.
+        Total force on the input nodes, N.
     push
-        On each input node along its direction, together, N: what is left where inputs push
-        against each other.
+        Sum over the input nodes of the force along the node's input direction, N. It differs from
+        the total force if the input nodes move in opposite directions.
     energy
-        Elastic, N mm.
+        Elastic energy, N mm.
     stress
-        The largest von Mises stress, MPa.
+        Largest von Mises stress, MPa.
     strain
-        The largest principal strain, 0.1 for 10 %.
+        Largest principal strain.
     """
 
     load: float
@@ -54,7 +54,7 @@ class StrokePoint:
     strain: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, with units in the names."""
+        """Return plain data with units in the keys."""
         return {
             "load": self.load,
             "efficiency": finite(self.efficiency),
@@ -72,19 +72,21 @@ def stroke_point(
     load: float,
     motion: NDArray[np.float64],
     forces: NDArray[np.float64],
-    **inner: float,
+    **figures: float,
 ) -> StrokePoint:
     """Return the figures of an equilibrium.
 
     Parameters
     ----------
+    part
+        Part that is analysed.
     load
-        Part of the full input, 0 to 1.
-    motion : (N, 2)
-        Of the lattice's nodes, mm; 0 where no strut is.
-    forces : (i, 2)
-        On each input node, N.
-    **inner
+        Fraction of the full input, 0 to 1.
+    motion : (N, 2) float64
+        Displacements of the lattice nodes, mm; 0 for nodes without struts.
+    forces : (i, 2) float64
+        Forces on the input nodes, N.
+    **figures
         Energy, stress and strain.
     """
     problem = part.design.problem
@@ -95,7 +97,7 @@ def stroke_point(
         output=(float(output[0]), float(output[1])),
         force=(float(force[0]), float(force[1])),
         push=float((forces * problem.input.direction).sum()),
-        **inner,
+        **figures,
     )
 
 
@@ -105,14 +107,14 @@ class Field:
 
     Parameters
     ----------
-    rest : (n, 2) or (n, 3)
-        Positions of vertices at rest, mm.
-    displacement : (n, 2) or (n, 3)
-        mm.
+    rest : (n, 2) or (n, 3) float64
+        Positions of the vertices at rest, mm.
+    displacement : (n, 2) or (n, 3) float64
+        Displacements of the vertices, mm.
     cells : (c, k) int64
-        Two vertices each for the elements of a frame, three for triangles, four for tetrahedra.
-    stress : (n,) or (c,)
-        Von Mises, MPa: of each vertex, or of each element of a frame.
+        Vertices of the cells: two for beam elements, three for triangles, four for tetrahedra.
+    stress : (n,) or (c,) float64
+        Von Mises stress of each vertex, or of each beam element, MPa.
     """
 
     rest: NDArray[np.float64]
@@ -123,30 +125,28 @@ class Field:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Analysis:
-    """What became of a part.
+    """Result of one analysis of a part.
 
     Parameters
     ----------
     part
-        The part.
+        Part that was analysed.
     level
         Name in the registry of levels.
     theory
-        Of its beams, or law of its material.
+        Beam theory, or material law.
     linear
-        Whether it was taken to move little.
+        Whether displacements were assumed to be small.
     status
-        `converged` if it is stable all along the stroke.
+        How the equilibrium path ends; `converged` if it is stable along the whole stroke.
     loss
-        How stability is lost, if it is.
+        Kind of the loss of stability, if stability is lost.
     points
-        Stable equilibria from rest to the full stroke, or to where they end.
-    after
-        Where it comes to rest at the full stroke after it has snapped, if that was found.
+        Stable equilibria from rest to the full stroke or to the loss of stability.
     contacts
-        Struts that touch at the last of the points.
+        Struts that touch in any of the points.
     field
-        The last of the points.
+        State at the last point.
     cost
         Seconds, unknowns, factorisations.
     """
@@ -156,16 +156,15 @@ class Analysis:
     theory: str
     linear: bool
     status: PathStatus
-    loss: Loss | None
+    loss: StabilityLoss | None
     points: list[StrokePoint]
-    after: StrokePoint | None
     contacts: Contacts
     field: Field
     cost: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def efficiency(self) -> float:
-        """At the full stroke; nan if no stable path leads there."""
+        """Efficiency at the full stroke; nan if no stable path leads there."""
         return self.last.efficiency if self.status is PathStatus.CONVERGED else math.nan
 
     @property
@@ -175,7 +174,7 @@ class Analysis:
 
     @property
     def warnings(self) -> list[str]:
-        """What a builder should know, as sentences."""
+        """Defects of the part that a builder should know of, as sentences."""
         found = []
         if self.loss is not None:
             found.append(
@@ -188,14 +187,14 @@ class Analysis:
         limit = self.part.material.strain_limit
         if self.last.strain > limit:
             found.append(
-                f"strains up to {self.last.strain:.0%} are beyond the {limit:.0%} that "
-                f"{self.part.material.name} stands"
+                f"the largest strain, {self.last.strain:.0%}, exceeds the limit of "
+                f"{self.part.material.name}, {limit:.0%}"
             )
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the analysis as plain data; what is not a result is null."""
-        done = self.status is PathStatus.CONVERGED
+        """Return the analysis as plain data; figures without a value are None."""
+        converged = self.status is PathStatus.CONVERGED
         last = self.last.to_dict()
         reached = last.pop("load")
         return {
@@ -203,18 +202,17 @@ class Analysis:
             "theory": self.theory,
             "linear": self.linear,
             "status": self.status.value,
-            "stable": done,
+            "stable": converged,
             "reached": reached,
             "loss_of_stability": self.loss.value if self.loss else None,
-            **(last if done else dict.fromkeys(last)),
+            **(last if converged else dict.fromkeys(last)),
             "contacts": self.contacts.to_list(),
             "stroke": [point.to_dict() for point in self.points],
-            "after_snap": self.after.to_dict() if self.after else None,
             "warnings": self.warnings,
             "cost": self.cost,
         }
 
 
 def finite(value: float) -> float | None:
-    """Return a number that JSON knows, or None."""
+    """Return a finite number unchanged, and None instead of infinity or nan."""
     return value if math.isfinite(value) else None

@@ -1,9 +1,9 @@
-"""Struts as they are printed: the whole outline of a part, in the plane or in space.
+"""Continua: the printed outline of a part in plane stress or as a solid.
 
-Quadratic finite elements (NGSolve) with supports and inputs that grip hubs, small discs round
-the nodes of the lattice.
+Quadratic finite elements (NGSolve). Supports and inputs act on hubs, small discs around the lattice
+nodes.
 """
 
-from bellcrank.fem.continuum.level import analyse_plane, analyse_solid
+from bellcrank.fem.continuum.analysis import analyse_plane, analyse_solid
 
 __all__ = ["analyse_plane", "analyse_solid"]

@@ -1,4 +1,4 @@
-"""NGSolve, imported when it is first needed."""
+"""NGSolve, imported on first use."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 THREADS = 2
-LARGE = 200_000
-"""Unknowns from which on threads are worth it: they wait busily for each other, and on a machine
-that others use as well that can take ten times as long as the work."""
+MANY_UNKNOWNS = 200_000
+"""Number of unknowns above which threads are used. Threads of NGSolve wait actively for each other,
+so that on a busy machine they can take ten times as long as the computation."""
 
 
 def ngsolve() -> Any:
@@ -26,17 +26,26 @@ def ngsolve() -> Any:
     """
     try:
         import ngsolve as module
-    except ImportError as missing:
+    except ImportError as error:
         raise InvalidSettings(
             "levels plane and solid need NGSolve; install it with: pip install 'bellcrank[fem]'"
-        ) from missing
+        ) from error
     return module
+
+
+def missing_ngsolve() -> str | None:
+    """Return how to install NGSolve, or None if it is installed."""
+    try:
+        ngsolve()
+    except InvalidSettings as error:
+        return str(error)
+    return None
 
 
 @contextmanager
 def threads(unknowns: int) -> Iterator[None]:
-    """Let NGSolve work in some threads if there are many unknowns."""
-    if unknowns < LARGE:
+    """Use several threads of NGSolve if there are many unknowns."""
+    if unknowns < MANY_UNKNOWNS:
         yield
         return
     module = ngsolve()

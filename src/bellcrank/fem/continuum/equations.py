@@ -1,10 +1,11 @@
-"""Equilibrium of a continuum: finite elements, grips and their factorised stiffness.
+"""Equilibrium equations of continua.
 
-What is stationary is the stored energy plus, for each grip on the mean displacement m of a
-hub, k q (m - t g) - k^2 q^2 / 2 s, with q the unknown by which the grip pulls (-k q is its force
-on the part, k = E times thickness makes q a length), t the load, g the given motion and s the
-spring. A motion that is given exactly has no last term, but a minute one in the stiffness, so that
-this is quasi-definite and needs no pivoting.
+The functional that is stationary is the elastic energy plus, for each constraint on the mean
+displacement m of a hub, k q (m - t g) - k^2 q^2 / 2 s. Here q is the multiplier of the constraint:
+its force on the part is -k q, and k = E times thickness makes q a length. t is the load, g the
+prescribed displacement and s the stiffness of the spring. For an exact constraint the last term
+vanishes, but a very small one is kept in the stiffness, which is then quasi-definite and is
+factorised without pivoting.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.fem.continuum.backend import ngsolve, threads
-from bellcrank.fem.continuum.modes import negative, softest
+from bellcrank.fem.continuum.stability import count_negative, extreme_compliances
 from bellcrank.fem.continuum.system import MEAN_ORDER, integration
-from bellcrank.fem.path import Linearised
+from bellcrank.fem.path import Linearisation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,24 +27,23 @@ if TYPE_CHECKING:
     from bellcrank.fem.continuum.system import ContinuumSystem
 
 TOLERANCE = 1e-9
-"""Residual, as a part of the largest force on a node."""
-YIELDING = 1e-8
-"""Of motions given exactly, in the stiffness only, as a part of k."""
-LOOSE = 1e12
-"""Displacement by forces of which each is k times 1 mm, as a part of 1 mm for each, from which on
-nothing is held in place."""
+"""Admissible residual as a fraction of the largest force on a node."""
+COMPLIANCE = 1e-8
+"""Compliance of exact constraints in the stiffness, as a fraction of 1 / k."""
+SINGULAR = 1e12
+"""Ratio of displacements to forces / k above which the stiffness is considered singular."""
 
 
 class ContinuumEquations:
-    """Equilibrium of a continuum that moves far.
+    """Equilibrium of a continuum with large displacements.
 
-    The unknowns are the free displacements and the pull q of each grip, all in mm. One stiffness
-    is kept; that of a state which is asked for again after another is assembled again.
+    The unknowns are the free displacements and the multiplier q of each constraint, all in mm.
+    Only the stiffness of the last state is kept; that of an earlier state is assembled again.
 
     Parameters
     ----------
     system
-        Whose.
+        Mesh, material, supports and loads.
     """
 
     def __init__(self, system: ContinuumSystem) -> None:
@@ -52,13 +52,13 @@ class ContinuumEquations:
         region = system.mesh.mesh
         self.displacements = module.VectorH1(region, order=2)
         spaces = [
-            module.NumberSpace(region, definedon=system.mesh.hub(grip.node))
-            for grip in system.grips.means
+            module.NumberSpace(region, definedon=system.mesh.hub(constraint.node))
+            for constraint in system.boundary.means
         ]
         self.space = module.FESpace([self.displacements, *spaces])
         self.state = module.GridFunction(self.space)
         self._out = self.state.vec.CreateVector()
-        held = self.displacements.GetDofs(system.mesh.hub(*system.grips.clamped.tolist()))
+        held = self.displacements.GetDofs(system.mesh.hub(*system.boundary.clamped.tolist()))
         is_held = np.array(list(held), dtype=bool)
         is_free = np.array(list(self.space.FreeDofs()), dtype=bool)
         is_free[: len(is_held)] &= ~is_held
@@ -77,24 +77,26 @@ class ContinuumEquations:
 
     @property
     def gradient(self) -> Any:
-        """Gradient F of the deformation in the present state, a coefficient function."""
+        """Deformation gradient F of the current state, a coefficient function."""
         module = ngsolve()
         return module.Id(self.system.mesh.dimension) + module.Grad(self.state.components[0])
 
     @cached_property
-    def yielding(self) -> NDArray[np.float64]:
-        """(g,) k / s of each grip."""
-        springs = np.array([grip.spring for grip in self.system.grips.means])
-        return np.where(np.isinf(springs), YIELDING, self.system.unit / springs)
+    def compliance(self) -> NDArray[np.float64]:
+        """(g,) k / s of each constraint."""
+        springs = np.array([constraint.spring for constraint in self.system.boundary.means])
+        return np.where(np.isinf(springs), COMPLIANCE, self.system.unit / springs)
 
     @cached_property
     def exact(self) -> NDArray[np.bool_]:
-        """(g,) which grips give a motion exactly."""
-        return np.array([np.isinf(grip.spring) for grip in self.system.grips.means], dtype=bool)
+        """(g,) whether each constraint is exact."""
+        return np.array(
+            [np.isinf(constraint.spring) for constraint in self.system.boundary.means], dtype=bool
+        )
 
     @cached_property
     def hub_sizes(self) -> dict[int, float]:
-        """Area or volume of each hub, in mm."""
+        """Area, mm^2, or volume, mm^3, of each hub."""
         system = self.system
         module, region = ngsolve(), system.mesh.mesh
         sizes = module.Integrate(module.CF(1.0), region, order=MEAN_ORDER, region_wise=True)
@@ -103,88 +105,90 @@ class ContinuumEquations:
 
     @cached_property
     def load(self) -> NDArray[np.float64]:
-        """(F,) the derivative of the residual by the load, for all degrees of freedom."""
+        """(F,) derivative of the residual with respect to the load, for all degrees of freedom."""
         system = self.system
-        module, grips = ngsolve(), system.grips
+        module, boundary = ngsolve(), system.boundary
         rules = integration(system.mesh.dimension, MEAN_ORDER)
         test = self.space.TestFunction()[0]
         form = module.LinearForm(self.space)
-        for node, force in zip(grips.pushed.tolist(), grips.force.tolist(), strict=True):
+        for node, force in zip(boundary.loaded.tolist(), boundary.force.tolist(), strict=True):
             pulled = sum(part * test[axis] for axis, part in enumerate(force))
             hub = system.mesh.hub(node)
             form += pulled / self.hub_sizes[node] * module.dx(definedon=hub, intrules=rules)
         form.Assemble()
         load: NDArray[np.float64] = -form.vec.FV().NumPy()
-        motion = np.array([grip.motion for grip in grips.means])
+        motion = np.array([constraint.motion for constraint in boundary.means])
         load[len(load) - len(motion) :] -= system.unit * motion
         return load
 
-    def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearised:
-        """Return the equations near a state."""
+    def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearisation:
+        """Linearise the equations; raises RuntimeError if the state has no finite energy."""
         here = unknowns.copy()
         residual, tolerance = self.residual(here, load)
         if not np.isfinite(residual).all():
-            raise RuntimeError("the state has no energy")
+            raise RuntimeError("the state has no finite energy")
         self.factorise(here)
-        return Linearised(residual, tolerance, TangentFactor(self, here))
+        return Linearisation(residual, tolerance, TangentFactor(self, here))
 
-    def pull(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:  # noqa: ARG002
-        """Return (f,) the derivative of the residual by the load, the same in all states."""
+    def load_derivative(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return (f,) the derivative of the residual with respect to the load, a constant."""
         return self.load[self.free]
 
     def distance(self, change: NDArray[np.float64]) -> float:
         """Return the norm of a change of the displacements, mm."""
         return float(np.linalg.norm(change[: self.moving]))
 
-    def place(self, unknowns: NDArray[np.float64]) -> None:
-        """Make a state the present one."""
+    def set_state(self, unknowns: NDArray[np.float64]) -> None:
+        """Set the current state."""
         values = self.state.vec.FV().NumPy()
         values[:] = 0.0
         values[self.free] = unknowns
 
     def forces(self, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (F,) the gradient of what is stationary at load 0, for all degrees of freedom."""
-        self.place(unknowns)
+        """Return (F,) the gradient of the functional at load 0, for all degrees of freedom."""
+        self.set_state(unknowns)
         with threads(self.count):
             self._form.Apply(self.state.vec, self._out)
         total: NDArray[np.float64] = self._out.FV().NumPy().copy()
-        grips = len(self.exact)
-        if grips:
-            given = np.where(self.exact, self.yielding, 0.0)
-            total[-grips:] += self.system.unit * given * unknowns[-grips:]
+        count = len(self.exact)
+        if count:
+            given = np.where(self.exact, self.compliance, 0.0)
+            total[-count:] += self.system.unit * given * unknowns[-count:]
         return total
 
     def residual(
         self, unknowns: NDArray[np.float64], load: float
     ) -> tuple[NDArray[np.float64], float]:
-        """Return (f,) what is 0 in equilibrium, and how much of it is rounding.
+        """Return (f,) the residual and its tolerance.
 
-        Forces on nodes within clamped and driven hubs, and the pulls of grips themselves, tell
-        what is large.
+        The tolerance is relative to the largest force on a node, those in clamped and driven hubs
+        included, or of a constraint, plus the error by rounding.
         """
         forces = self.forces(unknowns)
-        pulls = self.system.unit * np.abs(unknowns[self.moving :]).max(initial=0.0)
-        largest = max(float(np.abs(forces[: self.displacements.ndof]).max()), float(pulls))
+        multipliers = self.system.unit * np.abs(unknowns[self.moving :]).max(initial=0.0)
+        largest = max(float(np.abs(forces[: self.displacements.ndof]).max()), float(multipliers))
         moved = float(np.abs(unknowns).max(initial=0.0))
         rounding = 100.0 * float(np.finfo(float).eps) * self.system.unit * moved
         residual = forces + load * self.load
         return residual[self.free], TOLERANCE * largest + rounding
 
     def potential(self, unknowns: NDArray[np.float64], load: float) -> float:
-        """Return what is stationary in equilibrium, N mm."""
-        self.place(unknowns)
+        """Return the functional that is stationary in equilibrium, N mm."""
+        self.set_state(unknowns)
         with threads(self.count):
             stored = float(self._form.Energy(self.state.vec))
-        pulls = unknowns[self.moving :]
-        stored += 0.5 * self.system.unit * float((self.yielding * pulls**2)[self.exact].sum())
+        multipliers = unknowns[self.moving :]
+        stored += (
+            0.5 * self.system.unit * float((self.compliance * multipliers**2)[self.exact].sum())
+        )
         return stored + load * float(self.load[self.free] @ unknowns)
 
     def factorise(self, unknowns: NDArray[np.float64]) -> None:
-        """Make the inverse that of the stiffness in a state, kept by the identity of its array."""
+        """Factorise the stiffness of a state, unless that array was factorised last."""
         if self._at is unknowns:
             return
         self._at = None
-        self.place(unknowns)
+        self.set_state(unknowns)
         with threads(self.count):
             self._form.AssembleLinearization(self.state.vec)
             if self._inverse is None:
@@ -194,18 +198,18 @@ class ContinuumEquations:
         self._at = unknowns
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (f,) the solution with the present inverse."""
+        """Return (f,) the solution with the stiffness that was factorised last."""
         given = self._out.CreateVector()
         values = given.FV().NumPy()
         values[:] = 0.0
         values[self.free] = right
-        # So short that threads take longer.
+        # Threads would take longer here.
         self._out.data = self._inverse * given
         solution: NDArray[np.float64] = self._out.FV().NumPy()[self.free]
         return solution
 
-    def compliance(self, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the extreme compliances in a state, mm / N; those below 0 are of instabilities."""
+    def extreme_compliances(self, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the extreme compliances of a state, mm / N; negative ones show instability."""
         self.factorise(unknowns)
         forces = np.zeros(self.count)
 
@@ -213,11 +217,13 @@ class ContinuumEquations:
             forces[: self.moving] = by
             return self.solve(forces)[: self.moving]
 
-        values, self._expected = softest(moved, self._expected, np.random.default_rng(0))
+        values, self._expected = extreme_compliances(
+            moved, self._expected, np.random.default_rng(0)
+        )
         return values
 
     def _assembled_form(self) -> Any:
-        """Return the form of the energy and all grips."""
+        """Return the form of the energy and all constraints."""
         system = self.system
         module, thickness = ngsolve(), system.mesh.thickness
         dimension = system.mesh.dimension
@@ -228,13 +234,15 @@ class ContinuumEquations:
         stored = thickness * system.law.energy(stretched, system.lame)
         form = module.BilinearForm(self.space, symmetric=False)
         form += module.Variation(stored.Compile() * module.dx(intrules=rules))
-        for grip, pull, yielding in zip(
-            system.grips.means, trial[1:], self.yielding.tolist(), strict=True
+        for constraint, multiplier, compliance in zip(
+            system.boundary.means, trial[1:], self.compliance.tolist(), strict=True
         ):
-            moved = sum(part * trial[0][axis] for axis, part in enumerate(grip.direction) if part)
-            work = system.unit * (pull * moved - 0.5 * yielding * pull * pull)
-            hub = module.dx(definedon=system.mesh.hub(grip.node), intrules=mean_rules)
-            form += module.Variation((work / self.hub_sizes[grip.node]).Compile() * hub)
+            moved = sum(
+                part * trial[0][axis] for axis, part in enumerate(constraint.direction) if part
+            )
+            work = system.unit * (multiplier * moved - 0.5 * compliance * multiplier * multiplier)
+            hub = module.dx(definedon=system.mesh.hub(constraint.node), intrules=mean_rules)
+            form += module.Variation((work / self.hub_sizes[constraint.node]).Compile() * hub)
         return form
 
 
@@ -245,26 +253,26 @@ class TangentFactor:
     Parameters
     ----------
     equations
-        That keep the factors of the state that was last asked for.
-    unknowns : (f,)
-        The state.
+        Equations, which keep the factorisation of one state.
+    unknowns : (f,) float64
+        State.
     """
 
     equations: ContinuumEquations
     unknowns: NDArray[np.float64]
 
     @property
-    def negative(self) -> int:
-        """Number of directions in which the state is found to be unstable."""
-        return negative(self.equations.compliance(self.unknowns))
+    def negative_eigenvalues(self) -> int:
+        """Number of negative eigenvalues that are found."""
+        return count_negative(self.equations.extreme_compliances(self.unknowns))
 
     @property
-    def firm(self) -> bool:
-        """Whether everything is held in place."""
+    def nonsingular(self) -> bool:
+        """Whether no rigid-body motion is left."""
         count = self.equations.count
         right = np.random.default_rng(0).standard_normal(count)
         moved = self.solve(self.equations.system.unit * right)
-        return bool(np.linalg.norm(moved) < LOOSE * np.linalg.norm(right))
+        return bool(np.linalg.norm(moved) < SINGULAR * np.linalg.norm(right))
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for a right-hand side."""

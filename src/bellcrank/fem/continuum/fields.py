@@ -1,8 +1,8 @@
-"""What a state looks like: stress and strain at the corners of the elements.
+"""Stress and strain at the corners of the elements.
 
-Stresses are most accurate at the integration points of each element. From three points in a
-triangle, four in a tetrahedron, they are extrapolated linearly to its corners, and averaged over
-all elements that meet in one.
+Stresses are most accurate at the integration points of each element. They are extrapolated linearly
+from three points in a triangle, or four in a tetrahedron, to its corners and averaged over the
+elements that share a corner.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
     from bellcrank.fem.continuum.equations import ContinuumEquations
 
 SAMPLES = 2
-"""Order of the rule whose points are taken: as many as an element has corners."""
+"""Order of the integration rule that has as many points as an element has corners."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Deformed:
-    """A deformed part.
+class StressField:
+    """Displacement, stress and strain of a state.
 
     Parameters
     ----------
     field
-        For pictures: of the corners of the elements, and as cells the triangles in the plane, those
-        of the surface in space.
-    strain : (n,)
-        Largest principal strain at each vertex: stretch less 1.
+        Displacement and stress at the corners of the elements. Its cells are the triangles in the
+        plane, and the surface triangles in space.
+    strain : (n,) float64
+        Largest principal strain, stretch minus 1, at each vertex.
     clamped : (n,) bool
-        Vertices of clamped hubs.
+        Whether each vertex belongs to a clamped hub.
     """
 
     field: Field
@@ -45,18 +45,18 @@ class Deformed:
 
     @property
     def largest_stress(self) -> float:
-        """The largest outside clamped hubs, MPa."""
+        """Largest von Mises stress outside clamped hubs, MPa."""
         return float(self.field.stress[~self.clamped].max())
 
     @property
     def largest_strain(self) -> float:
-        """The largest outside clamped hubs."""
+        """Largest principal strain outside clamped hubs."""
         return float(self.strain[~self.clamped].max())
 
 
-def deformed(equations: ContinuumEquations, unknowns: NDArray[np.float64]) -> Deformed:
-    """Return what a state looks like."""
-    equations.place(unknowns)
+def stress_field(equations: ContinuumEquations, unknowns: NDArray[np.float64]) -> StressField:
+    """Return displacement, stress and strain of a state."""
+    equations.set_state(unknowns)
     system = equations.system
     mesh, dimension = system.mesh, system.mesh.dimension
     vertices, elements = mesh.vertices, mesh.elements
@@ -65,17 +65,17 @@ def deformed(equations: ContinuumEquations, unknowns: NDArray[np.float64]) -> De
         at_vertices(mesh.mesh, elements, len(vertices), quantity)
         for quantity in (system.law.stress(gradient, system.lame), gradient)
     )
-    # In the basis of NGSolve the functions of the corners come first, with the values there.
+    # In NGSolve's basis the functions of the corners come first; coefficients are values there.
     values = equations.state.components[0].vec.FV().NumPy().reshape(dimension, -1)
     clamped = np.zeros(len(vertices), dtype=bool)
-    clamped[elements[np.isin(mesh.hub_of_element, system.grips.clamped)]] = True
+    clamped[elements[np.isin(mesh.hub_of_element, system.boundary.clamped)]] = True
     field = Field(
         rest=vertices,
         displacement=values[:, : len(vertices)].T.copy(),
         cells=elements if dimension == 2 else surface(elements),
         stress=von_mises(stress),
     )
-    return Deformed(field, largest_strain(stretched, small=system.law.small), clamped)
+    return StressField(field, largest_strain(stretched, small=system.law.small), clamped)
 
 
 def at_vertices(
@@ -87,7 +87,7 @@ def at_vertices(
     dimension = corners - 1
     rule = module.IntegrationRule(module.TRIG if dimension == 2 else module.TET, SAMPLES)
     where = np.array([point[:dimension] for point in rule.points])
-    # Linear functions that are 1 in one corner: those of x, y, ... = 1 come first.
+    # Linear functions that are 1 in one corner, first those of the corners on the axes.
     shapes = np.column_stack([where, 1.0 - where.sum(axis=1)])
     sampled = np.array(quantity(region.MapToAllElements(rule, module.VOL)))
     sampled = sampled.reshape(len(elements), len(shapes), -1)
@@ -99,7 +99,7 @@ def at_vertices(
 
 
 def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the equivalent stress by von Mises of (n, 2, 2) plane or (n, 3, 3) stresses.
+    """Return (n,) the von Mises stress of (n, 2, 2) plane or (n, 3, 3) stresses.
 
     Examples
     --------
@@ -114,12 +114,14 @@ def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def largest_strain(gradient: NDArray[np.float64], *, small: bool) -> NDArray[np.float64]:
-    """Return the largest principal stretch, less 1, of gradients (n, d, d) of the deformation.
+    """Return (n,) the largest principal stretch minus 1 of (n, d, d) deformation gradients.
 
     Parameters
     ----------
+    gradient : (n, d, d) float64
+        Deformation gradients.
     small
-        Whether to take that of small strains instead.
+        Whether to return the largest principal small strain instead.
     """
     turned = gradient.transpose(0, 2, 1)
     if small:
@@ -130,7 +132,7 @@ def largest_strain(gradient: NDArray[np.float64], *, small: bool) -> NDArray[np.
 
 
 def surface(tetrahedra: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return (t, 3) the faces that belong to one tetrahedron only, seen counterclockwise.
+    """Return (t, 3) the faces of only one tetrahedron, counter-clockwise seen from outside.
 
     Examples
     --------

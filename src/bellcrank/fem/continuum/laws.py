@@ -1,8 +1,8 @@
-"""Laws of the material: the energy that it stores per volume at rest.
+"""Material laws: elastic energy per volume at rest.
 
-F is the gradient of the deformation, lambda and mu are Lame's constants. In the plane a sheet
-is free to change its thickness (plane stress); its thickness stretches by the factor that makes
-the energy least, which has a closed form for each law here. All agree at small strains.
+F is the deformation gradient; lambda and mu are Lame's constants. In plane stress the thickness
+stretches by the factor that minimises the energy, which has a closed form for each law here. All
+laws agree at small strains.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bellcrank.part.materials import Material
 
 Quantity = Callable[[Any, "Lame"], Any]
-"""Of F, a coefficient function of NGSolve, and a material."""
+"""Function of F, a coefficient function of NGSolve, and of Lame's constants."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,15 +28,15 @@ class Lame:
     Parameters
     ----------
     first, shear
-        lambda and mu, MPa.
+        Constants lambda and mu, MPa.
     """
 
     first: float
     shear: float
 
     @property
-    def thin(self) -> float:
-        """What takes the place of lambda in a sheet that may change its thickness, MPa."""
+    def plane_stress(self) -> float:
+        """Constant that replaces lambda in plane stress, MPa."""
         return 2.0 * self.first * self.shear / (self.first + 2.0 * self.shear)
 
 
@@ -47,7 +47,7 @@ def lame_of(material: Material) -> Lame:
     --------
     >>> from bellcrank.part.materials import Material
     >>> constants = lame_of(Material(name="rubber", young=12.0, poisson=0.25))
-    >>> constants, round(constants.thin, 9)
+    >>> constants, round(constants.plane_stress, 9)
     (Lame(first=4.8, shear=4.8), 3.2)
     """
     first = 2.0 * material.shear * material.poisson / (1.0 - 2.0 * material.poisson)
@@ -56,16 +56,16 @@ def lame_of(material: Material) -> Lame:
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """Energy per volume at rest, N / mm^2.
+    """Elastic energy per volume at rest, N / mm^2.
 
     Parameters
     ----------
     plane, solid
-        Of a sheet by its F (2, 2), and of a body by its F (3, 3).
+        Energy in plane stress, from F (2, 2), and of a solid, from F (3, 3).
     thinning
-        Squared stretch of a sheet's thickness by its F.
+        Squared stretch of the thickness in plane stress, from F (2, 2).
     small
-        Whether it holds at small strains only, and is linear.
+        Whether the law is linear and holds at small strains only.
     """
 
     plane: Quantity
@@ -74,14 +74,11 @@ class Law:
     small: bool = False
 
     def energy(self, gradient: Any, lame: Lame) -> Any:
-        """Return the energy of a sheet or body, whichever F is of."""
+        """Return the energy in plane stress or of a solid, by the shape of F."""
         return (self.plane if gradient.dims[0] == 2 else self.solid)(gradient, lame)
 
     def stress(self, gradient: Any, lame: Lame) -> Any:
-        """Return Cauchy's stress, MPa: on areas as they are in that state.
-
-        In small strains areas do not change.
-        """
+        """Return the Cauchy stress, MPa; for small strains the nominal stress."""
         module = ngsolve()
         variable = gradient.MakeVariable()
         nominal = self.energy(variable, lame).Diff(variable)
@@ -94,7 +91,7 @@ class Law:
 
 
 laws: Registry[Law] = Registry("law")
-"""Laws by name."""
+"""Material laws by name."""
 
 
 def hooke(strain: Any, first: float, shear: float) -> Any:
@@ -117,7 +114,7 @@ def green_strain(gradient: Any) -> Any:
 
 laws.register("linear")(
     Law(
-        plane=lambda gradient, lame: hooke(small_strain(gradient), lame.thin, lame.shear),
+        plane=lambda gradient, lame: hooke(small_strain(gradient), lame.plane_stress, lame.shear),
         solid=lambda gradient, lame: hooke(small_strain(gradient), lame.first, lame.shear),
         thinning=lambda _gradient, _lame: ngsolve().CF(1.0),
         small=True,
@@ -125,17 +122,17 @@ laws.register("linear")(
 )
 
 
-def flattened(gradient: Any, lame: Lame) -> Any:
-    """Return 1 + 2 E33 of the strain E33 = -lambda / (lambda + 2 mu) tr E that bears no stress."""
-    part = lame.first / (lame.first + 2.0 * lame.shear)
-    return 1.0 - 2.0 * part * ngsolve().Trace(green_strain(gradient))
+def st_venant_kirchhoff_thinning(gradient: Any, lame: Lame) -> Any:
+    """Return 1 + 2 E33 with the strain E33 = -lambda / (lambda + 2 mu) tr E of zero stress."""
+    ratio = lame.first / (lame.first + 2.0 * lame.shear)
+    return 1.0 - 2.0 * ratio * ngsolve().Trace(green_strain(gradient))
 
 
 laws.register("st-venant-kirchhoff")(
     Law(
-        plane=lambda gradient, lame: hooke(green_strain(gradient), lame.thin, lame.shear),
+        plane=lambda gradient, lame: hooke(green_strain(gradient), lame.plane_stress, lame.shear),
         solid=lambda gradient, lame: hooke(green_strain(gradient), lame.first, lame.shear),
-        thinning=flattened,
+        thinning=st_venant_kirchhoff_thinning,
     )
 )
 
@@ -152,28 +149,30 @@ def ciarlet(trace: Any, volume: Any, lame: Lame) -> Any:
     return shape + size - (0.5 * lame.first + lame.shear) * ngsolve().log(volume)
 
 
-def squeezed(gradient: Any, lame: Lame) -> Any:
-    """Return c = (lambda + 2 mu) / (2 mu + lambda j^2), with j = det F of the sheet.
+def thinning_of(gradient: Any, lame: Lame) -> Any:
+    """Return c = (lambda + 2 mu) / (2 mu + lambda j^2), with j = det F in the plane.
 
-    The energy of Ciarlet's law, with I1 = tr F' F + c and J^2 = j^2 c, is least where
+    The energy of Ciarlet's law, with I1 = tr F' F + c and J^2 = j^2 c, is minimal for
     mu / 2 + lambda j^2 / 4 = (lambda / 2 + mu) / (2 c).
     """
     area = ngsolve().Det(gradient)
     return (lame.first + 2.0 * lame.shear) / (2.0 * lame.shear + lame.first * area * area)
 
 
-def rubber_sheet(gradient: Any, lame: Lame) -> Any:
-    """Return the energy of a sheet by Ciarlet's law."""
+def neo_hookean_plane(gradient: Any, lame: Lame) -> Any:
+    """Return the energy by Ciarlet's law in plane stress."""
     module = ngsolve()
-    thinning = squeezed(gradient, lame)
+    thinning = thinning_of(gradient, lame)
     trace = module.InnerProduct(gradient, gradient) + thinning
     return ciarlet(trace, module.Det(gradient) * module.sqrt(thinning), lame)
 
 
-def rubber(gradient: Any, lame: Lame) -> Any:
-    """Return the energy of a body by Ciarlet's law."""
+def neo_hookean_solid(gradient: Any, lame: Lame) -> Any:
+    """Return the energy by Ciarlet's law of a solid."""
     module = ngsolve()
     return ciarlet(module.InnerProduct(gradient, gradient), module.Det(gradient), lame)
 
 
-laws.register("neo-hookean")(Law(plane=rubber_sheet, solid=rubber, thinning=squeezed))
+laws.register("neo-hookean")(
+    Law(plane=neo_hookean_plane, solid=neo_hookean_solid, thinning=thinning_of)
+)

@@ -1,4 +1,4 @@
-"""From the outline of a part to curved triangles, with hubs where it is held and driven."""
+"""Meshes of curved triangles, with hubs at supports, inputs and outputs."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ if TYPE_CHECKING:
     from bellcrank.part.part import Part
 
 HUB = 0.35
-"""Radius of a hub, as a part of the width of struts: always within the material."""
+"""Radius of a hub as a fraction of the strut width, so small that hubs are within the material."""
 SIZE = 0.5
-"""Edges of triangles, as a part of the width."""
+"""Default edge length of triangles as a fraction of the strut width."""
 
 
 @dataclass(frozen=True, slots=True)
-class Turns:
-    """How much an arc may turn along the edge of one triangle, rad.
+class ArcAngles:
+    """Largest angle of an arc along the edge of one triangle, rad.
 
     Parameters
     ----------
     outline
-        That of the part. By the parabolas that edges of 40 degrees become, the area of the crane
-        is wrong by 2e-5.
+        Arcs of the outline. Edges are parabolas; with 40 degrees the relative error of the area of
+        the crane is 2e-5.
     hub
-        Those round hubs.
+        Circles of hubs.
     """
 
     outline: float = math.radians(40.0)
     hub: float = math.radians(60.0)
 
 
-CURVED = Turns()
+CURVED = ArcAngles()
 NETGEN = {"grading": 0.5, "curvaturesafety": 1.0}
-"""Triangles may grow fast, and arcs are cut by us, not by Netgen."""
+"""Triangles grow fast away from small edges; arcs are divided here and not by Netgen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,15 +54,15 @@ class ContinuumMesh:
     Parameters
     ----------
     mesh
-        NGSolve's: triangles, second order and curved, or straight tetrahedra. Materials are
-        `hub0`, `hub1`, ... round the nodes 0, 1, ... of the lattice, and `strut`.
+        Mesh of NGSolve: second-order curved triangles, or straight tetrahedra. Its materials are
+        `hub0`, `hub1`, ... around the lattice nodes 0, 1, ... and `strut`.
     hubs : (h,) int64
-        Nodes of the lattice that have a hub, ascending.
+        Lattice nodes that have a hub, ascending.
     node_count
-        Number of nodes of the lattice.
+        Number of lattice nodes.
     thickness
-        By which what is integrated over the mesh is multiplied: that of a part in the plane,
-        mm, and 1 in space.
+        Factor of integrals over the mesh: the thickness of the part in the plane, mm, and 1 in
+        space.
     """
 
     mesh: Any
@@ -77,13 +77,13 @@ class ContinuumMesh:
 
     @property
     def vertices(self) -> NDArray[np.float64]:
-        """(n, 2) or (n, 3) corners of the elements, mm."""
+        """(n, 2) or (n, 3) positions of the corners of the elements, mm."""
         corners: NDArray[np.float64] = np.array(self.mesh.ngmesh.Coordinates())
         return corners
 
     @property
     def elements(self) -> NDArray[np.int64]:
-        """(e, 3) or (e, 4) corners of each element."""
+        """(e, 3) or (e, 4) indices of the corners of each element."""
         whole = self.mesh.ngmesh
         found = whole.Elements2D() if self.dimension == 2 else whole.Elements3D()
         corners: NDArray[np.int64] = found.NumPy()["nodes"].astype(np.int64)
@@ -91,7 +91,7 @@ class ContinuumMesh:
 
     @property
     def hub_of_element(self) -> NDArray[np.int64]:
-        """(e,) the lattice's node whose hub each element is in, -1 for those of struts."""
+        """(e,) lattice node of the hub of each element, -1 for elements of struts."""
         whole = self.mesh.ngmesh
         found = whole.Elements2D() if self.dimension == 2 else whole.Elements3D()
         names = self.mesh.GetMaterials()
@@ -100,12 +100,12 @@ class ContinuumMesh:
         return of_element
 
     def hub(self, *nodes: int) -> Any:
-        """Return the region of the hubs of some nodes of the lattice."""
+        """Return the region of the hubs of lattice nodes."""
         return self.mesh.Materials("|".join(f"hub{node}" for node in nodes) or "nowhere")
 
 
-def gripped(part: Part) -> NDArray[np.int64]:
-    """Return those nodes of the lattice, ascending, at which a part is held, driven or watched."""
+def hub_nodes(part: Part) -> NDArray[np.int64]:
+    """Return the lattice nodes of supports, inputs and outputs that have struts, ascending."""
     problem = part.design.problem
     roles = [problem.supports.nodes, problem.input.nodes, problem.output.nodes]
     built = np.unique(problem.lattice.beams[part.design.mask])
@@ -113,25 +113,27 @@ def gripped(part: Part) -> NDArray[np.int64]:
     return nodes
 
 
-def plane_mesh(part: Part, size: float | None = None, turns: Turns = CURVED) -> ContinuumMesh:
-    """Cut a part in the plane into triangles.
+def plane_mesh(part: Part, size: float | None = None, angles: ArcAngles = CURVED) -> ContinuumMesh:
+    """Mesh a part in the plane with triangles.
 
     Parameters
     ----------
+    part
+        Part to be meshed.
     size
-        Of the largest triangles, mm; by default half the width.
-    turns
-        How finely arcs are cut.
+        Largest edge of the triangles, mm; half the strut width by default.
+    angles
+        Largest angles of arcs along one edge.
 
     Raises
     ------
     InvalidSettings
-        If there is no such outline or size, or two hubs touch.
+        If there is no valid outline, the size is not positive or two hubs touch.
     """
     size = SIZE * part.section.width if size is None else size
-    nodes, radius = gripped(part), HUB * part.section.width
+    nodes, radius = hub_nodes(part), HUB * part.section.width
     hubs = dict(zip(nodes.tolist(), part.positions[nodes], strict=True))
-    mesh = triangulated(part.outline(), hubs, radius, size, turns)
+    mesh = triangulated(part.outline(), hubs, radius, size, angles)
     mesh.Curve(2)
     return ContinuumMesh(
         mesh, nodes, part.design.problem.lattice.node_count, part.section.thickness
@@ -143,20 +145,22 @@ def triangulated(
     hubs: dict[int, NDArray[np.float64]],
     radius: float,
     size: float,
-    turns: Turns = CURVED,
+    angles: ArcAngles = CURVED,
 ) -> Any:
-    """Return NGSolve's mesh of an outline with hubs, the edges of its triangles straight.
+    """Return NGSolve's mesh of an outline with hubs, with straight edges.
 
     Parameters
     ----------
+    outline
+        Outline to be meshed.
     hubs
-        For each node of the lattice the (2,) centre of its hub, mm.
+        Centre (2,) of the hub of each lattice node, mm.
     radius
-        Of the hubs, mm.
+        Radius of the hubs, mm.
     size
-        Of the largest triangles, mm.
-    turns
-        How finely arcs are cut.
+        Largest edge of the triangles, mm.
+    angles
+        Largest angles of arcs along one edge.
     """
     if not 0.0 < size < math.inf:
         raise InvalidSettings(f"size: expected a length above 0 mm, got {size!r}")
@@ -166,11 +170,11 @@ def triangulated(
     check_apart(hubs, radius)
     geometry = SplineGeometry()
     for loop in (*outline.outer, *outline.holes):
-        add_loop(geometry, loop, 1, 0, turns.outline)
+        add_loop(geometry, loop, 1, 0, angles.outline)
     geometry.SetMaterial(1, "strut")
     for domain, (node, centre) in enumerate(hubs.items(), start=2):
         ends = centre + np.array([[-radius, 0.0], [radius, 0.0]])
-        add_loop(geometry, Loop(ends, np.ones(2)), domain, 1, turns.hub)
+        add_loop(geometry, Loop(ends, np.ones(2)), domain, 1, angles.hub)
         geometry.SetMaterial(domain, f"hub{node}")
     return module.Mesh(geometry.GenerateMesh(maxh=size, **NETGEN))
 
@@ -183,30 +187,30 @@ def check_apart(hubs: dict[int, NDArray[np.float64]], radius: float) -> None:
     close = cKDTree(centres).query_pairs(2.2 * radius)
     for first, second in sorted(close):
         raise InvalidSettings(
-            f"nodes {nodes[first]} and {nodes[second]} are so close to each other that they "
-            "cannot be gripped one by one; choose narrower struts or a larger scale"
+            f"nodes {nodes[first]} and {nodes[second]} are so close to each other that their hubs "
+            "touch; choose narrower struts or a larger scale"
         )
 
 
 def add_loop(geometry: Any, loop: Loop, left: int, right: int, turn: float) -> None:
-    """Add a closed curve between two domains to a geometry of Netgen, in pieces of some turn."""
+    """Add a closed curve between two domains to a geometry of Netgen, with divided arcs."""
     corners, turns = split(loop, turn)
     ids = [geometry.AppendPoint(x, y) for x, y in corners.tolist()]
     ends = np.roll(corners, -1, axis=0)
-    for k, part in enumerate(turns.tolist()):
+    for k, angle in enumerate(turns.tolist()):
         first, last = ids[k], ids[(k + 1) % len(ids)]
         curve = ["line", first, last]
-        if part:
-            # A rational parabola with the tangents of a circle at its ends is the circle.
+        if angle:
+            # A rational parabola that has the tangents of a circle at its ends is that circle.
             chord = ends[k] - corners[k]
             outward = np.array([chord[1], -chord[0]])
-            tip = (corners[k] + ends[k] + math.tan(part / 2.0) * outward) / 2.0
+            tip = (corners[k] + ends[k] + math.tan(angle / 2.0) * outward) / 2.0
             curve = ["spline3", first, geometry.AppendPoint(*tip.tolist()), last]
         geometry.Append(curve, leftdomain=left, rightdomain=right)
 
 
 def split(loop: Loop, largest: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return (m, 2) corners and (m,) turns of a loop whose long arcs are cut into pieces.
+    """Return (m, 2) corners and (m,) turning angles of a loop with divided arcs.
 
     Examples
     --------

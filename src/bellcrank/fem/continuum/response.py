@@ -1,4 +1,4 @@
-"""The response of a part to its input, as a continuum in the plane or in space."""
+"""Responses of parts to their input, in plane stress or as solids."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.fem.continuum.equations import ContinuumEquations
-from bellcrank.fem.continuum.fields import Deformed, deformed
+from bellcrank.fem.continuum.fields import StressField, stress_field
 from bellcrank.fem.continuum.mesh import plane_mesh
 from bellcrank.fem.continuum.solid import solid_mesh
 from bellcrank.fem.continuum.system import MEAN_ORDER, continuum_system, integration
-from bellcrank.fem.path import Path, PathStatus, State, Stepping, follow
+from bellcrank.fem.path import EquilibriumPath, PathState, PathStatus, StepControl, follow_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,11 +24,7 @@ if TYPE_CHECKING:
     from bellcrank.fem.results import Field
     from bellcrank.part.part import Part
 
-STEPPING = Stepping(first=0.125, largest=0.25)
-
-
-def in_silence(_state: State) -> None:
-    """Tell nobody."""
+STEPS = StepControl(first=0.125, largest=0.25)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,19 +34,19 @@ class ContinuumState:
     Parameters
     ----------
     load
-        Part of the full input, 0 to 1.
-    motion : (N, 2) or (N, 3)
-        Mean displacement of the hubs of the lattice's nodes, mm; 0 where there is none.
-    force : (N, 2) or (N, 3)
-        What holds, drives or resists each of these hubs, N.
+        Fraction of the full input, 0 to 1.
+    motion : (N, 2) or (N, 3) float64
+        Mean displacements of the hubs of the lattice nodes, mm; 0 for nodes without a hub.
+    force : (N, 2) or (N, 3) float64
+        External forces on the hubs, N, from supports, input and springs.
     input_force
-        Of the input along its directions, N.
+        Total input force along the input directions, N.
     energy
-        Stored in the material, N mm.
+        Elastic energy, N mm.
     stress
-        Largest equivalent (Cauchy's) stress by von Mises outside clamped hubs, MPa.
+        Largest von Mises (Cauchy) stress outside clamped hubs, MPa.
     strain
-        Largest principal strain there.
+        Largest principal strain outside clamped hubs.
     """
 
     load: float
@@ -63,166 +59,157 @@ class ContinuumState:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Response:
-    """What a part does under its input.
+class ContinuumResponse:
+    """Response of a part to its input.
 
     Parameters
     ----------
     path
-        Its equilibria.
-    states
-        The same in full.
-    fields
-        The same for pictures and files.
-    unknowns
-        How many there are.
-    elements
-        How many there are.
+        Equilibrium path.
+    states, fields
+        Figures and fields of the equilibria of the path.
+    unknowns, elements
+        Number of unknowns and of elements.
     """
 
-    path: Path
+    path: EquilibriumPath
     states: list[ContinuumState]
     fields: list[Field]
     unknowns: int
     elements: int
-
-    @property
-    def field(self) -> Field:
-        """The last equilibrium."""
-        return self.fields[-1]
 
 
 def solve_plane(
     part: Part,
     law: str = "neo-hookean",
     size: float | None = None,
-    stepping: Stepping = STEPPING,
-    tell: Callable[[State], None] = in_silence,
-) -> Response:
-    """Return the response of a part as a sheet (plane stress).
+    control: StepControl = STEPS,
+    report: Callable[[PathState], None] = lambda _state: None,
+) -> ContinuumResponse:
+    """Return the response of a part in plane stress.
 
     Parameters
     ----------
+    part
+        Part to be analysed.
     law
-        Name in the registry of laws; `linear` takes the full input in one step.
+        Name in the registry of laws; `linear` applies the full input in one step.
     size
-        Of the largest triangles, mm; by default half the width.
-    stepping
-        With what steps its path is followed.
-    tell
-        Called with each state that is reached.
+        Largest edge of the triangles, mm; half the strut width by default.
+    control
+        Step sizes of the continuation.
+    report
+        Called with each state on the path.
 
     Raises
     ------
-    InvalidSettings, UnknownName
+    InvalidSettings
+        If the part cannot be meshed.
+    UnknownName
+        If there is no such law.
     """
-    return respond(part, plane_mesh(part, size), law, stepping, tell)
+    return solve_mesh(part, plane_mesh(part, size), law, control, report)
 
 
 def solve_solid(
     part: Part,
     law: str = "neo-hookean",
     size: float | None = None,
-    stepping: Stepping = STEPPING,
-    tell: Callable[[State], None] = in_silence,
-) -> Response:
-    """Return the response of a part as a body, with one layer of elements across its thickness.
+    control: StepControl = STEPS,
+    report: Callable[[PathState], None] = lambda _state: None,
+) -> ContinuumResponse:
+    """Return the response of a part as a solid, with one layer of elements across its thickness.
 
-    Parameters are those of `solve_plane`; triangles are by default as large as the width.
-
-    Raises
-    ------
-    InvalidSettings, UnknownName
+    Parameters and errors are those of `solve_plane`, but the default size is the strut width.
     """
-    return respond(part, solid_mesh(part, size), law, stepping, tell)
+    return solve_mesh(part, solid_mesh(part, size), law, control, report)
 
 
-def respond(
+def solve_mesh(
     part: Part,
     mesh: ContinuumMesh,
     law: str,
-    stepping: Stepping = STEPPING,
-    tell: Callable[[State], None] = in_silence,
-) -> Response:
-    """Return the response of a part that is cut into elements already."""
+    control: StepControl = STEPS,
+    report: Callable[[PathState], None] = lambda _state: None,
+) -> ContinuumResponse:
+    """Return the response of a meshed part."""
     equations = ContinuumEquations(continuum_system(part, mesh, law))
     if equations.system.law.small:
-        path = solve_linear(equations)
+        path = _solve_linear(equations)
     else:
-        path = follow(equations, stepping, tell)
-    shapes = [deformed(equations, state.unknowns) for state in path.states]
+        path = follow_path(equations, control, report)
+    stresses = [stress_field(equations, state.unknowns) for state in path.states]
     states = [
-        complete(part, equations, state, shape)
-        for state, shape in zip(path.states, shapes, strict=True)
+        _complete(part, equations, state, stress)
+        for state, stress in zip(path.states, stresses, strict=True)
     ]
-    fields = [shape.field for shape in shapes]
-    return Response(path, states, fields, equations.count, len(mesh.elements))
+    fields = [stress.field for stress in stresses]
+    return ContinuumResponse(path, states, fields, equations.count, len(mesh.elements))
 
 
-def solve_linear(equations: ContinuumEquations) -> Path:
-    """Return rest and the response to the full input of equations that are linear."""
-    rest = State(0.0, np.zeros(equations.count))
-    near = equations.linearise(rest.unknowns, 1.0)
-    if not near.factor.firm:
-        return Path([rest], PathStatus.MECHANISM, 1)
-    unknowns = -near.factor.solve(near.residual)
-    # The stiffness lets given motions yield a little; a second solution takes that away.
-    unknowns -= near.factor.solve(equations.residual(unknowns, 1.0)[0])
-    return Path([rest, State(1.0, unknowns)], PathStatus.CONVERGED, 1)
+def _solve_linear(equations: ContinuumEquations) -> EquilibriumPath:
+    """Return rest and the response to the full input of linear equations."""
+    rest = PathState(0.0, np.zeros(equations.count))
+    linear = equations.linearise(rest.unknowns, 1.0)
+    if not linear.stiffness.nonsingular:
+        return EquilibriumPath([rest], PathStatus.MECHANISM, 1)
+    unknowns = -linear.stiffness.solve(linear.residual)
+    # Exact constraints are slightly compliant in the stiffness; a second solution corrects this.
+    unknowns -= linear.stiffness.solve(equations.residual(unknowns, 1.0)[0])
+    return EquilibriumPath([rest, PathState(1.0, unknowns)], PathStatus.CONVERGED, 1)
 
 
-def complete(
-    part: Part, equations: ContinuumEquations, state: State, shape: Deformed
+def _complete(
+    part: Part, equations: ContinuumEquations, state: PathState, stress: StressField
 ) -> ContinuumState:
-    """Return an equilibrium with motions and forces at the lattice's nodes."""
+    """Return an equilibrium with displacements and forces at the lattice nodes."""
     system, given = equations.system, part.design.problem.input
-    force = forces_on_hubs(equations, state)
-    motion = motion_of_hubs(equations, state)
-    along = (force[given.nodes, :2] * given.direction).sum()
+    force = _hub_forces(equations, state)
+    motion = _hub_displacements(equations, state)
     mesh = system.mesh
-    stored = mesh.thickness * system.law.energy(equations.gradient, system.lame)
+    density = mesh.thickness * system.law.energy(equations.gradient, system.lame)
     rules = integration(mesh.dimension, system.order)
-    energy = ngsolve().Integrate(stored * ngsolve().dx(intrules=rules), mesh.mesh)
+    energy = ngsolve().Integrate(density * ngsolve().dx(intrules=rules), mesh.mesh)
     return ContinuumState(
         load=state.load,
         motion=motion,
         force=force,
-        input_force=float(along),
+        input_force=float((force[given.nodes, :2] * given.direction).sum()),
         energy=float(energy),
-        stress=shape.largest_stress,
-        strain=shape.largest_strain,
+        stress=stress.largest_stress,
+        strain=stress.largest_strain,
     )
 
 
-def motion_of_hubs(equations: ContinuumEquations, state: State) -> NDArray[np.float64]:
-    """Return (N, d) the mean displacement of hubs, mm; 0 where there is none."""
+def _hub_displacements(equations: ContinuumEquations, state: PathState) -> NDArray[np.float64]:
+    """Return (N, d) the mean displacements of hubs, mm; 0 for nodes without a hub."""
     module, mesh = ngsolve(), equations.system.mesh
-    equations.place(state.unknowns)
+    equations.set_state(state.unknowns)
     names = mesh.mesh.GetMaterials()
-    places = [names.index(f"hub{node}") for node in mesh.hubs]
+    regions = [names.index(f"hub{node}") for node in mesh.hubs]
     sizes = np.array([equations.hub_sizes[node] for node in mesh.hubs.tolist()])
     motion = np.zeros((mesh.node_count, mesh.dimension))
     for axis in range(mesh.dimension):
-        moved = equations.state.components[0][axis]
-        totals = module.Integrate(moved, mesh.mesh, order=MEAN_ORDER, region_wise=True)
-        motion[mesh.hubs, axis] = np.array([totals[place] for place in places]) / sizes
+        component = equations.state.components[0][axis]
+        totals = module.Integrate(component, mesh.mesh, order=MEAN_ORDER, region_wise=True)
+        motion[mesh.hubs, axis] = np.array([totals[region] for region in regions]) / sizes
     return motion
 
 
-def forces_on_hubs(equations: ContinuumEquations, state: State) -> NDArray[np.float64]:
-    """Return (N, d) what acts on hubs from outside, N; 0 where there is none."""
+def _hub_forces(equations: ContinuumEquations, state: PathState) -> NDArray[np.float64]:
+    """Return (N, d) the external forces on hubs, N; 0 for nodes without a hub."""
     system = equations.system
-    grips, mesh = system.grips, system.mesh
+    boundary, mesh = system.boundary, system.mesh
     force = np.zeros((mesh.node_count, mesh.dimension))
-    pulls = state.unknowns[equations.moving :]
-    for grip, pull in zip(grips.means, pulls.tolist(), strict=True):
-        force[grip.node] -= system.unit * pull * np.array(grip.direction)
-    force[grips.pushed, :2] += state.load * grips.force
-    inner = equations.forces(state.unknowns)[: equations.displacements.ndof]
-    inner = inner.reshape(mesh.dimension, -1)
+    multipliers = state.unknowns[equations.moving :]
+    for constraint, multiplier in zip(boundary.means, multipliers.tolist(), strict=True):
+        force[constraint.node] -= system.unit * multiplier * np.array(constraint.direction)
+    force[boundary.loaded, :2] += state.load * boundary.force
+    internal = equations.forces(state.unknowns)[: equations.displacements.ndof]
+    internal = internal.reshape(mesh.dimension, -1)
     hub_of_element, elements = mesh.hub_of_element, mesh.elements
-    for node in grips.clamped.tolist():
-        # The functions of the corners add up to 1 everywhere.
+    for node in boundary.clamped.tolist():
+        # The shape functions of the corners add up to 1 everywhere.
         corners = np.unique(elements[hub_of_element == node])
-        force[node] += inner[:, corners].sum(axis=1)
+        force[node] += internal[:, corners].sum(axis=1)
     return force

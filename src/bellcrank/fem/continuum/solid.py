@@ -1,4 +1,4 @@
-"""Parts in space: the triangles of the plane, made as thick as the part."""
+"""Meshes of tetrahedra: the triangles of the plane extruded by the thickness."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.continuum.backend import ngsolve
-from bellcrank.fem.continuum.mesh import ContinuumMesh, Turns, plane_mesh
+from bellcrank.fem.continuum.mesh import ArcAngles, ContinuumMesh, plane_mesh
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,24 +17,27 @@ if TYPE_CHECKING:
     from bellcrank.part.part import Part
 
 SIZE = 1.0
-"""Of the largest triangles, as a part of the width."""
-STRAIGHT = Turns(outline=math.radians(60.0), hub=math.radians(90.0))
+"""Default edge length of triangles as a fraction of the strut width."""
+STRAIGHT = ArcAngles(outline=math.radians(60.0), hub=math.radians(90.0))
 
 
 def solid_mesh(part: Part, size: float | None = None, layers: int = 1) -> ContinuumMesh:
-    """Cut a part in space into tetrahedra with straight edges.
+    """Mesh a part in space with straight tetrahedra.
 
     Parameters
     ----------
+    part
+        Part to be meshed.
     size
-        Of the largest triangles, mm; by default the width.
+        Largest edge of the triangles, mm; the strut width by default.
     layers
-        Of elements across the thickness.
+        Number of layers of elements across the thickness.
 
     Raises
     ------
     InvalidSettings
-        If there is no such outline, size or number of layers, or two hubs touch.
+        If there is no valid outline, the size or number of layers is not positive, or two hubs
+        touch.
     """
     if layers < 1:
         raise InvalidSettings(f"layers: expected at least 1 across the thickness, got {layers}")
@@ -47,22 +50,26 @@ def solid_mesh(part: Part, size: float | None = None, layers: int = 1) -> Contin
 
 
 def raised(vertices: NDArray[np.float64], thickness: float, layers: int) -> NDArray[np.float64]:
-    """Return ((layers + 1) n, 3) vertices of the plane (n, 2) at all heights, layer by layer."""
+    """Return ((layers + 1) n, 3) copies of (n, 2) vertices at all heights, layer by layer."""
     heights = np.linspace(0.0, thickness, layers + 1)
     flat = np.tile(vertices, (layers + 1, 1))
     return np.column_stack([flat, np.repeat(heights, len(vertices))])
 
 
 def tetrahedra(triangles: NDArray[np.int64], count: int, layers: int) -> NDArray[np.int64]:
-    """Return (3 t layers, 4) the tetrahedra of the prisms on triangles (t, 3).
+    """Return (3 t layers, 4) the tetrahedra of the prisms over (t, 3) triangles.
 
-    Those of one triangle follow each other. The diagonal of each upright face starts below at
-    the vertex of the lower number, so that neighbours agree on it.
+    The tetrahedra of one triangle are consecutive. The diagonal of each vertical face starts at the
+    bottom at the vertex with the lower index, so that neighbouring prisms share it.
 
     Parameters
     ----------
+    triangles : (t, 3) int64
+        Vertices of the triangles.
     count
-        Vertices in each layer.
+        Number of vertices of each layer.
+    layers
+        Number of layers.
 
     Examples
     --------
@@ -70,7 +77,7 @@ def tetrahedra(triangles: NDArray[np.int64], count: int, layers: int) -> NDArray
     [[0, 1, 2, 5], [0, 4, 1, 5], [0, 3, 4, 5]]
     """
     low = np.sort(triangles, axis=1)
-    # A triangle is turned over by sorting if that takes an odd number of exchanges.
+    # Sorting reverses the orientation of a triangle if it takes an odd number of exchanges.
     first, second, third = triangles.T
     turned = ((first > second) ^ (second > third)) ^ (first > third)
     i, j, k = low.T
@@ -99,14 +106,15 @@ def solid_of(
 
     Parameters
     ----------
-    vertices : (n, 3)
-        mm.
+    vertices : (n, 3) float64
+        Positions, mm.
     elements : (e, 4) int64
-        Their corners, the first three counterclockwise as seen from the other side of the fourth.
+        Corners of the elements, the first three counter-clockwise as seen from the side opposite
+        to the fourth.
     hubs : (e,) int64
-        The lattice's node whose hub each is in, or -1.
+        Lattice node of the hub of each element, or -1.
     node_count
-        Number of nodes of the lattice.
+        Number of lattice nodes.
     """
     module = ngsolve()
     from netgen.meshing import Mesh

@@ -1,28 +1,127 @@
-"""A mesh with a material and what holds and drives it."""
+"""Meshes with their material, supports and loads.
+
+Supports hold all of a hub, rollers and driven inputs its mean displacement, so that driven hubs
+rotate freely.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bellcrank.fem.continuum.backend import ngsolve
-from bellcrank.fem.continuum.grips import Grips, grips_of
 from bellcrank.fem.continuum.laws import lame_of, laws
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from bellcrank.fem.continuum.laws import Lame, Law
     from bellcrank.fem.continuum.mesh import ContinuumMesh
     from bellcrank.part.part import Part
 
 ORDER = {2: 4, 3: 2}
-"""Degree up to which energies are integrated exactly: six points in a triangle, and the four of
-quadratic tetrahedra, which more points only make stiffer."""
+"""Degree of exact integration of energies: six points in a triangle and four in a tetrahedron, for
+which more points only increase the stiffness."""
 MEAN_ORDER = 5
-"""Degree up to which mean displacements of hubs are."""
+"""Degree of exact integration of mean displacements of hubs."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeanConstraint:
+    """A constraint on one component of the mean displacement of one hub.
+
+    Parameters
+    ----------
+    node
+        Lattice node of the hub.
+    direction
+        Unit vector of the component, of two or three numbers.
+    motion
+        Prescribed displacement at the full stroke, mm.
+    spring
+        Stiffness of a spring between the hub and the prescribed displacement, N / mm; inf for a
+        displacement that is prescribed exactly.
+    """
+
+    node: int
+    direction: tuple[float, ...]
+    motion: float = 0.0
+    spring: float = math.inf
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Boundary:
+    """Supports and loads of a part.
+
+    Parameters
+    ----------
+    clamped : (c,) int64
+        Lattice nodes whose hubs are held.
+    means
+        Constraints on mean displacements of hubs.
+    loaded : (p,) int64
+        Lattice nodes whose hubs are loaded by forces.
+    force : (p, 2) float64
+        Forces on them at the full load, N.
+    """
+
+    clamped: NDArray[np.int64]
+    means: tuple[MeanConstraint, ...]
+    loaded: NDArray[np.int64]
+    force: NDArray[np.float64]
+
+
+def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary:
+    """Return the supports and loads of the hubs of a part.
+
+    In space the mean displacement of driven hubs and of those on rollers has no component out of
+    the plane.
+
+    Parameters
+    ----------
+    part
+        Part with its problem.
+    hubs : (h,) int64
+        Lattice nodes that have a hub.
+    dimension
+        2 in the plane, 3 in space.
+    """
+    problem = part.design.problem
+    supports, given, output = problem.supports, problem.input, problem.output
+    axes = [tuple(row) for row in np.eye(dimension).tolist()]
+    means: list[MeanConstraint] = []
+    for nodes, held in ((supports.fixed_x, 0), (supports.fixed_y, 1)):
+        for node in np.intersect1d(nodes, hubs).tolist():
+            means += [MeanConstraint(node, axis) for axis in (axes[held], *axes[2:])]
+    present = np.isin(given.nodes, hubs)
+    loaded, force = np.empty(0, dtype=np.int64), np.empty((0, 2))
+    if given.drive == "displacement":
+        full = given.amount * part.scale * given.direction[present]
+        for node, motion in zip(given.nodes[present].tolist(), full.tolist(), strict=True):
+            means += [
+                MeanConstraint(node, axis, move) for axis, move in zip(axes, motion, strict=False)
+            ]
+            means += [MeanConstraint(node, axis) for axis in axes[2:]]
+    else:
+        unit = part.stiffness_unit * part.scale
+        loaded, force = given.nodes[present], given.amount * unit * given.direction[present]
+    if output.spring is not None:
+        spring = output.spring * part.stiffness_unit
+        present = np.isin(output.nodes, hubs)
+        for node, along in zip(
+            output.nodes[present].tolist(), output.direction[present].tolist(), strict=True
+        ):
+            isotropic = output.spring_kind == "isotropic"
+            directions = axes[:2] if isotropic else [(*along, *axes[0][2:])]
+            means += [MeanConstraint(node, direction, spring=spring) for direction in directions]
+    return Boundary(np.intersect1d(supports.fixed, hubs), tuple(means), loaded, force)
 
 
 def integration(dimension: int, order: int) -> dict[Any, Any]:
-    """Return NGSolve's rules for triangles or tetrahedra."""
+    """Return NGSolve's integration rules for triangles or tetrahedra."""
     module = ngsolve()
     shape = module.TRIG if dimension == 2 else module.TET
     return {shape: module.IntegrationRule(shape, order)}
@@ -30,24 +129,24 @@ def integration(dimension: int, order: int) -> dict[Any, Any]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContinuumSystem:
-    """A mesh with a material and what holds and drives it.
+    """A mesh with its material, supports and loads.
 
     Parameters
     ----------
     mesh
-        Its elements.
-    grips
-        On its hubs.
+        Elements.
+    boundary
+        Supports and loads.
     law, lame
-        Of the material.
+        Material law and its constants.
     unit
-        k, stiffness in N / mm by which forces of grips are made lengths.
+        Stiffness k, N / mm, that converts forces of constraints to lengths.
     order
-        Degree up to which energies are integrated exactly.
+        Degree of exact integration of energies.
     """
 
     mesh: ContinuumMesh
-    grips: Grips
+    boundary: Boundary
     law: Law
     lame: Lame
     unit: float
@@ -57,23 +156,28 @@ class ContinuumSystem:
 def continuum_system(
     part: Part, mesh: ContinuumMesh, law: str = "neo-hookean", order: int | None = None
 ) -> ContinuumSystem:
-    """Hold and drive a mesh as the problem of its part says.
+    """Return a mesh with the material, supports and loads of its part.
 
     Parameters
     ----------
+    part
+        Part that was meshed.
+    mesh
+        Its mesh.
     law
         Name in the registry of laws.
     order
-        Degree up to which energies are integrated exactly; by default 4 in the plane, 2 in space.
+        Degree of exact integration of energies; by default 4 in the plane and 2 in space.
 
     Raises
     ------
     UnknownName
+        If there is no such law.
     """
     dimension = mesh.dimension
     return ContinuumSystem(
         mesh=mesh,
-        grips=grips_of(part, mesh.hubs, dimension),
+        boundary=boundary_of(part, mesh.hubs, dimension),
         law=laws[law],
         lame=lame_of(part.material),
         unit=part.material.young * part.section.thickness,

@@ -1,10 +1,13 @@
-"""Beam elements: the stiffness of a straight strut, and how it turns with it.
+"""Co-rotational beam elements in the plane.
 
-Local quantities of an element are its elongation and the rotations of its two ends relative to
-its chord. For these three a slender beam (Euler-Bernoulli) or one that shears (Timoshenko) is
-linear; what is not linear is how they follow from the motion of the ends (co-rotational
-formulation; Crisfield, Non-linear finite element analysis of solids and structures, vol. 1,
-1991, ch. 7). All functions take all elements at once.
+The local deformations of an element are its elongation and the rotations of its two ends relative
+to its chord. Beams are linear in these three quantities, without shear (Euler-Bernoulli) or with it
+(Timoshenko); the only nonlinearity is their dependence on the displacements of the ends. All
+functions work on all elements at once.
+
+References
+----------
+M. A. Crisfield, Non-linear finite element analysis of solids and structures, vol. 1, 1991, ch. 7.
 """
 
 from __future__ import annotations
@@ -34,21 +37,23 @@ def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
 def natural(
     mesh: FrameMesh, displacement: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return what strains the elements: elongation and end rotations relative to the chord.
+    """Return the local deformations of the elements, with their chords.
 
     Parameters
     ----------
-    displacement : (n, 3)
-        Of the nodes: x, y in mm, rotation in radians.
+    mesh
+        Elements.
+    displacement : (n, 3) float64
+        Displacements of the nodes in x and y, mm, and their rotations, rad.
 
     Returns
     -------
-    strain : (e, 3)
-        Elongation (mm), rotation of the first and of the second end.
-    direction : (e, 2)
-        Of the chords.
-    length : (e,)
-        Of the chords, mm.
+    strain : (e, 3) float64
+        Elongation, mm, and rotations of the first and the second end, rad.
+    direction : (e, 2) float64
+        Unit vectors along the chords.
+    length : (e,) float64
+        Lengths of the chords, mm.
     """
     first, second = mesh.elements.T
     apart = displacement[second, :2] - displacement[first, :2]
@@ -60,7 +65,7 @@ def natural(
         (mesh.chord * chord).sum(axis=1),
     )
     strain = np.empty((len(length), 3))
-    # The difference of the squares: that of the lengths would be lost in rounding.
+    # From the difference of squares, because that of the lengths loses digits to rounding.
     strain[:, 0] = ((mesh.chord + chord) * apart).sum(axis=1) / (length + mesh.length)
     strain[:, 1] = wrapped(displacement[first, 2] - turned)
     strain[:, 2] = wrapped(displacement[second, 2] - turned)
@@ -70,7 +75,7 @@ def natural(
 def strain_of(
     mesh: FrameMesh, displacement: NDArray[np.float64], *, linear: bool
 ) -> NDArray[np.float64]:
-    """Return (e, 3) what strains the elements, `linear` if they are taken to move little."""
+    """Return (e, 3) the local deformations, to first order in the displacements if `linear`."""
     if not linear:
         return natural(mesh, displacement)[0]
     direction = mesh.chord / mesh.length[:, None]
@@ -83,10 +88,10 @@ def strain_of(
 def gradient_of_natural(
     direction: NDArray[np.float64], length: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return (e, 3, 6) derivatives of the natural quantities by the motion of the ends.
+    """Return (e, 3, 6) derivatives of the local deformations by the end displacements.
 
-    Also (e, 6) the derivatives r of the elongation and z, those of the rotation of the chord
-    times its length.
+    The second and third results, both (e, 6), are Crisfield's r, the derivative of the elongation,
+    and z, that of the rotation of the chord multiplied by its length.
     """
     count = len(length)
     along = np.zeros((count, 6))
@@ -104,7 +109,7 @@ def gradient_of_natural(
 
 
 def forces(mesh: FrameMesh, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (e, 6) the forces of the elements on their ends."""
+    """Return (e, 6) the internal forces at the ends of the elements."""
     strain, direction, length = natural(mesh, displacement)
     gradient, _, _ = gradient_of_natural(direction, length)
     force: NDArray[np.float64] = np.einsum("eji,ejk,ek->ei", gradient, mesh.stiffness, strain)
@@ -114,7 +119,7 @@ def forces(mesh: FrameMesh, displacement: NDArray[np.float64]) -> NDArray[np.flo
 def forces_and_stiffness(
     mesh: FrameMesh, displacement: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return (e, 6) the forces of the elements on their ends, and (e, 6, 6) their derivatives."""
+    """Return (e, 6) the internal forces and (e, 6, 6) the tangent stiffness of the elements."""
     strain, direction, length = natural(mesh, displacement)
     gradient, along, across = gradient_of_natural(direction, length)
     stress = np.einsum("eij,ej->ei", mesh.stiffness, strain)

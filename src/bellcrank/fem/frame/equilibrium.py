@@ -1,4 +1,4 @@
-"""Forces and stiffness of a whole frame in a state, and the equations of its equilibrium."""
+"""Equilibrium equations of frames."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.fem.frame import elements
 from bellcrank.fem.frame.system import SparseFactor, dofs_of
-from bellcrank.fem.path import Linearised, State
+from bellcrank.fem.path import Linearisation, PathState
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from bellcrank.fem.frame.system import FrameSystem
 
 TOLERANCE = 1e-10
-"""Residual, as a part of the largest force within an element."""
+"""Admissible residual as a fraction of the largest force within an element."""
 ROUNDING = 100.0 * float(np.finfo(float).eps)
 DIFFERENCE = 1e-7
-"""Part of the input by which it is moved to see what that does."""
+"""Step of the finite difference with respect to the load."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,24 +31,21 @@ class FrameState:
     Parameters
     ----------
     load
-        Part of the full input, 0 to 1.
-    displacement : (n, 3)
-        Of the mesh's nodes: x, y in mm, rotation in radians.
-    reaction : (n, 3)
-        Forces (N) and moments (N mm) on the held degrees of freedom, 0 on the others.
-    negative
-        Eigenvalues below 0 of its stiffness; stable if there are none.
+        Fraction of the full input, 0 to 1.
+    displacement : (n, 3) float64
+        Displacements of the mesh nodes in x and y, mm, and their rotations, rad.
+    reaction : (n, 3) float64
+        Forces, N, and moments, N mm, on the held degrees of freedom; 0 on the free ones.
     """
 
     load: float
     displacement: NDArray[np.float64]
     reaction: NDArray[np.float64]
-    negative: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameEquations:
-    """Equilibrium of a frame that moves far; the unknowns are its free degrees of freedom."""
+    """Equilibrium of a frame with large displacements; unknowns are the free displacements."""
 
     system: FrameSystem
 
@@ -58,21 +55,22 @@ class FrameEquations:
         return len(self.system.free)
 
     def displacement(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
-        """Return (n, 3) the displacement of all nodes."""
+        """Return (n, 3) the displacements of all nodes."""
         whole = load * self.system.motion
         whole.ravel()[self.system.free] = unknowns
         return whole
 
-    def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearised:
-        """Return the equations near a state."""
+    def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearisation:
+        """Linearise the equations; raises RuntimeError if the stiffness is singular."""
         system = self.system
         displacement = self.displacement(unknowns, load)
-        force, matrix, magnitude = inner_forces(system, displacement)
+        force, matrix, magnitude = forces_and_stiffness(system, displacement)
         residual = (force - load * system.load).ravel()[system.free]
-        return Linearised(residual, allowed(system, displacement, magnitude), SparseFactor(matrix))
+        tolerance = residual_tolerance(system, displacement, magnitude)
+        return Linearisation(residual, tolerance, SparseFactor(matrix))
 
-    def pull(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
-        """Return (f,) the derivative of the residual by the load."""
+    def load_derivative(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
+        """Return (f,) the derivative of the residual with respect to the load."""
         system = self.system
         here = self.displacement(unknowns, load)
         given = here + DIFFERENCE * system.motion
@@ -80,46 +78,38 @@ class FrameEquations:
         return change.ravel()[system.free]
 
     def distance(self, change: NDArray[np.float64]) -> float:
-        """Return the norm of a change without its rotations, mm."""
+        """Return the norm of a change of the displacements, without rotations, mm."""
         return float(np.linalg.norm(change[self.system.free % 3 < 2]))
 
-    def complete(self, state: State) -> FrameState:
-        """Return an equilibrium with all displacements and reactions."""
+    def complete(self, state: PathState) -> FrameState:
+        """Return an equilibrium with the displacements and reactions of all nodes."""
         displacement = self.displacement(state.unknowns, state.load)
         reaction = (forces(self.system, displacement) - state.load * self.system.load).ravel()
         reaction[self.system.free] = 0.0
-        return FrameState(state.load, displacement, reaction.reshape(-1, 3), state.negative)
+        return FrameState(state.load, displacement, reaction.reshape(-1, 3))
 
 
-def inner_forces(
+def forces_and_stiffness(
     system: FrameSystem, displacement: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], csc_matrix, float]:
-    """Return (n, 3) the forces that hold a state, their derivative, and their magnitude.
+    """Return (n, 3) the internal forces, the tangent stiffness and the largest element force.
 
-    The derivative is by the free degrees of freedom only; the magnitude is the largest force
-    within any element, against which a residual is small or not.
+    The stiffness is that of the free degrees of freedom. The residual is small or large compared
+    with the largest force within any element.
     """
     force, tangent = elements.forces_and_stiffness(system.mesh, displacement)
-    total = gathered(system, force, displacement)
+    total = assembled(system, force, displacement)
     entries = np.concatenate([tangent.ravel(), system.springs.ravel()])
     return total, system.assembly.matrix(entries), float(np.abs(force[:, [0, 1, 3, 4]]).max())
 
 
 def forces(system: FrameSystem, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (n, 3) the forces that hold a state."""
-    return gathered(system, elements.forces(system.mesh, displacement), displacement)
-
-
-def potential(system: FrameSystem, load: float, displacement: NDArray[np.float64]) -> float:
-    """Return elastic energy less the work of the loads, N mm."""
-    moved = displacement[system.spring_nodes, :2]
-    springs = 0.5 * np.einsum("si,sij,sj->", moved, system.springs, moved)
-    work = load * float((system.load * displacement).sum())
-    return float(elements.energy(system.mesh, displacement).sum() + springs - work)
+    """Return (n, 3) the internal forces of elements and springs."""
+    return assembled(system, elements.forces(system.mesh, displacement), displacement)
 
 
 def solve_linear(system: FrameSystem) -> FrameState:
-    """Return the response to the full input of a frame that moves little.
+    """Return the response to the full input for small displacements.
 
     Raises
     ------
@@ -129,31 +119,31 @@ def solve_linear(system: FrameSystem) -> FrameState:
     given = system.motion
     tangent = elements.linear_stiffness(system.mesh)
 
-    def held(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    def internal(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         ends = displacement[system.mesh.elements].reshape(-1, 6)
-        return gathered(system, np.einsum("eij,ej->ei", tangent, ends), displacement)
+        return assembled(system, np.einsum("eij,ej->ei", tangent, ends), displacement)
 
     entries = np.concatenate([tangent.ravel(), system.springs.ravel()])
     factor = SparseFactor(system.assembly.matrix(entries))
-    if not factor.firm:
+    if not factor.nonsingular:
         raise RuntimeError("singular")
     displacement = given.copy()
-    right = (system.load - held(given)).ravel()[system.free]
+    right = (system.load - internal(given)).ravel()[system.free]
     displacement.ravel()[system.free] = factor.solve(right)
-    reaction = (held(displacement) - system.load).ravel()
+    reaction = (internal(displacement) - system.load).ravel()
     reaction[system.free] = 0.0
-    return FrameState(1.0, displacement, reaction.reshape(-1, 3), factor.negative)
+    return FrameState(1.0, displacement, reaction.reshape(-1, 3))
 
 
-def allowed(
+def residual_tolerance(
     system: FrameSystem, displacement: NDArray[np.float64], magnitude: float
 ) -> NDArray[np.float64]:
-    """Return (f,) the residual that may be left: forces in N, moments in N mm.
+    """Return (f,) the admissible residual: forces in N, moments in N mm.
 
-    A small part of the forces at work, and what rounding makes of nothing: displacements are
-    exact to a part of themselves, angles of chords to that part over their length and to a part
-    of one. In slender struts the former is no small part of what bends them, in short elements
-    and at short strokes the latter.
+    It is a small fraction of the largest element force plus the error by rounding. Displacements
+    have a relative rounding error, and angles of chords that error divided by the length and a
+    constant one. The first matters in slender struts, the second in short elements and at short
+    strokes.
     """
     mesh = system.mesh
     moved = float(np.abs(displacement[:, :2]).max())
@@ -164,10 +154,10 @@ def allowed(
     return force * arm
 
 
-def gathered(
+def assembled(
     system: FrameSystem, force: NDArray[np.float64], displacement: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Add up (n, 3) what elements and springs exert."""
+    """Return (n, 3) the sum of the forces of elements and springs at the nodes."""
     count = 3 * system.mesh.node_count
     ends = dofs_of(system.mesh.elements).ravel()
     total: NDArray[np.float64] = np.zeros((system.mesh.node_count, 3))

@@ -1,4 +1,4 @@
-"""From a design to a mesh of beam elements."""
+"""Meshes of beam elements."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameMesh:
-    """Straight elements between nodes in the plane.
+    """Straight beam elements between nodes in the plane.
 
     Parameters
     ----------
-    positions : (n, 2)
-        Of the nodes at rest, mm. First those of the lattice that beams touch, in order, then
-        those within struts.
+    positions : (n, 2) float64
+        Positions of the nodes at rest, mm: first the lattice nodes with struts, in order, then
+        the nodes within struts.
     node : (N,) int64
-        For each node of the lattice its node in the mesh, -1 where no beam is.
+        Mesh node of each lattice node, -1 for lattice nodes without struts.
     elements : (e, 2) int64
-        Their ends, strut by strut.
+        End nodes of the elements, strut by strut.
     strut : (e,) int64
-        The beam of the lattice that each is a part of.
-    chord : (e, 2)
-        From the first to the second end at rest, mm.
-    length : (e,)
-        Of the elements at rest, mm.
-    stiffness : (e, 3, 3)
-        From elongation and end rotations to force (N) and end moments (N mm).
+        Lattice beam of each element.
+    chord : (e, 2) float64
+        Vector from the first to the second end at rest, mm.
+    length : (e,) float64
+        Lengths of the elements at rest, mm.
+    stiffness : (e, 3, 3) float64
+        Matrices from elongation and end rotations to axial force, N, and end moments, N mm.
     """
 
     positions: NDArray[np.float64]
@@ -56,14 +56,14 @@ class FrameMesh:
         return len(self.positions)
 
     def at_lattice(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (N, 2) the motion of the lattice's nodes, mm; 0 where no strut is."""
+        """Return (N, 2) the displacements of the lattice nodes, mm; 0 for nodes without struts."""
         moved = np.zeros((len(self.node), 2))
-        there = self.node >= 0
-        moved[there] = displacement[self.node[there], :2]
+        present = self.node >= 0
+        moved[present] = displacement[self.node[present], :2]
         return moved
 
     def lines(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return (s,) the beams that have struts, and (s, k) the nodes along each."""
+        """Return (s,) the lattice beams with struts, and (s, k) the mesh nodes along each."""
         struts, first = np.unique(self.strut, return_index=True)
         each = len(self.elements) // len(struts)
         chains = self.elements.reshape(len(struts), each, 2)
@@ -72,19 +72,19 @@ class FrameMesh:
 
 
 theories: Registry[Callable[[Part, NDArray[np.float64]], NDArray[np.float64]]] = Registry("theory")
-"""From a part and the lengths (e,) of elements to the ratio of shear to bending flexibility,
-12 E I / (kappa G A L^2)."""
+"""Beam theories: functions of a part and the lengths (e,) of its elements that return the ratio of
+shear to bending flexibility, 12 E I / (kappa G A L^2)."""
 
 
 @theories.register("euler-bernoulli")
 def euler_bernoulli(_part: Part, length: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross-sections stay normal to the axis: no shear."""
+    """Return 0: cross-sections stay normal to the axis."""
     return np.zeros_like(length)
 
 
 @theories.register("timoshenko")
 def timoshenko(part: Part, length: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross-sections stay plane, but shear."""
+    """Return the ratio for cross-sections that stay plane but not normal to the axis."""
     bending = 12.0 * part.material.young * part.section.inertia
     ratio: NDArray[np.float64] = bending / (
         SHEAR_COEFFICIENT * part.material.shear * part.section.area * length**2
@@ -93,18 +93,23 @@ def timoshenko(part: Part, length: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def frame_mesh(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -> FrameMesh:
-    """Cut each strut of a part into elements.
+    """Divide each strut of a part into elements of equal length.
 
     Parameters
     ----------
+    part
+        Part to be meshed.
     elements
-        Per strut.
+        Number of elements of each strut.
     theory
         Name in the registry of theories.
 
     Raises
     ------
-    InvalidSettings, UnknownName
+    InvalidSettings
+        If the number of elements is not positive.
+    UnknownName
+        If there is no such theory.
     """
     if elements < 1:
         raise InvalidSettings(f"elements: expected at least 1 in each strut, got {elements}")
@@ -139,7 +144,7 @@ def frame_mesh(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
 def natural_stiffness(
     part: Part, length: NDArray[np.float64], shear: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return (e, 3, 3) what elongation and end rotations are resisted with."""
+    """Return (e, 3, 3) the stiffness against elongation and end rotations."""
     young, section = part.material.young, part.section
     bending = young * section.inertia / (length * (1.0 + shear))
     stiffness = np.zeros((len(length), 3, 3))

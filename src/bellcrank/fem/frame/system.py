@@ -1,4 +1,4 @@
-"""A mesh with what holds and drives it: one sparse system of equations."""
+"""Frames with their supports and loads: sparse systems of equations."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ if TYPE_CHECKING:
     from bellcrank.part.part import Part
 
 
-SOFTEST = 1e-12
-"""Least pivot, with a diagonal of ones, of a stiffness that holds everything in place."""
+SMALLEST_PIVOT = 1e-12
+"""Smallest pivot of a nonsingular stiffness that is scaled to a diagonal of ones."""
 
 
 class SparseFactor:
-    """A symmetric factorisation that also tells how many eigenvalues are negative.
+    """Factorisation of a symmetric sparse matrix with its number of negative eigenvalues.
 
     Parameters
     ----------
     matrix
-        Symmetric, in compressed columns.
+        Symmetric matrix in compressed columns.
 
     Raises
     ------
     RuntimeError
-        If it is exactly singular.
+        If the matrix is exactly singular.
     """
 
     def __init__(self, matrix: csc_matrix) -> None:
-        # With a diagonal of ones, forces and moments compare, and so do small parts and large.
+        # Scaled to a diagonal of ones, so that pivots do not depend on units.
         diagonal = np.abs(matrix.diagonal())
         self._scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         columns = np.repeat(np.arange(len(diagonal)), np.diff(matrix.indptr))
@@ -51,14 +51,14 @@ class SparseFactor:
         self.pivots: NDArray[np.float64] = self._factor.U.diagonal()
 
     @property
-    def negative(self) -> int:
+    def negative_eigenvalues(self) -> int:
         """Number of negative eigenvalues."""
         return int((self.pivots < 0.0).sum())
 
     @property
-    def firm(self) -> bool:
-        """Whether everything is held in place."""
-        return bool(self.pivots.min() >= SOFTEST)
+    def nonsingular(self) -> bool:
+        """Whether no rigid-body motion is left."""
+        return bool(self.pivots.min() >= SMALLEST_PIVOT)
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the solution for a right-hand side."""
@@ -68,24 +68,24 @@ class SparseFactor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameSystem:
-    """Equations of a frame.
+    """A frame with its supports, loads and springs.
 
     Parameters
     ----------
     mesh
-        Its elements.
+        Elements.
     free : (f,) int64
-        Degrees of freedom that are not given, out of 3 for each node of the mesh.
-    motion : (n, 3)
-        Given displacements at the full stroke, 0 where none is.
-    load : (n, 3)
+        Free degrees of freedom, out of 3 for each node of the mesh.
+    motion : (n, 3) float64
+        Prescribed displacements at the full stroke, 0 for free degrees of freedom.
+    load : (n, 3) float64
         Forces at the full stroke, N.
     spring_nodes : (s,) int64
         Nodes with springs to the ground.
-    springs : (s, 2, 2)
-        Their stiffness, N / mm.
+    springs : (s, 2, 2) float64
+        Stiffness of the springs, N / mm.
     assembly
-        Of the stiffness for the free degrees of freedom, from elements and springs in order.
+        Assembly of the stiffness of the free degrees of freedom, from elements, then springs.
     """
 
     mesh: FrameMesh
@@ -99,18 +99,18 @@ class FrameSystem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembly:
-    """Where the entries of dense blocks go in a sparse matrix, found once.
+    """Positions of the entries of dense blocks in a sparse matrix.
 
     Parameters
     ----------
     kept : (k,) int64
-        Those of the entries that are not about held degrees of freedom.
+        Entries of free degrees of freedom only.
     slot : (k,) int64
-        Which value of the matrix each is added to.
+        Value of the matrix to which each of them is added.
     rows, starts
-        Of the values, in compressed columns.
+        Rows and column starts of the values, in compressed columns.
     size
-        Rows of the matrix.
+        Number of rows of the matrix.
     """
 
     kept: NDArray[np.int64]
@@ -120,13 +120,13 @@ class Assembly:
     size: int
 
     def matrix(self, entries: NDArray[np.float64]) -> csc_matrix:
-        """Return the matrix of the free degrees of freedom from all entries in order."""
+        """Return the matrix of the free degrees of freedom from the entries of all blocks."""
         data = np.bincount(self.slot, weights=entries[self.kept], minlength=len(self.rows))
         return csc_matrix((data, self.rows, self.starts), shape=(self.size, self.size))
 
 
 def assembly_of(blocks: list[NDArray[np.int64]], free: NDArray[np.int64], count: int) -> Assembly:
-    """Find the places of dense blocks, each given by its degrees of freedom (b, k)."""
+    """Return the assembly of dense blocks, given by their degrees of freedom (b, k)."""
     number = np.full(count, -1, dtype=np.int64)
     number[free] = np.arange(len(free))
     rows = np.concatenate([np.repeat(number[dof], dof.shape[1], axis=1).ravel() for dof in blocks])
@@ -143,31 +143,32 @@ def dofs_of(nodes: NDArray[np.int64], each: int = 3) -> NDArray[np.int64]:
 
 
 def frame_system(part: Part, mesh: FrameMesh) -> FrameSystem:
-    """Hold and drive a mesh as the problem of its part says.
+    """Return a mesh with the supports, input and output springs of its problem.
 
-    Supports that hold both coordinates clamp; others and driven nodes turn freely.
+    Supports that hold both coordinates also hold the rotation. Rollers and driven nodes rotate
+    freely.
     """
     problem = part.design.problem
     supports, given, output = problem.supports, problem.input, problem.output
     held = np.zeros((mesh.node_count, 3), dtype=bool)
-    held[present(mesh, supports.fixed)] = True
-    held[present(mesh, supports.fixed_x), 0] = True
-    held[present(mesh, supports.fixed_y), 1] = True
+    held[present_nodes(mesh, supports.fixed)] = True
+    held[present_nodes(mesh, supports.fixed_x), 0] = True
+    held[present_nodes(mesh, supports.fixed_y), 1] = True
     motion = np.zeros((mesh.node_count, 3))
     load = np.zeros((mesh.node_count, 3))
-    there = mesh.node[given.nodes] >= 0
-    nodes = mesh.node[given.nodes[there]]
+    present = mesh.node[given.nodes] >= 0
+    nodes = mesh.node[given.nodes[present]]
     if given.drive == "displacement":
         held[nodes, :2] = True
-        motion[nodes, :2] = given.amount * part.scale * given.direction[there]
+        motion[nodes, :2] = given.amount * part.scale * given.direction[present]
     else:
         unit = part.stiffness_unit * part.scale
-        load[nodes, :2] = given.amount * unit * given.direction[there]
+        load[nodes, :2] = given.amount * unit * given.direction[present]
     spring_nodes, springs = np.empty(0, dtype=np.int64), np.empty((0, 2, 2))
     if output.spring is not None:
-        there = mesh.node[output.nodes] >= 0
-        spring_nodes = mesh.node[output.nodes[there]]
-        direction = output.direction[there]
+        present = mesh.node[output.nodes] >= 0
+        spring_nodes = mesh.node[output.nodes[present]]
+        direction = output.direction[present]
         shape = direction[:, :, None] * direction[:, None, :]
         if output.spring_kind == "isotropic":
             shape = np.broadcast_to(np.eye(2), shape.shape)
@@ -178,7 +179,7 @@ def frame_system(part: Part, mesh: FrameMesh) -> FrameSystem:
     return FrameSystem(mesh, free, motion, load, spring_nodes, springs, assembly)
 
 
-def present(mesh: FrameMesh, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the mesh's nodes of those lattice nodes that have any."""
+def present_nodes(mesh: FrameMesh, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the mesh nodes of those lattice nodes that have struts."""
     found = mesh.node[nodes]
     return found[found >= 0]

@@ -1,4 +1,4 @@
-"""Levels B and C: a part as a sheet or a body, along the whole stroke."""
+"""The levels `plane` and `solid`: analysis of the printed outline of a part."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.contact import Contacts, centre_lines, find_contacts
-from bellcrank.fem.continuum.backend import ngsolve
+from bellcrank.fem.continuum.backend import missing_ngsolve, ngsolve
 from bellcrank.fem.continuum.laws import laws
 from bellcrank.fem.continuum.response import solve_plane, solve_solid
 from bellcrank.fem.levels import Level, levels
@@ -21,62 +21,70 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.fem.continuum.response import ContinuumState, Response
+    from bellcrank.fem.continuum.response import ContinuumResponse, ContinuumState
     from bellcrank.fem.levels import FemSettings
     from bellcrank.fem.results import Field
     from bellcrank.part import Part
 
 
 def check_outline(part: Part, settings: FemSettings) -> None:
-    """Refuse what cannot be meshed: no NGSolve, an unknown law, no such outline."""
+    """Raise an error if the law is unknown, NGSolve is missing or there is no valid outline."""
     law = laws[settings.law]
     if law.small:
-        raise InvalidSettings(f"law: {settings.law!r} is for small motions; ask for --linear")
+        raise InvalidSettings(
+            f"law: {settings.law!r} is for small displacements; use --linear instead"
+        )
     ngsolve()
     part.outline()
 
 
-def analyse_plane(part: Part, settings: FemSettings, tell: Callable[[float], None]) -> Analysis:
-    """Analyse a part as a sheet in plane stress, cut into second-order triangles.
+def analyse_plane(part: Part, settings: FemSettings, report: Callable[[float], None]) -> Analysis:
+    """Analyse a part in plane stress with second-order triangles.
+
+    Parameters
+    ----------
+    part
+        Part to be analysed.
+    settings
+        Material law, size of the elements, linear or not.
+    report
+        Called with each load reached.
 
     Raises
     ------
     InvalidSettings
         If NGSolve is not installed, or struts or fillets are so wide that holes close.
     """
-    return _analyse(part, settings, tell, "plane", solve_plane)
+    return _analyse(part, settings, report, "plane", solve_plane)
 
 
-def analyse_solid(part: Part, settings: FemSettings, tell: Callable[[float], None]) -> Analysis:
-    """Analyse a part as a body, cut into second-order tetrahedra.
+def analyse_solid(part: Part, settings: FemSettings, report: Callable[[float], None]) -> Analysis:
+    """Analyse a part as a solid with second-order tetrahedra.
 
-    Raises
-    ------
-    InvalidSettings
-        If NGSolve is not installed, or struts or fillets are so wide that holes close.
+    Parameters and errors are those of `analyse_plane`.
     """
-    return _analyse(part, settings, tell, "solid", solve_solid)
+    return _analyse(part, settings, report, "solid", solve_solid)
 
 
-levels.register("plane")(Level(analyse_plane, check_outline))
-levels.register("solid")(Level(analyse_solid, check_outline))
+levels.register("plane")(Level(analyse_plane, check_outline, missing_ngsolve))
+levels.register("solid")(Level(analyse_solid, check_outline, missing_ngsolve))
 
 
 def _analyse(
     part: Part,
     settings: FemSettings,
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
     level: str,
-    solve: Callable[..., Response],
+    solve: Callable[..., ContinuumResponse],
 ) -> Analysis:
-    """Analyse a part by one of the two."""
+    """Analyse a part in the plane or in space."""
     began = time.perf_counter()
     law = "linear" if settings.linear else settings.law
-    found = solve(part, law, settings.size, tell=lambda state: tell(state.load))
-    path = found.path
+    response = solve(part, law, settings.size, report=lambda state: report(state.load))
+    path = response.path
     if settings.linear and path.status is PathStatus.MECHANISM:
         raise InvalidSettings(f"the part cannot be analysed: {path.status.message}")
-    states = [state for state in found.states if state.load or len(found.states) == 1]
+    states = [state for state in response.states if state.load or len(response.states) == 1]
     return Analysis(
         part=part,
         level=level,
@@ -84,20 +92,19 @@ def _analyse(
         linear=settings.linear,
         status=path.status,
         loss=path.loss,
-        points=[point_of(part, state) for state in states],
-        after=None,
-        contacts=contacts_of(part, found),
-        field=found.field,
+        points=[_point_of(part, state) for state in states],
+        contacts=_contacts_of(part, response),
+        field=response.fields[-1],
         cost={
             "seconds": time.perf_counter() - began,
-            "unknowns": found.unknowns,
-            "elements": found.elements,
+            "unknowns": response.unknowns,
+            "elements": response.elements,
             "factorisations": path.factorisations,
         },
     )
 
 
-def point_of(part: Part, state: ContinuumState) -> StrokePoint:
+def _point_of(part: Part, state: ContinuumState) -> StrokePoint:
     """Return the figures of an equilibrium."""
     return stroke_point(
         part,
@@ -110,10 +117,10 @@ def point_of(part: Part, state: ContinuumState) -> StrokePoint:
     )
 
 
-def contacts_of(part: Part, response: Response) -> Contacts:
+def _contacts_of(part: Part, response: ContinuumResponse) -> Contacts:
     """Find the struts whose centre lines come too close in any equilibrium of the path."""
     lines = centre_lines(part.positions[part.struts])
-    interpolate = interpolator(response.field, lines.reshape(-1, 2))
+    interpolate = _interpolator(response.fields[0], lines.reshape(-1, 2))
     stroke = (
         (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
         for state, field in zip(response.states, response.fields, strict=True)
@@ -122,7 +129,7 @@ def contacts_of(part: Part, response: Response) -> Contacts:
     return find_contacts(beams, lines, stroke, part.section.width)
 
 
-def interpolator(
+def _interpolator(
     field: Field, points: NDArray[np.float64]
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
     """Return a function that interpolates vertex displacements to points of a part.
@@ -131,13 +138,14 @@ def interpolator(
     ----------
     field
         Any state of the part; in space the points are on its lower face.
-    points : (p, 2)
-        Within the part at rest, mm.
+    points : (p, 2) float64
+        Points within the part at rest, mm.
 
     Returns
     -------
     callable
-        From (n, 2) or (n, 3) displacements of the vertices to (p, 2) those of the points, mm.
+        Function from (n, 2) or (n, 3) displacements of the vertices to (p, 2) displacements of
+        the points, mm.
     """
     import shapely
 
@@ -147,12 +155,12 @@ def interpolator(
         cells = cells[(field.rest[cells, 2] <= floor).all(axis=1)]
     corners = rest[cells]
     tree = shapely.STRtree(shapely.polygons(corners))
-    # A point on an edge is in two triangles, one between curved edges perhaps in none.
+    # A point on an edge is in two triangles, or in none between curved edges.
     which, cell = tree.query_nearest(shapely.points(points), all_matches=False)
     first, second, third = corners[cell].transpose(1, 0, 2)
     sides = np.stack([second - first, third - first], axis=2)
-    part = np.linalg.solve(sides, (points[which] - first)[:, :, None])[:, :, 0]
-    weight = np.column_stack([1.0 - part.sum(axis=1), part])
+    local = np.linalg.solve(sides, (points[which] - first)[:, :, None])[:, :, 0]
+    weight = np.column_stack([1.0 - local.sum(axis=1), local])
 
     def interpolate(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         moved = np.zeros_like(points)

@@ -1,4 +1,4 @@
-"""Level A: a part as a frame of beams with rigid joints, along the whole stroke."""
+"""The level `frame`: analysis of a part as a frame of beams with rigid joints."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from bellcrank.fem.contact import find_contacts
 from bellcrank.fem.frame.elements import energy, strain_of
 from bellcrank.fem.frame.equilibrium import FrameEquations, solve_linear
 from bellcrank.fem.frame.mesh import frame_mesh, theories
-from bellcrank.fem.frame.settling import settle
 from bellcrank.fem.frame.system import frame_system
 from bellcrank.fem.levels import Level, levels
-from bellcrank.fem.path import Follower, PathStatus, Stepping
+from bellcrank.fem.path import PathStatus, follow_path
 from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
 
 if TYPE_CHECKING:
@@ -27,31 +26,36 @@ if TYPE_CHECKING:
     from bellcrank.fem.frame.equilibrium import FrameState
     from bellcrank.fem.frame.mesh import FrameMesh
     from bellcrank.fem.levels import FemSettings
-    from bellcrank.fem.path import Path
     from bellcrank.part.part import Part
-
-SNAPS = 5
-"""Jumps after which nobody wants to know where the part ends."""
 
 
 def check_frame(_part: Part, settings: FemSettings) -> None:
-    """Refuse an unknown theory."""
+    """Raise UnknownName for an unknown beam theory."""
     theories[settings.theory]
 
 
-def analyse_frame(part: Part, settings: FemSettings, tell: Callable[[float], None]) -> Analysis:
+def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], None]) -> Analysis:
     """Analyse a part as a frame.
+
+    Parameters
+    ----------
+    part
+        Part to be analysed.
+    settings
+        Beam theory, elements of each strut, linear or not.
+    report
+        Called with each load reached.
 
     Raises
     ------
     InvalidSettings
-        If a piece of it is not held, in a linear analysis.
+        If a piece of the part is not held, in a linear analysis.
     """
     began = time.perf_counter()
     mesh = frame_mesh(part, settings.elements, settings.theory)
     system = frame_system(part, mesh)
     equations = FrameEquations(system)
-    status, loss, after = PathStatus.CONVERGED, None, None
+    status, loss = PathStatus.CONVERGED, None
     if settings.linear:
         try:
             states = [solve_linear(system)]
@@ -61,12 +65,9 @@ def analyse_frame(part: Part, settings: FemSettings, tell: Callable[[float], Non
             ) from None
         factorisations = 1
     else:
-        path = Follower(equations, Stepping(), lambda state: tell(state.load)).follow()
+        path = follow_path(equations, report=lambda state: report(state.load))
         states = [equations.complete(state) for state in path.states]
         status, loss, factorisations = path.status, path.loss, path.factorisations
-        if status is PathStatus.SNAPPED:
-            after = beyond(equations, path)
-    last = states[-1]
     points = [
         point_of(part, mesh, state, linear=settings.linear)
         for state in states
@@ -80,9 +81,8 @@ def analyse_frame(part: Part, settings: FemSettings, tell: Callable[[float], Non
         status=status,
         loss=loss,
         points=points,
-        after=point_of(part, mesh, after) if after else None,
         contacts=contacts_of(part, mesh, states),
-        field=field_of(part, mesh, last, linear=settings.linear),
+        field=field_of(part, mesh, states[-1], linear=settings.linear),
         cost={
             "seconds": time.perf_counter() - began,
             "unknowns": equations.count,
@@ -94,25 +94,9 @@ def analyse_frame(part: Part, settings: FemSettings, tell: Callable[[float], Non
 levels.register("frame")(Level(analyse_frame, check_frame))
 
 
-def beyond(equations: FrameEquations, path: Path) -> FrameState | None:
-    """Return where a frame is at the full input, after all its jumps; None if that is not found."""
-    for _ in range(SNAPS):
-        landed = settle(equations, path.states[-1])
-        if landed is None:
-            return None
-        path = Follower(equations, Stepping()).follow(landed)
-        if path.status is PathStatus.CONVERGED:
-            return equations.complete(path.states[-1])
-        if path.status is not PathStatus.SNAPPED:
-            return None
-    return None
-
-
-def point_of(
-    part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool = False
-) -> StrokePoint:
+def point_of(part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool) -> StrokePoint:
     """Return the figures of an equilibrium."""
-    stress, strain = fibres(part, mesh, state.displacement, linear=linear)
+    stress, strain = fibre_stress_and_strain(part, mesh, state.displacement, linear=linear)
     return stroke_point(
         part,
         state.load,
@@ -125,31 +109,32 @@ def point_of(
 
 
 def input_forces(part: Part, mesh: FrameMesh, state: FrameState) -> NDArray[np.float64]:
-    """Return (i, 2) what pushes each input node, N; 0 where no strut is."""
+    """Return (i, 2) the forces on the input nodes, N; 0 for nodes without struts."""
     given = part.design.problem.input
     nodes = mesh.node[given.nodes]
-    there = (nodes >= 0)[:, None]
+    present = (nodes >= 0)[:, None]
     if given.drive == "displacement":
-        return np.where(there, state.reaction[nodes, :2], 0.0)
+        return np.where(present, state.reaction[nodes, :2], 0.0)
     force = state.load * given.amount * part.stiffness_unit * part.scale
-    return np.where(there, force * given.direction, 0.0)
+    return np.where(present, force * given.direction, 0.0)
 
 
-def fibres(
+def fibre_stress_and_strain(
     part: Part, mesh: FrameMesh, displacement: NDArray[np.float64], *, linear: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return (e,) the largest stress in size, MPa, and the largest principal strain.
+    """Return (e,) the largest absolute stress of each element, MPa, and its largest strain.
 
-    Stress is uniaxial, so its size is the von Mises stress as well.
+    Both are those of the outermost fibres. Stress is uniaxial, so that its absolute value is the
+    von Mises stress.
     """
     strain = strain_of(mesh, displacement, linear=linear)
-    inner = np.einsum("eij,ej->ei", mesh.stiffness, strain)
+    forces = np.einsum("eij,ej->ei", mesh.stiffness, strain)
     section, young = part.section, part.material.young
-    bent = np.abs(inner[:, 1:]).max(axis=1) * section.width / (2.0 * young * section.inertia)
-    stretched = strain[:, 0] / mesh.length
-    # What is pressed together one way grows the other.
-    widened = part.material.poisson * (bent - stretched)
-    return young * (np.abs(stretched) + bent), np.maximum(stretched + bent, widened)
+    bending = np.abs(forces[:, 1:]).max(axis=1) * section.width / (2.0 * young * section.inertia)
+    axial = strain[:, 0] / mesh.length
+    # Compression in one direction is extension across it.
+    across = part.material.poisson * (bending - axial)
+    return young * (np.abs(axial) + bending), np.maximum(axial + bending, across)
 
 
 def contacts_of(part: Part, mesh: FrameMesh, states: Sequence[FrameState]) -> Contacts:
@@ -160,6 +145,6 @@ def contacts_of(part: Part, mesh: FrameMesh, states: Sequence[FrameState]) -> Co
 
 
 def field_of(part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool) -> Field:
-    """Return what pictures need."""
-    stress, _ = fibres(part, mesh, state.displacement, linear=linear)
+    """Return a state for pictures and files."""
+    stress, _ = fibre_stress_and_strain(part, mesh, state.displacement, linear=linear)
     return Field(mesh.positions, state.displacement[:, :2], mesh.elements, stress)

@@ -1,4 +1,4 @@
-"""Whether a state is stable, from solutions with its stiffness alone."""
+"""Stability of a state from solutions with its stiffness."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ if TYPE_CHECKING:
     Solve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 SOLUTIONS = 12
-"""Dimension of Lanczos' space."""
+"""Dimension of the Krylov space."""
 SPREAD = 0.3
-"""Of the start, as a part of what is expected to be the softest mode."""
+"""Size of the random part of the start vector, relative to the expected softest mode."""
 ROUNDING = 1e-8
-"""Compliance, as a part of the largest, below which signs mean nothing."""
+"""Compliance, as a fraction of the largest, below which its sign is not significant."""
 
 
-def softest(
+def extreme_compliances(
     solve: Solve, expected: NDArray[np.float64], rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the extreme compliances of a structure and the mode of the least stable one.
 
-    Lanczos' method on the inverse of the stiffness. What it finds lies within the spectrum: a
-    compliance below 0 proves that the structure is unstable. An unstable direction is missed
-    only if it is far stiffer than the softest stable ones and unlike the start.
+    Lanczos' method with the inverse of the stiffness. Its values lie within the spectrum, so that
+    a negative compliance proves instability. An unstable direction is missed only if it is much
+    stiffer than the softest stable ones and nearly orthogonal to the start vector.
 
     Parameters
     ----------
     solve
-        Displacements (f,) by forces (f,).
-    expected : (f,)
-        A guess of the softest mode; zeros if there is none.
+        Function from forces (f,) to displacements (f,).
+    expected : (f,) float64
+        Estimate of the softest mode; zeros if there is none.
     rng
-        For the rest of the start.
+        Random numbers for the start vector.
 
     Returns
     -------
-    compliance : (k,)
-        Ascending.
-    mode : (f,)
+    compliance : (k,) float64
+        Compliances in ascending order.
+    mode : (f,) float64
         Unit vector.
     """
     start = solve(rng.standard_normal(len(expected)))
@@ -70,12 +70,12 @@ def softest(
     return compliance, mode
 
 
-def negative(compliance: NDArray[np.float64]) -> int:
-    """Return how many of some compliances are below 0, beyond rounding.
+def count_negative(compliance: NDArray[np.float64]) -> int:
+    """Return the number of compliances that are negative beyond rounding.
 
     Examples
     --------
-    >>> negative(np.array([-2.0, -1e-12, 0.5]))
+    >>> count_negative(np.array([-2.0, -1e-12, 0.5]))
     1
     """
     return int((compliance < -ROUNDING * np.abs(compliance).max(initial=0.0)).sum())
