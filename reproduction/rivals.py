@@ -12,7 +12,7 @@ import numpy as np
 
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.search import read_settings
-from bellcrank.workflows.choosing import PartChoice
+from bellcrank.workflows.candidate_ranking import CandidateRanking
 from bellcrank.workflows.design import verification_evaluator
 from reproduction.boxes import Box, box_of
 from reproduction.outline_analysis import analyse_outline, contour_of, narrowest, polygon_of
@@ -164,7 +164,7 @@ def _chosen(box: Box, chains: Sequence[Mapping[str, Any]], values: Mapping[str, 
     settings = read_settings(dict(values))
     began = time.thread_time()
     evaluator = verification_evaluator(box.problem, settings)
-    found = best_design(box.problem, chains, evaluator, PartChoice(box.spec, settings))
+    found = best_design(box.problem, chains, evaluator, CandidateRanking(box.spec, settings))
     return {
         "mask": found.design.mask_hex,
         "model": found.efficiency_after,

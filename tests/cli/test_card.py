@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import pytest
+from matplotlib.transforms import Bbox
 
 from bellcrank.model import find_problem, human_design
-from bellcrank.workflows.card import design_hash
+from bellcrank.plots.card import card_figure
+from bellcrank.workflows import find_design, spec_for
+from bellcrank.workflows.card import card_of, design_hash
 
 from .helpers import call, colours, files, refusal, write
 
@@ -38,6 +42,39 @@ def test_a_card_takes_up_the_record_of_a_run(copy: Path, here: Path) -> None:
     call("validate", copy, "--theory", "timoshenko", "--linear")
     assert call("card", copy, "two.png").code == 0
     assert (here / "one.png").read_bytes() != (here / "two.png").read_bytes()
+
+
+def overlaps(boxes: list[tuple[str, Bbox]]) -> list[tuple[str, str]]:
+    """Pairs of named boxes that overlap by more than one point each way."""
+    found = []
+    for (name, box), (other_name, other) in combinations(boxes, 2):
+        common = Bbox.intersection(box, other)
+        if common is not None and min(common.width, common.height) > 1.0:
+            found.append((name, other_name))
+    return found
+
+
+@pytest.mark.parametrize("name", ["human:crane", "human:pliers", "machine:scaling-8"])
+def test_nothing_on_a_card_overlaps_and_nothing_is_cut(name: str) -> None:
+    design = find_design(name)
+    entry = {
+        "level": "solid", "linear": True, "efficiency": -12.345,
+        "status": "converged", "von_mises_MPa": 0.123, "principal_strain": 0.1,
+    }  # fmt: skip
+    figure = card_figure(card_of(design, spec_for(design), [entry] * 6, name))
+    figure.set_dpi(72.0)
+    figure.canvas.draw()
+    [legend] = figure.legends
+    boxes = [(text.get_text(), text.get_window_extent()) for text in figure.texts]
+    boxes += [("legend", legend.get_window_extent())]
+    panel, *diagrams = figure.axes
+    boxes += [("drawing", panel.get_window_extent())]
+    boxes += [("diagram", diagram.get_tightbbox()) for diagram in diagrams]
+    assert overlaps([(label, box) for label, box in boxes if label.strip()]) == []
+    page = figure.bbox
+    for label, box in boxes:
+        assert page.x0 <= box.x0 <= box.x1 <= page.x1, label
+        assert page.y0 <= box.y0 <= box.y1 <= page.y1, label
 
 
 def test_cards_are_refused_like_all_pictures(here: Path) -> None:

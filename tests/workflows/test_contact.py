@@ -10,7 +10,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, Status
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports
 from bellcrank.part import PartSpec
 from bellcrank.search.constraints import ConstrainedEvaluator, LoadCase
-from bellcrank.workflows.choosing import fault_of
+from bellcrank.workflows.candidate_ranking import fault_of
 from bellcrank.workflows.fabricate import findings_about, profile_for
 
 SPEC = PartSpec(width=1.5)

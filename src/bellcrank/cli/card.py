@@ -1,4 +1,4 @@
-"""`bellcrank card`: a page about a design as a part."""
+"""`bellcrank card`: a one-page summary of a design as a part."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from bellcrank.cli.arguments import (
     part_of,
 )
 from bellcrank.cli.console import announce_compilation, notes, plain
-from bellcrank.cli.validate import record_beside
+from bellcrank.cli.validate import record_of
 
 
 @app.command()
@@ -35,9 +35,11 @@ def card(
     scale: Scale = None,
     fillet: Fillet = None,
     material: MaterialName = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the card.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing file.")
+    ] = False,
 ) -> None:
-    """Put on one page what there is to say about a design as a part."""
+    """Draw a one-page summary of a design as a part."""
     from bellcrank.workflows import spec_for
     from bellcrank.workflows.card import make_card
 
@@ -46,5 +48,5 @@ def card(
     spec = part_of(spec_for(chosen), part, lengths, material)
     target = out or Path(f"{chosen.problem.name}.pdf")
     announce_compilation()
-    make_card(chosen, spec, target, record=record_beside(design), title=design, overwrite=overwrite)
+    make_card(chosen, spec, target, record=record_of(design), title=design, overwrite=overwrite)
     notes.print(f"wrote {plain(target)}")

@@ -1,4 +1,4 @@
-"""`bellcrank validate`: finite elements of the part that a design becomes."""
+"""`bellcrank validate`: analysis of a design as a part by finite elements."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ if TYPE_CHECKING:
 
 
 class StrokeProgress(Live):
-    """A live line: which analysis, and how far along the stroke it is."""
+    """Progress of a validation: current analysis and fraction of the stroke reached."""
 
     def __init__(self, names: Sequence[str]) -> None:
         super().__init__("validating", 100 * len(names))
         self._names = names
 
     def __call__(self, index: int, load: float) -> None:
-        """Show the part of the stroke that an analysis has reached."""
+        """Show the fraction of the stroke that an analysis has reached."""
         name = self._names[index]
         line = f"{name}: {load:.0%} of the stroke"
         self._show(int(100 * (index + load)), 100 * len(self._names), name, line)
@@ -54,18 +54,21 @@ class StrokeProgress(Live):
 def validate(
     design: DesignName,
     level: Annotated[
-        str, typer.Option(help="frame, plane or solid; several with commas between.")
+        str, typer.Option(help="Levels of analysis: frame, plane, solid, separated by commas.")
     ] = "frame",
     theory: Annotated[
-        str, typer.Option(help="Of frames: euler-bernoulli or timoshenko, or both.")
+        str, typer.Option(help="Beam theory of frames: euler-bernoulli, timoshenko or both.")
     ] = "euler-bernoulli",
     law: Annotated[
-        str, typer.Option(help="Of plane and solid: neo-hookean, st-venant-kirchhoff, or both.")
+        str,
+        typer.Option(
+            help="Material law of plane and solid: neo-hookean, st-venant-kirchhoff, both."
+        ),
     ] = "neo-hookean",
-    linear: Annotated[bool, typer.Option("--linear", help="Small motions only.")] = False,
-    elements: Annotated[int, typer.Option(help="Beam elements in each strut.")] = 8,
+    linear: Annotated[bool, typer.Option("--linear", help="Assume small displacements.")] = False,
+    elements: Annotated[int, typer.Option(help="Number of beam elements of each strut.")] = 8,
     size: Annotated[
-        str | None, typer.Option(help="Largest edge of plane and solid elements.")
+        str | None, typer.Option(help="Largest edge of plane and solid elements (for example 1mm).")
     ] = None,
     part: PartFile = None,
     width: Width = None,
@@ -73,69 +76,89 @@ def validate(
     scale: Scale = None,
     fillet: Fillet = None,
     stroke: Annotated[
-        str | None, typer.Option(help="Motion of the input; default: the problem's.")
+        str | None,
+        typer.Option(help="Input displacement (for example 4mm); default: that of the problem."),
     ] = None,
     material: MaterialName = None,
     young: Annotated[float | None, typer.Option(help="Young's modulus in MPa.")] = None,
     poisson: Annotated[float | None, typer.Option(help="Poisson's ratio.")] = None,
     picture: Annotated[
-        Path | None, typer.Option(help="Draw the moved part coloured by stress (png, svg, pdf).")
+        Path | None, typer.Option(help="Draw the deformed part coloured by stress (png, svg, pdf).")
     ] = None,
     compare: Annotated[
-        str | None, typer.Option(help="A second design for the picture, like human:crane.")
+        str | None, typer.Option(help="Second design for the picture (for example human:crane).")
     ] = None,
-    vtu: Annotated[Path | None, typer.Option(help="Write the moved part for ParaView.")] = None,
+    vtu: Annotated[
+        Path | None, typer.Option(help="Write the deformed part for ParaView (vtu).")
+    ] = None,
     record: Annotated[
         Path | None,
-        typer.Option(help="Where to keep the record; default: validation.json beside the design."),
+        typer.Option(help="File of the record; default: validation.json beside the design."),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace picture, VTU.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing picture or VTU file.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Check a design by finite elements: does the part move as it should."""
-    from bellcrank.workflows import check_plan, spec_for, validate, with_stroke
+    """Analyse a design as a part by finite elements."""
+    from bellcrank.workflows import (
+        check_plan,
+        spec_for,
+        validate,
+        with_stroke,
+        without_missing_levels,
+    )
     from bellcrank.workflows.pictures import check_targets, draw_validations, write_vtu
 
     chosen = design_named(design)
     check_targets(picture, vtu, overwrite=overwrite)
-    target = record or record_beside(design)
-    _check_record(target, chosen, asked=record is not None)
+    target = record or record_of(design)
+    _check_record(target, chosen, required=record is not None)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material, young, poisson)
-    plan = _plan(level, theory, law, linear=linear, elements=elements, size=size)
+    plan, missing = without_missing_levels(
+        _plan(level, theory, law, linear=linear, elements=elements, size=size)
+    )
     others = [design_named(compare)] if compare is not None else []
     if others and picture is None:
         raise InvalidSettings("--compare is for the picture; give --picture FILE too")
     drives = {one.problem.input.drive for one in (chosen, *others)}
     if len(drives) > 1:
-        raise InvalidSettings(f"--compare: {compare} is driven otherwise than {design}")
-    driven = [
+        raise InvalidSettings(
+            f"--compare: {compare} and {design} are not driven alike, by a displacement or a force"
+        )
+    strokes = [
         one if stroke is None else with_stroke(one, stroke, spec.scale) for one in (chosen, *others)
     ]
-    for one in driven:
+    for one in strokes:
         check_plan(one, spec, plan)
     announce_compilation()
-    keepers = [_keeper(target, asked=record is not None), lambda _so_far: None]
-    found = []
+    savers: list[Callable[[Validation], None]] = [
+        _saver(target, required=record is not None),
+        lambda _validation: None,
+    ]
+    validations = []
     names = [f"{name} {_model(name, settings)}" for name, settings in plan]
-    for one, keep in zip(driven, keepers, strict=False):
+    for one, save in zip(strokes, savers, strict=False):
         with StrokeProgress(names) as progress:
-            found.append(validate(one, spec, plan, progress, keep))
-    validation = found[0]
+            validations.append(validate(one, spec, plan, progress, save))
+    validation = validations[0]
     if as_json:
         print_json(json.dumps(validation.to_dict(), indent=1))
     else:
         _print(validation)
     if picture is not None:
         draw_validations(
-            found, [design, *([compare] if compare else [])], picture, overwrite=overwrite
+            validations, [design, *([compare] if compare else [])], picture, overwrite=overwrite
         )
     if vtu is not None:
         write_vtu(validation.analyses[-1], vtu, overwrite=overwrite)
     for path in (picture, vtu):
         if path is not None:
             notes.print(f"wrote {plain(path)}")
-    if any(
+    for line in missing:
+        notes.print(f"[bold red]error:[/] {plain(line)}")
+    if missing or any(
         analysis.status.value in ("mechanism", "unconverged") for analysis in validation.analyses
     ):
         raise typer.Exit(FAILED)
@@ -144,7 +167,7 @@ def validate(
 def _plan(
     level: str, theory: str, law: str, *, linear: bool, elements: int, size: str | None
 ) -> list[tuple[str, FemSettings]]:
-    """Return each level with each of its theories or laws."""
+    """Return each level with each of its theories or laws, in order."""
     from bellcrank.fem import FemSettings, levels
     from bellcrank.fem.continuum.laws import laws
     from bellcrank.fem.frame import theories
@@ -152,9 +175,9 @@ def _plan(
 
     longest = None if size is None else read_length("size", size)
     common = FemSettings(linear=linear, elements=elements, size=longest)
-    theories_, laws_ = _words("--theory", theory, theories), _words("--law", law, laws)
+    theories_, laws_ = _names("--theory", theory, theories), _names("--law", law, laws)
     plan = []
-    for name in _words("--level", level, levels):
+    for name in _names("--level", level, levels):
         if name == "frame":
             plan += [(name, replace(common, theory=one)) for one in theories_]
         else:
@@ -162,22 +185,22 @@ def _plan(
     return plan
 
 
-def _words(option: str, text: str, known: Registry[Any]) -> list[str]:
-    """Read names with commas between them, each once."""
-    words = list(dict.fromkeys(word.strip() for word in text.split(",")))
-    if "" in words:
-        raise InvalidSettings(f"{option} {text!r}: expected names with commas between")
-    for word in words:
-        known[word]
-    return words
+def _names(option: str, text: str, known: Registry[Any]) -> list[str]:
+    """Return the names in a list separated by commas, each once."""
+    names = list(dict.fromkeys(name.strip() for name in text.split(",")))
+    if "" in names:
+        raise InvalidSettings(f"{option} {text!r}: expected names separated by commas")
+    for name in names:
+        known[name]
+    return names
 
 
 def _model(level: str, settings: FemSettings) -> str:
     return settings.theory if level == "frame" else settings.law
 
 
-def record_beside(design: str) -> Path | None:
-    """Return where the record of a design that lies in a file belongs."""
+def record_of(design: str) -> Path | None:
+    """Return the path of the record of a design in a file or folder, None for a bundled design."""
     from bellcrank.model import builtin
     from bellcrank.workflows.find import hides_problem
 
@@ -191,35 +214,38 @@ def record_beside(design: str) -> Path | None:
     return path.with_name(f"{name}validation.json")
 
 
-def _check_record(path: Path | None, design: Design, *, asked: bool) -> None:
-    """Refuse a record that could not be kept anyway, before anything is computed."""
+def _check_record(path: Path | None, design: Design, *, required: bool) -> None:
+    """Check before any computation that the record can be written."""
     from bellcrank.model.storage import check_folder
-    from bellcrank.workflows import check_record, identity
+    from bellcrank.workflows import problem_identity, read_record
 
     if path is not None:
-        check_record(path, identity(design), design.mask_hex)
-        if asked:
+        read_record(path, problem_identity(design), design.mask_hex)
+        if required:
             check_folder(path)
 
 
-def _keeper(path: Path | None, *, asked: bool) -> Callable[[Validation], None]:
-    """Return what keeps the record; nobody asked for one beside the design, so that may fail."""
-    from bellcrank.workflows import keep_record
+def _saver(path: Path | None, *, required: bool) -> Callable[[Validation], None]:
+    """Return a function that adds a validation to the record.
 
-    def keep(so_far: Validation) -> None:
+    A failure is an error only if `required`, which is whether the user has named the file.
+    """
+    from bellcrank.workflows import add_to_record
+
+    def save(validation: Validation) -> None:
         if path is None:
             return
         try:
-            keep_record(so_far, path)
+            add_to_record(validation, path)
         except StorageError as error:
-            if asked:
+            if required:
                 raise
-            notes.print(f"[yellow]no record kept:[/] {plain(error)}")
+            notes.print(f"[yellow]record not written:[/] {plain(error)}")
             return
-        if len(so_far.analyses) == len(so_far.plan):
-            notes.print(f"kept {plain(path)}")
+        if len(validation.analyses) == len(validation.plan):
+            notes.print(f"wrote {plain(path)}")
 
-    return keep
+    return save
 
 
 def _print(validation: Validation) -> None:
@@ -228,7 +254,7 @@ def _print(validation: Validation) -> None:
 
     table = Table(box=SIMPLE)
     table.add_column("")
-    table.add_column("discrete model", justify="right")
+    table.add_column("spring model", justify="right")
     columns = [_column(analysis) for analysis in validation.analyses]
     for analysis in validation.analyses:
         table.add_column(_heading(analysis), justify="right")
@@ -243,8 +269,8 @@ def _print(validation: Validation) -> None:
         "strain",
         "status",
     )
-    for place, name in enumerate(names):
-        table.add_row(name, first[place], *(column[place] for column in columns))
+    for row, name in enumerate(names):
+        table.add_row(name, first[row], *(column[row] for column in columns))
     results.print(table)
     for doubt in validation.doubts:
         notes.print(f"[yellow]design:[/] {plain(doubt)}")
@@ -254,13 +280,13 @@ def _print(validation: Validation) -> None:
 
 
 def _heading(analysis: Analysis) -> str:
-    """Return what an analysis is called."""
+    """Return the heading of the column of an analysis."""
     kind = f"{analysis.level}, linear" if analysis.linear else analysis.level
     return f"{kind}\n{analysis.theory}"
 
 
 def _column(analysis: Analysis) -> list[str]:
-    """Return the figures of an analysis as words."""
+    """Return the figures of an analysis as text."""
     point = analysis.last
     known = math.isfinite(analysis.efficiency)
     status = analysis.status.value

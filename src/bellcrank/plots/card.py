@@ -24,9 +24,14 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 11.69, 8.27
 """A4 in landscape format, inches."""
 MARGIN = 0.45
-DRAWING = (6.9, 5.2)
+DRAWING = (6.9, 4.8)
 """Largest size of the drawing, inches."""
 CURVES = (3.2, 1.45)
+"""Size of each of the two diagrams, inches."""
+TABLES_TOP = 2.05
+"""Height of the headings of the tables above the lower edge, inches."""
+LEGEND_TOP = 2.85
+"""Height of the legend, which is below the diagrams, inches."""
 LEGEND_COLUMNS = 3
 
 Table = tuple[str, list[tuple[str, str]]]
@@ -78,6 +83,11 @@ def draw_card(card: Card, path: str | os.PathLike[str], *, overwrite: bool = Fal
         If the file exists or cannot be written.
     """
     check_target(path, overwrite=overwrite)
+    save_figure(card_figure(card), path, overwrite=overwrite)
+
+
+def card_figure(card: Card) -> Figure:
+    """Return the figure of a card."""
     figure = style.new_figure(WIDTH, HEIGHT)
     style.add_heading(figure, card.title, card.note, MARGIN, MARGIN)
     _add_drawing(figure, card)
@@ -87,11 +97,11 @@ def draw_card(card: Card, path: str | os.PathLike[str], *, overwrite: bool = Fal
         MARGIN / WIDTH, 0.25 / HEIGHT, card.footer,
         size=6.5, color=style.NOTE, family=style.FONT, parse_math=False,
     )  # fmt: skip
-    save_figure(figure, path, overwrite=overwrite)
+    return figure
 
 
 def _add_drawing(figure: Figure, card: Card) -> None:
-    """Add the design at rest and displaced, upper left."""
+    """Add the design at rest and displaced, upper left, and its legend below the diagrams."""
     drawing = Drawing("", "", card.motion, displaced=True)
     ((low, high),) = drawing_frames([drawing])
     size = high - low
@@ -99,26 +109,26 @@ def _add_drawing(figure: Figure, card: Card) -> None:
     top = HEIGHT - MARGIN - 0.65
     corner = (MARGIN, top - scale * float(size[1]))
     add_drawing(add_panel(figure, card.motion.design.problem, corner, scale, low, high), drawing)
-    legend_top = corner[1] - 0.02
-    add_legend(figure, legend_entries([drawing]), legend_top, LEGEND_COLUMNS, left=MARGIN, size=7.5)
+    left = WIDTH - MARGIN - CURVES[0] - 0.5
+    add_legend(figure, legend_entries([drawing]), LEGEND_TOP, LEGEND_COLUMNS, left=left, size=7.5)
 
 
 def _add_curves(figure: Figure, card: Card) -> None:
     """Add efficiency and force along the stroke, upper right."""
     left = WIDTH - MARGIN - CURVES[0]
     pair: list[Axes] = []
-    for index in range(2):
-        bottom = HEIGHT - MARGIN - 0.75 - CURVES[1] - index * (CURVES[1] + 0.7)
-        place_of = (left / WIDTH, bottom / HEIGHT, CURVES[0] / WIDTH, CURVES[1] / HEIGHT)
-        pair.append(figure.add_axes(place_of))
+    for row in range(2):
+        bottom = HEIGHT - MARGIN - 0.75 - CURVES[1] - row * (CURVES[1] + 0.7)
+        box = (left / WIDTH, bottom / HEIGHT, CURVES[0] / WIDTH, CURVES[1] / HEIGHT)
+        pair.append(figure.add_axes(box))
     draw_strokes((pair[0], pair[1]), [card.curve], card.labels)
 
 
 def _add_tables(figure: Figure, tables: list[Table]) -> None:
     """Add the tables at the bottom, in columns of equal width."""
     wide = (WIDTH - 2.0 * MARGIN) / max(len(tables), 1)
-    for index, (heading, rows) in enumerate(tables):
-        left, top = MARGIN + index * wide, 2.05
+    for column, (heading, rows) in enumerate(tables):
+        left, top = MARGIN + column * wide, TABLES_TOP
         options: dict[str, Any] = {"family": style.FONT, "parse_math": False, "va": "top"}
         figure.text(
             left / WIDTH, top / HEIGHT, heading,

@@ -39,6 +39,7 @@ class StrokeLabels:
 
     stroke: str = "input displacement, mm"
     force: str = "input force, N"
+    efficiency: str = "efficiency"
 
 
 def draw_strokes(
@@ -58,7 +59,7 @@ def draw_strokes(
     """
     colours = (style.HUMAN, style.OUTPUT) if len(curves) > 1 else (style.OUTPUT,)
     for axes, quantity, label in zip(
-        pair, ("efficiency", "force"), ("efficiency", labels.force), strict=True
+        pair, ("efficiency", "force"), (labels.efficiency, labels.force), strict=True
     ):
         for curve, colour in zip(curves, colours, strict=True):
             axes.plot(

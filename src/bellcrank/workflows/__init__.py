@@ -1,4 +1,4 @@
-"""Whole jobs that need several layers at once, for every face: command line, web, scripts."""
+"""Jobs that combine several packages: design, validation, pictures and files of parts."""
 
 from bellcrank.workflows.design import (
     complete_design,
@@ -6,32 +6,35 @@ from bellcrank.workflows.design import (
     start_design,
 )
 from bellcrank.workflows.find import find_design
-from bellcrank.workflows.outcome import DesignReport
 from bellcrank.workflows.pictures import draw_run, motion_of
-from bellcrank.workflows.record import check_record, keep_record
-from bellcrank.workflows.validate import (
+from bellcrank.workflows.report import DesignReport
+from bellcrank.workflows.validation import (
     Validation,
+    add_to_record,
     check_plan,
-    identity,
+    problem_identity,
+    read_record,
     spec_for,
     validate,
     with_stroke,
+    without_missing_levels,
 )
 
 __all__ = [
     "DesignReport",
     "Validation",
+    "add_to_record",
     "check_plan",
-    "check_record",
     "complete_design",
     "draw_run",
     "find_design",
-    "identity",
-    "keep_record",
     "motion_of",
+    "problem_identity",
+    "read_record",
     "reopen_design",
     "spec_for",
     "start_design",
     "validate",
     "with_stroke",
+    "without_missing_levels",
 ]

@@ -1,4 +1,4 @@
-"""A card that says all about a design as a part, on one page."""
+"""Design cards: a one-page summary of a design as a part."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.export import Export, check_print
 from bellcrank.fem import FemSettings
-from bellcrank.model.parsing import read_json
+from bellcrank.mechanics import objective_name
 from bellcrank.plots.card import Card, draw_card
 from bellcrank.plots.saving import check_target
 from bellcrank.plots.scene import Motion
 from bellcrank.provenance import provenance
 from bellcrank.workflows.fabricate import profile_for
 from bellcrank.workflows.pictures import stressed_part, stroke_labels
-from bellcrank.workflows.record import check_record
-from bellcrank.workflows.validate import identity, validate
+from bellcrank.workflows.validation import problem_identity, read_record, validate
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,14 +24,14 @@ if TYPE_CHECKING:
     from bellcrank.model import Design
     from bellcrank.part import Part, PartSpec
     from bellcrank.plots.card import Table
-    from bellcrank.workflows.validate import Validation
+    from bellcrank.workflows.validation import Validation
 
-VALIDATED = 6
-"""Most rows of the table of validations."""
+ANALYSES = 6
+"""Largest number of analyses in the table."""
 
 
 def design_hash(design: Design) -> str:
-    """Return what names a design: problem, stroke included, and beams.
+    """Return a hash of a design: its problem, stroke included, and its beams.
 
     Examples
     --------
@@ -57,46 +56,56 @@ def make_card(
 
     Parameters
     ----------
+    design
+        Design to be drawn.
     spec
-        Size and material.
+        Size and material of the part.
     path
-        A pdf, png or svg.
+        Output file; the suffix pdf, png or svg selects the format.
     record
-        Of its validations, if there is one.
+        Record of the design's validations, if there is one.
     title
-        By default the name of the problem.
+        Title of the card; the name of the problem by default.
+    overwrite
+        Whether an existing file is replaced.
 
     Raises
     ------
-    InvalidSettings, InvalidFile, OutputExists, StorageError
+    InvalidSettings, InvalidFile
+        If the suffix is unknown, the part cannot be built or the record is not valid.
+    OutputExists, StorageError
+        If the file exists or cannot be written.
     """
     check_target(path, overwrite=overwrite)
-    kept: list[dict[str, Any]] = []
-    if record is not None and record.exists():
-        check_record(record, identity(design), design.mask_hex)
-        kept = read_json(record)["results"]
+    recorded: list[dict[str, Any]] = []
+    if record is not None:
+        recorded = read_record(record, problem_identity(design), design.mask_hex)
+    card = card_of(design, spec, recorded, title)
+    draw_card(card, path, overwrite=overwrite)
+
+
+def card_of(
+    design: Design, spec: PartSpec, recorded: list[dict[str, Any]], title: str = ""
+) -> Card:
+    """Return the content of the card of a design, with its frame analysis."""
     validation = validate(design, spec, [("frame", FemSettings())])
     bundle = Export(part=spec.of(design))
-    profile = profile_for(None, spec)
-    part = bundle.part
     response = validation.response
-    name = title or design.problem.name
-    card = Card(
-        title=name,
-        note=f"efficiency {response.efficiency:.3f} by the discrete model · "
-        f"{design.beam_count} beams · {design_hash(design)}",
+    return Card(
+        title=title or design.problem.name,
+        note=f"efficiency ({objective_name(design.problem)}) {response.efficiency:.3f} in the "
+        f"spring model · {design.beam_count} beams · {design_hash(design)}",
         motion=Motion(design, response.displacement, response.efficiency),
         curve=stressed_part(validation.analyses[0]).curve,
         labels=stroke_labels(validation),
         tables=[
-            _part_table(bundle, part),
-            _print_table(bundle, profile),
-            _fem_table(validation, kept),
+            _part_table(bundle, bundle.part),
+            _print_table(bundle, profile_for(None, spec)),
+            _fem_table(validation, recorded),
             _origin_table(design),
         ],
-        footer=_foot(design),
+        footer=_footer(design),
     )
-    draw_card(card, path, overwrite=overwrite)
 
 
 def _part_table(bundle: Export, part: Part) -> Table:
@@ -119,30 +128,33 @@ def _part_table(bundle: Export, part: Part) -> Table:
 
 
 def _print_table(bundle: Export, profile: PrintProfile) -> Table:
-    found = check_print(bundle, profile.rules)
+    findings = check_print(bundle, profile.rules)
     rows = [
         ("nozzle", f"{profile.nozzle:g} mm"),
         ("layers", f"{round(bundle.thickness / profile.layer)} of {profile.layer:g} mm"),
         ("lines", f"{profile.bead_width:g} mm wide"),
-        ("heat", f"{profile.temperature} C, bed {profile.bed_temperature} C"),
+        ("temperature", f"{profile.temperature} C, bed {profile.bed_temperature} C"),
         ("speed", f"{profile.speed:g} mm/s"),
-        ("remarks", ", ".join(finding.kind for finding in found) or "none"),
+        ("warnings", ", ".join(finding.kind for finding in findings) or "none"),
     ]
     return "Printing", rows
 
 
-def _fem_table(validation: Validation, kept: list[dict[str, Any]]) -> Table:
-    """Return efficiencies by level: those on record, or the frame computed for this card."""
-    entries = kept or validation.to_dict()["results"]
+def _fem_table(validation: Validation, recorded: list[dict[str, Any]]) -> Table:
+    """Return efficiencies by level, from the record or else from the frame analysis."""
+    entries = recorded or validation.to_dict()["results"]
     rows = []
-    for entry in entries[:VALIDATED]:
+    for entry in entries[:ANALYSES]:
         value = entry["efficiency"]
         figure = f"{value:.3f}" if value is not None else entry["status"]
         stress, strain = entry["von_mises_MPa"], entry["principal_strain"]
         more = f", {stress:.2g} MPa, {strain:.0%}" if stress is not None else ""
-        kind = f"{entry['level']}, linear" if entry["linear"] else entry["level"]
-        rows.append((kind, f"{figure}{more}"))
-    return "Finite elements", rows
+        level = f"{entry['level']}, linear" if entry["linear"] else entry["level"]
+        rows.append((level, f"{figure}{more}"))
+    contacts = validation.analyses[0].contacts
+    if contacts.first is not None:
+        rows.append(("contact", f"frame, from {contacts.first:.0%} of the stroke"))
+    return "Efficiency by finite elements", rows
 
 
 def _origin_table(design: Design) -> Table:
@@ -154,12 +166,12 @@ def _origin_table(design: Design) -> Table:
         ("search", str(settings.get("search", settings.get("name", "-")))),
         ("seed", str(settings.get("seed", "-"))),
         ("version", f"{origin.get('version', '-')} {str(origin.get('commit') or '')[:9]}"),
-        ("made", str(origin.get("time", "-"))),
+        ("date", str(origin.get("time", "-"))),
     ]
     return "Origin", [(name, value) for name, value in rows if value.strip(" -")]
 
 
-def _foot(design: Design) -> str:
+def _footer(design: Design) -> str:
     now = provenance()
     commit = str(now["commit"] or "")[:9]
     return f"bellcrank {now['version']} {commit} · {now['time']} · {design.mask_hex[:96]}"

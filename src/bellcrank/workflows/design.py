@@ -29,11 +29,9 @@ from bellcrank.search import (
 )
 from bellcrank.storage import RunFolder, check_no_run, remove_temporaries
 from bellcrank.storage.locking import LOCK, locked
-from bellcrank.workflows.choosing import FINE, LEVEL, PartChoice, stands
-from bellcrank.workflows.outcome import DesignReport
-from bellcrank.workflows.record import begin_record
-from bellcrank.workflows.report import RESULTS, write_report
-from bellcrank.workflows.validate import Validation, validate
+from bellcrank.workflows.candidate_ranking import FINE, LEVEL, CandidateRanking, is_held
+from bellcrank.workflows.report import RESULTS, DesignReport, write_report
+from bellcrank.workflows.validation import Validation, replace_record, validate
 
 if TYPE_CHECKING:
     import threading
@@ -209,7 +207,7 @@ def conclude(
     spec = _part_of(folder)
     candidates, proposals, best = accepted_candidates(folder, settings)
     evaluator = verification_evaluator(problem, settings)
-    choose = most_efficient if spec is None else PartChoice(spec, settings, trying)
+    choose = most_efficient if spec is None else CandidateRanking(spec, settings, trying)
     selection = select(problem, candidates, settings.objective, evaluator, choose)
     literal = verification_evaluator(problem, settings, goals=())
     human = human_counterpart(problem)
@@ -237,14 +235,14 @@ def conclude(
     )
     write_design(design, folder.path / "design.json", overwrite=True)
     if report.validation is not None:
-        begin_record(report.validation, folder.path / "validation.json")
+        replace_record(report.validation, folder.path / "validation.json")
     write_report(report, folder)
     return report
 
 
 def _validated(design: Design, spec: PartSpec | None) -> Validation | None:
     """Return what a frame says of a design for a part; None if it is for none, or is none."""
-    if spec is None or not stands(design):
+    if spec is None or not is_held(design):
         return None
     return validate(design, spec, [(LEVEL, FINE)])
 

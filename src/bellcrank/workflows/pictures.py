@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
     from bellcrank.fem import Analysis
     from bellcrank.model import Design
-    from bellcrank.workflows.outcome import DesignReport
-    from bellcrank.workflows.validate import Validation
+    from bellcrank.workflows.report import DesignReport
+    from bellcrank.workflows.validation import Validation
 
 
 def chain_paths(folder: RunFolder, settings: SearchSettings) -> list[ChainPath]:
@@ -166,10 +166,11 @@ def draw_validations(
 
 
 def stroke_labels(validation: Validation) -> StrokeLabels:
-    """Return the axis labels of the curves of a design."""
+    """Return the axis labels of the curves of the last analysis of a design."""
+    efficiency = f"efficiency ({validation.analyses[-1].level})"
     if validation.design.problem.input.drive == "displacement":
-        return StrokeLabels()
-    return StrokeLabels(stroke="input force, N", force="mean output displacement, mm")
+        return StrokeLabels(efficiency=efficiency)
+    return StrokeLabels("input force, N", "output displacement, mm", efficiency)
 
 
 def stressed_part(analysis: Analysis) -> StressedPart:

@@ -1,23 +1,86 @@
-"""The result folder for people: pictures and a summary."""
+"""Report of a design job: its figures, summary and pictures in the result folder."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.model.storage import write_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bellcrank.mechanics import Response
+    from bellcrank.model import Design
+    from bellcrank.part import PartSpec
+    from bellcrank.search import SearchSettings, Selection
     from bellcrank.storage import RunFolder
-    from bellcrank.workflows.outcome import DesignReport
+    from bellcrank.workflows.validation import Validation
 
 
 RESULTS = re.compile(
     r"(design|validation)\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png"
 )
 """Names of the files that conclude a design job."""
+
+
+AGREEMENT = 1e-6
+"""Largest difference between the efficiencies of two loading paths that verify each other, relative
+to the efficiency, or to 1 where that is less."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DesignReport:
+    """Result of a design job.
+
+    Parameters
+    ----------
+    folder
+        Result folder.
+    settings
+        Settings of the search.
+    selection
+        Chosen design and its origin.
+    checks
+        Efficiency of the design from rest, by the load increments that it was computed in.
+    initial_efficiency
+        Efficiency of the initial design by the same objective; nan if it has none.
+    human
+        Human design of the same problem, if there is one.
+    human_response
+        Response of the human design by the same objective.
+    proposals, best_by_chain
+        Number of designs evaluated; best efficiency that each chain accepted.
+    part
+        Part for which the design was searched, if any.
+    validation
+        Frame analysis of that part, if all its pieces are supported.
+    """
+
+    folder: Path
+    settings: SearchSettings
+    selection: Selection
+    checks: dict[str, float]
+    initial_efficiency: float
+    human: Design | None
+    human_response: Response | None
+    proposals: int
+    best_by_chain: list[float]
+    part: PartSpec | None = None
+    validation: Validation | None = None
+
+    @property
+    def agreement(self) -> float:
+        """Largest difference between the checks."""
+        return max(self.checks.values()) - min(self.checks.values())
+
+    @property
+    def verified(self) -> bool:
+        """Whether the checks agree."""
+        return self.agreement <= AGREEMENT * max(1.0, *map(abs, self.checks.values()))
 
 
 def summary_data(report: DesignReport) -> dict[str, Any]:
@@ -49,7 +112,7 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
 
 
 def _as_part(report: DesignReport) -> dict[str, Any] | None:
-    """Return what finite elements say of a design for a part."""
+    """Return the figures of the frame analysis as plain data."""
     if report.validation is None:
         return None
     data = report.validation.to_dict()["results"][0]
@@ -58,7 +121,7 @@ def _as_part(report: DesignReport) -> dict[str, Any] | None:
 
 
 def part_rows(report: DesignReport) -> list[tuple[str, str]]:
-    """Return what finite elements say of a design for a part, in rows for people."""
+    """Return the figures of the frame analysis as rows of a name and a value."""
     if report.part is None:
         return []
     name = f"as {report.part.width:g} mm struts"

@@ -1,0 +1,317 @@
+"""Validation of designs by finite elements, and the record of its results beside a design."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from bellcrank.errors import InvalidFile, InvalidSettings
+from bellcrank.fem import FemSettings, levels
+from bellcrank.fem.results import finite
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    Response,
+    SpringEvaluator,
+    objective_name,
+)
+from bellcrank.model.parsing import read_json
+from bellcrank.model.storage import write_text
+from bellcrank.part import PartSpec, read_length
+from bellcrank.part.pieces import doubts_about, require_held
+from bellcrank.provenance import provenance
+from bellcrank.storage.locking import locked
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from bellcrank.fem import Analysis
+    from bellcrank.model import Design
+
+    Plan = Sequence[tuple[str, FemSettings]]
+
+SCHEMA = "bellcrank/validation/1"
+KEY = ("level", "theory", "linear", "settings", "part")
+"""Entries in which two analyses of a design that are the same agree."""
+TOP = (
+    "level", "theory", "linear", "status", "reached", "efficiency",
+    "mean_output_displacement_mm", "input_force_N", "input_push_N", "energy_N_mm",
+    "von_mises_MPa", "principal_strain",
+)  # fmt: skip
+"""Figures of the first analysis that are repeated at the top of the JSON result."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Validation:
+    """A design and the analyses of its part.
+
+    Parameters
+    ----------
+    design
+        Design with the stroke of the analyses.
+    spec
+        Size and material of the part.
+    response
+        Response of the spring model with the stiffness of the design's problem.
+    plan
+        Levels and settings.
+    analyses
+        Results, in the order of the plan, as far as they are computed.
+    """
+
+    design: Design
+    spec: PartSpec
+    response: Response
+    plan: Plan
+    analyses: list[Analysis]
+
+    @property
+    def doubts(self) -> list[str]:
+        """Defects of the design itself that a builder should know of, as sentences."""
+        return doubts_about(self.design)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data; the figures of the first analysis are repeated at the top."""
+        given = self.design.problem.input
+        stroke = given.amount * self.spec.scale if given.drive == "displacement" else None
+        stiffness = self.design.problem.stiffness
+        discrete = {
+            "efficiency": finite(self.response.efficiency),
+            "status": self.response.status.label,
+            "stiffness": {"bond": stiffness.bond, "angle": stiffness.angle},
+        }
+        results = [
+            {
+                **analysis.to_dict(),
+                "settings": {"elements": settings.elements}
+                if level == "frame"
+                else {"size": settings.size},
+                "part": {**self.spec.to_dict(), "stroke": stroke},
+                "discrete_model": discrete,
+            }
+            for analysis, (level, settings) in zip(self.analyses, self.plan, strict=False)
+        ]
+        return {
+            "schema": SCHEMA,
+            "problem": self.design.problem.name,
+            "problem_hash": problem_identity(self.design),
+            "mask": self.design.mask_hex,
+            "objective": objective_name(self.design.problem),
+            **{key: results[0][key] for key in TOP},
+            "discrete_model": discrete,
+            "doubts": self.doubts,
+            "results": results,
+            "provenance": provenance(),
+        }
+
+
+def problem_identity(design: Design) -> str:
+    """Return a hash of the problem of a design that does not depend on the stroke."""
+    problem = design.problem
+    return replace(problem, input=replace(problem.input, amount=1.0)).hash
+
+
+def spec_for(design: Design) -> PartSpec:
+    """Return the part for which a design was searched, or the default part."""
+    return PartSpec.from_dict(design.provenance.get("part") or {}, "provenance.part")
+
+
+def with_stroke(design: Design, stroke: str | float, scale: float) -> Design:
+    """Return a design with another stroke.
+
+    Parameters
+    ----------
+    design
+        Design whose input is driven by a displacement.
+    stroke
+        Displacement of the input; a number is in mm.
+    scale
+        Length of a lattice unit, mm.
+
+    Raises
+    ------
+    InvalidSettings
+        If the stroke is not a length above 0, or a force drives the input.
+    """
+    length = read_length("stroke", stroke)
+    given = design.problem.input
+    if given.drive != "displacement":
+        raise InvalidSettings(
+            f"stroke: {design.problem.name!r} is driven by a force, not by a displacement"
+        )
+    if length <= 0.0:
+        raise InvalidSettings(f"stroke: expected a length above 0 mm, got {length:g}")
+    changed = replace(given, amount=length / scale)
+    return replace(design, problem=replace(design.problem, input=changed))
+
+
+def check_plan(design: Design, spec: PartSpec, plan: Plan) -> None:
+    """Raise an error for an analysis that is not possible, before anything is computed.
+
+    Raises
+    ------
+    InvalidSettings
+        If the part cannot be built or analysed.
+    UnknownName
+        If there is no such level, theory or law.
+    """
+    part = spec.of(design)
+    require_held(design)
+    for level, settings in plan:
+        levels[level].check(part, settings)
+
+
+def without_missing_levels(plan: Plan) -> tuple[Plan, list[str]]:
+    """Return the part of a plan whose libraries are installed, and what is missing.
+
+    Parameters
+    ----------
+    plan
+        Levels and settings.
+
+    Returns
+    -------
+    plan
+        Analyses that can be computed.
+    missing
+        Names of the other levels with what to install, as sentences.
+
+    Raises
+    ------
+    InvalidSettings
+        If no analysis can be computed.
+    """
+    reasons = {level: levels[level].missing() for level, _ in plan}
+    possible = [(level, settings) for level, settings in plan if reasons[level] is None]
+    missing = [f"{level}: not computed; {why}" for level, why in reasons.items() if why]
+    if missing and not possible:
+        raise InvalidSettings("; ".join(missing))
+    return possible, missing
+
+
+def validate(
+    design: Design,
+    spec: PartSpec,
+    plan: Plan,
+    report: Callable[[int, float], None] = lambda _index, _load: None,
+    save: Callable[[Validation], None] = lambda _validation: None,
+) -> Validation:
+    """Analyse a design as a part.
+
+    Parameters
+    ----------
+    design
+        Design to be analysed.
+    spec
+        Size and material of the part.
+    plan
+        Levels and settings, in order.
+    report
+        Called with the index in the plan and the fraction of the stroke reached.
+    save
+        Called after each analysis with all results so far, so that no result is lost if a later
+        analysis is interrupted.
+
+    Raises
+    ------
+    InvalidSettings, UnknownName
+        If the part cannot be built or analysed.
+
+    Examples
+    --------
+    >>> from bellcrank.model import human_design
+    >>> crane = human_design("crane")
+    >>> validation = validate(crane, PartSpec(), [("frame", FemSettings())])
+    >>> round(validation.analyses[0].efficiency, 3)
+    1.21
+    """
+    check_plan(design, spec, plan)
+    part = spec.of(design)
+    response = SpringEvaluator(design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
+    validation = Validation(design, spec, response, plan, [])
+    for index, (level, settings) in enumerate(plan):
+        analysis = levels[level].analyse(
+            part, settings, lambda load, index=index: report(index, load)
+        )
+        validation = replace(validation, analyses=[*validation.analyses, analysis])
+        save(validation)
+    return validation
+
+
+def read_record(path: Path, problem: str, mask: str) -> list[dict[str, Any]]:
+    """Return the analyses in a record; an empty list if the file does not exist.
+
+    Parameters
+    ----------
+    path
+        File of the record.
+    problem, mask
+        Identity of the design (`problem_identity`) and its mask in hexadecimal.
+
+    Raises
+    ------
+    InvalidFile
+        If the file is not a valid record, or the record of another design.
+    """
+    if not os.path.lexists(path):
+        return []
+    data = read_json(path)
+    results = data.get("results")
+    complete = isinstance(results, list) and all(
+        isinstance(entry, dict) and all(key in entry for key in KEY) for entry in results
+    )
+    if data.get("schema") != SCHEMA or not complete:
+        raise InvalidFile(
+            f"{path}: expected a record of {SCHEMA}, to which an analysis can be added; remove it, "
+            "or name another file with --record"
+        )
+    if (data.get("problem_hash"), data.get("mask")) != (problem, mask):
+        raise InvalidFile(
+            f"{path}: record of another design or of a changed problem; remove it, or name "
+            "another file with --record"
+        )
+    assert isinstance(results, list)
+    return results
+
+
+def add_to_record(validation: Validation, path: Path) -> None:
+    """Add a validation to the record of its design; repeated analyses replace earlier ones.
+
+    Raises
+    ------
+    InvalidFile
+        If the file is not a record of this design.
+    StorageError
+        If the file cannot be written.
+    """
+    data = validation.to_dict()
+    with locked(path.with_name(f".{path.name}.lock")):
+        old = read_record(path, data["problem_hash"], data["mask"])
+        new = [_key(entry) for entry in data["results"]]
+        others = [entry for entry in old if _key(entry) not in new]
+        record = {key: data[key] for key in ("schema", "problem", "problem_hash", "mask")}
+        record |= {"results": [*others, *data["results"]], "provenance": data["provenance"]}
+        write_text(path, json.dumps(record, indent=1) + "\n", overwrite=True)
+
+
+def replace_record(validation: Validation, path: Path) -> None:
+    """Add a validation to the record of its design, and remove a record of another design.
+
+    Raises
+    ------
+    StorageError
+        If the file cannot be written.
+    """
+    data = validation.to_dict()
+    try:
+        read_record(path, data["problem_hash"], data["mask"])
+    except InvalidFile:
+        path.unlink()
+    add_to_record(validation, path)
+
+
+def _key(entry: dict[str, Any]) -> str:
+    """Return the identity of an analysis."""
+    return json.dumps([entry[key] for key in KEY], sort_keys=True)
