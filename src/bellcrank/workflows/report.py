@@ -73,6 +73,19 @@ class DesignReport:
     validation: Validation | None = None
 
     @property
+    def failures(self) -> list[str]:
+        """Reasons why the design does not work; empty if it does."""
+        found = []
+        if self.selection.efficiency_after <= 0.0:
+            found.append("the output does not move in the wanted direction")
+        if self.part is not None:
+            if self.validation is None:
+                found.append("the part is not held by any support")
+            else:
+                found += self.validation.analyses[0].warnings
+        return found
+
+    @property
     def agreement(self) -> float:
         """Largest difference between the checks."""
         return max(self.checks.values()) - min(self.checks.values())
