@@ -9,6 +9,7 @@ from bellcrank.fem import FemSettings, levels
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Status
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports
 from bellcrank.part import PartSpec
+from bellcrank.search import Verdict
 from bellcrank.search.constraints import ConstrainedEvaluator, LoadCase
 from bellcrank.workflows.candidate_ranking import fault_of
 from bellcrank.workflows.fabricate import findings_about, profile_for
@@ -63,8 +64,8 @@ def test_a_sheet_reports_contact_in_the_middle_of_the_stroke(sweep: Design) -> N
 def test_no_contact_is_verified_along_the_stroke(sweep: Design) -> None:
     evaluator = ConstrainedEvaluator([LoadCase(sweep.problem)], ["no-contact 0.15"])
     assert evaluator.evaluate(sweep.mask).status is Status.CONVERGED
-    assert evaluator.evaluate(sweep.mask, VERIFICATION_INCREMENT).status is Status.UNMET
-    assert evaluator.broken(sweep.mask) == ["no-contact 0.15"]
+    assert evaluator.evaluate(sweep.mask, VERIFICATION_INCREMENT).status is Verdict.UNMET
+    assert evaluator.violated(sweep.mask) == ["no-contact 0.15"]
     clear = ConstrainedEvaluator([LoadCase(sweep.problem)], ["no-contact 0.01"])
     assert clear.evaluate(sweep.mask, VERIFICATION_INCREMENT).status is Status.CONVERGED
 
