@@ -1,27 +1,27 @@
-"""The errors that bellcrank raises on purpose.
+"""Exceptions of bellcrank.
 
-Every one derives from `BellcrankError` and from the builtin a caller would
-expect, so that both ``except BellcrankError`` and ``except ValueError`` work.
-A message says which argument, what was expected, what came, and what to do.
+Each derives from `BellcrankError` and from the matching builtin exception, so that both
+``except BellcrankError`` and ``except ValueError`` work. A message names the argument, the
+expected value, the value received, and what to do.
 """
 
 from __future__ import annotations
 
 
 class BellcrankError(Exception):
-    """Root of all errors raised on purpose by bellcrank."""
+    """Base class of all exceptions of bellcrank."""
 
 
 class InvalidProblem(BellcrankError, ValueError):
-    """A lattice, problem or design breaks a rule that everything relies on."""
+    """A lattice, problem or design is not valid."""
 
 
 class InvalidFile(BellcrankError, ValueError):
-    """A file cannot be read as what it should be."""
+    """A file cannot be read or does not follow its schema."""
 
 
 class InvalidSettings(BellcrankError, ValueError):
-    """A search, run or command was given settings that make no sense."""
+    """A setting or argument is not valid."""
 
 
 class NoDesignFound(BellcrankError, RuntimeError):
@@ -36,7 +36,7 @@ class UnknownName(BellcrankError, KeyError):
 
 
 class OutputExists(BellcrankError, FileExistsError):
-    """Writing would overwrite something and nobody asked for that."""
+    """The output exists already and is not to be overwritten."""
 
 
 class StorageError(BellcrankError, OSError):
@@ -44,27 +44,27 @@ class StorageError(BellcrankError, OSError):
 
 
 class CorruptRun(BellcrankError, ValueError):
-    """A run directory does not hold what its own description says."""
+    """The content of a run folder contradicts its description."""
 
 
 class ClusterError(BellcrankError, RuntimeError):
-    """The machines of a campaign cannot be reached, or do not fit together."""
+    """The workers of a campaign cannot be reached or have different versions."""
 
 
 class RunFailed(BellcrankError, RuntimeError):
-    """Runs of a campaign could not be brought to their end."""
+    """A run or an external program failed."""
 
 
 class InvalidDataset(BellcrankError, ValueError):
-    """Data to learn from is empty, inconsistent or has labels that are no numbers."""
+    """A training set is empty, inconsistent or has labels that are not finite."""
 
 
 class InvalidModel(BellcrankError, ValueError):
-    """A trained network cannot be read, or is not for the lattice it is asked about."""
+    """A trained network cannot be read or belongs to another lattice."""
 
 
 def first_line(error: BaseException) -> str:
-    r"""Return what an error of somebody else's says, in one line to go into a message of ours.
+    r"""Return the first line of an exception's message, for use in another message.
 
     Examples
     --------

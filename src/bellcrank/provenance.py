@@ -1,6 +1,6 @@
-"""Where a result comes from: versions, commit, machine and time.
+"""Provenance of results: versions, commit, machine and time.
 
-Nothing in it names a person or a folder, so that results can be published as they are.
+It contains no names of users or folders, so that results can be published unchanged.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 
 def provenance(**extra: Any) -> dict[str, Any]:
-    """Describe the software and machine that a result is made with.
+    """Return the versions, commit, machine and time of a result made now.
 
     Parameters
     ----------
     **extra
-        What else to note about the result: seed, tolerances, wall time. Kept as given.
+        Further entries, such as seed, tolerances or wall time, stored as given.
 
     Returns
     -------
     dict
-        Plain data, ready for JSON. What cannot be found out is None; nothing is raised.
+        Plain data for JSON. Unknown values are None; no exception is raised.
 
     Examples
     --------
@@ -53,13 +53,13 @@ def provenance(**extra: Any) -> dict[str, Any]:
     }
 
 
-def other_version(begun: Mapping[str, Any]) -> str | None:
-    """Return the version that something was begun with, if it is not this one.
+def other_version(recorded: Mapping[str, Any]) -> str | None:
+    """Return the version that a result was started with if it differs from the current one.
 
     Parameters
     ----------
-    begun
-        Its `provenance`.
+    recorded
+        Provenance stored with the result.
 
     Examples
     --------
@@ -69,21 +69,21 @@ def other_version(begun: Mapping[str, Any]) -> str | None:
     """
     now = provenance()
     keys = ("version", "commit")
-    if all(begun.get(key) == now[key] for key in keys):
+    if all(recorded.get(key) == now[key] for key in keys):
         return None
-    return " ".join(str(begun[key]) for key in keys if begun.get(key)) or "unknown"
+    return " ".join(str(recorded[key]) for key in keys if recorded.get(key)) or "unknown"
 
 
 def _version(package: str) -> str | None:
-    """Version of an installed package, without importing it."""
+    """Return the version of an installed package without importing it."""
     with contextlib.suppress(metadata.PackageNotFoundError):
         return metadata.version(package)
     return None
 
 
 def _commit() -> str | None:
-    """Commit of the checkout that this file lies in, or of the one it was installed from."""
-    # A broken checkout or installation must not keep a result from being stored.
+    """Return the commit of the checkout of this file, or of the installed distribution."""
+    # Results are stored even if the checkout or installation is damaged.
     with contextlib.suppress(OSError, ValueError, LookupError):
         return _commit_of_checkout(Path(__file__).resolve().parents[2])
     with contextlib.suppress(OSError, ValueError, LookupError, AttributeError):
@@ -93,15 +93,15 @@ def _commit() -> str | None:
 
 
 def _commit_of_checkout(root: Path) -> str:
-    """Read the commit from git's own files: starting git takes longer and may not work.
+    """Read the commit from the files of git, without starting git.
 
     Raises
     ------
     OSError, LookupError
-        If `root` is not the top of a checkout, or one that git itself would not understand.
+        If `root` is not the top folder of a valid checkout.
     """
     folder = root / ".git"
-    if folder.is_file():  # a linked working tree points to its folder
+    if folder.is_file():  # a linked working tree
         folder = root / folder.read_text(encoding="utf-8").removeprefix("gitdir:").strip()
     head = (folder / "HEAD").read_text(encoding="utf-8").strip()
     if not head.startswith("ref:"):
@@ -110,9 +110,9 @@ def _commit_of_checkout(root: Path) -> str:
     common = folder
     if (folder / "commondir").is_file():
         common = folder / (folder / "commondir").read_text(encoding="utf-8").strip()
-    for place in (folder, common):
-        if (place / reference).is_file():
-            return (place / reference).read_text(encoding="utf-8").strip()
+    for parent in (folder, common):
+        if (parent / reference).is_file():
+            return (parent / reference).read_text(encoding="utf-8").strip()
     for line in (common / "packed-refs").read_text(encoding="utf-8").splitlines():
         commit, _, name = line.partition(" ")
         if name == reference:

@@ -1,8 +1,8 @@
-"""Named choices: one small dictionary that explains itself when asked wrongly.
+"""Registries: named functions, settings and file formats.
 
-A registry replaces if-chains over names. Adding an objective, a schedule, a lattice
-or a file format means writing one function and putting
-``@registry.register("name")`` over it; the contract tests pick it up by itself.
+A registry replaces if-chains over names. An objective, a schedule, a lattice or a file format is
+added by writing one function and registering it with ``@registry.register("name")``. The contract
+tests include every registered entry.
 
 Examples
 --------
@@ -23,9 +23,13 @@ bellcrank.errors.UnknownName: unknown shape 'circle'; known: square
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from bellcrank.errors import UnknownName
+
+if TYPE_CHECKING:
+    import os
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -37,7 +41,7 @@ class Registry(Mapping[str, T]):
     Parameters
     ----------
     kind
-        What the entries are, in the singular; used in error messages.
+        Noun for an entry, in the singular, for error messages.
     """
 
     def __init__(self, kind: str) -> None:
@@ -45,30 +49,30 @@ class Registry(Mapping[str, T]):
         self._entries: dict[str, T] = {}
 
     def register(self, name: str) -> Callable[[U], U]:
-        """Return a decorator that files its target under `name`.
+        """Return a decorator that registers its target under `name`.
 
         Raises
         ------
         ValueError
-            If the name is taken: two entries never compete silently.
+            If the name is registered already.
         """
 
-        def file_under_name(entry: U) -> U:
+        def add_entry(entry: U) -> U:
             if name in self._entries:
                 raise ValueError(f"{self.kind} {name!r} is registered twice")
             self._entries[name] = entry  # type: ignore[assignment]
             return entry
 
-        return file_under_name
+        return add_entry
 
     def names(self) -> list[str]:
-        """All names, in the order of registration."""
+        """Return all names, in the order of registration."""
         return list(self._entries)
 
     def __getitem__(self, name: str) -> T:
         try:
             return self._entries[name]
-        except (KeyError, TypeError):  # what cannot be hashed is no name either
+        except (KeyError, TypeError):  # TypeError: not hashable
             known = ", ".join(self._entries)
             raise UnknownName(f"unknown {self.kind} {name!r}; known: {known}") from None
 
@@ -77,3 +81,33 @@ class Registry(Mapping[str, T]):
 
     def __len__(self) -> int:
         return len(self._entries)
+
+
+class FileFormat(Protocol):
+    """An entry with the suffixes of its files, the usual one first."""
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """Suffixes with a leading dot, in lower case."""
+
+
+F = TypeVar("F", bound=FileFormat)
+
+
+class FormatRegistry(Registry[F]):
+    """A registry of file formats, which are selected by the suffix of a path."""
+
+    def for_path(self, path: str | os.PathLike[str]) -> F:
+        """Return the format of the suffix of `path`; upper and lower case are equal.
+
+        Raises
+        ------
+        UnknownName
+            If no format has that suffix; lists the known ones.
+        """
+        suffix = Path(path).suffix.lower()
+        for entry in self.values():
+            if suffix in entry.suffixes:
+                return entry
+        known = ", ".join(suffix for entry in self.values() for suffix in entry.suffixes)
+        raise UnknownName(f"{path}: unknown {self.kind} {suffix!r}; known suffixes: {known}")

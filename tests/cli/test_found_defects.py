@@ -120,7 +120,21 @@ def test_a_file_nested_too_deeply_is_refused(here: Path) -> None:
     assert "deep.json: not valid JSON" in refusal("evaluate", "deep.json")
 
 
-def test_a_push_beyond_all_measure_ends_unconverged(here: Path) -> None:
+def test_a_displacement_beyond_the_lattice_is_refused(here: Path) -> None:
     huge = {**SMALL, "input": {**SMALL["input"], "amount": 1e300}}
     write(here / "huge.json", huge)
-    assert call("evaluate", "huge.json", "--json").data["results"][0]["status"] == "unconverged"
+    assert "input.amount" in refusal("evaluate", "huge.json")
+
+
+def test_a_stroke_is_given_in_beam_lengths_and_millimetres(here: Path, lift: str) -> None:
+    few = ("--search", "paper", "--steps", "2", "--chains", "1")
+    small = call("design", lift, *few, "--out", "small").err
+    assert "0.2 beam lengths" in small
+    assert "2 mm" in small
+    text = (here / lift).read_text().replace("amount = 0.2", "amount = 3")
+    write(here / "large.toml", text)
+    large = call("design", "large.toml", *few, "--out", "large").err
+    assert "3 beam lengths" in large
+    assert "30 mm" in large
+    assert "note:" in large
+    assert "note:" not in small

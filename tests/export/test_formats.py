@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from tests.fabricate.reading import area_in_dxf, area_in_svg, read_step
 
 from bellcrank.errors import (
     BellcrankError,
@@ -20,13 +19,14 @@ from bellcrank.errors import (
     StorageError,
     UnknownName,
 )
-from bellcrank.export import Export, export, exporter_for, exporters
+from bellcrank.export import Export, export, exporters
 from bellcrank.export.formats.step import solid_to_bytes as step_bytes
 from bellcrank.model import find_problem, gallery_design, human_design, read_network
 from bellcrank.part import PartSpec
 from bellcrank.part.outline import strut_outline
 from bellcrank.part.outline.grips import filled
 from bellcrank.part.outline.screws import drilled
+from tests.export.reading import area_in_dxf, area_in_svg, read_step
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -74,7 +74,7 @@ def test_every_format_writes_the_same_file_twice(name: str, part: Part, tmp_path
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_suffixes_name_formats_in_capitals_too(suffix: str) -> None:
-    assert exporter_for(f"part{suffix.upper()}") is exporter_for(f"part{suffix}")
+    assert exporters.for_path(f"part{suffix.upper()}") is exporters.for_path(f"part{suffix}")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -338,3 +338,15 @@ def test_the_thickness_is_in_whole_layers_unless_none_are_wanted() -> None:
     assert Export(part=made).thickness == 5.12
     assert Export(part=made, layer=0.2).thickness == 5.0
     assert Export(part=made, layer=None).thickness == 5.0
+
+
+@pytest.mark.parametrize("name", [name for name, format_ in exporters.items() if format_.module])
+def test_a_format_without_its_module_names_the_extra(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _module: None)
+    format_ = exporters[name]
+    part = PartSpec().of(find_problem("crane").full_design())
+    with pytest.raises(InvalidSettings, match=rf"{format_.module}.*bellcrank\[{format_.extra}\]"):
+        export(part, tmp_path / f"part{format_.suffixes[0]}")
+    assert not list(tmp_path.iterdir())

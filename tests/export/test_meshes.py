@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from tests.fabricate.reading import read_3mf, read_3mf_strictly, read_stl
-from tests.geometry.layouts import random_layout
 
 from bellcrank.export import Export, exporters, extruded
 from bellcrank.export.formats import stl, threemf
 from bellcrank.model import builtin, find_problem, gallery_design
 from bellcrank.part import PartSpec
 from bellcrank.part.outline import expected_holes, room_for_fillet, strut_outline
+from tests.export.reading import read_3mf, read_3mf_strictly, read_stl
+from tests.part.outline.layouts import random_layout
 
 if TYPE_CHECKING:
     import trimesh
-    from tests.geometry.layouts import Layout
 
     from bellcrank.model import Design
+    from tests.part.outline.layouts import Layout
 
 KINDS = ("human", "machine")
 GALLERY = [(k, name) for k in KINDS for name in builtin if gallery_design(k, name) is not None]

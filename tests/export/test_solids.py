@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 import shapely
-from tests.geometry.layouts import random_layout, triangular
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.export import Solid, extruded, whole_layers
 from bellcrank.export.flattening import polygons_of
 from bellcrank.part.outline import Loop, Outline, room_for_fillet, strut_outline
+from tests.part.outline.layouts import random_layout, triangular
 
 TRIANGLE = ([[0.0, 0.0], [12.0, 0.0], [6.0, 108.0**0.5]], [[0, 1], [1, 2], [2, 0]])
 

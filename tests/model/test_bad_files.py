@@ -58,7 +58,7 @@ def test_files_that_break_the_schema_are_refused(write, small, key, value, messa
     ("key", "value", "message"),
     [
         ("positions.2", [0.0], "positions[2]: expected 2 numbers as in positions[0], got [0.0]"),
-        ("positions.1", [0, 0], "beams[0]: has no length, nodes 0 and 1 are in one place"),
+        ("positions.1", [0, 0], "beams[0]: has no length, nodes 0 and 1"),
         ("beams.7", [0, 9], "beams[7][1]: expected a node from 0 to 5, got 9"),
         ("beams.7", [0, 1], "beams[7]: [0, 1] is the same beam as beams[0]"),
         ("beams.7", [3, 3], "beams[7]: joins node 3 to itself"),
@@ -75,7 +75,7 @@ def test_files_that_break_the_schema_are_refused(write, small, key, value, messa
         ("stiffness.bond", 0, "stiffness.bond: expected a number greater than 0"),
         ("supports.fixed", [0, 0], "supports.fixed[1]: node 0 is listed twice"),
         ("supports.fixed", [5], "input.nodes: node 5 is also in supports.fixed"),
-        ("objective", "", "objective: expected the name of one, got ''"),
+        ("objective", "", "objective: expected a name, got ''"),
     ],
 )
 def test_files_of_impossible_problems_are_refused(write, small, key, value, message):

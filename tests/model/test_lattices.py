@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import tracemalloc
+from unittest import mock
+
 import numpy as np
 import pytest
 
@@ -128,3 +131,33 @@ def test_impossible_parameters_are_refused(kind, changes, message):
 def test_unknown_lattices_list_the_known_ones():
     with pytest.raises(UnknownName, match=r"unknown lattice 'square'; known: .*triangular-rows"):
         lattices["square"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "key"),
+    [
+        ("triangular-rectangle", {"columns": 10_000, "rows": 10_000}, "lattice.columns"),
+        ("triangular-rectangle", {"columns": 2, "rows": 10**12}, "lattice.columns"),
+        ("triangular-rows", {"counts": [10**9, 10**9], "first_x": [0.0, 0.5]}, "lattice.counts"),
+        ("displaced-delaunay", {"columns": 10_000, "rows": 10_000}, "lattice.columns"),
+        ("jammed-discs", {"discs": 10**8}, "lattice.discs"),
+    ],
+)
+def test_a_lattice_that_does_not_fit_is_refused_before_it_is_generated(kind, size, key):
+    with (
+        mock.patch.object(np, "arange", side_effect=MemoryError),
+        pytest.raises(
+            InvalidProblem,
+            match=rf"{key}: .* too large; expected at most 250,000 nodes .*500 x 500",
+        ),
+    ):
+        make(kind, **size)
+
+
+def test_wide_rows_need_memory_in_proportion_to_their_nodes():
+    tracemalloc.start()
+    lattice = make("triangular-rows", counts=[10_000, 10_000], first_x=[0.0, 0.5])
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert lattice.beam_count == 2 * 9_999 + 19_999
+    assert peak < 100e6  # 800 MB, were all nodes compared with all others

@@ -1,4 +1,4 @@
-"""What several commands read from their words in the same way."""
+"""Arguments and options shared by several commands."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ if TYPE_CHECKING:
 DesignName = Annotated[
     str,
     typer.Argument(
-        help="A design file or folder, human:NAME, machine:NAME, an entry of the library, or a "
-        "problem."
+        help="Design file, result folder, human:NAME, machine:NAME, library entry, or problem."
     ),
 ]
 PartFile = Annotated[
     Path | None,
-    typer.Option("--part", help="TOML file with width, thickness, scale, material, fillet."),
+    typer.Option("--part", help="TOML file with width, thickness, scale, material and fillet."),
 ]
-Width = Annotated[str | None, typer.Option(help="Of the struts. \\[2mm]")]
-Thickness = Annotated[str | None, typer.Option(help="Of the part. \\[5mm]")]
+Width = Annotated[str | None, typer.Option(help="Strut width (for example 2mm). \\[2mm]")]
+Thickness = Annotated[str | None, typer.Option(help="Part thickness. \\[5mm]")]
 Scale = Annotated[str | None, typer.Option(help="Length of a lattice unit. \\[10mm]")]
-Fillet = Annotated[str | None, typer.Option(help="Radius in corners between struts.")]
+Fillet = Annotated[
+    str | None, typer.Option(help="Fillet radius between struts. \\[a quarter of the width]")
+]
 MaterialName = Annotated[
-    str | None, typer.Option(help="ninjaflex, tpu-95a, pla or petg. \\[ninjaflex]")
+    str | None, typer.Option(help="Material: ninjaflex, tpu-95a, pla or petg. \\[ninjaflex]")
 ]
 
 
@@ -65,7 +66,7 @@ def part_of(
     young: float | None = None,
     poisson: float | None = None,
 ) -> PartSpec:
-    """Put together a part from what a design says, a file, and the command line, the last first.
+    """Return a part specification from a base, a file and options, with increasing precedence.
 
     Raises
     ------
@@ -87,12 +88,12 @@ def part_of(
 
 
 def settings_of(option: str, texts: Iterable[str] | None) -> dict[str, Any]:
-    """Read each ``KEY=VALUE`` that an option was given; values as JSON, or else as text.
+    """Parse the ``KEY=VALUE`` arguments of an option; values are JSON or text.
 
     Raises
     ------
     InvalidSettings
-        If one is not of that form.
+        If an argument does not have this form.
 
     Examples
     --------

@@ -148,6 +148,7 @@ def design(
                 task = find_problem(problem)
             else:
                 task = _task_from(design_named(str(begin)))
+            _print_stroke(task, 10.0 if part is None else part.scale)
             folder = start_design(task, settings, out or _new_folder(task), part)
         command = f"bellcrank design --resume {shlex.quote(str(folder.path))}"
         stop.hint = f"Stopped. To continue: {plain(command)}"
@@ -172,6 +173,25 @@ def _new_folder(task: Problem) -> Path:
     if folder != wanted:
         notes.print(f"{plain(wanted)}/ exists; the results are written to {plain(folder)}/")
     return folder
+
+
+def _print_stroke(task: Problem, scale: float) -> None:
+    """Print the input displacement in beam lengths and in millimetres of a part."""
+    import numpy as np
+
+    if task.input.drive != "displacement":
+        return
+    amount = task.input.amount
+    lengths = amount / float(np.median(task.lattice.rest_length))
+    notes.print(
+        f"input: {lengths:.3g} beam lengths, {amount * scale:.3g} mm at {scale:g} mm for each "
+        "lattice unit"
+    )
+    if lengths > 1.0:
+        notes.print(
+            "[yellow]note:[/] input.amount is in lattice units, not in millimetres; a displacement "
+            "of more than one beam length is unusually large"
+        )
 
 
 def _task_from(design: Design) -> Problem:

@@ -1,4 +1,4 @@
-"""`bellcrank export`: files to print, cut, look at and compute with."""
+"""`bellcrank export`: files for printers, cutters and other programs."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from bellcrank.workflows.fabricate import Grips
 
 PRINTED = (".stl", ".3mf")
-"""What goes to a printer, whose limits are worth a word."""
+"""Suffixes of files for printing, for which the part is checked."""
 CUT = (".dxf", ".svg", ".step", ".stp")
-"""What becomes a part by other ways."""
+"""Suffixes of files for other ways of making the part."""
 
-Plate = Annotated[bool, typer.Option("--plate", help="Make the supports a solid plate to clamp.")]
-Screws = Annotated[int, typer.Option(help="Screw holes through that plate.")]
-ScrewDiameter = Annotated[str, typer.Option(help="Of the screw holes.")]
-Pad = Annotated[bool, typer.Option("--pad", help="Make the input a solid pad to push.")]
-Pointer = Annotated[str, typer.Option(help="Length of a strut that points out of the output.")]
+Plate = Annotated[bool, typer.Option("--plate", help="Fill the supports to a plate for clamping.")]
+Screws = Annotated[int, typer.Option(help="Number of screw holes in the plate.")]
+ScrewDiameter = Annotated[str, typer.Option(help="Diameter of the screw holes.")]
+Pad = Annotated[bool, typer.Option("--pad", help="Fill the input to a pad for pushing.")]
+Pointer = Annotated[str, typer.Option(help="Length of a pointer at the output.")]
 
 
 def grips_of(plate: bool, screws: int, screw_diameter: str, pad: bool, pointer: str) -> Grips:
-    """Return what is added to a part, from what stands on the command line."""
+    """Return the plate, pad and pointer of the options."""
     from bellcrank.part import read_length
     from bellcrank.workflows.fabricate import Grips
 
@@ -55,7 +55,7 @@ def export(
     design: DesignName,
     out: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="stl, 3mf, step, dxf, svg, vtu, data or dump."),
+        typer.Argument(metavar="FILE", help="File: stl, 3mf, step, dxf, svg, vtu, data or dump."),
     ],
     part: PartFile = None,
     width: Width = None,
@@ -64,7 +64,7 @@ def export(
     fillet: Fillet = None,
     material: MaterialName = None,
     layer: Annotated[
-        str, typer.Option(help="Layer height: the part is as thick as whole layers; 0: as said.")
+        str, typer.Option(help="Layer height, to which the thickness is rounded; 0: no rounding.")
     ] = "0.32mm",
     plate: Plate = False,
     screws: Screws = 0,
@@ -72,19 +72,19 @@ def export(
     pad: Pad = False,
     pointer: Pointer = "0",
     moved: Annotated[
-        bool, typer.Option("--moved", help="With the motion, where the format can hold one.")
+        bool, typer.Option("--moved", help="Include the motion (vtu, data, dump).")
     ] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
-    """Write the part that a design becomes, for printers, cutters and other programs."""
-    from bellcrank.export import check_print, exporter_for
+    """Write the part of a design to a file for printers, cutters or other programs."""
+    from bellcrank.export import check_print, exporters
     from bellcrank.export import export as write
     from bellcrank.model.storage import check_folder
     from bellcrank.part import read_length
     from bellcrank.workflows import spec_for
     from bellcrank.workflows.fabricate import bundle_of
 
-    exporter_for(out)
+    exporters.for_path(out).check_installed()
     chosen = design_named(design)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material)

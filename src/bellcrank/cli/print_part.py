@@ -1,4 +1,4 @@
-"""`bellcrank print`: G-code for a printer, by a slicer."""
+"""`bellcrank print`: G-code by PrusaSlicer."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ if TYPE_CHECKING:
 def print_(
     design: DesignName,
     out: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="G-code to write; default: NAME.gcode.")
+        Path | None, typer.Argument(metavar="FILE", help="G-code file to write. \\[NAME.gcode]")
     ] = None,
     profile: Annotated[
-        str | None, typer.Option(help="Printer settings; default: those for the material.")
+        str | None, typer.Option(help="Print profile. \\[that of the material]")
     ] = None,
-    nozzle: Annotated[str | None, typer.Option(help="Diameter. \\[0.4mm]")] = None,
-    layer: Annotated[str | None, typer.Option(help="Height of layers. \\[0.32mm]")] = None,
-    bead_width: Annotated[str | None, typer.Option(help="Of lines. \\[0.45mm]")] = None,
-    slicer: Annotated[str | None, typer.Option(help="PrusaSlicer's program.")] = None,
+    nozzle: Annotated[str | None, typer.Option(help="Nozzle diameter. \\[0.4mm]")] = None,
+    layer: Annotated[str | None, typer.Option(help="Layer height. \\[0.32mm]")] = None,
+    bead_width: Annotated[str | None, typer.Option(help="Line width. \\[0.45mm]")] = None,
+    slicer: Annotated[str | None, typer.Option(help="Path of PrusaSlicer.")] = None,
     part: PartFile = None,
     width: Width = None,
     thickness: Thickness = None,
@@ -54,7 +54,7 @@ def print_(
     pointer: Pointer = "0",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
-    """Slice a design for a printer, and say what it takes."""
+    """Slice a design for a printer and report material and time."""
     from bellcrank.part import read_length
     from bellcrank.workflows import spec_for
     from bellcrank.workflows.fabricate import (
@@ -82,7 +82,7 @@ def print_(
 
 
 def _print(job: PrintJob) -> None:
-    """Say what printing takes."""
+    """Print layers, size, volume, mass and time."""
     deposit = job.sliced.deposit
     size = deposit.high - deposit.low
     table = Table.grid(padding=(0, 2))
@@ -90,11 +90,11 @@ def _print(job: PrintJob) -> None:
     table.add_row("size", f"{size[0]:.1f} x {size[1]:.1f} x {deposit.high[2]:.2f} mm")
     table.add_row("solid", f"{job.volume / 1000.0:.2f} cm3")
     share = deposit.volume / job.volume
-    table.add_row("laid down", f"{deposit.volume / 1000.0:.2f} cm3, {share:.1%} of the solid")
+    table.add_row("deposited", f"{deposit.volume / 1000.0:.2f} cm3, {share:.1%} of the solid")
     if math.isfinite(job.mass):
         table.add_row("mass", f"{job.mass:.1f} g")
     if math.isfinite(deposit.seconds):
         minutes = round(deposit.seconds / 60.0)
-        table.add_row("time", f"{minutes // 60} h {minutes % 60:02d} min, as the slicer estimates")
-    table.add_row("by", plain(job.sliced.slicer))
+        table.add_row("time", f"{minutes // 60} h {minutes % 60:02d} min (estimate of the slicer)")
+    table.add_row("slicer", plain(job.sliced.slicer))
     results.print(table)

@@ -1,6 +1,8 @@
-"""`bellcrank problems`: what can be designed out of the box."""
+"""`bellcrank problems`: the bundled problems."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 from rich.box import SIMPLE
 from rich.table import Table
@@ -13,14 +15,14 @@ DRIVES = {"displacement": "motion", "force": "force"}
 
 @app.command()
 def problems() -> None:
-    """List the built-in problems."""
+    """List the bundled problems."""
     from bellcrank.model import builtin, find_problem, gallery_design
 
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
     headings = ("designable", "drive", "input", "output", "human", "machine")
     for name in ("problem", *headings):
-        figure = name == "designable"
-        table.add_column(name, no_wrap=True, justify="right" if figure else "left")
+        justify: Literal["left", "right"] = "right" if name == "designable" else "left"
+        table.add_column(name, no_wrap=True, justify=justify)
     for name in builtin:
         problem = find_problem(name)
         table.add_row(
@@ -35,7 +37,7 @@ def problems() -> None:
 
 
 def _direction(vectors: list[list[float]]) -> str:
-    """Name a direction that all nodes share, along an axis if it is one."""
+    """Return the direction of all nodes as text, or ``several``."""
     first = vectors[0]
     if any(vector != first for vector in vectors):
         return "several"

@@ -1,11 +1,11 @@
-"""Files from which a part is printed, cut or looked at, and what a printer will make of it.
+"""Export of parts to files, checks before printing, and slicing.
 
 >>> from tempfile import TemporaryDirectory
 >>> from bellcrank.model import human_design
 >>> from bellcrank.part import PartSpec
 >>> part = PartSpec(width=1.6, thickness=5.0).of(human_design("crane"))
 
-Solids have the exact volume of their outline, whole layers high:
+Solids have the exact area of the outline, and a thickness of whole layers:
 
 >>> bundle = Export(part=part, layer=0.32)
 >>> bundle.thickness
@@ -14,13 +14,13 @@ Solids have the exact volume of their outline, whole layers high:
 >>> round(solid.volume / (part.outline().area * 5.12), 6)
 1.0
 
-The suffix chooses the format of a file:
+The suffix determines the format of a file:
 
 >>> with TemporaryDirectory() as folder:
 ...     for suffix in ("stl", "3mf", "dxf", "svg"):
 ...         export(bundle, f"{folder}/crane.{suffix}")
 
-What a printer cannot make as drawn is said in sentences:
+Features that a printer cannot reproduce are listed:
 
 >>> rules = PrintRules(bead_width=0.40, layer=0.32)
 >>> for finding in check_print(bundle, rules)[:2]:
@@ -31,7 +31,7 @@ A thickness of 5 mm is no whole number of layers of 0.32 mm; 16 of them are 5.12
 
 from bellcrank.export.beads import PrintRules
 from bellcrank.export.checks import Finding, check_print, checks
-from bellcrank.export.formats import Export, Exporter, export, exporter_for, exporters
+from bellcrank.export.formats import Export, Exporter, export, exporters
 from bellcrank.export.solid import Solid, extruded, whole_layers
 
 __all__ = [
@@ -43,7 +43,6 @@ __all__ = [
     "check_print",
     "checks",
     "export",
-    "exporter_for",
     "exporters",
     "extruded",
     "whole_layers",

@@ -1,4 +1,4 @@
-"""How wide the lines of a printer are, one and several side by side."""
+"""Widths of printed lines, one and several side by side."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from bellcrank.errors import InvalidSettings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintRules:
-    """What a printer lays down.
+    """Cross-section of the lines of a printer.
 
-    A bead is a rectangle with half circles at both sides, as high as a layer. Beads side by
-    side overlap by as much as fills what the half circles leave open, so that each needs
-    ``bead_width - layer (1 - pi / 4)``, and n of them are that times n, and once
-    ``layer (1 - pi / 4)``, wide.
+    The cross-section of a bead is a rectangle with half circles at both sides, of the height of a
+    layer. Adjacent beads overlap so that no voids remain. The distance of their centre lines is
+    ``bead_width - layer (1 - pi / 4)``, and n beads are n times this distance plus
+    ``layer (1 - pi / 4)`` wide.
 
     Parameters
     ----------
     nozzle, bead_width, layer : float, mm
-        Its diameter, the width of a single bead, and its height.
-    least_lines
-        How many lines struts should have at least. One alone tears where it begins and ends.
+        Diameter of the nozzle, width of a single bead, and its height.
+    min_lines
+        Smallest number of lines of a strut. A single line tears at its ends.
 
     Raises
     ------
     InvalidSettings
-        If a length makes no sense, or layers are higher than a nozzle or a bead is wide.
+        If a length is not positive, or layers are higher than the nozzle or a bead is wide.
 
     References
     ----------
@@ -36,7 +36,7 @@ class PrintRules:
 
     Examples
     --------
-    A strut of 1.6 mm is four lines of 0.45 mm, but no whole number of lines of 0.40 mm:
+    A strut of 1.6 mm consists of four lines of 0.45 mm, but of no whole number of 0.40 mm lines:
 
     >>> rules = PrintRules(bead_width=0.45, layer=0.32)
     >>> [round(rules.width_of(lines), 3) for lines in (1, 2, 3, 4)]
@@ -49,7 +49,7 @@ class PrintRules:
     nozzle: float = 0.4
     bead_width: float = 0.45
     layer: float = 0.32
-    least_lines: int = 2
+    min_lines: int = 2
 
     def __post_init__(self) -> None:
         for name in ("nozzle", "bead_width", "layer"):
@@ -62,20 +62,20 @@ class PrintRules:
                 f"layer: expected at most {most:g} mm, the smaller of nozzle and bead_width, "
                 f"got {self.layer:g} mm"
             )
-        if self.least_lines < 1:
-            raise InvalidSettings(f"least_lines: expected at least 1, got {self.least_lines}")
+        if self.min_lines < 1:
+            raise InvalidSettings(f"min_lines: expected at least 1, got {self.min_lines}")
 
     @property
     def overlap(self) -> float:
-        """By how much a bead is wider than the space that it needs beside others, mm."""
+        """Overlap of adjacent beads, mm."""
         return self.layer * (1.0 - 0.25 * math.pi)
 
     def width_of(self, lines: int) -> float:
-        """Return the width of so many lines side by side, mm."""
+        """Return the width of a number of adjacent lines, mm."""
         return lines * (self.bead_width - self.overlap) + self.overlap
 
     def lines_in(self, width: float) -> int:
-        """Return how many lines, one at least, come nearest to a width.
+        """Return the number of lines, at least 1, whose width is nearest to `width` (mm).
 
         Examples
         --------

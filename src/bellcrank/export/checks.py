@@ -1,4 +1,4 @@
-"""What a printer can make of a part, and what not: a registry of checks."""
+"""Checks of a part before printing, in a registry."""
 
 from __future__ import annotations
 
@@ -22,49 +22,49 @@ if TYPE_CHECKING:
     from bellcrank.part import Part
     from bellcrank.part.outline import Outline
 
-    Places = tuple[tuple[float, float], ...]
+    Points = tuple[tuple[float, float], ...]
 
-NEARLY = 0.1
-"""By how much of a bead struts may differ from a whole number of lines."""
+WIDTH_TOLERANCE = 0.1
+"""Tolerance of the width of struts, as a fraction of the width of a bead."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something that a printer will not make as it is drawn, or that serves no purpose.
+    """A feature of a part that a printer cannot reproduce, or that has no function.
 
     Parameters
     ----------
     kind
         Name of the check.
     sentence
-        What was found, and what to do.
-    places : tuple of (x, y), mm
-        Where, the worst first; empty where it is the same everywhere.
+        Description and recommendation.
+    points : tuple of (x, y), mm
+        Positions, the worst first; empty if the finding concerns the whole part.
     """
 
     kind: str
     sentence: str
-    places: Places = ()
+    points: Points = ()
 
 
 checks: Registry[Callable[[Part, Outline, PrintRules], Finding | None]] = Registry("print check")
-"""From a part, its outline and what a printer lays down, to what there is to say, if anything."""
+"""Functions from a part, its outline and the print rules to a finding or None."""
 
 
 def check_print(what: Part | Export, rules: PrintRules | None = None) -> list[Finding]:
-    """Return what is to be said about printing a part.
+    """Return the findings of all checks of a part.
 
     Parameters
     ----------
     what
-        A part, or one with a changed outline.
+        A part, or a part with a changed outline.
     rules
-        What the printer lays down.
+        Cross-section of printed lines.
 
     Raises
     ------
     InvalidSettings
-        If there can be no such part, or it is thinner than one layer.
+        If the part is not valid, or thinner than one layer.
 
     Examples
     --------
@@ -83,16 +83,16 @@ def check_print(what: Part | Export, rules: PrintRules | None = None) -> list[Fi
 
 @checks.register("struts")
 def check_struts(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
-    """Find struts that are too few lines wide, or no whole number of them."""
+    """Check that struts consist of a whole number of lines, and of enough of them."""
     width = part.section.width
-    lines, least = rules.lines_in(width), rules.width_of(rules.least_lines)
-    short = NEARLY * rules.bead_width
+    lines, least = rules.lines_in(width), rules.width_of(rules.min_lines)
+    short = WIDTH_TOLERANCE * rules.bead_width
     bead = f"{rules.bead_width:g} mm beads in {rules.layer:g} mm layers"
     if width < least - short:
         return Finding(
             "struts",
-            f"Struts {width:g} mm wide hold fewer than {_counted(rules.least_lines, 'line')} of "
-            f"{bead}; make them at least {least:.2f} mm wide, or choose a finer nozzle.",
+            f"Struts {width:g} mm wide are narrower than {_counted(rules.min_lines, 'line')} of "
+            f"{bead}; choose a width of at least {least:.2f} mm, or a smaller nozzle.",
         )
     off = width - rules.width_of(lines)
     if abs(off) <= short:
@@ -102,59 +102,59 @@ def check_struts(part: Part, outline: Outline, rules: PrintRules) -> Finding | N
     bead_width = (width - rules.overlap) / lines + rules.overlap
     return Finding(
         "struts",
-        f"Struts {width:g} mm wide are no whole number of {bead}: {fitting} mm would be, and so "
-        f"would {lines} beads of {bead_width:.2f} mm.",
+        f"Struts {width:g} mm wide are not a whole number of {bead}; choose {fitting} mm, or "
+        f"{lines} beads of {bead_width:.2f} mm.",
     )
 
 
 @checks.register("layers")
 def check_layers(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
-    """Find a thickness that is no whole number of layers."""
+    """Check that the thickness is a whole number of layers."""
     wanted = part.section.thickness
     printed = whole_layers(wanted, rules.layer)
     if abs(printed - wanted) <= 1e-6 * wanted:
         return None
     return Finding(
         "layers",
-        f"A thickness of {wanted:g} mm is no whole number of layers of {rules.layer:g} mm; "
-        f"{round(printed / rules.layer)} of them are {printed:g} mm.",
+        f"The thickness of {wanted:g} mm is not a whole number of layers of {rules.layer:g} mm; "
+        f"{round(printed / rules.layer)} layers are {printed:g} mm.",
     )
 
 
 @checks.register("gaps")
 def check_gaps(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:
-    """Find places where struts that share no node come closer than a printer can keep them."""
+    """Check that gaps between struts without a common node are wide enough to stay open."""
     import shapely
 
     least, half = _smallest_gap(rules), 0.5 * part.section.width
     struts = read_struts(part.positions, part.struts)
     joins = find_joins(struts, half, half + 0.5 * least)
     width = 2.0 * (joins.bottlenecks - half)
-    # Within plates there are no gaps any more.
+    # Plates have no gaps.
     solid = outline.polygon()
     shapely.prepare(solid)
-    open_ = (width < least) & ~shapely.contains_xy(solid, *joins.places.T)
+    open_ = (width < least) & ~shapely.contains_xy(solid, *joins.points.T)
     if not open_.any():
         return None
     return Finding(
         "gaps",
         f"{_counted(int(open_.sum()), 'gap')} between struts that share no node, narrower than "
-        f"{least:g} mm, may close in print; the narrowest is {width[open_][0]:.2g} mm "
-        f"at {_place(joins.places[open_][0])}. Choose narrower struts or a larger scale.",
-        _places(joins.places[open_]),
+        f"{least:g} mm, may close in printing; the narrowest is {width[open_][0]:.2g} mm "
+        f"at {_format(joins.points[open_][0])}. Choose narrower struts or a larger scale.",
+        _points(joins.points[open_]),
     )
 
 
 @checks.register("holes")
 def check_holes(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
-    """Find holes in which no circle as wide as a bead fits."""
+    """Check that a circle of the width of a bead fits into each hole."""
     import shapely
 
     if not outline.holes:
         return None
     least = _smallest_gap(rules)
     rings = np.array([shapely.Polygon(loop.flattened(0.01 * least)) for loop in outline.holes])
-    # A circle with the radius area / length fits into any hole.
+    # A circle of the radius area / length fits into every hole.
     small = np.flatnonzero(shapely.area(rings) < 0.5 * least * shapely.length(rings))
     circles = shapely.maximum_inscribed_circle(rings[small], 0.01 * least)
     across = 2.0 * shapely.length(circles)
@@ -162,47 +162,47 @@ def check_holes(part: Part, outline: Outline, rules: PrintRules) -> Finding | No
     if not narrow.any():
         return None
     order = np.argsort(across[narrow], kind="stable")
-    places = shapely.get_coordinates(shapely.get_point(circles[narrow][order], 0))
+    points = shapely.get_coordinates(shapely.get_point(circles[narrow][order], 0))
     return Finding(
         "holes",
         f"{_counted(int(narrow.sum()), 'hole')} less than {least:g} mm across may close in "
-        f"print; the smallest is {across[narrow].min():.2g} mm at {_place(places[0])}. Choose "
+        f"printing; the smallest is {across[narrow].min():.2g} mm at {_format(points[0])}. Choose "
         "narrower struts or a larger scale.",
-        _places(places),
+        _points(points),
     )
 
 
 @checks.register("fillets")
 def check_fillets(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
-    """Find fillets that are smaller than half a bead."""
+    """Check that fillets are not smaller than half a bead."""
     radius, least = part.fillet_radius, 0.5 * rules.bead_width
     if radius >= least:
         return None
     return Finding(
         "fillets",
-        f"Fillets of {radius:.3g} mm are smaller than half a bead ({least:.3g} mm): corners come "
-        "out rounder than they are drawn and computed; choose larger ones.",
+        f"Fillets of {radius:.3g} mm are smaller than half a bead ({least:.3g} mm): "
+        "printed corners are rounder than computed; choose larger fillets.",
     )
 
 
 @checks.register("pieces")
 def check_pieces(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
-    """Find separate pieces."""
+    """Check that the part is one piece."""
     if outline.piece_count == 1:
         return None
     loose = sorted(outline.outer, key=lambda loop: loop.area)[:-1]
-    places = np.array([loop.points[0] for loop in loose])
+    points = np.array([loop.points[0] for loop in loose])
     return Finding(
         "pieces",
-        f"The part is in {outline.piece_count} pieces that do not hang together, the smallest "
-        f"at {_place(places[0])}; leave out what is loose.",
-        _places(places),
+        f"The part is in {outline.piece_count} pieces, the smallest at "
+        f"{_format(points[0])}; remove loose pieces.",
+        _points(points),
     )
 
 
 @checks.register("dead-ends")
 def check_dead_ends(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
-    """Find struts that end in a node that nothing holds, drives or observes."""
+    """Check for struts that end in a free node."""
     problem = part.design.problem
     degree = np.bincount(part.struts.ravel(), minlength=problem.lattice.node_count)
     used = np.concatenate([problem.supports.nodes, problem.input.nodes, problem.output.nodes])
@@ -213,13 +213,13 @@ def check_dead_ends(part: Part, outline: Outline, rules: PrintRules) -> Finding 
     return Finding(
         "dead-ends",
         f"{_counted(len(ends), 'strut')} {end} in a free node and {carry} no load, the first in "
-        f"node {ends[0]} at {_place(part.positions[ends[0]])}; stripping saves material.",
-        _places(part.positions[ends]),
+        f"node {ends[0]} at {_format(part.positions[ends[0]])}; removing them saves material.",
+        _points(part.positions[ends]),
     )
 
 
 def _smallest_gap(rules: PrintRules) -> float:
-    """Return how far apart surfaces must be to stay so, mm."""
+    """Return the smallest gap that stays open, mm."""
     return max(rules.nozzle, rules.bead_width)
 
 
@@ -227,9 +227,9 @@ def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def _place(place: NDArray[np.float64]) -> str:
-    return f"({place[0]:.4g}, {place[1]:.4g}) mm"
+def _format(point: NDArray[np.float64]) -> str:
+    return f"({point[0]:.4g}, {point[1]:.4g}) mm"
 
 
-def _places(places: NDArray[np.float64]) -> Places:
-    return tuple((x, y) for x, y in places.tolist())
+def _points(points: NDArray[np.float64]) -> Points:
+    return tuple((x, y) for x, y in points.tolist())

@@ -1,15 +1,13 @@
-"""Polygons that enclose exactly the area of lines and arcs.
+"""Polygons with exactly the area of outlines of lines and arcs.
 
-Chords of an arc cut off a little of it, and all the more of a part that consists of fillets.
-Here the corners between chords lie on a slightly larger circle instead, the first and the last
-on the arc itself. An arc of radius r that turns by n phi then becomes n chords which enclose
-n - 2 triangles between corners at q r, and one at either end of which one corner is at r:
+Polygons with corners on an arc enclose less than its area. Here the inner corners lie on a
+slightly larger circle of radius q r, and the first and the last corner on the arc of radius r. An
+arc that turns by n phi is replaced by n sides. Their area equals that of the sector if
 
     (n - 2) q^2 + 2 q = n phi / sin(phi)
 
-makes their area that of the sector. Neither the ends nor their neighbours move, so that nothing
-is seen of it: corners lie outside by a sixth of r phi^2 at most, and where arcs meet lines the
-kink is smaller than with chords in the circle.
+The ends of the arc do not move. Corners are outside the arc by at most r phi^2 / 6, and the kink
+between an arc and a line is smaller than with chords.
 """
 
 from __future__ import annotations
@@ -31,38 +29,37 @@ if TYPE_CHECKING:
     Ids = NDArray[np.int64]
 
 SAGITTA = 0.01
-"""Greatest distance between an arc and its polygon, mm, where nothing calls for a smaller one."""
+"""Default of the largest distance between an arc and its polygon, mm."""
 
 _BITS = 24
-"""Of a number in an STL file."""
+"""Bits of the mantissa of numbers in STL files."""
 _REFINEMENTS = 8
-"""How often the distance is quartered where polygons would touch."""
+"""Largest number of divisions of the distance by four where polygons touch."""
 
 
 def polygons_of(outline: Outline, sagitta: float = SAGITTA) -> list[Reals]:
-    """Return a polygon for each loop of an outline, with the area of the outline.
+    """Return a polygon for each loop of an outline, with the total area of the outline.
 
-    Their corners lie on a grid of a power of two, so fine that it divides the size of the part
-    by 8 to 16 million, and so coarse that numbers of single precision hold it exactly. Where
-    polygons would touch each other or themselves, since the surfaces of the part almost do,
-    they follow arcs more closely.
+    The corners lie on a grid whose spacing is a power of two, between 1/16 and 1/8 million of the
+    size of the part, so that numbers of single precision represent them exactly. Where polygons
+    touch, because surfaces of the part almost touch, the distance to the arcs is reduced.
 
     Parameters
     ----------
     outline
-        Of the part.
+        Outline of the part.
     sagitta : float, mm
-        Greatest distance between an arc and its polygon.
+        Largest distance between an arc and its polygon.
 
     Returns
     -------
     list of (m, 2) float64, mm
-        For outer loops, counterclockwise, and then holes, clockwise.
+        Counterclockwise for outer loops, then clockwise for holes.
 
     Raises
     ------
     InvalidSettings
-        If `sagitta` is not above 0, or surfaces are so close that no polygon tells them apart.
+        If `sagitta` is not above 0, or surfaces are too close for polygons that do not touch.
 
     Examples
     --------
@@ -76,7 +73,7 @@ def polygons_of(outline: Outline, sagitta: float = SAGITTA) -> list[Reals]:
     if not 0.0 < sagitta < float("inf"):
         raise InvalidSettings(f"sagitta: expected a length above 0 mm, got {sagitta!r}")
     low_x, low_y, high_x, high_y = outline.bounds
-    # Corners lie outside by the sagitta at most.
+    # Corners are outside by at most the sagitta.
     extent = max(high_x - low_x, high_y - low_y)
     extent += 2.0 * min(sagitta, extent)
     grid = 2.0 ** (np.ceil(np.log2(extent)) - _BITS)
@@ -84,18 +81,18 @@ def polygons_of(outline: Outline, sagitta: float = SAGITTA) -> list[Reals]:
     fine = np.full(len(loops), sagitta)
     for _ in range(_REFINEMENTS):
         rings = _on_grid(_followed(loops, fine), grid, outline.area)
-        touching, place = _touching(rings)
+        touching, point = _touching(rings)
         if not len(touching):
             return rings
         fine[touching] *= 0.25
     raise InvalidSettings(
-        f"fillet: surfaces all but touch at ({place[0]:.4g}, {place[1]:.4g}) mm; choose narrower "
+        f"fillet: surfaces almost touch at ({point[0]:.4g}, {point[1]:.4g}) mm; choose narrower "
         "struts or smaller fillets"
     )
 
 
 def _followed(loops: Sequence[Loop], sagitta: Reals) -> list[Reals]:
-    """Return a polygon for each loop that departs from its arcs by its own `sagitta`."""
+    """Return a polygon for each loop, with the sagitta of the loop."""
     sizes = np.array([len(loop.points) for loop in loops])
     start = np.concatenate([loop.points for loop in loops])
     chord = np.concatenate([loop.chords for loop in loops])
@@ -105,7 +102,7 @@ def _followed(loops: Sequence[Loop], sagitta: Reals) -> list[Reals]:
     height = 0.25 * (1.0 / bulge[arc] - bulge[arc])
     spoke = -0.5 * chord[arc] - height[:, None] * _left(chord[arc])
     radius = np.hypot(*spoke.T)
-    # Corners are outside by no more than 4/3 of what chords would be inside.
+    # Corners are outside by at most 4/3 of the sagitta of chords.
     depth = np.repeat(sagitta, sizes)[arc] / radius
     step = np.maximum(2.0 * np.arccos(np.clip(1.0 - 0.75 * depth, 0.0, 1.0)), np.sqrt(depth))
     parts = np.ones(len(bulge), dtype=np.int64)
@@ -113,7 +110,7 @@ def _followed(loops: Sequence[Loop], sagitta: Reals) -> list[Reals]:
     edge = np.repeat(np.arange(len(bulge)), parts)
     number = np.arange(len(edge)) - np.repeat(np.cumsum(parts) - parts, parts)
     corners = start[edge]
-    # All corners but the first of each arc are found from its centre.
+    # All corners of an arc but the first are computed from its centre.
     of_arc = np.full(len(bulge), -1)
     of_arc[arc] = np.arange(len(arc))
     between = number > 0
@@ -130,7 +127,7 @@ def _followed(loops: Sequence[Loop], sagitta: Reals) -> list[Reals]:
 
 
 def _swelling(parts: Ids, turn: Reals) -> Reals:
-    """Return how much farther than its radius from its centre the corners of an arc lie."""
+    """Return the ratio q of corner distance to radius for each arc."""
     share = turn / parts
     sector = parts / np.sinc(share / np.pi)
     inner = parts - 2
@@ -143,10 +140,10 @@ def _left(vectors: Reals) -> Reals:
 
 
 def _on_grid(rings: list[Reals], grid: float, area: float) -> list[Reals]:
-    """Return polygons on a grid, without corners that come twice, that enclose an area.
+    """Return polygons on a grid with a given total area, without repeated corners.
 
-    Lines that run along the grid are rounded as a whole, which tells in a regular lattice. So
-    some corners go to the next best place, until the area is right.
+    Lines parallel to the grid are rounded as a whole, which changes the area of a regular lattice.
+    Some corners are therefore moved to a neighbouring grid point until the area is correct.
     """
     sizes = np.array([len(ring) for ring in rings])
     exact = np.concatenate(rings) / grid
@@ -156,7 +153,7 @@ def _on_grid(rings: list[Reals], grid: float, area: float) -> list[Reals]:
     count = np.repeat(sizes, sizes)
     onward, before = first + (number + 1) % count, first + (number - 1) % count
     missing = area / grid**2 - _area(placed, onward, first)
-    # Neighbours would disturb each other: first each second corner, then those between.
+    # Neighbours depend on each other: first every second corner, then those between.
     for nearer, parity in ((True, 0), (True, 1), (False, 0), (False, 1)):
         chosen = (number % 2 == parity) & ((number < count - 1) | (parity == 1))
         missing -= _step(
@@ -178,9 +175,9 @@ def _step(
     missing: float,
     nearer: bool,
 ) -> float:
-    """Move chosen corners by one place, each at most once, and return what that adds to the area.
+    """Move chosen corners by one grid point, each at most once, and return the change of the area.
 
-    Steps go to the other side of the exact place, or else anywhere.
+    If `nearer` is set, corners move to the other side of the exact point, otherwise anywhere.
     """
     gain = np.column_stack([span[:, 1], -span[:, 0]])
     step = np.where(exact > placed, 1.0, -1.0) if nearer else np.sign(gain) * np.sign(missing)
@@ -199,13 +196,13 @@ def _step(
 
 
 def _area(corners: Reals, onward: Ids, first: Ids) -> float:
-    """Return the area inside polygons, holes taken off."""
+    """Return the area of polygons minus their holes."""
     x, y = (corners - corners[first]).T
     return float(0.5 * np.sum(x * y[onward] - x[onward] * y))
 
 
 def _touching(rings: list[Reals]) -> tuple[Ids, Reals]:
-    """Return which polygons touch others or themselves, or have vanished, and one place."""
+    """Return the polygons that touch others or themselves or have vanished, and one point."""
     import shapely
 
     sizes = np.array([len(ring) for ring in rings])
@@ -220,5 +217,5 @@ def _touching(rings: list[Reals]) -> tuple[Ids, Reals]:
     first = np.repeat(np.cumsum(sizes) - sizes, sizes)
     following = first + (np.arange(len(loop)) - first + 1) % sizes[loop]
     meet = (one != two) & (following[one] != two) & (following[two] != one)
-    places: Reals = start[one[meet]]
-    return np.unique(loop[one[meet]]), places[0] if len(places) else np.zeros(2)
+    points: Reals = start[one[meet]]
+    return np.unique(loop[one[meet]]), points[0] if len(points) else np.zeros(2)

@@ -1,4 +1,4 @@
-"""What a printer will really do: G-code, read back."""
+"""Read G-code: deposited volume, size, layers and time."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ SECONDS = {"d": 86400, "h": 3600, "m": 60, "s": 1}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deposit:
-    """What G-code lays down.
+    """Material deposited by G-code.
 
     Parameters
     ----------
     volume
-        Of the filament that is pushed out on the way, mm^3.
+        Volume of the extruded filament, mm^3.
     low, high : (3,)
-        Corners of the box in which the nozzle moves while it does, mm.
+        Corners of the bounding box of extruding moves, mm.
     layers
-        Heights at which it does.
+        Number of distinct heights of extruding moves.
     seconds
-        That the slicer estimates; nan if it says nothing.
+        Printing time estimated by the slicer; nan if unknown.
     """
 
     volume: float
@@ -45,21 +45,22 @@ class Deposit:
 
 
 def read_gcode(lines: Iterable[str], filament_diameter: float) -> Deposit:
-    """Read what G-code lays down.
+    """Return the material that G-code deposits.
 
-    Counts what is pushed out on straight moves in the plane, and so neither retractions nor what
-    takes them back. Knows absolute and relative coordinates of the filament, and absolute ones
-    of the nozzle.
+    Extrusion is counted on straight moves in the plane, which excludes retractions and their
+    reversal. Filament coordinates may be absolute or relative, nozzle coordinates are absolute.
 
     Parameters
     ----------
+    lines
+        Lines of the G-code.
     filament_diameter
-        mm.
+        Diameter of the filament, mm.
 
     Raises
     ------
     InvalidFile
-        If nothing is laid down, or a move makes no sense.
+        If nothing is deposited, or a move cannot be read.
 
     Examples
     --------
@@ -68,45 +69,46 @@ def read_gcode(lines: Iterable[str], filament_diameter: float) -> Deposit:
     >>> round(found.volume, 3), found.low.tolist(), found.layers
     (2.405, [10.0, 0.0, 0.3], 1)
     """
-    relative, filament, place = False, 0.0, {"X": 0.0, "Y": 0.0, "Z": 0.0}
-    pushed, seconds = 0.0, math.nan
+    relative, filament, position = False, 0.0, {"X": 0.0, "Y": 0.0, "Z": 0.0}
+    extruded, seconds = 0.0, math.nan
     visited: list[tuple[float, float, float]] = []
     for number, line in enumerate(lines, start=1):
         if found := ESTIMATE.match(line):
             seconds = float(sum(int(n) * SECONDS[unit] for n, unit in SPAN.findall(found[1])))
-        words = line.split(";", 1)[0].split()
-        if not words:
+        fields = line.split(";", 1)[0].split()
+        if not fields:
             continue
-        code = words[0].upper()
+        code = fields[0].upper()
         if code in ("M82", "M83"):
             relative = code == "M83"
         if code not in ("G0", "G1", "G92"):
             continue
-        given = _numbers(words[1:], number)
+        given = _numbers(fields[1:], number)
         if code == "G92":
             filament = given.get("E", filament)
             continue
-        before = dict(place)
-        place.update({axis: given[axis] for axis in place if axis in given})
+        before = dict(position)
+        position.update({axis: given[axis] for axis in position if axis in given})
         if "E" not in given:
             continue
         amount = given["E"] if relative else given["E"] - filament
         filament = given["E"]
         if amount > 0.0 and ("X" in given or "Y" in given):
-            pushed += amount
-            visited.append((before["X"], before["Y"], place["Z"]))
-            visited.append((place["X"], place["Y"], place["Z"]))
+            extruded += amount
+            visited.append((before["X"], before["Y"], position["Z"]))
+            visited.append((position["X"], position["Y"], position["Z"]))
     if not visited:
-        raise InvalidFile("the G-code lays nothing down")
-    places = np.array(visited)
-    heights = np.unique(np.round(places[:, 2], 4))
+        raise InvalidFile("the G-code deposits no material")
+    points = np.array(visited)
+    heights = np.unique(np.round(points[:, 2], 4))
     section = math.pi * filament_diameter**2 / 4.0
-    return Deposit(pushed * section, places.min(axis=0), places.max(axis=0), len(heights), seconds)
+    volume = extruded * section
+    return Deposit(volume, points.min(axis=0), points.max(axis=0), len(heights), seconds)
 
 
-def _numbers(words: list[str], line: int) -> dict[str, float]:
+def _numbers(fields: list[str], line: int) -> dict[str, float]:
     """Read the coordinates of a move."""
     try:
-        return {word[0].upper(): float(word[1:]) for word in words if len(word) > 1}
+        return {field[0].upper(): float(field[1:]) for field in fields if len(field) > 1}
     except ValueError:
-        raise InvalidFile(f"line {line} of the G-code makes no sense: {' '.join(words)}") from None
+        raise InvalidFile(f"line {line} of the G-code cannot be read: {' '.join(fields)}") from None

@@ -1,4 +1,4 @@
-"""How parts are printed: a registry of profiles for fused deposition."""
+"""Print profiles for fused deposition, in a registry."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintProfile:
-    """Printer and filament.
+    """Settings of printer and filament.
 
     Parameters
     ----------
     name
-        What to call it.
+        Name of the profile.
     nozzle
-        Diameter, mm.
+        Diameter of the nozzle, mm.
     layer
         Height of layers, mm.
     bead_width
-        Of a line of plastic, mm.
+        Width of printed lines, mm.
     temperature, bed_temperature
-        Of nozzle and bed, degrees Celsius.
+        Temperatures of nozzle and bed, degrees Celsius.
     speed
-        Along lines, mm / s.
+        Speed of the nozzle, mm / s.
     filament_diameter
-        mm.
+        Diameter of the filament, mm.
     sources
-        Where each figure comes from.
+        Source of each value.
 
     Raises
     ------
     InvalidSettings
-        If a figure is impossible: layers higher than the nozzle is wide, say.
+        If a value is not valid, for example layers higher than the nozzle diameter.
 
     Examples
     --------
@@ -64,20 +64,20 @@ class PrintProfile:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise InvalidSettings(f"{name}: expected a number above 0, got {value!r}")
-        self.rules  # noqa: B018  refuses lengths that make no sense
+        self.rules  # noqa: B018  validates the lengths
 
     @property
     def rules(self) -> PrintRules:
-        """What the printer lays down."""
+        """Cross-section of printed lines."""
         return PrintRules(nozzle=self.nozzle, bead_width=self.bead_width, layer=self.layer)
 
 
 profiles: Registry[PrintProfile] = Registry("profile")
-"""Profiles by the material that they are for."""
+"""Profiles by material."""
 
 PAPER = "Bonfanti et al. 2020: nozzle 0.4 mm, layers of 0.8 of that"
-CUSTOMARY = "customary for the polymer; the label of your filament knows better"
-NOZZLE = {"nozzle": PAPER, "layer": PAPER, "bead_width": "a little over the nozzle, customary"}
+CUSTOMARY = "typical of the polymer; the label of the filament takes precedence"
+NOZZLE = {"nozzle": PAPER, "layer": PAPER, "bead_width": "slightly wider than the nozzle, typical"}
 HEAT = {"temperature": CUSTOMARY, "bed_temperature": CUSTOMARY, "speed": CUSTOMARY}
 
 for _name, _nozzle, _bed, _speed in (

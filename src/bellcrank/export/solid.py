@@ -1,4 +1,4 @@
-"""Solids: an outline, extruded to whole layers, as a closed surface of triangles."""
+"""Solids: closed surfaces of triangles, extruded from outlines."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Solid:
     Parameters
     ----------
     vertices : (V, 3) float64, mm
-        Its corners, none of which come twice.
+        Distinct vertices.
     triangles : (T, 3) int64
-        The corners of each triangle, counterclockwise as seen from outside.
+        Vertices of each triangle, counterclockwise as seen from outside.
     """
 
     vertices: NDArray[np.float64]
@@ -44,40 +44,40 @@ class Solid:
 
     @property
     def volume(self) -> float:
-        """Volume inside, mm^3."""
-        # Seen from one of the vertices, coordinates far from the origin lose no digits.
+        """Enclosed volume, mm^3."""
+        # Relative to one vertex: coordinates far from the origin would lose digits.
         a, b, c = (self.vertices - self.vertices[0])[self.triangles].transpose(1, 0, 2)
         return float(np.sum(a * np.cross(b, c)) / 6.0)
 
     @property
     def euler_number(self) -> int:
-        """Vertices - edges + triangles: for each piece 2, less 2 for each hole through it."""
+        """Vertices - edges + triangles: 2 for each piece, minus 2 for each hole."""
         return len(self.vertices) - len(self.triangles) // 2
 
     def on_the_bed(self) -> Solid:
-        """Return it moved to where no coordinate is negative, as a printer has it."""
+        """Return the solid translated so that its smallest coordinates are 0."""
         return Solid(self.vertices - self.vertices.min(axis=0), self.triangles)
 
 
 def extruded(outline: Outline, thickness: float, sagitta: float = SAGITTA) -> Solid:
     """Return the prism over an outline, from z = 0 up.
 
-    Its volume is area times thickness: polygons stand for arcs, but with their exact area
-    (`bellcrank.export.flattening`), up to the rounding to numbers of single precision.
+    Its volume is the area of the outline times the thickness, up to rounding to single precision:
+    the polygons have the exact area of the arcs (`bellcrank.export.flattening`).
 
     Parameters
     ----------
     outline
-        Of the part.
+        Outline of the part.
     thickness : float, mm
-        Of the part.
+        Thickness of the part.
     sagitta : float, mm
-        Greatest distance between an arc and the surface.
+        Largest distance between an arc and the surface.
 
     Raises
     ------
     InvalidSettings
-        If a length makes no sense, or surfaces are too close to tell apart.
+        If a length is not valid, or surfaces are too close to separate.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def extruded(outline: Outline, thickness: float, sagitta: float = SAGITTA) -> So
     rings = polygons_of(outline, sagitta)
     flat = np.concatenate(rings)
     count = len(flat)
-    # Triangulated near the origin, where no digits are lost.
+    # Triangulated near the origin to minimise rounding errors.
     middle = flat[0]
     top = manifold3d.triangulate([ring - middle for ring in rings]).astype(np.int64)
     sizes = np.array([len(ring) for ring in rings])
@@ -117,17 +117,17 @@ def extruded(outline: Outline, thickness: float, sagitta: float = SAGITTA) -> So
 
 
 def whole_layers(thickness: float, layer: float) -> float:
-    """Return the number of whole layers nearest to a thickness, as a thickness in mm.
+    """Return the thickness of whole layers nearest to a thickness, mm.
 
     Parameters
     ----------
     thickness, layer : float, mm
-        What is wanted, and the height of a layer.
+        Wanted thickness, and height of a layer.
 
     Raises
     ------
     InvalidSettings
-        If the part would be thinner than one layer, or a length makes no sense.
+        If the part is thinner than one layer, or a length is not valid.
 
     Examples
     --------

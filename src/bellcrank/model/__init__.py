@@ -1,9 +1,7 @@
-"""Lattices, problems and designs: what there is, what is asked, what is made.
+"""Lattices, problems and designs.
 
-Everything else in bellcrank starts here. A `Problem` is a `Lattice` together
-with what drives, holds and observes it; a `Design` is a problem and a mask of
-the beams that are present. All of them are immutable and check themselves when
-they are built.
+A `Problem` is a `Lattice` with supports, input and output. A `Design` is a problem with a mask of
+the beams that are present. All objects are immutable and validated on construction.
 
 Examples
 --------
@@ -13,15 +11,15 @@ Examples
 >>> design.beam_count, len(problem.designable)
 (352, 203)
 
-A beam is removed by making another design.
+Removing a beam makes a new design:
 
 >>> mask = design.mask.copy()
 >>> mask[problem.designable[0]] = False
 >>> design.with_mask(mask).beam_count
 351
 
-Problems of one's own are written in TOML (see `bellcrank.model.schema`) and
-read by `read_problem`; designs travel in JSON.
+Problems are written in TOML (see `bellcrank.model.schema`) and read by `read_problem`; designs
+are stored in JSON.
 """
 
 from bellcrank.model.builtin import builtin

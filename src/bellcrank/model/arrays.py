@@ -1,8 +1,7 @@
-"""Checked, read-only arrays: what every object of the model is made of.
+"""Validated, read-only arrays for the objects of the model.
 
-An object that cannot change can be shared between chains, hashed once and
-trusted without looking again. Arrays are therefore copied, cast, made
-contiguous and locked when an object is built, and never afterwards.
+Arrays are copied, cast, made contiguous and locked when an object is built. Immutable objects can
+be shared between chains and hashed once.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def locked(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a contiguous copy of `array` that refuses to be written to.
+    """Return a contiguous, read-only copy of `array`.
 
     Examples
     --------
@@ -40,7 +39,7 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     Raises
     ------
     InvalidProblem
-        If they are not numbers, ragged, or not finite; names the first offender.
+        If they are not numbers, ragged, or not finite; names the first invalid entry.
     """
     raw = _as_array(name, values)
     if raw.dtype.kind not in "iuf":
@@ -55,12 +54,12 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
 
 
 def index_array(name: str, values: ArrayLike) -> NDArray[np.int64]:
-    """Cast `values` to whole numbers without ever rounding one.
+    """Cast `values` to integers without rounding.
 
     Raises
     ------
     InvalidProblem
-        If they are anything but integers.
+        If they are not integers.
     """
     array = _as_array(name, values)
     if array.size == 0:
@@ -76,25 +75,36 @@ def id_list(name: str, values: ArrayLike) -> NDArray[np.int64]:
     Raises
     ------
     InvalidProblem
-        If they are not a flat list of integers, or one of them comes twice.
+        If they are not a flat list of integers, or one is repeated.
     """
     ids = index_array(name, values)
     if ids.ndim != 1:
         raise InvalidProblem(f"{name}: expected a flat list of ids, got shape {ids.shape}")
-    first_places = np.unique(ids, return_index=True)[1]
-    if len(first_places) < len(ids):
-        repeated = np.setdiff1d(np.arange(len(ids)), first_places)[0]
+    first = np.unique(ids, return_index=True)[1]
+    if len(first) < len(ids):
+        repeated = np.setdiff1d(np.arange(len(ids)), first)[0]
         raise InvalidProblem(f"{name}[{repeated}]: {ids[repeated]} is listed twice")
     return ids
 
 
 def check_ids(name: str, ids: NDArray[np.int64], count: int, kind: str) -> None:
-    """Check that all `ids` name one of `count` things of a `kind`.
+    """Check that all `ids` are between 0 and ``count - 1``.
+
+    Parameters
+    ----------
+    name
+        Name of the argument, for the error.
+    ids : (n,) int64
+        Node or beam numbers.
+    count
+        Number of nodes or beams.
+    kind
+        ``"node"`` or ``"beam"``, for the error.
 
     Raises
     ------
     InvalidProblem
-        If one does not; names the first offender.
+        If one is not; names the first invalid entry.
     """
     bad = np.flatnonzero((ids < 0) | (ids >= count))
     if len(bad):
@@ -104,7 +114,7 @@ def check_ids(name: str, ids: NDArray[np.int64], count: int, kind: str) -> None:
 
 
 def _as_array(name: str, values: ArrayLike) -> NDArray[Any]:
-    """Make an array, or name the first row that is longer or shorter than the others."""
+    """Return an array, or name the first row of another length in the error."""
     try:
         return np.asarray(values)
     except ValueError:
@@ -117,12 +127,12 @@ def _as_array(name: str, values: ArrayLike) -> NDArray[Any]:
 
 
 def boolean_mask(name: str, values: ArrayLike, length: int) -> NDArray[np.bool_]:
-    """Cast `values` to a mask with one boolean per beam.
+    """Return `values` as a mask with one boolean per beam.
 
     Raises
     ------
     InvalidProblem
-        If it has another shape or holds anything but booleans.
+        If the shape or the type is another.
     """
     mask = np.asarray(values)
     if mask.shape != (length,):
@@ -135,9 +145,8 @@ def boolean_mask(name: str, values: ArrayLike, length: int) -> NDArray[np.bool_]
 
 
 def rebuild(instance: DataclassInstance) -> tuple[type, tuple[Any, ...]]:
-    """Pickle and copy `instance` through its constructor (used as ``__reduce__``).
+    """Pickle and copy `instance` through its constructor (for use as ``__reduce__``).
 
-    A frozen dataclass restored field by field would come back with writable
-    arrays, because pickle forgets the read-only flag.
+    Pickle does not restore the read-only flag of arrays; the constructor sets it again.
     """
     return type(instance), tuple(getattr(instance, field.name) for field in fields(instance))

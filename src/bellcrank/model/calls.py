@@ -1,4 +1,4 @@
-"""Calling a registered function with the keys of a table in a file."""
+"""Call a registered function with the keys of a table in a file."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from bellcrank.model.parsing import explain_value
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-# What a parameter that is set from a file may be. Annotations are compared as
-# they are written, so that a generator's signature is all that describes it.
+# Types of parameters that can be set from a file, by the text of their annotation: the signature
+# of a generator is its only description.
 _STRICT = ConfigDict(strict=True, allow_inf_nan=False)
 _KINDS: dict[str, TypeAdapter[Any]] = {
     "int": TypeAdapter(int, config=_STRICT),
@@ -41,20 +41,20 @@ def call_with_keys(
     Parameters
     ----------
     function
-        A registered function. Where it takes ``rng``, the table says ``seed``.
+        A registered function. A parameter ``rng`` is set from the key ``seed``.
     table
-        The keys and values read.
+        Keys and values of the file.
     key
-        Where the table stands in the file, for errors.
+        Key of the table in the file, for errors.
     leading
-        Arguments that do not come from the file.
+        Positional arguments that are not read from the file.
     folder
-        What a path in the file is relative to.
+        Folder to which paths in the file are relative.
 
     Raises
     ------
     InvalidFile
-        If a key is unknown or missing, or a value is of the wrong kind.
+        If a key is unknown or missing, or a value has the wrong type.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What surrounds a lattice: stiffness, supports, input and output."""
+"""Stiffness, supports, input and output of a problem."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _no_nodes() -> NDArray[np.int64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stiffness:
-    """How hard it is to stretch a beam and to bend a joint.
+    """Stiffness of beams against stretching and of joints against bending.
 
     Parameters
     ----------
@@ -49,13 +49,13 @@ class Stiffness:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Supports:
-    """Nodes that are held in place; on rollers if held in one coordinate only.
+    """Supported nodes, fixed or on rollers.
 
     Parameters
     ----------
     fixed, fixed_x, fixed_y : int64, node ids
-        Held in both coordinates, in x, in y. They are sorted, and a node held in
-        x and in y is moved to `fixed`, so that equal supports compare equal.
+        Nodes fixed in both coordinates, in x only, and in y only. They are sorted, and a node
+        fixed in x and in y is moved to `fixed`.
 
     Raises
     ------
@@ -86,31 +86,31 @@ class Supports:
 
     @property
     def nodes(self) -> NDArray[np.int64]:
-        """All supported nodes, held in one coordinate or in both, sorted."""
+        """All supported nodes, sorted."""
         return np.unique(np.concatenate([self.fixed, self.fixed_x, self.fixed_y]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Input:
-    """Where, which way and how much the structure is driven.
+    """Driven nodes, their direction and the amount of displacement or force.
 
     Parameters
     ----------
     nodes : (n,) int64, node ids
-        The driven nodes.
+        Driven nodes.
     direction : (n, 2) float64, unit vectors
-        One per node; a single vector serves all.
+        One vector for each node; a single vector is used for all nodes.
     drive
-        ``"displacement"``: each node is moved by amount x direction and held
-        there. ``"force"``: amount x direction pulls at each node.
+        ``"displacement"`` prescribes amount x direction as displacement of each node,
+        ``"force"`` applies it as a force to each node.
     amount
-        Length (lattice units) or force (on each node), greater than zero.
+        Displacement (lattice units) or force on each node, greater than zero.
 
     Raises
     ------
     InvalidProblem
-        If there is no node, a direction is no unit vector, or the drive or the
-        amount is impossible.
+        If there is no node, a direction is not a unit vector, or the drive or the amount is
+        invalid.
 
     Examples
     --------
@@ -141,27 +141,25 @@ class Input:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Output:
-    """Where and which way the structure is meant to move, and against what.
+    """Observed nodes, the wanted direction of their motion, and springs against it.
 
     Parameters
     ----------
     nodes : (n,) int64, node ids
-        The observed nodes.
+        Observed nodes.
     direction : (n, 2) float64, unit vectors
-        One per node; a single vector serves all.
+        One vector for each node; a single vector is used for all nodes.
     spring
-        k_ext of the monitor spring at each node, energy ``1/2 k_ext ...``; none
-        if nothing resists.
+        Stiffness k_ext of the spring at each node, with energy ``1/2 k_ext ...``; None for no
+        spring.
     spring_kind
-        ``"directional"`` resists motion along `direction` (the paper, and the
-        default where a spring is given), ``"isotropic"`` motion anywhere (the
-        published code).
+        ``"directional"`` springs act along `direction` (the paper; default if a spring is
+        given), ``"isotropic"`` springs in all directions (the published code).
 
     Raises
     ------
     InvalidProblem
-        If there is no node, a direction is no unit vector, or the spring is
-        impossible.
+        If there is no node, a direction is not a unit vector, or the spring is invalid.
 
     Examples
     --------
@@ -222,8 +220,8 @@ def _unit_vectors(name: str, values: NDArray[np.float64], count: int) -> NDArray
             f"{name}: expected unit vectors, got {vectors[bad[0]].tolist()} "
             f"of length {lengths[bad[0]]:.7g} for node number {bad[0]} of the region"
         )
-    # Dividing again and again by 1 +- 1e-16 would keep changing the last bit,
-    # and with it the hash of a problem that is merely read and written.
+    # Repeated division by 1 +- 1e-16 would change the last bit, and with it the hash of a problem
+    # that is read and written.
     rounded = np.abs(lengths - 1.0) <= 1e-15
     unit: NDArray[np.float64] = np.where(rounded[:, None], vectors, vectors / lengths[:, None])
     return unit

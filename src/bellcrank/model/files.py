@@ -1,4 +1,4 @@
-"""Problems, designs and masks on disk."""
+"""Read and write problems, designs and masks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DESIGN_SCHEMA = "bellcrank/design/1"
 
 
 class DesignTable(Table):
-    """A whole design file."""
+    """A design file."""
 
     schema_: Literal["bellcrank/design/1"] = Field(alias="schema")
     problem: dict[str, Any]
@@ -37,14 +37,14 @@ class DesignTable(Table):
 
 
 def find_problem(name_or_path: str | os.PathLike[str]) -> Problem:
-    """Return the built-in problem of that name, else read the file of that name.
+    """Return the bundled problem of a name, otherwise the problem of a file.
 
     Raises
     ------
     UnknownName
-        If there is neither; lists the built-in names.
+        If there is neither; lists the bundled names.
     InvalidFile, InvalidProblem
-        If the file is there but does not describe a problem.
+        If the file does not describe a valid problem.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def read_problem(path: str | os.PathLike[str]) -> Problem:
     InvalidFile
         If the file cannot be read or does not follow the schema.
     InvalidProblem
-        If the problem it describes is impossible.
+        If the problem is not valid.
     """
     return problem_from_dict(read_table(path), source=str(path), folder=Path(path).parent)
 
@@ -81,7 +81,7 @@ def read_problem(path: str | os.PathLike[str]) -> Problem:
 def write_problem(
     problem: Problem, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
-    """Write a problem out in full, as JSON.
+    """Write a problem in full as JSON.
 
     Raises
     ------
@@ -103,14 +103,14 @@ def write_problem(
 
 
 def read_design(path: str | os.PathLike[str]) -> Design:
-    """Read a design file: schema ``bellcrank/design/1``, JSON.
+    """Read a design file (JSON, schema ``bellcrank/design/1``).
 
     Raises
     ------
     InvalidFile
         If the file cannot be read or does not follow the schema.
     InvalidProblem
-        If the problem in it is impossible.
+        If its problem is not valid.
     """
     return design_from_dict(read_json(path), str(path), Path(path).parent)
 
@@ -118,21 +118,21 @@ def read_design(path: str | os.PathLike[str]) -> Design:
 def design_from_dict(
     data: Mapping[str, Any], source: str = "design", folder: Path = Path()
 ) -> Design:
-    """Build the design that plain data describes.
+    """Return the design that plain data describes.
 
     Parameters
     ----------
     data
-        As `design_to_dict` makes it.
+        Data as returned by `design_to_dict`.
     source
-        What to call it in an error, usually the file.
+        Name of the data in errors, usually the file.
     folder
-        Where the files lie that its problem refers to.
+        Folder to which paths in the problem are relative.
 
     Raises
     ------
     InvalidFile, InvalidProblem
-        As `read_design`.
+        As for `read_design`.
     """
     table = parse(DesignTable, data, source)
     problem = problem_from_dict(table.problem, source=f"{source}: problem", folder=folder)
@@ -145,7 +145,7 @@ def design_from_dict(
 
 
 def design_to_dict(design: Design) -> dict[str, Any]:
-    """Return a design together with its problem as plain data.
+    """Return a design with its problem as plain data.
 
     Examples
     --------
@@ -163,14 +163,14 @@ def design_to_dict(design: Design) -> dict[str, Any]:
 
 
 def write_design(design: Design, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a design together with its problem, as JSON.
+    """Write a design with its problem as JSON.
 
     Raises
     ------
     OutputExists
         If the file exists and `overwrite` is not set.
     InvalidProblem
-        If its provenance holds something that JSON cannot.
+        If its provenance cannot be written as JSON.
     StorageError
         If it cannot be written.
 
@@ -187,14 +187,13 @@ def write_design(design: Design, path: str | os.PathLike[str], *, overwrite: boo
 
 
 MASK_FILE_KEYS = ("masks", "results", "schema", "problem", "measures", "note", "provenance")
-"""Of a file with masks: the masks, and what says where they come from."""
+"""Keys of a file with masks."""
 
 
 def read_masks(path: str | os.PathLike[str], problem: Problem) -> list[NDArray[np.bool_]]:
-    """Read the masks in a JSON file: its list ``masks``, or ``results[].mask``.
+    """Read the masks of a JSON file: its list ``masks``, or ``results[].mask``.
 
-    Such files are made by people and by several commands. What the latter say of a design, beside
-    its mask, is left alone; what somebody may think of as a setting is not.
+    Further keys of an entry of ``results`` are ignored; unknown keys of the file are refused.
 
     Returns
     -------
@@ -204,8 +203,8 @@ def read_masks(path: str | os.PathLike[str], problem: Problem) -> list[NDArray[n
     Raises
     ------
     InvalidFile
-        If there are neither or both, a mask does not fit the problem, or a key of the file is none
-        of `MASK_FILE_KEYS`.
+        If there is neither or both, a mask does not fit the problem, or a key is not one of
+        `MASK_FILE_KEYS`.
     """
     data = read_json(path)
     for key in data:
@@ -238,9 +237,9 @@ def _mask(text: object, problem: Problem, where: str) -> NDArray[np.bool_]:
 
 def _write_json(data: dict[str, Any], path: str | os.PathLike[str], *, overwrite: bool) -> None:
     if Path(path).suffix.lower() != ".json":
-        raise InvalidSettings(f"{path}: expected a name ending in .json, as that is written")
+        raise InvalidSettings(f"{path}: expected a name ending in .json")
     try:
         text = json.dumps(data, allow_nan=False)
     except (TypeError, ValueError) as error:
-        raise InvalidProblem(f"provenance: expected only what JSON can hold ({error})") from None
+        raise InvalidProblem(f"provenance: expected data for JSON ({error})") from None
     write_text(path, text + "\n", overwrite=overwrite)

@@ -1,7 +1,8 @@
-"""The lattice: nodes at rest and every beam that may exist between them."""
+"""The lattice: nodes at rest and all beams that may exist between them."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,24 +14,49 @@ from bellcrank.model.arrays import check_ids, index_array, locked, real_array, r
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+MAX_NODES = 250_000
+"""Largest number of nodes of a lattice (500 x 500)."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lattice:
-    """Nodes at rest and all beams that may join them.
+
+def check_node_count(name: str, count: int) -> None:
+    """Check that a lattice of `count` nodes is not too large, before it is generated.
 
     Parameters
     ----------
-    positions : (N, 2) float64, lattice units
-        The nodes at rest. Files may also carry (N, 3).
-    beams : (M, 2) int64
-        The two nodes that each beam joins. Order and orientation are kept:
-        masks refer to them.
+    name
+        Name of the argument that determines the size, for the error.
+    count
+        Number of nodes.
 
     Raises
     ------
     InvalidProblem
-        If a shape is wrong, a number is not finite, or a beam names a node that
-        does not exist, starts and ends in one place, or comes twice.
+        If there are more than `MAX_NODES`.
+    """
+    if count > MAX_NODES:
+        side = math.isqrt(MAX_NODES)
+        raise InvalidProblem(
+            f"{name}: a lattice of {count:,} nodes is too large; expected at most {MAX_NODES:,} "
+            f"nodes (for example {side} x {side})"
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lattice:
+    """Nodes at rest and all beams that may exist between them.
+
+    Parameters
+    ----------
+    positions : (N, 2) float64, lattice units
+        Nodes at rest. Lattices read from files may have shape (N, 3).
+    beams : (M, 2) int64
+        The two nodes of each beam. Order and orientation are kept, since masks refer to them.
+
+    Raises
+    ------
+    InvalidProblem
+        If a shape is wrong, a number is not finite, there are too many nodes, or a beam names
+        a node that does not exist, has no length, or is repeated.
 
     Examples
     --------
@@ -60,6 +86,7 @@ class Lattice:
             raise InvalidProblem(
                 f"beams: expected shape (M, 2) with M >= 1, got shape {beams.shape}"
             )
+        check_node_count("positions", len(positions))
         _check_beams(positions, beams)
         object.__setattr__(self, "positions", locked(positions))
         object.__setattr__(self, "beams", locked(beams))
@@ -68,26 +95,26 @@ class Lattice:
 
     @property
     def node_count(self) -> int:
-        """N, the number of nodes."""
+        """Number of nodes N."""
         return len(self.positions)
 
     @property
     def beam_count(self) -> int:
-        """M, the number of beams that may exist."""
+        """Number of beams M."""
         return len(self.beams)
 
     @property
     def dimension(self) -> int:
-        """2 in the plane, 3 in space."""
+        """Spatial dimension, 2 or 3."""
         return int(self.positions.shape[1])
 
     @property
     def rest_length(self) -> NDArray[np.float64]:
-        """(M,) length of each beam at rest, lattice units."""
+        """Length of each beam at rest, (M,), lattice units."""
         return _beam_lengths(self.positions, self.beams)
 
     def beams_touching(self, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """(M,) mask of the beams that start or end in one of `nodes`.
+        """Return the mask (M,) of the beams that start or end at one of `nodes`.
 
         Examples
         --------
@@ -100,7 +127,7 @@ class Lattice:
         return marked[self.beams[:, 0]] | marked[self.beams[:, 1]]
 
     def reachable(self, sources: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """(N,) mask of the nodes joined to one of `sources` by a path of beams.
+        """Return the mask (N,) of the nodes connected to one of `sources` by beams.
 
         Examples
         --------
@@ -148,11 +175,9 @@ def _check_beams(positions: NDArray[np.float64], beams: NDArray[np.int64]) -> No
             f"beams[{first[inverse.ravel()[second]]}]"
         )
     lengths = _beam_lengths(positions, beams)
-    # A beam this short has no direction left to rotate away from.
+    # Shorter beams have no defined direction.
     extent = float(np.ptp(positions, axis=0).max())
     points = np.flatnonzero(lengths <= 1e-12 * extent)
     if len(points):
         a, b = beams[points[0]]
-        raise InvalidProblem(
-            f"beams[{points[0]}]: has no length, nodes {a} and {b} are in one place"
-        )
+        raise InvalidProblem(f"beams[{points[0]}]: has no length, nodes {a} and {b} coincide")

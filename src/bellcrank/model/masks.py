@@ -1,8 +1,7 @@
 """Masks over the beams of a lattice, packed into hexadecimal text.
 
-A mask belongs to the lattice it came with: bit m is beam m in the order of the
-file, eight beams to a byte, the first in the highest bit (`numpy.packbits`);
-the last byte is filled up with zeros.
+Bit m is beam m of the lattice in the order of its file, eight beams to a byte, the first in the
+highest bit (`numpy.packbits`). The last byte is padded with zeros.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def pack_mask(mask: ArrayLike) -> str:
-    """Write a mask as hexadecimal text.
+    """Return a mask as hexadecimal text.
 
     Parameters
     ----------
@@ -34,7 +33,7 @@ def pack_mask(mask: ArrayLike) -> str:
 
 
 def unpack_mask(text: str, beam_count: int) -> NDArray[np.bool_]:
-    """Read a mask of `beam_count` beams from hexadecimal text.
+    """Return the mask of `beam_count` beams that hexadecimal text describes.
 
     Returns
     -------
@@ -43,8 +42,7 @@ def unpack_mask(text: str, beam_count: int) -> NDArray[np.bool_]:
     Raises
     ------
     InvalidFile
-        If the text is not hexadecimal, has the wrong length, or marks beams
-        beyond the last one: it then belongs to another lattice.
+        If the text is not hexadecimal, has the wrong length, or marks beams beyond the last one.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""From text to checked tables: one error, naming file, key and first offender."""
+"""Read TOML and JSON files and validate their content.
+
+An error is one sentence that names the file, the key, the expected and the given value.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Table(BaseModel):
-    """A table of a file: no unknown keys, no silent conversions, no NaN."""
+    """A table of a file, without unknown keys, implicit conversions and NaN."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
@@ -29,12 +32,12 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 
 
 def read_json(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a JSON file that holds one object.
+    """Read a JSON file that contains one object.
 
     Raises
     ------
     InvalidFile
-        If it cannot be read, is no JSON, or gives a key twice.
+        If it cannot be read, is not valid JSON, or repeats a key.
     """
     try:
         data = json.loads(read_text(path), object_pairs_hook=_unique_keys)
@@ -55,7 +58,7 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     InvalidFile
-        If it cannot be read or is no TOML.
+        If it cannot be read or is not valid TOML.
     """
     try:
         return tomllib.loads(read_text(path))
@@ -64,12 +67,12 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def read_table(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a TOML or JSON file, by its suffix.
+    """Read a TOML or JSON file, selected by its suffix.
 
     Raises
     ------
     InvalidFile
-        If it is neither, or cannot be read.
+        If the suffix is another, or the file cannot be read.
     """
     readers = {".toml": read_toml, ".json": read_json}
     suffix = Path(path).suffix.lower()
@@ -81,21 +84,21 @@ def read_table(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def parse(model: type[AnyTable], data: Mapping[str, Any], source: str) -> AnyTable:
-    """Check `data` against a table's model.
+    """Validate `data` against the model of a table.
 
     Parameters
     ----------
     model
-        What is expected.
+        The expected table.
     data
-        What was read.
+        Content of the file.
     source
-        What to call it in an error, usually the file.
+        Name of the data in errors, usually the file.
 
     Raises
     ------
     InvalidFile
-        With one sentence about the first thing that is wrong.
+        With one sentence about the first error.
     """
     try:
         return model.model_validate(data)
@@ -104,7 +107,7 @@ def parse(model: type[AnyTable], data: Mapping[str, Any], source: str) -> AnyTab
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
-    """Say in one sentence what is wrong first: key, what was expected, what came.
+    """Return the first error in one sentence: key, expected and given value.
 
     Examples
     --------
@@ -116,7 +119,7 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
     ...     print(explain(error, Push))
     amount: expected a valid number, got 'much'
     """
-    problem = _worth_telling(error)
+    problem = _first_error(error)
     loc = problem["loc"]
     key = _key(loc)
     if problem["type"] == "missing":
@@ -127,20 +130,20 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def explain_value(error: ValidationError, key: str) -> str:
-    """Say in one sentence what is wrong with the single value that stands at `key`."""
+    """Return the error of the single value at `key` in one sentence."""
     problem = error.errors()[0]
     return _sentence(key + _key(problem["loc"]) if problem["loc"] else key, problem)
 
 
 def _sentence(key: str, problem: ErrorDetails) -> str:
     expected = problem["msg"].removeprefix("Input should be ")
-    if problem["type"] == "model_type":  # which would name our Python classes
+    if problem["type"] == "model_type":  # its message names Python classes
         expected = "a table"
     return f"{key}: expected {expected}, got {_short(problem['input'])}"
 
 
-def _worth_telling(error: ValidationError) -> ErrorDetails:
-    """Prefer an unknown key (often a misspelt one) to the key it should have been."""
+def _first_error(error: ValidationError) -> ErrorDetails:
+    """Return the first unknown key (often a misspelt one), otherwise the first error."""
     errors = error.errors()
     unknown = [e for e in errors if e["type"] == "extra_forbidden"]
     return (unknown or errors)[0]

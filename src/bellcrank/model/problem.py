@@ -1,4 +1,4 @@
-"""The two nouns that everything else is about: a Problem and a Design for it."""
+"""Problems and designs."""
 
 from __future__ import annotations
 
@@ -36,38 +36,38 @@ Aggregate = Literal["mean", "sum"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """A lattice, what drives and holds it, and what it is asked to do.
+    """A lattice with supports, input, output and the beams to design.
 
     Parameters
     ----------
     name
-        What to call it.
+        Name of the problem.
     lattice
-        Nodes and all beams that may exist, in the plane.
+        Nodes and all beams that may exist; planar.
     supports, input, output
-        The regions; no node may belong to two of them.
+        Disjoint sets of nodes.
     stiffness
-        Of beams and joints.
+        Stiffness of beams and joints.
     initial : (M,) bool
-        The beams present before any search; all by default.
+        Beams present in the initial design; all by default.
     designable : (D,) int64, beam indices
-        The beams that a search may remove or add, sorted; by default those that
-        touch no support, input or output node. All others stay as in `initial`.
+        Beams that a search may remove or add, sorted; by default those that touch no support,
+        input or output node. All others remain as in `initial`.
     aggregate
-        Whether efficiencies compare means over the nodes of a region (the paper)
-        or totals (the published code's force cases).
+        Whether an efficiency is a ratio of means over the nodes of a region (the paper) or of
+        sums (the published code, for forces).
     objective
-        Name of an efficiency; None chooses by the drive.
+        Name of the objective; None for the default of the drive.
 
     Raises
     ------
     InvalidProblem
-        If regions overlap or name unknown nodes, no path of beams connects the
-        output to the input, or no beam is designable.
+        If regions overlap or name unknown nodes, no path of beams connects output and input, or
+        no beam is designable.
 
     Examples
     --------
-    Four beams in a square, two of them to design with.
+    A square of four beams, two of which are designable:
 
     >>> from bellcrank.model import Lattice
     >>> problem = Problem(
@@ -88,14 +88,14 @@ class Problem:
     input: Input
     output: Output
     stiffness: Stiffness = Stiffness()  # noqa: RUF009 - frozen, so it is safe to share
-    # None only ever comes in: the constructor replaces it by the default.
+    # The constructor replaces None by the default.
     initial: NDArray[np.bool_] = None  # type: ignore[assignment]
     designable: NDArray[np.int64] = None  # type: ignore[assignment]
     aggregate: Aggregate = "mean"
     objective: str | None = None
 
     def __post_init__(self) -> None:
-        _check_words(self)
+        _check_texts(self)
         if self.lattice.dimension != 2:
             raise InvalidProblem(
                 "positions: expected a lattice in the plane, shape (N, 2), "
@@ -122,8 +122,8 @@ class Problem:
     __reduce__ = rebuild
 
     def _default_designable(self) -> NDArray[np.int64]:
-        taken = np.concatenate([self.supports.nodes, self.input.nodes, self.output.nodes])
-        return np.flatnonzero(~self.lattice.beams_touching(taken))
+        used = np.concatenate([self.supports.nodes, self.input.nodes, self.output.nodes])
+        return np.flatnonzero(~self.lattice.beams_touching(used))
 
     def full_design(self) -> Design:
         """Return the design with all the beams of `initial`."""
@@ -131,30 +131,30 @@ class Problem:
 
     @property
     def hash(self) -> str:
-        """SHA-256 of the canonical JSON: equal for equal problems, on any machine."""
+        """SHA-256 hash of the canonical JSON; equal for equal problems on all machines."""
         text = json.dumps(problem_to_dict(self), sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
-    """A problem and the beams that are present.
+    """A problem with the beams that are present.
 
     Parameters
     ----------
     problem
-        The problem it answers.
+        The problem, with the objective of `efficiency`.
     mask : (M,) bool
-        Which beams of the problem's lattice are present.
+        Beams of the lattice that are present.
     efficiency
-        As computed by whoever made the design; None if nobody did.
+        Efficiency computed when the design was made; None if unknown.
     provenance
-        Where it comes from: anything that JSON can hold.
+        Origin of the design, as data for JSON.
 
     Raises
     ------
     InvalidProblem
-        If the mask has not one boolean per beam, or the efficiency is no number.
+        If the mask has not one boolean for each beam, or the efficiency is not finite.
 
     Examples
     --------
@@ -188,11 +188,11 @@ class Design:
 
     @property
     def mask_hex(self) -> str:
-        """The mask as hexadecimal text."""
+        """Mask as hexadecimal text."""
         return pack_mask(self.mask)
 
     def with_mask(self, mask: ArrayLike) -> Design:
-        """Return a design with other beams; its efficiency is not known yet."""
+        """Return a design with other beams and without efficiency."""
         return replace(self, mask=np.asarray(mask), efficiency=None)
 
 
@@ -248,14 +248,14 @@ def _one_or_each(vectors: NDArray[np.float64]) -> list[Any]:
     return written
 
 
-def _check_words(problem: Problem) -> None:
+def _check_texts(problem: Problem) -> None:
     if not isinstance(problem.name, str) or not problem.name.strip():
         raise InvalidProblem(f"name: expected some text, got {problem.name!r}")
     if problem.aggregate not in get_args(Aggregate):
         raise InvalidProblem(f"aggregate: expected 'mean' or 'sum', got {problem.aggregate!r}")
     objective = problem.objective
     if objective is not None and (not isinstance(objective, str) or not objective.strip()):
-        raise InvalidProblem(f"objective: expected the name of one, got {objective!r}")
+        raise InvalidProblem(f"objective: expected a name, got {objective!r}")
 
 
 def _check_regions(problem: Problem) -> None:
@@ -278,11 +278,11 @@ def _check_regions(problem: Problem) -> None:
 
 
 def _check_connection(problem: Problem) -> None:
-    # One connected node suffices: discs that rattle about in a jammed packing
-    # have no contacts at all, and may well lie within a region.
+    # One connected node is sufficient: regions of a jammed packing may contain discs without
+    # contacts.
     reached = problem.lattice.reachable(problem.input.nodes)
     if not reached[problem.output.nodes].any():
         raise InvalidProblem(
-            f"output.nodes: node {problem.output.nodes[0]}, like all others there, is not "
-            "connected to the input by any path of beams, even in the full lattice"
+            f"output.nodes: node {problem.output.nodes[0]} and all other output nodes are not "
+            "connected to the input by beams, even in the full lattice"
         )

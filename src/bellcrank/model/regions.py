@@ -1,11 +1,11 @@
-"""Regions: naming nodes by where they are rather than by number.
+"""Regions: sets of nodes selected by position or number.
 
-In a problem file a region is a small table whose key says which kind it is::
+In a problem file a region is an inline table whose key is the kind of region::
 
     nodes = [{ row = -1, rightmost = 3 }, { box = [0, 8, 2, 10] }, { ids = [4, 5] }]
 
-A new kind is a function ``(lattice, value, ...) -> node ids`` under
-``@regions.register("key")``; further parameters become further keys.
+To add a kind, register a function ``(lattice, value, ...) -> node ids`` with
+``@regions.register("key")``. Further parameters are further keys.
 
 Examples
 --------
@@ -38,9 +38,12 @@ if TYPE_CHECKING:
 
 regions: Registry[Callable[..., NDArray[np.int64]]] = Registry("region")
 
+MAX_NEAREST = 1.5
+"""Largest distance of the region ``nearest`` from its point, in median beam lengths."""
+
 
 def find_rows(lattice: Lattice) -> list[NDArray[np.int64]]:
-    """Sort the nodes into rows of equal y, from the bottom; each from left to right.
+    """Return the nodes of each row of equal y, rows from the bottom, nodes from the left.
 
     Examples
     --------
@@ -66,21 +69,21 @@ def row(
     leftmost: int | None = None,
     rightmost: int | None = None,
 ) -> NDArray[np.int64]:
-    """Pick the nodes of one row, or the first or last few of it.
+    """Return the nodes of one row, or the leftmost or rightmost ones of it.
 
     Parameters
     ----------
     lattice
         The lattice.
     row
-        Its number from the bottom, 0 the lowest; negative counts from the top.
+        Number of the row from the bottom, starting at 0; negative numbers count from the top.
     leftmost, rightmost
-        How many nodes from the left, or from the right; all if neither is given.
+        Number of nodes from the left or right; all if neither is given.
 
     Raises
     ------
     InvalidProblem
-        If there is no such row, it has fewer nodes, or both sides are asked for.
+        If there is no such row, it has fewer nodes, or both sides are given.
     """
     found = find_rows(lattice)
     if not -len(found) <= row < len(found):
@@ -90,7 +93,7 @@ def row(
         )
     nodes = found[row]
     if leftmost is not None and rightmost is not None:
-        raise InvalidProblem("row: expected leftmost or rightmost, got both; use two regions")
+        raise InvalidProblem("row: expected leftmost or rightmost, got both; give two regions")
     for name, count in (("leftmost", leftmost), ("rightmost", rightmost)):
         if count is not None and not 1 <= count <= len(nodes):
             raise InvalidProblem(
@@ -111,7 +114,7 @@ def rows(
     leftmost: int | None = None,
     rightmost: int | None = None,
 ) -> NDArray[np.int64]:
-    """Pick the nodes of several rows, or the first or last few of each.
+    """Return the nodes of several rows, or the leftmost or rightmost ones of each.
 
     Raises
     ------
@@ -124,16 +127,16 @@ def rows(
 
 @regions.register("box")
 def box(lattice: Lattice, box: Sequence[float]) -> NDArray[np.int64]:
-    """Pick the nodes within ``[x_min, y_min, x_max, y_max]``, edges included.
+    """Return the nodes within ``[x_min, y_min, x_max, y_max]``, edges included.
 
     Raises
     ------
     InvalidProblem
-        If these are not four numbers in order.
+        If `box` is not four numbers, or a minimum exceeds its maximum.
     """
     if len(box) != 4 or not (box[0] <= box[2] and box[1] <= box[3]):
         raise InvalidProblem(f"box: expected [x_min, y_min, x_max, y_max], got {list(box)}")
-    # Rounding must not throw out a node that lies on an edge.
+    # Nodes on an edge are included despite rounding errors.
     slack = 1e-6 * float(np.median(lattice.rest_length))
     low, high = np.array(box[:2]) - slack, np.array(box[2:]) + slack
     plane = lattice.positions[:, :2]
@@ -142,29 +145,40 @@ def box(lattice: Lattice, box: Sequence[float]) -> NDArray[np.int64]:
 
 @regions.register("nearest")
 def nearest(lattice: Lattice, nearest: Sequence[float], *, count: int = 1) -> NDArray[np.int64]:
-    """Pick the `count` nodes nearest to a point ``[x, y]``.
+    """Return the `count` nodes nearest to a point ``[x, y]``.
 
     Raises
     ------
     InvalidProblem
-        If the point is not two numbers or there are not so many nodes.
+        If `nearest` is not two numbers, no node is within `MAX_NEAREST` beam lengths of the point,
+        or the lattice has fewer than `count` nodes.
     """
     if len(nearest) != 2:
         raise InvalidProblem(f"nearest: expected a point [x, y], got {list(nearest)}")
     if not 1 <= count <= lattice.node_count:
         raise InvalidProblem(f"count: expected 1 to {lattice.node_count} nodes, got {count}")
-    distance = np.linalg.norm(lattice.positions[:, :2] - np.array(nearest), axis=1)
+    plane = lattice.positions[:, :2]
+    distance = np.linalg.norm(plane - np.array(nearest), axis=1)
+    length = float(np.median(lattice.rest_length))
+    if distance.min() > MAX_NEAREST * length:
+        low, high = plane.min(axis=0).tolist(), plane.max(axis=0).tolist()
+        raise InvalidProblem(
+            f"nearest: the node nearest to {list(nearest)} is {distance.min():.4g} lattice units "
+            f"({distance.min() / length:.3g} beam lengths) away; expected a point within "
+            f"{MAX_NEAREST:g} beam lengths of the lattice, which extends from "
+            f"x = {low[0]:.4g} to {high[0]:.4g} and from y = {low[1]:.4g} to {high[1]:.4g}"
+        )
     return np.sort(np.argsort(distance, kind="stable")[:count])
 
 
 @regions.register("ids")
 def ids(lattice: Lattice, ids: Sequence[int]) -> NDArray[np.int64]:
-    """Pick nodes by number, in the order given.
+    """Return nodes given by number, in the order given.
 
     Raises
     ------
     InvalidProblem
-        If a node does not exist or comes twice.
+        If a node does not exist or is repeated.
     """
     nodes = id_list("ids", np.array(ids, dtype=np.int64))
     check_ids("ids", nodes, lattice.node_count, "node")
@@ -172,10 +186,10 @@ def ids(lattice: Lattice, ids: Sequence[int]) -> NDArray[np.int64]:
 
 
 def leftmost(lattice: Lattice, in_row: int, count: int) -> NDArray[np.int64]:
-    """Pick the `count` leftmost nodes of a row."""
+    """Return the `count` leftmost nodes of a row."""
     return row(lattice, in_row, leftmost=count)
 
 
 def rightmost(lattice: Lattice, in_row: int, count: int) -> NDArray[np.int64]:
-    """Pick the `count` rightmost nodes of a row."""
+    """Return the `count` rightmost nodes of a row."""
     return row(lattice, in_row, rightmost=count)

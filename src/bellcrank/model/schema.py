@@ -1,7 +1,7 @@
-"""Problem files: what may stand in them, and the problem they describe.
+"""Problem files: schema ``bellcrank/problem/1``, in TOML or JSON.
 
-One schema, ``bellcrank/problem/1``, in TOML or JSON. People describe the
-lattice and name regions; programs write everything out. Both forms may mix.
+The lattice is generated from parameters or listed in full, and nodes are given by regions or by
+number. Both forms can be combined.
 
 ::
 
@@ -15,14 +15,14 @@ lattice and name regions; programs write everything out. Both forms may mix.
     counts = [5, 6, 5, 6]           # its parameters; `seed` for the disordered ones
     first_x = [0.5, 0.0, 0.5, 0.0]
 
-    [supports]                      # each a list of regions and node numbers
-    fixed = [{ row = 0 }]           # also fixed_x, fixed_y: on rollers
+    [supports]                      # lists of regions and node numbers
+    fixed = [{ row = 0 }]           # also fixed_x, fixed_y: rollers
 
     [input]
     nodes = [{ row = -1, rightmost = 2 }]
     direction = [0, -1]             # one unit vector, or one for each node
     drive = "displacement"          # or "force"
-    amount = 0.1
+    amount = 0.1                    # lattice units, at most the size of the lattice
 
     [output]
     nodes = [{ row = -1, leftmost = 2 }]
@@ -30,15 +30,14 @@ lattice and name regions; programs write everything out. Both forms may mix.
     spring = 0.5                    # optional
     spring_kind = "directional"     # or "isotropic"; optional
 
-    [stiffness]                     # optional, as are both keys
+    [stiffness]                     # optional, with optional keys
     bond = 5.0
     angle = 0.1
 
-Regions are described in `bellcrank.model.regions`. Three more keys are
-optional: `initial`, a mask of the beams present at first; `designable`, the
-numbers of the beams that a search may change; or, instead of these, `frozen`, a
-list of regions whose beams it may not change, on top of those at supports,
-input and output.
+Regions are described in `bellcrank.model.regions`. Further keys are optional: `initial`, the mask
+of the beams present in the initial design; `designable`, the numbers of the beams that a search
+may change; or, in place of `designable`, `frozen`, a list of regions whose beams it may not change
+in addition to those at supports, input and output.
 """
 
 from __future__ import annotations
@@ -65,6 +64,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
+
+
+LATTICE_UNIT = 10.0
+"""Default length of a lattice unit in a part, mm."""
 
 
 class StiffnessTable(Table):
@@ -101,7 +104,7 @@ class OutputTable(Table):
 
 
 class ProblemTable(Table):
-    """A whole problem file."""
+    """A problem file."""
 
     schema_: Literal["bellcrank/problem/1"] = Field(alias="schema")
     name: str
@@ -122,23 +125,23 @@ class ProblemTable(Table):
 def problem_from_dict(
     data: Mapping[str, Any], source: str = "problem", folder: Path = Path()
 ) -> Problem:
-    """Build the problem that a file describes.
+    """Return the problem that plain data describes.
 
     Parameters
     ----------
     data
-        The content of the file, as read from TOML or JSON.
+        Content of a file, as read from TOML or JSON.
     source
-        What to call it in an error, usually the file.
+        Name of the data in errors, usually the file.
     folder
-        Where the files lie that it refers to.
+        Folder to which paths in the data are relative.
 
     Raises
     ------
     InvalidFile
-        If keys are unknown, missing, or hold something of the wrong kind.
+        If a key is unknown or missing, or a value has the wrong type.
     InvalidProblem
-        If the problem they describe is impossible.
+        If the problem is not valid, or its displacement exceeds the size of the lattice.
 
     Examples
     --------
@@ -169,7 +172,9 @@ def problem_from_dict(
 
 def _build(table: ProblemTable, folder: Path) -> Problem:
     lattice = _lattice(table, folder)
-    supports, push, watch = table.supports, table.input, table.output
+    supports, inputs, outputs = table.supports, table.input, table.output
+    if inputs.drive == "displacement":
+        _check_amount(lattice, inputs.amount)
     problem = Problem(
         name=table.name,
         lattice=lattice,
@@ -179,16 +184,16 @@ def _build(table: ProblemTable, folder: Path) -> Problem:
             fixed_y=_nodes(lattice, supports.fixed_y, "supports.fixed_y"),
         ),
         input=Input(
-            nodes=_nodes(lattice, push.nodes, "input.nodes"),
-            direction=push.direction,  # type: ignore[arg-type]  # checked there
-            drive=push.drive,
-            amount=push.amount,
+            nodes=_nodes(lattice, inputs.nodes, "input.nodes"),
+            direction=inputs.direction,  # type: ignore[arg-type]  # checked there
+            drive=inputs.drive,
+            amount=inputs.amount,
         ),
         output=Output(
-            nodes=_nodes(lattice, watch.nodes, "output.nodes"),
-            direction=watch.direction,  # type: ignore[arg-type]  # checked there
-            spring=watch.spring,
-            spring_kind=watch.spring_kind,
+            nodes=_nodes(lattice, outputs.nodes, "output.nodes"),
+            direction=outputs.direction,  # type: ignore[arg-type]  # checked there
+            spring=outputs.spring,
+            spring_kind=outputs.spring_kind,
         ),
         stiffness=Stiffness(bond=table.stiffness.bond, angle=table.stiffness.angle),
         initial=_initial(table, lattice),  # type: ignore[arg-type]  # None means all
@@ -222,11 +227,29 @@ def _lattice(table: ProblemTable, folder: Path) -> Lattice:
     return lattice
 
 
+def _check_amount(lattice: Lattice, amount: float) -> None:
+    """Check that an input displacement is not larger than the lattice.
+
+    Raises
+    ------
+    InvalidProblem
+        If it is, as where millimetres were given instead of lattice units.
+    """
+    extent = float(np.ptp(lattice.positions, axis=0).max())
+    if amount > extent:
+        length = float(np.median(lattice.rest_length))
+        raise InvalidProblem(
+            f"input.amount: {amount:g} lattice units are {amount / length:.3g} beam lengths, more "
+            f"than the size of the lattice ({extent:.4g}); expected a displacement in lattice "
+            f"units (a part has {LATTICE_UNIT:g} mm for each by default)"
+        )
+
+
 def _nodes(lattice: Lattice, entries: list[Any], key: str) -> NDArray[np.int64]:
-    """Gather node numbers and regions, in the order given, overlaps counted once."""
+    """Return the nodes of numbers and regions, in the order given, without repetitions."""
     found: dict[int, None] = {}
-    for place, entry in enumerate(entries):
-        where = f"{key}[{place}]"
+    for index, entry in enumerate(entries):
+        where = f"{key}[{index}]"
         if isinstance(entry, int) and not isinstance(entry, bool):
             if entry in found:
                 raise InvalidProblem(f"{where}: node {entry} is listed twice")

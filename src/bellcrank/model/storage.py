@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
+MAX_BYTES = 256_000_000
+"""Largest text file that is read: several times a problem with the largest lattice."""
+
 
 def read_text(path: str | os.PathLike[str]) -> str:
     """Read a text file.
@@ -23,9 +26,16 @@ def read_text(path: str | os.PathLike[str]) -> str:
     Raises
     ------
     InvalidFile
-        If there is no such file, it may not be read, or is not UTF-8 text.
+        If there is no such file, it cannot be read, is larger than `MAX_BYTES`, or is not UTF-8
+        text.
     """
     try:
+        size = Path(path).stat().st_size
+        if size > MAX_BYTES:
+            raise InvalidFile(
+                f"{path}: {size / 1e6:,.0f} MB are too large for a text file; expected at most "
+                f"{MAX_BYTES / 1e6:,.0f} MB"
+            )
         return Path(path).read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InvalidFile(f"{path}: no such file") from None
@@ -122,6 +132,7 @@ def check_folder(target: Path) -> None:
     Raises
     ------
     StorageError
+        If not.
     """
     folder = target.parent
     if not folder.is_dir():

@@ -1,4 +1,4 @@
-"""Parts: a design with a size, struts of a width and thickness, and a material.
+"""Parts: designs with a size, a strut cross-section and a material.
 
 >>> from bellcrank.model import find_problem
 >>> from bellcrank.part import PartSpec

@@ -1,18 +1,18 @@
-"""From struts to springs: the stiffness of the discrete model that stands for a real part.
+"""Calibration of the spring model: the spring stiffness equivalent to struts of a part.
 
-A beam of the model has the stiffness 2 k, its strut E A / L, so k = E A / (2 L) sets the scale.
-What decides how a design moves is the ratio of bending to stretching. Where two struts meet in
-a joint that turns freely, bending them by an angle costs what two angular springs of
-lambda = E I / (2 L) cost, with E I / L the bending stiffness of a strut; where n meet, the
-springs in their cyclic order are stiffer against some motions and softer against others than
-struts are, with a mean of lambda = E I / L (1 - 1 / n). Joints of a diluted lattice have few
-struts that bear load. Over some hundred designs from searches, a factor a little above one half
-makes efficiencies agree best with frames (`docs/validation.md` has the figures):
+A beam of the model has the stiffness 2 k and a strut E A / L, so that k = E A / (2 L) determines
+the scale. The motion of a design depends on the ratio of bending to stretching stiffness. If two
+struts meet at a freely rotating joint, bending them by an angle is equivalent to two angular
+springs of lambda = E I / (2 L), where E I / L is the bending stiffness of a strut. If n struts
+meet, angular springs in cyclic order are stiffer against some motions and softer against others,
+with the mean lambda = E I / L (1 - 1 / n). Joints of a diluted lattice have few loaded struts. A
+factor slightly above one half gives the best agreement of efficiencies with frames over about a
+hundred designs of searches (figures in `docs/validation.md`):
 
     lambda / k = 2 JOINT I / (A L^2) = JOINT w^2 / (6 L^2)
 
-for struts of width w; a material has no part in it. The paper's k = 5 and lambda = 0.1 are those
-of struts almost half as wide as they are long.
+for struts of width w, independent of the material. The paper's k = 5 and lambda = 0.1 correspond
+to struts whose width is almost half their length.
 """
 
 from __future__ import annotations
@@ -29,26 +29,28 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 JOINT = 0.55
-"""lambda in units of E I / L, by fit; 1/2 for two struts in a joint, 5/6 on average for six."""
+"""Fitted lambda in units of E I / L; 1/2 for two struts at a joint, 5/6 on average for six."""
 
 
 def calibrated(problem: Problem, width: float, scale: float = 10.0) -> Problem:
-    """Return a problem whose springs stand for struts of some width.
+    """Return a problem whose springs are equivalent to struts of a given width.
 
-    Beams keep their stiffness, so that forces and output springs of the problem strain the
-    struts as they strain the beams; angular springs change.
+    The stiffness of the beams is unchanged, so that forces and output springs of the problem
+    strain the struts as they strain the beams. The angular springs change.
 
     Parameters
     ----------
+    problem
+        The problem.
     width
-        Of the struts, mm.
+        Strut width, mm.
     scale
         Length of a lattice unit, mm.
 
     Raises
     ------
     InvalidSettings
-        If struts are wider than they are long.
+        If the struts are wider than long.
 
     Examples
     --------
@@ -56,7 +58,7 @@ def calibrated(problem: Problem, width: float, scale: float = 10.0) -> Problem:
     >>> crane = find_problem("crane")
     >>> round(calibrated(crane, 2.0).stiffness.angle, 5), crane.stiffness.angle
     (0.01833, 0.1)
-    >>> round(equivalent_width(crane), 2)  # the struts that the paper's stiffness stands for
+    >>> round(equivalent_width(crane), 2)  # struts equivalent to the paper's stiffness
     4.67
     """
     length = float(np.mean(problem.lattice.rest_length))
@@ -71,6 +73,6 @@ def calibrated(problem: Problem, width: float, scale: float = 10.0) -> Problem:
 
 
 def equivalent_width(problem: Problem, scale: float = 10.0) -> float:
-    """Return the width in mm of struts that bend and stretch as a problem's springs do."""
+    """Return the width, mm, of the struts that the springs of a problem are equivalent to."""
     stiffness = problem.stiffness
     return float(scale * np.sqrt(6.0 * stiffness.angle / (JOINT * stiffness.bond)))

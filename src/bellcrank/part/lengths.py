@@ -1,4 +1,4 @@
-"""Lengths as people write them."""
+"""Lengths with units."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ UNITS = {
     "m": 1000.0,
     "in": 25.4,
 }
-"""In mm."""
-WRITTEN = re.compile(r"\s*([-+0-9.eE]+?)\s*([a-zµμ]*)\s*")
+"""Length of each unit, mm."""
+LENGTH = re.compile(r"\s*([-+0-9.eE]+?)\s*([a-zµμ]*)\s*")
 
 
 def read_length(name: str, text: str | float) -> float:
-    """Return a length in mm; a bare number is in mm.
+    """Return a length in mm; numbers without unit are in mm.
 
     Parameters
     ----------
     name
-        What it is the length of, for the error.
+        Name of the quantity, for the error.
     text
-        Like ``2mm``, ``0.2 cm`` or ``2``.
+        For example ``2mm``, ``0.2 cm`` or ``2``.
 
     Raises
     ------
     InvalidSettings
-        If it is no length.
+        If it is not a length.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def read_length(name: str, text: str | float) -> float:
     length = math.nan
     if isinstance(text, int | float) and not isinstance(text, bool):
         length = float(text)
-    elif isinstance(text, str) and (found := WRITTEN.fullmatch(text)) and found[2] in UNITS:
+    elif isinstance(text, str) and (found := LENGTH.fullmatch(text)) and found[2] in UNITS:
         with suppress(ValueError):
             length = float(found[1]) * UNITS[found[2]]
     if not math.isfinite(length):

@@ -1,4 +1,4 @@
-"""What parts are made of: a registry of printable materials, and any other by its figures."""
+"""Materials of parts, and a registry of printable ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 LARGEST_POISSON = 0.495
-"""Nearer to 0.5 a solid hardly changes its volume, and elements of displacements alone lock."""
+"""Largest Poisson's ratio: nearer to 0.5, displacement-based finite elements lock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,22 +23,22 @@ class Material:
     Parameters
     ----------
     name
-        What to call it.
+        Name of the material.
     young
-        Young's modulus E in MPa.
+        Young's modulus E, MPa.
     poisson
-        Poisson's ratio, 0 or more and below 0.495.
+        Poisson's ratio, from 0 to 0.495.
     density
-        In g/cm^3; nan if nobody says.
+        Density, g/cm^3; nan if unknown.
     strain_limit
-        Elongation that it stands without lasting damage, 0.65 for 65 %; nan if nobody says.
+        Largest strain without permanent damage (0.65 for 65 %); nan if unknown.
     sources
-        Where each figure comes from.
+        Source of each value.
 
     Raises
     ------
     InvalidSettings
-        If a figure is impossible.
+        If a value is outside its range.
 
     Examples
     --------
@@ -67,20 +67,23 @@ class Material:
 
     @property
     def shear(self) -> float:
-        """Shear modulus G in MPa."""
+        """Shear modulus G, MPa."""
         return self.young / (2.0 * (1.0 + self.poisson))
 
 
 materials: Registry[Material] = Registry("material")
-"""Printable materials by name. Printed parts differ with direction, machine and colour by tens
-of percent; efficiencies do not depend on E at all and hardly on Poisson's ratio, forces do on E."""
+"""Printable materials by name.
+
+Properties of printed parts vary by tens of percent with direction, machine and colour.
+Efficiencies do not depend on E and hardly on Poisson's ratio; forces are proportional to E.
+"""
 
 NINJATEK = "NinjaTek, NinjaFlex technical data sheet (ASTM D638), as quoted by others"
 TPU_MODULUS = "Haid, Duncan, Hart and Foster, 14th dvs Symposium: 24 to 247 MPa over printed TPUs"
 TPU_RATIO = "Xu and Juang, Polymers 13, 1498 (2021): 0.48 after the first loading, measured on TPU"
 ULTIMAKER = "Ultimaker, material file of generic TPU 95A"
 PRUSAMENT = "Prusa Polymers, Prusament {} data sheet v1.1 (2022), ISO 527-1, printed flat"
-CUSTOMARY = "customary for the polymer; in no data sheet"
+CUSTOMARY = "typical of the polymer; in no data sheet"
 
 materials.register("ninjaflex")(
     Material(

@@ -1,4 +1,4 @@
-"""The part that a design becomes: how large, of what, with struts how wide."""
+"""A part: a design with a scale, a strut cross-section and a material."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ if TYPE_CHECKING:
 
 
 FILLET = 0.25
-"""Default fillet radius, as a part of the strut width."""
+"""Default fillet radius as a fraction of the strut width."""
 ROOM = 0.5
-"""And at most so much of what leaves the holes open."""
+"""Largest default fillet radius as a fraction of the radius at which holes close."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A design with a size and a material.
+    """A design with a scale, a strut cross-section and a material.
 
     Parameters
     ----------
     design
-        Whose beams become struts.
+        The design, whose beams become struts.
     material
-        What they are made of.
+        Material of the struts.
     section
-        Their cross-section.
+        Cross-section of the struts.
     scale
         Length of a lattice unit, mm.
     fillet
         Radius in the corners between struts, mm; None for a quarter of the strut width, or less
-        where that leaves no room.
+        where there is no room for it.
 
     Raises
     ------
     InvalidSettings
-        If nothing is there to be built, or struts are as wide as they are long.
+        If there are no beams, or the struts are not longer than wide.
 
     Examples
     --------
@@ -72,7 +72,7 @@ class Part:
         if not 0.0 < self.scale < float("inf"):
             raise InvalidSettings(f"scale: expected a length above 0 mm, got {self.scale!r}")
         if not self.design.mask.any():
-            raise InvalidSettings("the design has no beams; there is no part to validate")
+            raise InvalidSettings("the design has no beams")
         shortest = float(self.design.problem.lattice.rest_length[self.design.mask].min())
         if self.section.width >= shortest * self.scale:
             raise InvalidSettings(
@@ -90,36 +90,36 @@ class Part:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(N, 2) nodes of the lattice at rest, mm."""
+        """Nodes of the lattice at rest, (N, 2), mm."""
         return self.design.problem.lattice.positions * self.scale
 
     @property
     def struts(self) -> NDArray[np.int64]:
-        """(s, 2) nodes of the beams that are present."""
+        """The two nodes of each present beam, (s, 2)."""
         return self.design.problem.lattice.beams[self.design.mask]
 
     def outline(self) -> Outline:
-        """Return the planar outline: what is meshed, printed and cut.
+        """Return the planar outline that is meshed, printed and cut.
 
         Raises
         ------
         InvalidSettings
-            If struts or fillets are so wide that holes between them close.
+            If struts or fillets close holes between struts.
         """
         return strut_outline(self.positions, self.struts, self.section.width, self.fillet_radius)
 
     @property
     def stroke(self) -> float:
-        """The full motion of the input, mm; nan where a force drives it."""
+        """Full displacement of the input, mm; nan for an input force."""
         given = self.design.problem.input
         return given.amount * self.scale if given.drive == "displacement" else float("nan")
 
     @property
     def stiffness_unit(self) -> float:
-        """Stiffness in N / mm of what counts 1 in the problem.
+        """Stiffness in N / mm that corresponds to 1 in the problem.
 
-        A beam of the discrete model has the stiffness 2 k, its strut that of an elastic bar.
-        Forces and springs of a problem are made real by this factor, so that they strain the
+        A beam of the spring model has the stiffness 2 k and its strut that of an elastic bar.
+        Forces and springs of a problem are multiplied by this factor, so that they strain the
         struts as they strain the beams.
         """
         stiffness = self.design.problem.stiffness

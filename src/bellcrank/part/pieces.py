@@ -1,4 +1,4 @@
-"""Which beams of a design hang together, and which on no support."""
+"""Connected pieces of a design, their supports, and crossing beams."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def piece_of_beams(design: Design) -> NDArray[np.int64]:
-    """Return (b,) the number of the piece that each present beam belongs to, from 0.
+    """Return the number of the piece of each present beam, (b,) int64 from 0.
 
     Examples
     --------
@@ -35,29 +35,29 @@ def piece_of_beams(design: Design) -> NDArray[np.int64]:
 
 
 def require_held(design: Design) -> None:
-    """Refuse a design of which a piece hangs on no support.
+    """Check that all pieces of a design are supported.
 
     Raises
     ------
     InvalidSettings
-        Naming the first beam of such a piece.
+        If not; names the first beam of an unsupported piece.
     """
     problem = design.problem
     present = np.flatnonzero(design.mask)
     piece = piece_of_beams(design)
-    held = np.isin(problem.lattice.beams[present], problem.supports.nodes).any(axis=1)
-    loose = ~np.isin(piece, piece[held])
+    supported = np.isin(problem.lattice.beams[present], problem.supports.nodes).any(axis=1)
+    loose = ~np.isin(piece, piece[supported])
     if loose.any():
         count = int(piece.max()) + 1
         raise InvalidSettings(
             f"the design is in {count} piece{'s' * (count > 1)}: {loose.sum()} of its "
-            f"{len(present)} beams hang on no support, the first being beam {present[loose][0]}; "
-            "leave them out"
+            f"{len(present)} beams are connected to no support, first beam {present[loose][0]}; "
+            "remove them"
         )
 
 
 def doubts_about(design: Design) -> list[str]:
-    """Return what a builder should know of a design before any motion, as sentences.
+    """Return warnings about the connections of a design, as sentences.
 
     Examples
     --------
@@ -79,19 +79,19 @@ def doubts_about(design: Design) -> list[str]:
         for region in (problem.input.nodes, problem.output.nodes)
     ]
     if ends[0] and ends[1] and not ends[0] & ends[1]:
-        found.append("input and output do not hang together: no motion can reach the output")
+        found.append("input and output are not connected: no motion reaches the output")
     crossing = crossings(design)
     if len(crossing):
         first, second = crossing[0]
         found.append(
-            f"beams cross each other without a node, {first} and {second} among them: frames and "
-            "the discrete model let them pass, in the printed outline they are joined"
+            f"beams cross without a common node, for example {first} and {second}: they are "
+            "independent in frames and in the spring model but joined in the printed outline"
         )
     return found
 
 
 def crossings(design: Design) -> NDArray[np.int64]:
-    """Return (p, 2) the pairs of beams that meet elsewhere than in a common node."""
+    """Return the pairs of beams, (p, 2), that intersect without a common node."""
     import shapely
 
     present = np.flatnonzero(design.mask)

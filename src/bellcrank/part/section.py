@@ -1,4 +1,4 @@
-"""The cross-section of a strut: a rectangle, as wide as drawn and as thick as the part."""
+"""The cross-section of a strut."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from dataclasses import dataclass
 from bellcrank.errors import InvalidSettings
 
 SHEAR_COEFFICIENT = 5.0 / 6.0
-"""Of a rectangle: the part of its area that bears shear."""
+"""Shear coefficient of a rectangle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A rectangle.
+    """A rectangular cross-section.
 
     Parameters
     ----------
     width
-        In the plane of the lattice, mm.
+        Size in the plane of the lattice, mm.
     thickness
-        Out of it, mm.
+        Size normal to the lattice, mm.
 
     Raises
     ------
     InvalidSettings
-        Unless both are above 0.
+        If one is not above 0.
 
     Examples
     --------
@@ -43,7 +43,7 @@ class Section:
 
     @property
     def area(self) -> float:
-        """A in mm^2."""
+        """Area A, mm^2."""
         return self.width * self.thickness
 
     @property

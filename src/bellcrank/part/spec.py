@@ -1,4 +1,4 @@
-"""What turns designs into parts, as it is written in files and on the command line."""
+"""Specification of parts: size and material, in files and on the command line."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class PartSpec:
     Parameters
     ----------
     width, thickness
-        Of the struts, mm.
+        Strut width and part thickness, mm.
     scale
         Length of a lattice unit, mm.
     fillet
         Radius in the corners between struts, mm; None for a quarter of the width, or less where
-        that leaves no room.
+        there is no room for it.
     material
-        A name in the registry of materials, or a material.
+        Name of a registered material, or a material.
 
     Raises
     ------
@@ -53,7 +53,7 @@ class PartSpec:
     material: str | Material = "ninjaflex"
 
     def of(self, design: Design) -> Part:
-        """Return a design as such a part.
+        """Return the part of a design.
 
         Raises
         ------
@@ -65,12 +65,12 @@ class PartSpec:
         return Part(design, material, Section(self.width, self.thickness), self.scale, self.fillet)
 
     def changed(self, changes: Mapping[str, Any]) -> PartSpec:
-        """Return it with some values replaced by what a person wrote; lengths may have units.
+        """Return a copy with some values replaced; lengths may be texts with units.
 
         Raises
         ------
         InvalidSettings
-            If a length is none, or a key is unknown.
+            If a length cannot be read, or a key is unknown.
         """
         known = {field.name for field in fields(self)}
         unknown = sorted(set(changes) - known)
@@ -83,7 +83,7 @@ class PartSpec:
         return replace(self, **read)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, that `changed` reads."""
+        """Return plain data, which `from_dict` reads."""
         data = {field.name: getattr(self, field.name) for field in fields(self)}
         if isinstance(self.material, Material):
             figures = asdict(self.material)
@@ -96,20 +96,20 @@ class PartSpec:
 
     @classmethod
     def from_dict(cls, data: object, source: str = "part") -> PartSpec:
-        """Return what `to_dict` wrote, or what a file says.
+        """Return the specification that plain data describes.
 
         Raises
         ------
         InvalidFile
-            Naming `source` and the first offender.
+            If a key is unknown or has the wrong type; names `source`.
         InvalidSettings
-            If a value makes no sense.
+            If a value is outside its range.
         """
         return cls().changed(_changes(data, source))
 
 
 class MaterialTable(Table):
-    """A material by its figures, in a file."""
+    """A material, in a file."""
 
     name: str = "custom"
     young: float
@@ -119,9 +119,9 @@ class MaterialTable(Table):
 
 
 class PartTable(Table):
-    """What may be said of a part."""
+    """Keys of a part; all optional."""
 
-    width: Any = None  # what is no length is refused where lengths are read
+    width: Any = None  # lengths are validated by `read_length`
     thickness: Any = None
     scale: Any = None
     fillet: Any = None
@@ -129,13 +129,13 @@ class PartTable(Table):
 
 
 class PartFile(PartTable):
-    """A whole file of a part."""
+    """A part file."""
 
     schema_: Literal["bellcrank/part/1"] = Field(alias="schema")
 
 
 def _changes(data: object, source: str, table: type[PartTable] = PartTable) -> dict[str, Any]:
-    """Return what is said of a part, checked."""
+    """Return the validated keys of a part."""
     if not isinstance(data, dict):
         raise InvalidFile(f"{source}: expected a table, got {data!r}")
     given = parse(table, data, source).model_dump(exclude={"schema_"}, exclude_none=True)
@@ -149,19 +149,21 @@ def _changes(data: object, source: str, table: type[PartTable] = PartTable) -> d
 
 
 def read_part(path: str | os.PathLike[str], base: PartSpec | None = None) -> PartSpec:
-    r"""Read size and material of parts from a TOML file.
+    r"""Read a part specification from a TOML file.
 
     Parameters
     ----------
+    path
+        The file.
     base
-        What holds where the file says nothing.
+        Values of the keys that are not in the file.
 
     Raises
     ------
     InvalidFile
-        If it is no such file.
+        If the file cannot be read or does not follow the schema.
     InvalidSettings
-        If a value makes no sense.
+        If a value is outside its range.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""From a design to files that are printed or cut, and to G-code."""
+"""Prepare designs for export and printing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.export import Export, check_print, exporter_for
+from bellcrank.export import Export, check_print, exporters
 from bellcrank.export.profiles import profiles
 from bellcrank.export.slicer import find_slicer, slice_solid
 from bellcrank.fem.contact import centre_lines, find_contacts
@@ -30,25 +30,25 @@ if TYPE_CHECKING:
     from bellcrank.part.outline import Outline
 
 FRAMES = 25
-"""Along a motion that is written to a file."""
+"""Number of states of a motion that is written to a file."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grips:
-    """What is added to a part so that it can be held, pushed and read.
+    """Additions to a part for clamping, pushing and measuring.
 
     Parameters
     ----------
     plate
-        Fill the holes between supports: a plate to clamp.
+        Whether to fill the holes between supports to a plate.
     screws
-        Holes to drill into that plate.
+        Number of screw holes in the plate.
     screw_diameter, wall
-        Of the holes, and least thickness of material around, mm.
+        Diameter of the holes, and smallest thickness of material around them, mm.
     pad
-        Fill the holes between input nodes: a pad to push.
+        Whether to fill the holes between input nodes to a pad.
     pointer
-        Length of a strut that points out from the output, mm; 0 for none.
+        Length of an additional strut at the output, mm; 0 for none.
     """
 
     plate: bool = False
@@ -62,17 +62,17 @@ class Grips:
         if self.screws < 0:
             raise InvalidSettings(f"screws: expected a number of holes, got {self.screws}")
         if self.screws and not self.plate:
-            raise InvalidSettings("screws need a plate to go through; ask for the plate too")
+            raise InvalidSettings("screws: expected a plate as well (--plate)")
         if not 0.0 <= self.pointer < float("inf"):
             raise InvalidSettings(f"pointer: expected a length, got {self.pointer!r} mm")
 
     def applied(self, part: Part) -> Outline:
-        """Return the outline of a part with these.
+        """Return the outline of a part with these additions.
 
         Raises
         ------
         InvalidSettings
-            If there is no room for them.
+            If there is no room for them or the output has no beam.
         """
         problem = part.design.problem
         positions, beams = part.positions, part.struts
@@ -96,13 +96,13 @@ class Grips:
 
     @staticmethod
     def _outermost(part: Part) -> int:
-        """Return the output node that lies farthest along its wanted direction and has beams."""
+        """Return the output node with beams that is farthest in its wanted direction."""
         output = part.design.problem.output
-        built = np.isin(output.nodes, part.struts)
-        if not built.any():
+        present = np.isin(output.nodes, part.struts)
+        if not present.any():
             raise InvalidSettings("pointer: no beam touches the output")
         reach = (part.positions[output.nodes] * output.direction).sum(axis=1)
-        return int(output.nodes[np.argmax(np.where(built, reach, -np.inf))])
+        return int(output.nodes[np.argmax(np.where(present, reach, -np.inf))])
 
 
 def bundle_of(
@@ -114,25 +114,27 @@ def bundle_of(
     moved: bool = False,
     whole: bool = True,
 ) -> Export:
-    """Return a design ready to be written.
+    """Return the export of a design.
 
     Parameters
     ----------
+    design
+        The design.
     spec
-        Size and material.
+        Size and material of the part.
     grips
-        What is added.
+        Plate, pad and pointer.
     layer
-        Height of layers, of which the part gets a whole number; None for its own thickness.
+        Layer height, to which the thickness is rounded; None for no rounding.
     moved
-        Whether formats that can are to hold the motion.
+        Whether to compute the motion.
     whole
-        Whether to refuse designs of which a piece hangs on nothing: what is printed or cut.
+        Whether to refuse designs with unsupported pieces, which cannot be printed or cut.
 
     Raises
     ------
     InvalidSettings, UnknownName
-        If there can be no such part.
+        If the part is not valid.
     """
     part = spec.of(design)
     if whole:
@@ -151,7 +153,7 @@ def bundle_of(
 
 
 def findings_about(bundle: Export, profile: PrintProfile) -> list[str]:
-    """Return what is to be said about printing a part and moving it, as sentences."""
+    """Return findings about printing and motion of a part, as sentences."""
     part = bundle.part
     sentences = [finding.sentence for finding in check_print(bundle, profile.rules)]
     sentences += doubts_about(part.design)
@@ -168,18 +170,18 @@ def findings_about(bundle: Export, profile: PrintProfile) -> list[str]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PrintJob:
-    """A part in G-code, and what it takes.
+    """A sliced part.
 
     Parameters
     ----------
     sliced
-        By the slicer.
+        Result of the slicer.
     volume
-        Of the solid, mm^3.
+        Volume of the solid, mm^3.
     mass
-        g; nan where nobody says how dense the material is.
+        Mass, g; nan if the density is unknown.
     profile
-        Printer and filament.
+        Settings of printer and filament.
     """
 
     sliced: Sliced
@@ -189,7 +191,7 @@ class PrintJob:
 
 
 def profile_for(name: str | None, spec: PartSpec, **changes: Any) -> PrintProfile:
-    """Return the profile of that name, or that of the material; with some figures changed.
+    """Return a profile by name or, by default, that of the material, with changed values.
 
     Raises
     ------
@@ -213,7 +215,7 @@ def print_design(
     Raises
     ------
     InvalidSettings
-        If there is no slicer, or can be no such part.
+        If there is no slicer, or the part is not valid.
     OutputExists, StorageError
         If the file exists or cannot be written.
     RunFailed
@@ -227,7 +229,7 @@ def print_design(
     check_folder(path)
     left, bottom, right, top = bundle.outline().bounds
     solid = bundle.solid()
-    content = exporter_for("part.3mf").to_bytes(bundle)
+    content = exporters.for_path("part.3mf").to_bytes(bundle)
     size = (right - left, top - bottom)
     sliced = slice_solid(content, ".3mf", profile, size, solid.volume, program)
     write_bytes(path, sliced.gcode, overwrite=overwrite)

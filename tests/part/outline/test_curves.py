@@ -124,7 +124,7 @@ def test_an_outline_that_is_none_is_refused() -> None:
     loop = rounded_square(4.0, 0.5)
     with pytest.raises(InvalidSettings, match="outer: expected one loop or more"):
         Outline(())
-    with pytest.raises(InvalidSettings, match=r"holes\[0\]: expected a loop that runs clockwise"):
+    with pytest.raises(InvalidSettings, match=r"holes\[0\]: expected a clockwise loop"):
         Outline((loop,), (loop,))
     with pytest.raises(InvalidSettings, match="sagitta: expected a length above 0 mm, got 0"):
         loop.flattened(0.0)

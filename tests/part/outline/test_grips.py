@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 import shapely
-from tests.geometry.layouts import random_layout, triangular
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.model import find_problem, human_design
@@ -15,6 +14,7 @@ from bellcrank.part import PartSpec
 from bellcrank.part.outline import Loop, Outline, room_for_fillet, strut_outline
 from bellcrank.part.outline.grips import filled, with_pointer
 from bellcrank.part.outline.screws import clearance, drilled, screw_places
+from tests.part.outline.layouts import random_layout, triangular
 
 SHEET = Outline((Loop([[0, 0], [40, 0], [40, 12], [0, 12]], [0, 0, 0, 0]),))
 CORNERS = [[0, 0], [40, 0], [40, 12], [0, 12]]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import shapely
-from tests.geometry.layouts import filled_by_polygons, random_layout, triangular
 
 from bellcrank.part.outline import (
     Outline,
@@ -17,10 +16,12 @@ from bellcrank.part.outline import (
     room_for_fillet,
     strut_outline,
 )
+from tests.part.outline.layouts import filled_by_polygons, random_layout, triangular
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from tests.geometry.layouts import Layout
+
+    from tests.part.outline.layouts import Layout
 
 TRIANGLE = (
     np.array([[0.0, 0.0], [12.0, 0.0], [6.0, 108.0**0.5]]),

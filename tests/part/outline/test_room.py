@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from tests.geometry.layouts import random_layout, triangular
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.part.outline import expected_holes, room_for_fillet, strut_outline
+from tests.part.outline.layouts import random_layout, triangular
 
 SQUARE = ([[0, 0], [20, 0], [20, 20], [0, 20]], [[0, 1], [1, 2], [2, 3], [3, 0]])
 # A ring with a waist of 4 mm between (10, 8) and (10, 12).

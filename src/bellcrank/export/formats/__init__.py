@@ -1,7 +1,7 @@
-"""Formats of exported files, one file per format.
+"""Formats of exported files, one module for each.
 
-A new one is an `Exporter` in a file of its own under ``exporters.register("name")``, imported
-below; the contract tests pick it up by themselves.
+To add one, register an `Exporter` with ``exporters.register("name")`` in a module of this folder
+and import it below. The contract tests include every registered format.
 
 >>> exporters.names()
 ['stl', '3mf', 'step', 'dxf', 'svg', 'vtu', 'lammps', 'dump']
@@ -14,16 +14,13 @@ from bellcrank.export.formats import dxf  # isort: skip
 from bellcrank.export.formats import svg  # isort: skip
 from bellcrank.export.formats import vtu  # isort: skip
 from bellcrank.export.formats import lammps  # isort: skip
-from bellcrank.export.formats import dump  # isort: skip
-from bellcrank.export.formats.base import Export, Exporter, export, exporter_for, exporters
+from bellcrank.export.formats.base import Export, Exporter, export, exporters
 
 __all__ = [
     "Export",
     "Exporter",
-    "dump",
     "dxf",
     "export",
-    "exporter_for",
     "exporters",
     "lammps",
     "step",

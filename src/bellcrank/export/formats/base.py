@@ -1,7 +1,8 @@
-"""What is written to files, and the registry of formats."""
+"""Content of exported files, and the registry of their formats."""
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings, UnknownName
+from bellcrank.errors import InvalidSettings
 from bellcrank.export.flattening import SAGITTA
 from bellcrank.export.solid import Solid, extruded, whole_layers
 from bellcrank.model.storage import already_exists, write_bytes
-from bellcrank.registry import Registry
+from bellcrank.registry import FormatRegistry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,31 +30,30 @@ LAYER = 0.32
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Export:
-    """A part, and what else may be written of it.
+    """A part with the options and data that formats can use.
 
     Parameters
     ----------
     part
         The part.
     shape
-        Its outline with whatever was changed of it, such as plates to clamp; None for the
-        part's own.
+        Its outline with changes such as a clamping plate; None for the outline of the part.
     layer : float, mm
-        Height of printed layers: the part is as thick as whole layers make it. None for its
-        own thickness.
+        Height of printed layers: the thickness is rounded to whole layers. None for the thickness
+        of the part.
     sagitta : float, mm
-        Greatest distance between arcs and the triangles of STL and 3MF.
+        Largest distance between arcs and the triangles of STL and 3MF.
     moved : (N, 2) float64, lattice units
-        Nodes where the part has moved them; None for those at rest.
+        Displaced nodes; None for nodes at rest.
     frames : (F, N, 2) float64, lattice units
-        Nodes along a motion, for formats that hold one.
+        Nodes in F states of a motion, for formats that contain one.
     title
-        What to call it; None for the name of the problem.
+        Title in the file; None for the name of the problem.
 
     Raises
     ------
     InvalidSettings
-        If an array has the wrong shape or holds what is no number.
+        If an array has the wrong shape or is not finite.
     """
 
     part: Part
@@ -82,12 +82,12 @@ class Export:
 
     @property
     def name(self) -> str:
-        """What it is called in a file."""
+        """Title in the file."""
         return self.part.design.problem.name if self.title is None else self.title
 
     @property
     def thickness(self) -> float:
-        """Of the part as it is printed, mm."""
+        """Thickness of the printed part, mm."""
         wanted = self.part.section.thickness
         return wanted if self.layer is None else whole_layers(wanted, self.layer)
 
@@ -97,81 +97,78 @@ class Export:
         Raises
         ------
         InvalidSettings
-            If struts or fillets are so wide that holes between them close.
+            If struts or fillets close holes between struts.
         """
         return self.part.outline() if self.shape is None else self.shape
 
     def solid(self) -> Solid:
-        """Return the surface of the part as it is printed, on the bed of a printer.
+        """Return the surface of the printed part, with its lowest corner at the origin.
 
         Raises
         ------
         InvalidSettings
-            If there can be no such part.
+            If the part is not valid.
         """
-        # What can be refused at once comes before what takes long.
+        # Validated before the outline, which takes longer.
         thickness = self.thickness
         return extruded(self.outline(), thickness, self.sagitta).on_the_bed()
 
 
 @dataclass(frozen=True, slots=True)
 class Exporter:
-    """A format.
+    """A file format.
 
     Parameters
     ----------
     suffixes
-        The endings of its files, the usual one first.
+        Suffixes of its files, the usual one first.
     to_bytes
-        The whole content of a file.
+        Function that returns the content of a file.
+    module, extra
+        Optional module that the format needs, and the extra of bellcrank that installs it.
     """
 
     suffixes: tuple[str, ...]
     to_bytes: Callable[[Export], bytes]
+    module: str = ""
+    extra: str = ""
+
+    def check_installed(self) -> None:
+        """Check that the module of the format is installed.
+
+        Raises
+        ------
+        InvalidSettings
+            If not; names the extra to install.
+        """
+        if self.module and importlib.util.find_spec(self.module) is None:
+            raise InvalidSettings(
+                f"{self.suffixes[0]} files need the module {self.module}; install it with: "
+                f"pip install 'bellcrank[{self.extra}]'"
+            )
 
 
-exporters: Registry[Exporter] = Registry("export format")
-
-
-def exporter_for(path: str | os.PathLike[str]) -> Exporter:
-    """Return the format that the suffix of a file names.
-
-    Raises
-    ------
-    UnknownName
-        If there is none; lists those there are.
-
-    Examples
-    --------
-    >>> exporter_for("crane.stp").suffixes
-    ('.step', '.stp')
-    """
-    suffix = Path(path).suffix.lower()
-    for entry in exporters.values():
-        if suffix in entry.suffixes:
-            return entry
-    known = ", ".join(suffix for entry in exporters.values() for suffix in entry.suffixes)
-    raise UnknownName(f"{path}: unknown export format {suffix!r}; known suffixes: {known}")
+exporters: FormatRegistry[Exporter] = FormatRegistry("export format")
 
 
 def export(what: Export | Part, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a part to a file, in the format that its suffix names, whole or not at all.
+    """Write a part to a file in the format of its suffix, atomically.
 
     Parameters
     ----------
     what
-        A part, or one with what else there is to write of it.
+        A part, or a part with options.
     path
         The file.
     overwrite
-        Whether to replace what is there.
+        Whether to replace an existing file.
 
     Raises
     ------
     UnknownName
         If no format has that suffix.
     InvalidSettings
-        If there can be no such part, or the format needs what is not installed.
+        If the part is not valid, or the module of the format is not installed.
     OutputExists
         If the file exists and `overwrite` is not set.
     StorageError
@@ -188,7 +185,8 @@ def export(what: Export | Part, path: str | os.PathLike[str], *, overwrite: bool
     ...     os.listdir(folder)
     ['crane.3mf']
     """
-    chosen = exporter_for(path)
+    chosen = exporters.for_path(path)
+    chosen.check_installed()
     if not overwrite and os.path.lexists(path):
         raise already_exists(Path(path))
     bundle = what if isinstance(what, Export) else Export(part=what)

@@ -1,4 +1,4 @@
-"""DXF: exact lines and arcs in mm, for laser and waterjet cutters and for CAD programs."""
+"""DXF: exact lines and arcs in mm, for laser and waterjet cutters and CAD programs."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from bellcrank.part.outline import Outline
 
 OUTER, HOLES = "outline", "holes"
-"""Names of layers: holes are to be cut before the outline, while the sheet still holds the part."""
+"""Names of layers. Holes are cut before the outline, while the part is connected to the sheet."""
 
 
 def to_bytes(export: Export) -> bytes:
-    """Return the outline as a DXF file of the year 2010."""
+    """Return the outline as a DXF file (R2010)."""
     return outline_to_bytes(export.outline())
 
 
@@ -47,7 +47,7 @@ def outline_to_bytes(outline: Outline) -> bytes:
 
 @contextmanager
 def _no_dates() -> Iterator[None]:
-    """Leave dates and random ids out, so that the same outline makes the same file."""
+    """Write no dates and random ids, so that files of equal outlines are equal."""
     import ezdxf
 
     options = ezdxf.options  # type: ignore[attr-defined]
@@ -59,4 +59,4 @@ def _no_dates() -> Iterator[None]:
         options.write_fixed_meta_data_for_testing = before
 
 
-exporters.register("dxf")(Exporter((".dxf",), to_bytes))
+exporters.register("dxf")(Exporter((".dxf",), to_bytes, "ezdxf", "files"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from bellcrank.part.outline import Loop, Outline
 
 _TOLERANCE = 1e-7
-"""Points closer to each other, mm, are one point in a STEP file."""
+"""Points closer than this distance, mm, coincide in a STEP file."""
 
 
 def to_bytes(export: Export) -> bytes:
@@ -29,21 +28,18 @@ def to_bytes(export: Export) -> bytes:
 
     Raises
     ------
-    InvalidSettings
-        If the modelling kernel is not installed.
     RunFailed
-        If it fails.
+        If the modelling kernel fails.
     """
-    _require_kernel()
     thickness = export.thickness
     return solid_to_bytes(export.outline(), thickness, export.name)
 
 
 def solid_to_bytes(outline: Outline, thickness: float, name: str) -> bytes:
-    """Return the prism over an outline as a STEP file, a solid for each piece.
+    """Return the prism over an outline as a STEP file, one solid for each piece.
 
-    The kernel works in a process of its own: NGSolve brings another version of it, and both in
-    one process end in a crash.
+    The kernel runs in a separate process: NGSolve contains another version of it, and a process
+    that loads both crashes.
 
     Raises
     ------
@@ -55,16 +51,18 @@ def solid_to_bytes(outline: Outline, thickness: float, name: str) -> bytes:
         for kind in (outline.outer, outline.holes)
     ]
     task = json.dumps({"loops": loops, "thickness": thickness, "name": name})
-    words = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
-    done = subprocess.run(words, input=task.encode(), capture_output=True, check=False)
+    command = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
+    done = subprocess.run(command, input=task.encode(), capture_output=True, check=False)
     if done.returncode or not done.stdout:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        raise RunFailed(f"Open CASCADE wrote no STEP file: {said[-1] if said else 'no word'}")
+        output = done.stderr.decode(errors="replace").strip().splitlines()
+        raise RunFailed(
+            f"Open CASCADE wrote no STEP file: {output[-1] if output else 'no message'}"
+        )
     return done.stdout
 
 
 def serve() -> None:
-    """Read a task from standard input and write its STEP file to standard output."""
+    """Read an outline from standard input and write its STEP file to standard output."""
     from bellcrank.part.outline import Loop, Outline
 
     task = json.load(sys.stdin)
@@ -73,16 +71,8 @@ def serve() -> None:
     sys.stdout.buffer.write(content)
 
 
-def _require_kernel() -> None:
-    if importlib.util.find_spec("OCP") is None:
-        raise InvalidSettings(
-            "export to STEP needs the modelling kernel Open CASCADE; "
-            "install it with: pip install 'bellcrank[step]'"
-        )
-
-
 def _prisms(outline: Outline, thickness: float) -> Any:
-    """Return one solid, or several in a compound."""
+    """Return one solid, or a compound of several."""
     from OCP.BRep import BRep_Builder
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
     from OCP.gp import gp_Vec
@@ -107,14 +97,14 @@ def _pieces(outline: Outline) -> list[tuple[Loop, list[Loop]]]:
 
     if outline.piece_count == 1:
         return [(outline.outer[0], list(outline.holes))]
-    # Pieces may lie in holes of others: a hole belongs to the least loop around it.
+    # Pieces may be inside holes of others: a hole belongs to the smallest loop around it.
     fine = 1e-3 * min(loop.length for loop in outline.loops)
     order = sorted(outline.outer, key=lambda loop: loop.area)
     pieces = [(outer, Polygon(outer.flattened(fine))) for outer in order]
     found: list[tuple[Loop, list[Loop]]] = [(outer, []) for outer in order]
     for hole in outline.holes:
-        place = Point(hole.points[0])
-        around = next(k for k, (_, polygon) in enumerate(pieces) if polygon.contains(place))
+        corner = Point(hole.points[0])
+        around = next(k for k, (_, polygon) in enumerate(pieces) if polygon.contains(corner))
         found[around][1].append(hole)
     return found
 
@@ -186,7 +176,7 @@ def _written(shape: Any, name: str) -> bytes:
 
 
 def _entitle(model: Any, name: str) -> None:
-    """Name the product, and leave out dates and counters: the same part makes the same file."""
+    """Set the title of the product and constant dates, so that files of equal parts are equal."""
     from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
     from OCP.StepBasic import StepBasic_Product
     from OCP.TCollection import TCollection_HAsciiString
@@ -206,7 +196,7 @@ def _entitle(model: Any, name: str) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the kernel from printing what it does."""
+    """Suppress the output of the kernel."""
     from OCP.Message import Message
 
     messenger = Message.DefaultMessenger_s()
@@ -222,7 +212,7 @@ def _quiet() -> Iterator[None]:
 
 @contextmanager
 def _without_curves_in_surfaces() -> Iterator[None]:
-    """Write each edge once, in space: on planes and cylinders the rest follows from that."""
+    """Write edges without curves on surfaces, which are determined on planes and cylinders."""
     from OCP.Interface import Interface_Static
     from OCP.STEPControl import STEPControl_Controller
 
@@ -236,4 +226,4 @@ def _without_curves_in_surfaces() -> Iterator[None]:
         Interface_Static.SetIVal_s(mode, before)
 
 
-exporters.register("step")(Exporter((".step", ".stp"), to_bytes))
+exporters.register("step")(Exporter((".step", ".stp"), to_bytes, "OCP", "step"))

@@ -1,4 +1,4 @@
-"""STL: triangles for any slicer. Binary; it has no unit, and slicers take it to be mm."""
+"""STL: triangles for slicers. The format is binary and has no unit; slicers assume mm."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def solid_to_bytes(solid: Solid, name: str) -> bytes:
     """Return a closed surface as a binary STL file."""
     corners = solid.vertices[solid.triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # Three corners in one line have no normal; they read 0 then, as STL permits.
+    # Collinear corners have no normal: it is 0, as STL permits.
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     facets = np.zeros(len(corners), dtype=_FACET)
     facets["normal"] = normal / np.where(length > 0.0, length, 1.0)
     facets["corners"] = corners
-    # A header must not begin with "solid", which would make readers expect text.
+    # A header that begins with "solid" would indicate the text format.
     readable = re.sub(r"[^ -~]", "_", name)
     header = f"bellcrank {readable}, lengths in mm"[:80].ljust(80).encode("ascii")
     return header + struct.pack("<I", len(facets)) + facets.tobytes()

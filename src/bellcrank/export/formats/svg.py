@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bellcrank.part.outline import Loop, Outline
 
 HAIRLINE = 0.025
-"""Width of lines, mm: what programs of laser cutters take for a cut."""
+"""Width of lines, mm, which programs of laser cutters interpret as a cut."""
 
 
 def to_bytes(export: Export) -> bytes:
@@ -22,9 +22,9 @@ def to_bytes(export: Export) -> bytes:
 
 
 def outline_to_bytes(outline: Outline, name: str) -> bytes:
-    """Return an outline as an SVG file: one path, a closed subpath for each loop, arcs as such.
+    """Return an outline as an SVG file: one path with a closed subpath of exact arcs for each loop.
 
-    Since y runs downwards there, it is turned round within the bounds of the outline.
+    The y axis points down in SVG. The outline is mirrored within its bounds accordingly.
     """
     low_x, low_y, high_x, high_y = outline.bounds
     width, height = high_x - low_x, high_y - low_y
@@ -42,18 +42,18 @@ def outline_to_bytes(outline: Outline, name: str) -> bytes:
 
 
 def _subpath(loop: Loop, left: float, top: float) -> str:
-    """Return a loop in the words of SVG, measured from a corner at the upper left."""
-    places = np.column_stack([loop.points[:, 0] - left, top - loop.points[:, 1]]).tolist()
-    words = ["M{!r} {!r}".format(*places[0])]
-    ends = [*places[1:], places[0]]
+    """Return a loop as SVG path commands, relative to the upper left corner."""
+    corners = np.column_stack([loop.points[:, 0] - left, top - loop.points[:, 1]]).tolist()
+    commands = ["M{!r} {!r}".format(*corners[0])]
+    ends = [*corners[1:], corners[0]]
     for (x, y), bulge, radius in zip(ends, loop.bulge.tolist(), loop.radii.tolist(), strict=True):
         if bulge == 0.0:
-            words.append(f"L{x!r} {y!r}")
+            commands.append(f"L{x!r} {y!r}")
         else:
-            # What turns counterclockwise does so with y downwards, too, if one looks at it, but
-            # SVG counts angles the other way round.
-            words.append(f"A{radius!r} {radius!r} 0 0 {0 if bulge > 0.0 else 1} {x!r} {y!r}")
-    return " ".join([*words, "Z"])
+            # A counterclockwise arc remains so in the picture. SVG counts angles clockwise, so
+            # that its sweep flag is 0.
+            commands.append(f"A{radius!r} {radius!r} 0 0 {0 if bulge > 0.0 else 1} {x!r} {y!r}")
+    return " ".join([*commands, "Z"])
 
 
 exporters.register("svg")(Exporter((".svg",), to_bytes))

@@ -1,6 +1,6 @@
 """3MF: a named object of triangles in mm, for slicers.
 
-Only the core specification is used: what extends it to lattices of beams no slicer opens.
+Only the core specification is used: slicers do not open its beam-lattice extension.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _RELATIONS = (
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>'
     "</Relationships>\n"
 )
-_LONG_AGO = (1980, 1, 1, 0, 0, 0)
-"""The date in the archive, so that the same part makes the same file."""
+_DATE = (1980, 1, 1, 0, 0, 0)
+"""Date in the archive, constant so that files of equal parts are equal."""
 
 
 def to_bytes(export: Export) -> bytes:
@@ -48,7 +48,7 @@ def solid_to_bytes(solid: Solid, name: str) -> bytes:
             ("_rels/.rels", _RELATIONS),
             ("3D/3dmodel.model", _model(solid, name)),
         ):
-            entry = zipfile.ZipInfo(path, _LONG_AGO)
+            entry = zipfile.ZipInfo(path, _DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, text)
     return content.getvalue()

@@ -1,4 +1,4 @@
-"""VTU: the lattice with what is known of its nodes and beams, for ParaView."""
+"""VTU: the lattice with data of its nodes and beams, for ParaView."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ KINDS = {2: "line", 3: "triangle", 4: "tetra"}
 
 
 def to_bytes(export: Export) -> bytes:
-    """Return the struts as lines in mm, at rest or where they have moved, as a VTU file.
+    """Return the struts as lines in mm, at rest or displaced, as a VTU file.
 
-    Nodes have their role (1 free, 2 support, 3 input, 4 output) and their displacement, beams
-    their number in the problem and whether a search may change them.
+    Nodes have their role (1 free, 2 support, 3 input, 4 output) and displacement, beams have
+    their number in the problem and whether they are designable.
     """
     part = export.part
     problem = part.design.problem
@@ -45,15 +45,24 @@ def to_bytes(export: Export) -> bytes:
 def mesh_to_bytes(
     points: Values, cells: Values, of_points: Mapping[str, Values], of_cells: Mapping[str, Values]
 ) -> bytes:
-    """Return lines, triangles or tetrahedra with what is known of them as a VTU file.
+    """Return lines, triangles or tetrahedra with data as a VTU file.
 
     Parameters
     ----------
     points : (n, 2) or (n, 3)
+        Vertices.
     cells : (c, 2), (c, 3) or (c, 4) int64
+        Vertices of each line, triangle or tetrahedron.
     of_points, of_cells
-        (n,) or (n, d), and (c,) or (c, d) each, by name; d of 2 becomes 3.
+        Data of vertices and cells by name, (n,) or (n, d) and (c,) or (c, d). Planar vectors
+        (d = 2) are extended by a third component of 0.
+
+    Raises
+    ------
+    InvalidSettings
+        If meshio is not installed.
     """
+    exporters["vtu"].check_installed()
     import meshio
 
     mesh = meshio.Mesh(
@@ -70,10 +79,10 @@ def mesh_to_bytes(
 
 
 def _in_space(values: Values) -> Values:
-    """Return vectors in the plane with a third coordinate of 0, and all else as it is."""
+    """Return planar vectors with a third component of 0, and other values unchanged."""
     if values.ndim == 2 and values.shape[1] == 2:
         return np.column_stack([values, np.zeros(len(values))])
     return values
 
 
-exporters.register("vtu")(Exporter((".vtu",), to_bytes))
+exporters.register("vtu")(Exporter((".vtu",), to_bytes, "meshio", "files"))

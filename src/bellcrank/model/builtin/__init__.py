@@ -1,7 +1,7 @@
-"""The problems that come with bellcrank, by name.
+"""Bundled problems, by name.
 
-A new one is a function without parameters that returns a Problem, in a file of
-its own, under ``@builtin.register("name")``, and imported below.
+To add one, write a function without parameters that returns a `Problem`, register it with
+``@builtin.register("name")`` in a module of this folder, and import the module below.
 """
 
 from bellcrank.model.builtin import crane, discs, pliers, scaling

@@ -1,7 +1,7 @@
-"""The paper's first actuators: push down on the right, move the left.
+"""The first two actuators of the paper.
 
-`crane` asks for motion at right angles to the push, `anti-parallel` for motion
-against it. Both share one lattice, which stands on three full rows of supports.
+The input on the right is pushed down. The output on the left moves to the left in `crane` and up
+in `anti-parallel`. Both use the same lattice, supported at its three lowest rows.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ ROW_FIRST_X = (0.5, 0.0, 0.5, 0.0, 0.5, 0.0, 0.5, 0.0, 0.5, -1.0, -0.5, -1.0)
 
 @builtin.register("crane")
 def crane() -> Problem:
-    """Turn a push downwards into a motion to the left.
+    """Convert a downward input into an output motion to the left.
 
-    133 nodes, 352 beams, 203 of them designable.
+    The lattice has 133 nodes and 352 beams, of which 203 are designable.
 
     Examples
     --------
@@ -37,7 +37,7 @@ def crane() -> Problem:
 
 @builtin.register("anti-parallel")
 def anti_parallel() -> Problem:
-    """Turn a push downwards into a motion upwards, on the lattice of `crane`.
+    """Convert a downward input into an upward output motion, on the lattice of `crane`.
 
     Examples
     --------
@@ -49,20 +49,20 @@ def anti_parallel() -> Problem:
 
 def _actuator(name: str, towards: tuple[float, float]) -> Problem:
     lattice = triangular_rows(ROW_COUNTS, ROW_FIRST_X)
-    pushed = ((-1, 3), (-2, 4), (-3, 3))
-    watched = ((-1, 3), (-2, 3), (-3, 3))
+    input_rows = ((-1, 3), (-2, 4), (-3, 3))
+    output_rows = ((-1, 3), (-2, 3), (-3, 3))
     return Problem(
         name=name,
         lattice=lattice,
         supports=Supports(fixed=np.arange(sum(ROW_COUNTS[:3]))),
         input=Input(
-            nodes=np.sort(np.concatenate([rightmost(lattice, row, n) for row, n in pushed])),
+            nodes=np.sort(np.concatenate([rightmost(lattice, row, n) for row, n in input_rows])),
             direction=np.array([0.0, -1.0]),
             drive="displacement",
             amount=math.sqrt(3.0) / 4.0,
         ),
         output=Output(
-            nodes=np.sort(np.concatenate([leftmost(lattice, row, n) for row, n in watched])),
+            nodes=np.sort(np.concatenate([leftmost(lattice, row, n) for row, n in output_rows])),
             direction=np.array(towards),
         ),
     )

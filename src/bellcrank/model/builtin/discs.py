@@ -1,4 +1,4 @@
-"""A lattice without order: the network of contacts of jammed discs."""
+"""Actuators on a disordered lattice: the contact network of jammed discs."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ SEEDS = range(1, 11)
 
 
 def discs(seed: int = 1) -> Problem:
-    """Push down the upper right corner of a disordered lattice, move the upper left.
+    """Return the problem on the disordered lattice of a seed.
 
-    Each seed is another lattice. The lowest tenth of the height is the support; input and
-    output lie within a fifth of width and height of the corners; the push is 1 % of the height.
+    The upper right corner is pushed down and the upper left corner moves to the left. Nodes in
+    the lowest tenth of the height are supports. Input and output are the nodes within a fifth of
+    width and height of their corners. The input displacement is 1 % of the height.
 
     Examples
     --------

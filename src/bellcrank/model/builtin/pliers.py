@@ -1,11 +1,10 @@
-"""Pliers: squeeze the handles, and the jaws should press.
+"""Pliers: a force on the handles is converted into a force at the jaws.
 
-Both halves are mirror images, so that only the upper one is modelled. It rests
-on rollers along the mirror line, right of the open mouth, and is pinned at one
-node of that line, the pivot. The halves do not cross, as those of ordinary
-pliers do, so that a plain lever from handle to jaw would open them. A beam that
-lies on the mirror line belongs to both halves and still counts in full here, as
-in the published code.
+Only the upper of two mirror-symmetric halves is modelled. It is supported by rollers along the
+mirror line, right of the open mouth, and pinned at one node of that line, the pivot. The halves do
+not cross as those of common pliers do, so a plain lever from handle to jaw would open them. Beams
+on the mirror line belong to both halves and have their full stiffness here, as in the published
+code.
 """
 
 from __future__ import annotations
@@ -26,11 +25,11 @@ PIVOT = (12.0, 0.0)
 
 @builtin.register("pliers")
 def pliers() -> Problem:
-    """Turn a squeeze of the handle into a force of the jaw on what it grips.
+    """Convert a force on the handle into a force of the jaw on the gripped object.
 
-    Five nodes at the end of the handle are pushed towards the mirror line, with
-    0.01 each; three nodes of the jaw press against stiff springs across it.
-    Efficiency compares total forces.
+    A force of 0.01 pushes each of five nodes at the end of the handle towards the mirror line.
+    Three nodes of the jaw act on stiff springs across it. The efficiency is the ratio of the
+    total forces.
 
     Examples
     --------
@@ -44,8 +43,7 @@ def pliers() -> Problem:
     pivot = nearest(lattice, PIVOT)
     handle = rightmost(lattice, -1, 5)
     jaw = leftmost(lattice, 2, 3)
-    # Rollers only stand for the other half, so beams may be cut off from them,
-    # unlike from a support.
+    # Rollers represent the other half, so that beams at them may be removed, unlike at supports.
     kept = lattice.beams_touching(np.concatenate([pivot, handle, jaw]))
     return Problem(
         name="pliers",

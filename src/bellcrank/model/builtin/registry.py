@@ -1,4 +1,4 @@
-"""The registry that built-in problems enter."""
+"""Registry of the bundled problems."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Square-ish lattices of growing size, to measure how cost grows with it."""
+"""Nearly square lattices of increasing size, to measure how cost grows with size."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ SIZES = range(8, 21)
 
 
 def scaling(size: int) -> Problem:
-    """Push down the upper right corner, watch the upper left one move left.
+    """Return the problem of a size.
 
-    The lattice has ``size + 2`` rows of `size` and ``size + 1`` nodes in turn
-    and stands on the bottom one. Input and output are the nodes within a fifth
-    of width and height of the corners; the push is 1 % of the height.
+    The upper right corner is pushed down and the upper left corner moves to the left. The lattice
+    has ``size + 2`` rows of alternately `size` and ``size + 1`` nodes; the lowest is the support.
+    Input and output are the nodes within a fifth of width and height of their corners. The input
+    displacement is 1 % of the height.
 
     Examples
     --------
@@ -30,7 +31,7 @@ def scaling(size: int) -> Problem:
     """
     lattice = triangular_rectangle(columns=size, rows=size + 2)
     x, y = (lattice.positions / lattice.positions.max(axis=0)).T
-    # Nodes exactly on the line stay outside, wherever rounding puts them.
+    # Nodes exactly on the limit are excluded despite rounding errors.
     near = 0.2 - 1e-9
     high = 1.0 - y < near
     return Problem(

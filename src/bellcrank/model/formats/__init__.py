@@ -1,8 +1,7 @@
-"""Exchange formats for lattices, one file per format.
+"""Exchange formats for lattices, one module for each.
 
-A new one is a `LatticeFormat` in a file of its own under
-``formats.register("name")``, imported below; the contract test, writing and
-reading back, picks it up by itself.
+To add one, register a `LatticeFormat` with ``formats.register("name")`` in a module of this folder
+and import it below. The contract test writes and reads every registered format.
 
 Examples
 --------

@@ -1,8 +1,8 @@
 """LAMMPS data files: atoms are nodes, bonds are beams, atom types are roles.
 
-Written in atom style *bond*, which LAMMPS reads with ``atom_style bond`` and
-OVITO opens as it is. Read are the styles atomic, bond, angle, molecular and
-full, told from the comment after ``Atoms`` or else from the number of columns.
+Files are written in atom style *bond*, which LAMMPS reads with ``atom_style bond`` and OVITO opens
+directly. The styles atomic, bond, angle, molecular and full are read. The style is the comment
+after ``Atoms``, otherwise it is determined by the number of columns.
 
 References
 ----------
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Columns before x, y, z; the atom type is the last of them, or in `full` the
-# one before the charge. Three image flags may follow.
+# Columns before x, y, z. Three image flags may follow.
 _STYLES = {
     "atomic": ("id", "type"),
     "bond": ("id", "molecule", "type"),
@@ -38,10 +37,10 @@ _STYLE_BY_COLUMNS = {5: "atomic", 8: "atomic", 6: "bond", 9: "bond", 7: "full", 
 
 
 def to_text(network: Network) -> str:
-    """Write a network as a LAMMPS data file.
+    """Return a network as a LAMMPS data file.
 
-    Coordinates are written with all their digits, so that reading them back
-    gives the same numbers. A lattice in the plane lies at z = 0.
+    Coordinates are written with all digits, so that reading returns the same numbers. A planar
+    lattice has z = 0.
 
     Examples
     --------
@@ -58,7 +57,7 @@ def to_text(network: Network) -> str:
     positions = np.zeros((lattice.node_count, 3))
     positions[:, : lattice.dimension] = lattice.positions
     types = max(int(network.roles.max()), *NodeRole)
-    margin = 0.5  # LAMMPS refuses a box without thickness
+    margin = 0.5  # LAMMPS refuses a box of no thickness
     lower, upper = positions.min(axis=0) - margin, positions.max(axis=0) + margin
     lines = [
         "bellcrank lattice, written in lattice units",
@@ -95,23 +94,22 @@ def to_text(network: Network) -> str:
 
 
 def from_text(text: str, source: str) -> Network:
-    """Read a network from a LAMMPS data file.
+    """Return the network of a LAMMPS data file.
 
-    Nodes and beams are numbered in the order of the atom and bond ids. The
-    lattice is in the plane if all z are equal. Bonds across a periodic boundary
-    are read as they stand.
+    Nodes and beams are numbered in the order of the atom and bond ids. The lattice is planar if
+    all z are equal. Bonds across a periodic boundary are read unchanged.
 
     Raises
     ------
     InvalidFile
-        If atoms or bonds are missing, or a line cannot be read; names the line.
+        If atoms or bonds are missing, or a line is invalid; names the line.
     """
     sections = _sections(text)
     if "Atoms" not in sections or "Bonds" not in sections:
         missing = "Atoms" if "Atoms" not in sections else "Bonds"
         raise InvalidFile(f"{source}: expected a LAMMPS data file with a section {missing!r}")
     style, atoms = _rows(source, sections["Atoms"])
-    # A style that is named is believed: others have the same number of columns.
+    # A named style takes precedence: several styles have the same number of columns.
     columns = _STYLES.get(style or _STYLE_BY_COLUMNS.get(atoms.shape[1], ""))
     if columns is None or atoms.shape[1] - len(columns) not in {3, 6}:
         raise InvalidFile(
@@ -137,11 +135,10 @@ def _comment(kind: int) -> str:
 
 
 def _sections(text: str) -> dict[str, tuple[str, list[tuple[int, str]]]]:
-    """Cut the file at its headings: for each the comment and the numbered lines."""
+    """Return the comment and the numbered lines of each section."""
     found: dict[str, tuple[str, list[tuple[int, str]]]] = {}
     lines: list[tuple[int, str]] = []
-    # The first line is a title, whatever it says; numbers before the first
-    # heading repeat what the sections hold.
+    # The first line is a title. Counts before the first section repeat the sections' lengths.
     for number, content, comment in _content(text):
         if content[0].isalpha():
             lines = []
@@ -161,12 +158,12 @@ def _content(text: str) -> Iterator[tuple[int, str, str]]:
 def _rows(
     source: str, section: tuple[str, list[tuple[int, str]]]
 ) -> tuple[str, NDArray[np.float64]]:
-    """Read the lines of a section as a table of numbers."""
+    """Return the comment and the lines of a section as a table of numbers."""
     comment, lines = section
     table: list[list[float]] = []
     for number, line in lines:
         try:
-            table.append([_finite(word) for word in line.split()])
+            table.append([_finite(field) for field in line.split()])
         except ValueError:
             raise InvalidFile(f"{source}: line {number}: expected numbers, got {line!r}") from None
         if len(table[-1]) != len(table[0]):
@@ -178,17 +175,17 @@ def _rows(
     return comment, np.array(table)
 
 
-def _finite(word: str) -> float:
-    value = float(word)
+def _finite(field: str) -> float:
+    value = float(field)
     if not math.isfinite(value):
-        raise ValueError(word)
+        raise ValueError(field)
     return value
 
 
 def _node_numbers(
     source: str, atom_ids: NDArray[np.int64], bonds: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Turn atom ids into places in the sorted list of them."""
+    """Return the positions of atom ids in the sorted list of ids."""
     if (np.diff(atom_ids) == 0).any():
         twice = atom_ids[np.flatnonzero(np.diff(atom_ids) == 0)[0]]
         raise InvalidFile(f"{source}: Atoms: atom {twice} is listed twice")

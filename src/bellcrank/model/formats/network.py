@@ -1,19 +1,18 @@
-"""What exchange formats carry: a lattice and the role of each node."""
+"""Content of the exchange formats: a lattice with the role of each node."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidProblem, UnknownName
+from bellcrank.errors import InvalidProblem
 from bellcrank.model.arrays import index_array, locked, rebuild
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.storage import read_text, write_text
-from bellcrank.registry import Registry
+from bellcrank.registry import FormatRegistry
 
 if TYPE_CHECKING:
     import os
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class NodeRole(IntEnum):
-    """What a node is there for; the number is its atom type in a LAMMPS file."""
+    """Role of a node; its value is the atom type in LAMMPS files."""
 
     FREE = 1
     SUPPORT = 2
@@ -42,13 +41,12 @@ class Network:
     lattice
         Nodes, in the plane or in space, and beams.
     roles : (N,) int64
-        A `NodeRole` for each node. Files from elsewhere may hold other positive
-        numbers, which are kept.
+        A `NodeRole` for each node. Other positive numbers from files are kept.
 
     Raises
     ------
     InvalidProblem
-        If there is not one positive role for each node.
+        If there is not one positive number for each node.
     """
 
     lattice: Lattice
@@ -68,15 +66,15 @@ class Network:
 
 @dataclass(frozen=True, slots=True)
 class LatticeFormat:
-    """How a format writes and reads a network.
+    """Functions that write and read a format.
 
     Parameters
     ----------
     suffixes
-        The endings of its files, the usual one first.
+        Suffixes of its files, the usual one first.
     to_text, from_text
-        The network as text, and back. The latter also gets the name of the
-        file, for its errors.
+        Conversion of a network to text, and of text and the name of the file (for errors) to a
+        network.
     """
 
     suffixes: tuple[str, ...]
@@ -84,13 +82,13 @@ class LatticeFormat:
     from_text: Callable[[str, str], Network]
 
 
-formats: Registry[LatticeFormat] = Registry("lattice format")
+formats: FormatRegistry[LatticeFormat] = FormatRegistry("lattice format")
 
 
 def network_of(design: Design) -> Network:
-    """Return the beams present in a design, with the roles its problem gives.
+    """Return the beams present in a design, with the roles of the nodes.
 
-    All nodes are kept, so that their numbers stay.
+    All nodes are kept, so that their numbers do not change.
     """
     problem = design.problem
     roles = np.full(problem.lattice.node_count, NodeRole.FREE, dtype=np.int64)
@@ -102,18 +100,18 @@ def network_of(design: Design) -> Network:
 
 
 def read_network(path: str | os.PathLike[str]) -> Network:
-    """Read a network from a file, in the format that its suffix says.
+    """Read a network from a file in the format of its suffix.
 
     Raises
     ------
     UnknownName
         If no format has that suffix.
     InvalidFile
-        If the file is not in that format.
+        If the file does not follow the format.
     InvalidProblem
-        If the lattice in it is impossible.
+        If its lattice is not valid.
     """
-    chosen = _by_suffix(path)
+    chosen = formats.for_path(path)
     try:
         return chosen.from_text(read_text(path), str(path))
     except InvalidProblem as error:
@@ -123,7 +121,7 @@ def read_network(path: str | os.PathLike[str]) -> Network:
 def write_network(
     network: Network, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
-    """Write a network to a file, in the format that its suffix says.
+    """Write a network to a file in the format of its suffix.
 
     Raises
     ------
@@ -134,13 +132,4 @@ def write_network(
     StorageError
         If it cannot be written.
     """
-    write_text(path, _by_suffix(path).to_text(network), overwrite=overwrite)
-
-
-def _by_suffix(path: str | os.PathLike[str]) -> LatticeFormat:
-    suffix = Path(path).suffix.lower()
-    for entry in formats.values():
-        if suffix in entry.suffixes:
-            return entry
-    known = ", ".join(suffix for entry in formats.values() for suffix in entry.suffixes)
-    raise UnknownName(f"{path}: unknown lattice format {suffix!r}; known suffixes: {known}")
+    write_text(path, formats.for_path(path).to_text(network), overwrite=overwrite)

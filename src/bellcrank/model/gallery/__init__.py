@@ -1,14 +1,13 @@
-"""Designs that come with the package: drawn by hand, and what searches made of the same task.
+"""Bundled designs: drawn by hand, and found by searches for the same problems.
 
-Each is a file ``human/NAME.json`` or ``machine/NAME.json`` next to this one, named like its
-problem::
+Each is a file ``human/NAME.json`` or ``machine/NAME.json`` in this folder, where NAME is the
+bundled problem::
 
     {"schema": "bellcrank/gallery/1", "problem": "crane",
      "origin": "how it works or was found, in a few sentences", "mask": "ffe0..."}
 
-It refers to the built-in problem by name instead of embedding it, so that the mask is read in
-the numbering of the code that ships it. A design for a part, with struts of a certain width,
-has that part and the stiffness of its struts too::
+The file refers to the problem by name, so that the mask uses the beam numbers of the bundled
+problem. A design for a part has the size of the part and the stiffness of its springs as well::
 
      "stiffness": {"bond": 5.0, "angle": 0.018}, "part": {"width": 2.0}
 """
@@ -34,14 +33,14 @@ Kind = Literal["human", "machine"]
 
 
 class StiffnessTable(Table):
-    """Of the springs that stand for the struts."""
+    """Stiffness of the springs that model the struts."""
 
     bond: float
     angle: float
 
 
 class GalleryTable(Table):
-    """A whole file of a design."""
+    """File of a bundled design."""
 
     schema_: Literal["bellcrank/gallery/1"] = Field(alias="schema")
     problem: str
@@ -52,24 +51,25 @@ class GalleryTable(Table):
 
 
 def gallery_design(kind: Kind, name: str) -> Design | None:
-    """Return the design of a kind for a built-in problem, if there is one.
+    """Return the bundled design of a kind for a problem.
 
     Parameters
     ----------
     kind
-        ``"human"`` for the one drawn by hand, ``"machine"`` for one that a search found.
+        ``"human"`` for the design drawn by hand, ``"machine"`` for the one found by a search.
     name
-        Of the problem.
+        Name of the problem.
 
     Returns
     -------
     Design or None
-        With ``provenance = {"kind": kind, "origin": ...}``, and the part where one was meant.
+        None if there is none. The provenance has ``kind``, ``origin`` and, for a design for a part,
+        ``part``.
 
     Raises
     ------
     InvalidFile
-        If the file that ships with the package does not fit its problem.
+        If the bundled file does not fit its problem.
 
     Examples
     --------
@@ -94,9 +94,7 @@ def gallery_design(kind: Kind, name: str) -> Design | None:
 
 
 def human_design(name: str) -> Design | None:
-    """Return the design drawn by hand for a built-in problem, which a search must beat.
-
-    Errors are those of `gallery_design`.
+    """Return the design drawn by hand for a problem, as `gallery_design`.
 
     Examples
     --------

@@ -1,9 +1,10 @@
 """Generators of lattices, by name.
 
-A new one is a function that returns a Lattice, in a file of its own, under
-``@lattices.register("name")``, and imported below. Its parameters become the
-keys of the ``[lattice]`` table in problem files; one that needs random numbers
-takes ``rng``, for which the file says ``seed``.
+To add one, write a function that returns a `Lattice`, register it with
+``@lattices.register("name")`` in a module of this folder, and import it below. Its parameters are
+the keys of the ``[lattice]`` table of problem files. A generator that needs random numbers has a
+parameter ``rng``, which is set from the key ``seed``. Generators check the number of nodes
+(`check_node_count`) before they start.
 """
 
 from bellcrank.model.lattices.delaunay import displaced_delaunay

@@ -1,4 +1,4 @@
-"""Disordered lattices from a triangular one: displace the nodes, join them anew."""
+"""Disordered lattices: a triangular lattice with displaced nodes, triangulated again."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from bellcrank.model.lattices.triangular import triangular_rectangle
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# A triangle at the rim that looks outwards with a wider angle than this is a
-# sliver: the triangulation fills every notch of the outline with such.
+# Boundary triangles with a larger angle opposite to the boundary edge are slivers: the
+# triangulation fills concave corners of the outline with them.
 WIDEST_ANGLE = math.radians(100.0)
 
 
@@ -29,26 +29,25 @@ def displaced_delaunay(
     displacement: float = 0.2,
     spacing: float = 1.0,
 ) -> Lattice:
-    """Displace the nodes of a triangular rectangle at random and triangulate.
+    """Return a triangular rectangle with randomly displaced nodes, triangulated again.
 
-    Without displacement this is `triangular_rectangle`.
+    Without displacement the result is `triangular_rectangle`.
 
     Parameters
     ----------
     columns, rows
-        Size of the rectangle, as there.
+        Size of the rectangle, as in `triangular_rectangle`.
     rng
-        Where the nodes go: anywhere in a disc around their place, evenly.
+        Source of the displacements, uniform in a disc around the regular position.
     displacement
-        Radius of that disc in spacings, from 0 to below 0.5, where nodes could
-        meet.
+        Radius of the disc in spacings, from 0 to below 0.5.
     spacing
-        Distance between neighbours before, lattice units.
+        Distance between neighbours before the displacement, lattice units.
 
     Raises
     ------
     InvalidProblem
-        If the size or the displacement lies outside these bounds.
+        If the size or the displacement is outside its bounds.
 
     Examples
     --------
@@ -78,16 +77,16 @@ def _triangulate(positions: NDArray[np.float64]) -> NDArray[np.int64]:
 def _without_slivers(
     positions: NDArray[np.float64], triangles: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Peel wide triangles off the rim, one layer after the other."""
+    """Remove slivers at the boundary, one layer after the other."""
     while True:
-        # Corner k of a triangle lies opposite to the edge between the others.
+        # Corner k of a triangle is opposite to edge k.
         edges = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2)
         _, inverse, uses = np.unique(
             edges.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
         )
         outer = (uses[inverse.ravel()] == 1).reshape(-1, 3)
         wide = outer & (_angles(positions, triangles) > WIDEST_ANGLE)
-        # A corner on the rim holds two parts together and must stay.
+        # A triangle whose corner is on the boundary connects two parts and is kept.
         on_rim = np.zeros(len(positions), dtype=np.bool_)
         on_rim[edges[outer]] = True
         sliver = (wide & ~on_rim[triangles]).any(axis=1)
@@ -97,7 +96,7 @@ def _without_slivers(
 
 
 def _angles(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(T, 3) angle at each corner of each triangle, radians."""
+    """Return the angle (T, 3) at each corner of each triangle, radians."""
     corners = positions[triangles]
     one = np.roll(corners, -1, axis=1) - corners
     two = np.roll(corners, 1, axis=1) - corners

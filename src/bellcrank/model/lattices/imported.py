@@ -1,4 +1,4 @@
-"""Lattices made elsewhere."""
+"""Lattices read from files of other programs."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def imported(path: Path) -> Lattice:
     Parameters
     ----------
     path
-        The file, relative to the problem file that names it. Its suffix says
-        the format (see `bellcrank.model.formats`).
+        The file, relative to the problem file that names it. Its suffix determines the format
+        (see `bellcrank.model.formats`).
 
     Raises
     ------
     InvalidFile, InvalidProblem, UnknownName
-        If there is no lattice to be read.
+        If the file cannot be read or does not contain a valid lattice.
     """
     return read_network(path).lattice

@@ -1,13 +1,12 @@
-"""Disordered lattices from packings of soft discs, jammed by our own code.
+"""Disordered lattices: contact networks of jammed soft discs.
 
-Discs of two sizes are thrown into a periodic box at random and pushed apart
-until they no longer move; where two touch, a beam joins their centres. Two
-sizes, because discs of one size crystallise.
+Discs of two sizes are placed at random in a periodic box and relaxed until all forces balance. A
+beam connects the centres of two discs in contact. Two sizes are used because discs of one size
+crystallise.
 
-The same generator gives the same packing on every machine: the relaxation uses
-only operations that IEEE arithmetic defines to the last bit (sums over all
-discs through `math.fsum`), as otherwise rounding would steer the many-body
-dynamics into another packing.
+A seed gives the same packing on every machine: the relaxation uses only operations that IEEE
+arithmetic defines to the last bit (sums over all discs by `math.fsum`). Other rounding errors
+would lead the many-body dynamics to another packing.
 
 References
 ----------
@@ -25,43 +24,43 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidProblem
-from bellcrank.model.lattice import Lattice
+from bellcrank.model.lattice import Lattice, check_node_count
 from bellcrank.model.lattices.registry import lattices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SIZE_RATIO = 1.4
-FORCE_TOLERANCE = 1e-9  # of the force between two discs that overlap completely
+FORCE_TOLERANCE = 1e-9  # relative to the force between two completely overlapping discs
 MAX_STEPS = 20_000
-SKIN = 0.3  # how far, in mean diameters, discs may approach before pairs are listed anew
+SKIN = 0.3  # distance beyond contact, in mean diameters, up to which pairs are listed
 
 
 @lattices.register("jammed-discs")
 def jammed_discs(
     discs: int, *, rng: np.random.Generator, packing_fraction: float = 0.88
 ) -> Lattice:
-    """Jam soft discs of two sizes and join those in contact.
+    """Return the contact network of jammed soft discs of two sizes.
 
-    The periodic box is cut open, so beams across its edges are left out, and
-    discs that hang on by less than two contacts are removed. Nodes are numbered
-    from the bottom; the mean beam is 1 long and the lower left corner is (0, 0).
+    Contacts across the edges of the periodic box are left out, and discs with fewer than two
+    contacts are removed. Nodes are numbered from the bottom. The mean beam length is 1 and the
+    lower left corner is (0, 0).
 
     Parameters
     ----------
     discs
-        Number of discs packed, at least 20; a few fewer become nodes.
+        Number of discs, at least 20. A few of them are removed from the network.
     rng
-        Where they are thrown.
+        Source of the initial positions.
     packing_fraction
-        Area of the discs over that of the box, from 0.85 (barely jammed: jamming
-        sets in at about 0.842) to 1.0.
+        Area of the discs divided by the area of the box, from 0.85 (jamming begins at about
+        0.842) to 1.0.
 
     Raises
     ------
     InvalidProblem
-        If there are too few discs or the fraction lies outside these bounds, or
-        the packing does not come to rest.
+        If the number of discs or the fraction is outside its bounds, or the relaxation does not
+        converge.
 
     Examples
     --------
@@ -71,6 +70,7 @@ def jammed_discs(
     """
     if discs < 20:
         raise InvalidProblem(f"lattice.discs: expected at least 20, got {discs}")
+    check_node_count("lattice.discs", discs)
     if not 0.85 <= packing_fraction <= 1.0:
         raise InvalidProblem(
             "lattice.packing_fraction: expected 0.85 to 1.0, where discs are jammed, "
@@ -85,7 +85,7 @@ def jammed_discs(
 def _relax(
     start: NDArray[np.float64], radii: NDArray[np.float64], box: float
 ) -> NDArray[np.float64]:
-    """Push overlapping discs apart by FIRE until every force is balanced."""
+    """Move overlapping discs apart by FIRE until all forces balance."""
     positions, velocity = start, np.zeros_like(start)
     step, mixing, downhill = 0.05, 0.1, 0
     pairs, listed_at = _close_pairs(positions, radii, box), positions
@@ -97,8 +97,8 @@ def _relax(
             return positions % box
         if math.fsum((force * velocity).ravel()) > 0.0:
             speed = math.sqrt(math.fsum((velocity * velocity).ravel()))
-            pull = math.sqrt(math.fsum((force * force).ravel()))
-            velocity = (1.0 - mixing) * velocity + (mixing * speed / pull) * force
+            strength = math.sqrt(math.fsum((force * force).ravel()))
+            velocity = (1.0 - mixing) * velocity + (mixing * speed / strength) * force
             downhill += 1
             if downhill > 5:
                 step, mixing = min(1.1 * step, 0.5), 0.99 * mixing
@@ -108,15 +108,15 @@ def _relax(
         velocity = velocity + step * force
         positions = positions + step * velocity
     raise InvalidProblem(
-        f"lattice: {len(start)} discs did not come to rest within {MAX_STEPS} steps; "
-        "try another seed or a higher packing_fraction"
+        f"lattice: the relaxation of {len(start)} discs did not converge within {MAX_STEPS} steps; "
+        "choose another seed or a higher packing_fraction"
     )
 
 
 def _close_pairs(
     positions: NDArray[np.float64], radii: NDArray[np.float64], box: float
 ) -> NDArray[np.int64]:
-    """List all pairs that may come into contact soon, in a fixed order."""
+    """Return all pairs close to contact, in a fixed order."""
     from scipy.spatial import cKDTree
 
     reach = 2.0 * float(radii.max()) + SKIN
@@ -132,15 +132,15 @@ def _repulsion(
     box: float,
     pairs: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Force on each disc, proportional to its overlaps: energy ``1/2 (1 - r/d)^2``."""
+    """Return the force on each disc, from the energy ``1/2 (1 - r/d)^2`` of each overlap."""
     first, second = pairs.T
     apart = positions[second] - positions[first]
     apart -= box * np.round(apart / box)
     distance = np.sqrt(apart[:, 0] ** 2 + apart[:, 1] ** 2)
     contact = radii[first] + radii[second]
     size = np.maximum(1.0 - distance / contact, 0.0) / contact
-    # Two discs thrown onto one point have no direction to leave in; another
-    # disc's push frees them, so no force is as good as any.
+    # Two discs at one point have no direction of repulsion. Their force is set to 0: forces of
+    # other discs separate them.
     push = (size / np.where(distance > 0.0, distance, np.inf))[:, None] * apart
     count = len(positions)
     return np.column_stack(
@@ -152,30 +152,30 @@ def _repulsion(
 
 
 def _network(positions: NDArray[np.float64], radii: NDArray[np.float64], box: float) -> Lattice:
-    """Join touching discs inside the box and number what holds together."""
+    """Return the network of discs in contact inside the box, with its nodes renumbered."""
     pairs = _close_pairs(positions, radii, box)
     apart = positions[pairs[:, 1]] - positions[pairs[:, 0]]
     touching = np.sqrt((apart**2).sum(axis=1)) < radii[pairs].sum(axis=1)
     beams = pairs[touching]
     while True:
         degree = np.bincount(beams.ravel(), minlength=len(positions))
-        firm = (degree[beams] >= 2).all(axis=1)
-        if firm.all():
+        connected = (degree[beams] >= 2).all(axis=1)
+        if connected.all():
             break
-        beams = beams[firm]
+        beams = beams[connected]
     whole = Lattice(positions, beams)
-    kept = _largest_piece(whole)
-    kept = kept[np.lexsort((positions[kept, 0], positions[kept, 1]))]
+    nodes = _largest_piece(whole)
+    nodes = nodes[np.lexsort((positions[nodes, 0], positions[nodes, 1]))]
     number = np.full(len(positions), -1)
-    number[kept] = np.arange(len(kept))
+    number[nodes] = np.arange(len(nodes))
     beams = np.sort(number[beams[number[beams[:, 0]] >= 0]], axis=1)
     beams = beams[np.lexsort((beams[:, 1], beams[:, 0]))]
-    mean = math.fsum(Lattice(positions[kept], beams).rest_length) / len(beams)
-    return Lattice((positions[kept] - positions[kept].min(axis=0)) / mean, beams)
+    mean = math.fsum(Lattice(positions[nodes], beams).rest_length) / len(beams)
+    return Lattice((positions[nodes] - positions[nodes].min(axis=0)) / mean, beams)
 
 
 def _largest_piece(lattice: Lattice) -> NDArray[np.int64]:
-    """Find the nodes of the largest part that hangs together."""
+    """Return the nodes of the largest connected piece."""
     left = np.ones(lattice.node_count, dtype=np.bool_)
     largest = np.empty(0, dtype=np.int64)
     while left.any():

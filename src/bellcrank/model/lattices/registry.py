@@ -1,4 +1,4 @@
-"""The registry that lattice generators enter."""
+"""Registry of the lattice generators."""
 
 from __future__ import annotations
 

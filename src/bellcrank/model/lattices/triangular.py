@@ -1,4 +1,4 @@
-"""Triangular lattices: rows of equally spaced nodes, joined to all neighbours."""
+"""Triangular lattices: rows of equally spaced nodes, connected to all neighbours."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidProblem
-from bellcrank.model.lattice import Lattice
+from bellcrank.model.lattice import Lattice, check_node_count
 from bellcrank.model.lattices.registry import lattices
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def triangular_rows(
     counts: Sequence[int], first_x: Sequence[float], spacing: float = 1.0
 ) -> Lattice:
-    """Stack rows of a triangular lattice from the bottom up.
+    """Return a triangular lattice of rows, from the bottom up.
 
     Nodes are numbered row by row from the bottom, left to right; beams are
     sorted by their first node, then by their second.
@@ -31,16 +31,15 @@ def triangular_rows(
     counts
         Number of nodes in each row.
     first_x
-        x of the first node of each row, lattice units. Neighbouring rows are
-        joined where they are shifted by half a spacing, as in a triangular
-        lattice.
+        x of the first node of each row, lattice units. Neighbouring rows are shifted by half a
+        spacing.
     spacing
-        Distance between neighbours; rows are ``sqrt(3)/2`` of it apart.
+        Distance between neighbours; the distance of rows is ``sqrt(3) / 2`` times as large.
 
     Raises
     ------
     InvalidProblem
-        If counts and shifts do not fit together.
+        If counts and shifts are inconsistent, or the lattice is too large.
 
     Examples
     --------
@@ -70,12 +69,12 @@ def triangular_rows(
 
 @lattices.register("triangular-rectangle")
 def triangular_rectangle(columns: int, rows: int, spacing: float = 1.0) -> Lattice:
-    """Fill a rectangle with `rows` rows of `columns` and one more node in turn.
+    """Return a rectangular lattice with alternately `columns` and ``columns + 1`` nodes in a row.
 
     Parameters
     ----------
     columns
-        Number of nodes in the bottom row, which starts half a spacing inside.
+        Number of nodes in the lowest row, which is shifted by half a spacing.
     rows
         Number of rows.
     spacing
@@ -84,7 +83,7 @@ def triangular_rectangle(columns: int, rows: int, spacing: float = 1.0) -> Latti
     Raises
     ------
     InvalidProblem
-        If there is not at least one column and two rows.
+        If there are no columns, fewer than two rows, or too many nodes.
 
     Examples
     --------
@@ -101,6 +100,7 @@ def triangular_rectangle(columns: int, rows: int, spacing: float = 1.0) -> Latti
         raise InvalidProblem(
             f"lattice: expected at least 1 column and 2 rows, got {columns} columns and {rows} rows"
         )
+    check_node_count("lattice.columns", columns * rows + rows // 2)
     counts = [columns + row % 2 for row in range(rows)]
     first_x = [0.0 if row % 2 else 0.5 * spacing for row in range(rows)]
     return triangular_rows(counts, first_x, spacing)
@@ -113,10 +113,17 @@ def _between(
     first_lower: int,
     first_upper: int,
 ) -> list[tuple[int, int]]:
-    """Join each node of a row to those half a spacing to its left and right above."""
-    shift = np.abs(upper[None, :, 0] - lower[:, None, 0])
-    pairs = np.argwhere(np.abs(shift - 0.5 * spacing) <= 1e-6 * spacing)
-    return [(first_lower + a, first_upper + b) for a, b in pairs.tolist()]
+    """Return the beams from each node of a row to those half a spacing away in the row above."""
+    beams: list[tuple[int, int]] = []
+    tolerance = 1e-6 * spacing
+    for shift in (-0.5 * spacing, 0.5 * spacing):
+        wanted = lower[:, 0] + shift
+        above = np.searchsorted(upper[:, 0], wanted - tolerance).clip(max=len(upper) - 1)
+        there = np.flatnonzero(np.abs(upper[above, 0] - wanted) <= tolerance)
+        beams += zip(
+            (first_lower + there).tolist(), (first_upper + above[there]).tolist(), strict=True
+        )
+    return beams
 
 
 def _check_rows(counts: Sequence[int], first_x: Sequence[float], spacing: float) -> None:
@@ -138,3 +145,4 @@ def _check_rows(counts: Sequence[int], first_x: Sequence[float], spacing: float)
                 f"lattice.first_x[{row}]: expected a row shifted by half a spacing "
                 f"({0.5 * spacing:g}) against the row below, got a shift of {offset * spacing:g}"
             )
+    check_node_count("lattice.counts", sum(counts))

@@ -1,7 +1,7 @@
-"""The planar outline of a part: what is meshed, printed and cut.
+"""The planar outline of a part, which is meshed, printed and cut.
 
-Straight struts become one region that is bounded by exact lines and circular arcs, with
-fillets in all corners between struts. All lengths are in mm.
+The outline of straight struts consists of exact lines and circular arcs, with fillets in all
+corners between struts. All lengths are in mm.
 
 Examples
 --------
@@ -17,7 +17,7 @@ Three struts between the corners of an equilateral triangle:
 >>> outline.piece_count, outline.hole_count
 (1, 1)
 
-Its hole has three straight sides and three fillets, which turn clockwise:
+Its hole has three straight sides and three fillets, in clockwise order:
 
 >>> hole = outline.holes[0]
 >>> (hole.turns * 180.0 / 3.141592653589793).round(6).tolist()
@@ -25,7 +25,7 @@ Its hole has three straight sides and three fillets, which turn clockwise:
 >>> hole.radii.round(6).tolist()
 [inf, 0.5, inf, 0.5, inf, 0.5]
 
-Polygons approach it as closely as one likes:
+Polygons approximate it to any accuracy:
 
 >>> round(outline.area, 3), round(outline.polygon(sagitta=1e-6).area, 3)
 (70.459, 70.459)

@@ -1,10 +1,9 @@
-"""The exact boundary of all points within some reach of a set of struts.
+"""The exact boundary of all points within a distance (reach) of a set of struts.
 
-It consists of lines beside struts and of arcs round nodes. What one strut hides of a line
-beside another, or of a circle round a node, is a single interval, for which there is a
-closed form: the strut with all points within reach of it is convex, and in the case of a
-circle of the same radius the covered angles are those of a disc that slides along the strut.
-What no interval covers is the boundary.
+It consists of lines parallel to struts and of arcs around nodes. The points of such a line or
+circle that are covered by another strut form a single interval, which has a closed form: the set of
+points within reach of a strut is convex, and the covered angles of a circle of the same radius are
+those of a disc that slides along the strut. The boundary is what no interval covers.
 """
 
 from __future__ import annotations
@@ -23,30 +22,29 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
     Ids = NDArray[np.int64]
 
-# Lines shorter than this part of the width, and arcs whose length at the surface of the
-# strut is shorter, are left out of an outline.
-LEAST_EDGE = 1e-5
+# Lines and arcs shorter than this fraction of the strut width are left out of an outline.
+MIN_EDGE = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Border:
-    """The boundary of all points within reach of struts, edge by edge along its loops.
+    """The boundary of all points within reach of struts, as edges in the order of its loops.
 
-    Material lies to the left. The edge e runs from ``foot[e, 0] + reach * normal[e, 0]`` to
+    The material is to the left. The edge e runs from ``foot[e, 0] + reach * normal[e, 0]`` to
     ``foot[e, 1] + reach * normal[e, 1]``.
 
     Parameters
     ----------
     foot : (E, 2, 2) float64, mm
-        Nearest points of the struts to start and end of each edge.
+        Points of the centre lines nearest to start and end of each edge.
     normal : (E, 2, 2) float64
-        Unit vectors out of the material at start and end of each edge.
+        Outward unit normals at start and end of each edge.
     turn : (E,) float64
-        Angle by which each edge turns: 0 beside a strut, positive round a node.
+        Angle by which each edge turns: 0 along a strut, positive around a node.
     sizes : tuple of int
-        Number of edges of each loop; edges of a loop follow each other.
+        Number of edges of each loop; the edges of a loop are consecutive.
     gap : float, mm
-        The greatest distance between the end of an edge and the start of the next.
+        Largest distance between the end of an edge and the start of the next.
     """
 
     foot: Reals
@@ -62,14 +60,14 @@ def border(struts: Struts, reach: float, width: float) -> Border:
     Parameters
     ----------
     struts
-        Struts, in general position or not.
+        The struts.
     reach : float, mm
-        Half the width of the struts with what is filled beside them.
+        Half the strut width plus the fillet radius.
     width : float, mm
-        What edges must not be much shorter than to be kept, see `LEAST_EDGE`.
+        Strut width, which determines the length of the shortest edges (`MIN_EDGE`).
     """
-    sides = _sides(struts, reach, LEAST_EDGE * width)
-    rounds = _rounds(struts, reach, 2.0 * LEAST_EDGE)
+    sides = _sides(struts, reach, MIN_EDGE * width)
+    rounds = _rounds(struts, reach, 2.0 * MIN_EDGE)
     foot, normal, turn = (np.concatenate(both) for both in zip(sides, rounds, strict=True))
     starts, ends = (foot + reach * normal).transpose(1, 0, 2)
     following, gap = _followers(starts, ends)
@@ -78,7 +76,7 @@ def border(struts: Struts, reach: float, width: float) -> Border:
 
 
 def _sides(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, Reals]:
-    """Return foot, normal and turn of all lines that bound the struts."""
+    """Return foot, normal and turn of all lines of the boundary."""
     count = len(struts.beams)
     start, end = struts.positions[struts.beams[:, 0]], struts.positions[struts.beams[:, 1]]
     length = np.linalg.norm(end - start, axis=1)
@@ -86,25 +84,25 @@ def _sides(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, Re
     near, other = struts.tree.query(struts.tree.geometries, "dwithin", 2.0 * reach)
     near, other = near[near != other], other[near != other]
     foot, normal = [], []
-    # The right-hand side of a strut, and of the same strut the other way round.
+    # The right-hand side of a strut, and of the reversed strut.
     for ends, begin, axis in (
         (struts.beams, start, along),
         (struts.beams[:, ::-1], end, -along),
     ):
         right = np.column_stack([axis[:, 1], -axis[:, 0]])
-        low, high = _hidden_of_lines(
+        low, high = _covered_lines(
             begin + reach * right, axis, length, ends, near, other, struts, reach
         )
         line, low, high = _uncovered(near, low, high, np.zeros(count), length)
-        kept = high - low > least
-        line, span = line[kept], np.column_stack([low, high])[kept]
+        long_enough = high - low > least
+        line, span = line[long_enough], np.column_stack([low, high])[long_enough]
         foot.append(begin[line, None] + span[:, :, None] * axis[line, None])
         normal.append(np.repeat(right[line, None], 2, axis=1))
     feet = np.concatenate(foot)
     return feet, np.concatenate(normal), np.zeros(len(feet))
 
 
-def _hidden_of_lines(
+def _covered_lines(
     origin: Reals,
     axis: Reals,
     length: Reals,
@@ -114,7 +112,7 @@ def _hidden_of_lines(
     struts: Struts,
     reach: float,
 ) -> tuple[Reals, Reals]:
-    """Return from where to where strut `other` hides the line beside strut `near`."""
+    """Return the interval of the line along strut `near` that strut `other` covers."""
     tail = struts.positions[struts.beams[other, 0]]
     head = struts.positions[struts.beams[other, 1]]
     span = length[other]
@@ -132,17 +130,17 @@ def _hidden_of_lines(
         off = np.abs(_cross(ahead, towards))
         square = (reach - off) * (reach + off)
         node = struts.beams[other, column]
-        # The circle round a node of the strut itself touches the line, at its end.
+        # The circle around a node of the strut itself is tangent to the line at its end.
         own = (node == ends[near, 0]) | (node == ends[near, 1])
-        hides = ~own & (square > 0.0)
-        half, middle = np.sqrt(np.where(hides, square, 0.0)), _dot(ahead, towards)
-        low = np.where(hides, np.minimum(low, middle - half), low)
-        high = np.where(hides, np.maximum(high, middle + half), high)
+        covers = ~own & (square > 0.0)
+        half, middle = np.sqrt(np.where(covers, square, 0.0)), _dot(ahead, towards)
+        low = np.where(covers, np.minimum(low, middle - half), low)
+        high = np.where(covers, np.maximum(high, middle + half), high)
     return low, high
 
 
 def _rounds(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, Reals]:
-    """Return foot, normal and turn of all arcs that bound the struts."""
+    """Return foot, normal and turn of all arcs of the boundary."""
     import shapely
 
     count = len(struts.positions)
@@ -151,13 +149,13 @@ def _rounds(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, R
     first, second = (struts.positions[struts.beams[strut, end]] for end in (0, 1))
     centre = struts.positions[node]
     begins, stops = struts.beams[strut, 0] == node, struts.beams[strut, 1] == node
-    middle, low, high = _hidden_of_circles(centre, first, second, reach)
-    # A strut that ends here hides exactly the half circle on its side.
+    middle, low, high = _covered_circles(centre, first, second, reach)
+    # A strut that ends at the node covers exactly the half circle on its side.
     away = np.where(begins[:, None], second - first, first - second)
     own = begins | stops
     middle = np.where(own, np.arctan2(away[:, 1], away[:, 0]), middle)
     low, high = np.where(own, -0.5 * np.pi, low), np.where(own, 0.5 * np.pi, high)
-    # Angles count from one of these struts, so that no arc passes the angle 0.
+    # Angles are measured from one of these struts, so that no arc contains the angle 0.
     zero = np.zeros(count)
     zero[node[own]] = middle[own]
     middle = np.mod(middle - zero[node], 2.0 * np.pi)
@@ -169,27 +167,29 @@ def _rounds(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, R
         np.full(count, 0.5 * np.pi),
         np.full(count, 1.5 * np.pi),
     )
-    kept = high - low > least
-    arc, angle = arc[kept], np.column_stack([low, high])[kept]
+    long_enough = high - low > least
+    arc, angle = arc[long_enough], np.column_stack([low, high])[long_enough]
     turn = angle[:, 1] - angle[:, 0]
     angle += zero[arc, None]
     foot = np.repeat(struts.positions[arc, None], 2, axis=1)
     return foot, np.stack([np.cos(angle), np.sin(angle)], axis=2), turn
 
 
-def _hidden_of_circles(
+def _covered_circles(
     centre: Reals, first: Reals, second: Reals, reach: float
 ) -> tuple[Reals, Reals, Reals]:
-    """Return which angles of circles of radius `reach` a strut hides, each with its own.
+    """Return the angles of circles of radius `reach` that struts cover, one strut per circle.
 
-    The angles are a middle, that towards the line of the strut, and from there the least
-    and the greatest.
+    Returns
+    -------
+    middle, low, high : (n,) float64
+        Direction towards the line of the strut, and the limits of the interval relative to it.
     """
     axis = second - first
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     right = np.column_stack([axis[:, 1], -axis[:, 0]])
     height = _dot(right, first - centre)
-    # Seen with the strut in front, the nodes at its left and right.
+    # Direction towards the strut, and positions of its ends along it.
     front = np.where(height[:, None] >= 0.0, right, -right)
     sideways = np.where(height >= 0.0, 1.0, -1.0)
     height = np.abs(height)
@@ -198,31 +198,31 @@ def _hidden_of_circles(
     right_end = sideways * _dot(axis, second - centre)
     for end in (left_end, right_end):
         distance = np.hypot(end, height)
-        hides = distance < 2.0 * reach
+        covers = distance < 2.0 * reach
         half = np.arccos(np.minimum(0.5 * distance / reach, 1.0))
         angle = np.arctan2(end, height)
-        low = np.where(hides, np.minimum(low, angle - half), low)
-        high = np.where(hides, np.maximum(high, angle + half), high)
+        low = np.where(covers, np.minimum(low, angle - half), low)
+        high = np.where(covers, np.maximum(high, angle + half), high)
     half = np.arccos(np.minimum(height / reach - 1.0, 1.0))
     for angle in (-half, half):
-        place = reach * np.sin(angle)
-        hides = (height < 2.0 * reach) & (place >= np.minimum(left_end, right_end))
-        hides &= place <= np.maximum(left_end, right_end)
-        low = np.where(hides, np.minimum(low, angle), low)
-        high = np.where(hides, np.maximum(high, angle), high)
+        offset = reach * np.sin(angle)
+        covers = (height < 2.0 * reach) & (offset >= np.minimum(left_end, right_end))
+        covers &= offset <= np.maximum(left_end, right_end)
+        low = np.where(covers, np.minimum(low, angle), low)
+        high = np.where(covers, np.maximum(high, angle), high)
     return np.arctan2(front[:, 1], front[:, 0]), low, high
 
 
 def _uncovered(
     curve: Ids, low: Reals, high: Reals, begin: Reals, end: Reals
 ) -> tuple[Ids, Reals, Reals]:
-    """Return what the intervals leave of each curve, which runs from `begin` to `end`."""
+    """Return the intervals of each curve from `begin` to `end` that are not covered."""
     every = np.arange(len(begin))
     some = low < high
     curve = np.concatenate([every, curve[some], every])
     low = np.concatenate([np.full(len(begin), -np.inf), low[some], end])
     high = np.concatenate([begin, high[some], np.full(len(begin), np.inf)])
-    # Ranks grow from curve to curve, so that one running maximum serves them all.
+    # Ranks increase from curve to curve, so that one running maximum is sufficient.
     by_end = np.lexsort((high, curve))
     rank = np.empty(len(curve), dtype=np.int64)
     rank[by_end] = np.arange(len(curve))
@@ -234,7 +234,7 @@ def _uncovered(
 
 
 def _followers(starts: Reals, ends: Reals) -> tuple[Ids, float]:
-    """Return the edge that follows each edge, and the greatest gap between two of them."""
+    """Return the edge that follows each edge, and the largest gap between consecutive edges."""
     following = np.full(len(ends), -1, dtype=np.int64)
     edges, heads = np.arange(len(ends)), np.arange(len(starts))
     gap = 0.0
@@ -250,14 +250,14 @@ def _followers(starts: Reals, ends: Reals) -> tuple[Ids, float]:
     return following, gap
 
 
-def _nearest(places: Reals, points: Reals) -> tuple[Reals, Ids]:
-    """Return the distance of each of `points` to the nearest of `places`, and which it is."""
-    distance, which = cKDTree(places).query(points)
+def _nearest(targets: Reals, points: Reals) -> tuple[Reals, Ids]:
+    """Return distance and index of the nearest of `targets` for each of `points`."""
+    distance, which = cKDTree(targets).query(points)
     return np.asarray(distance, dtype=np.float64), np.asarray(which, dtype=np.int64)
 
 
 def _cycles(following: Ids) -> tuple[Ids, tuple[int, ...]]:
-    """Return all edges in the order in which they follow each other, and each loop's count."""
+    """Return all edges in order, loop by loop, and the number of edges of each loop."""
     order: list[int] = []
     sizes: list[int] = []
     successor = following.tolist()
@@ -276,7 +276,7 @@ def _cycles(following: Ids) -> tuple[Ids, tuple[int, ...]]:
 def _between(
     value: Reals, slope: Reals, least: Reals | float, most: Reals | float
 ) -> tuple[Reals, Reals]:
-    """Return from where to where ``value + slope * t`` lies between `least` and `most`."""
+    """Return the interval of t in which ``value + slope * t`` is between `least` and `most`."""
     steep = np.where(np.abs(slope) < 1e-15, 1e-15, slope)
     one, two = (least - value) / steep, (most - value) / steep
     return np.minimum(one, two), np.maximum(one, two)

@@ -1,4 +1,4 @@
-"""Closed curves of straight lines and circular arcs, and the outline of a part made of them."""
+"""Closed curves of lines and circular arcs, and outlines that consist of them."""
 
 from __future__ import annotations
 
@@ -16,24 +16,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loop:
-    """A closed curve of straight lines and circular arcs, with material to its left.
+    """A closed curve of lines and circular arcs, with material to its left.
 
-    An outer boundary therefore runs counterclockwise, a hole clockwise.
+    An outer boundary is counterclockwise, a hole clockwise.
 
     Parameters
     ----------
     points : (n, 2) float64, mm
-        Corners in order; the last is joined to the first.
+        Corners in order; the last is connected to the first.
     bulge : (n,) float64
-        Of the edge from each point to the next: 0 for a straight line, otherwise the
-        tangent of a quarter of the angle by which an arc turns, positive if it turns
-        counterclockwise (as in DXF). No edge turns by more than half a circle.
+        Bulge of the edge from each point to the next, as in DXF: 0 for a line, otherwise the
+        tangent of a quarter of the angle of the arc, positive for a counterclockwise arc. No edge
+        turns by more than half a circle.
 
     Raises
     ------
     InvalidSettings
-        If shapes are wrong, a number is not finite, or an edge turns by more than half a
-        circle.
+        If a shape is wrong, a number is not finite, or an edge turns by more than half a circle.
 
     Examples
     --------
@@ -74,25 +73,25 @@ class Loop:
 
     @property
     def turns(self) -> NDArray[np.float64]:
-        """(n,) angle by which each edge turns, positive counterclockwise; 0 for lines."""
+        """Angle by which each edge turns, (n,), positive counterclockwise; 0 for lines."""
         return 4.0 * np.arctan(self.bulge)
 
     @property
     def chords(self) -> NDArray[np.float64]:
-        """(n, 2) vector from the start of each edge to its end, mm."""
+        """Vector from the start of each edge to its end, (n, 2), mm."""
         vectors: NDArray[np.float64] = np.roll(self.points, -1, axis=0) - self.points
         return vectors
 
     @property
     def radii(self) -> NDArray[np.float64]:
-        """(n,) radius of each arc, mm; inf for lines."""
+        """Radius of each arc, (n,), mm; inf for lines."""
         return _divided(
             np.linalg.norm(self.chords, axis=1) * (1.0 + self.bulge**2), 4.0 * np.abs(self.bulge)
         )
 
     @property
     def centres(self) -> NDArray[np.float64]:
-        """(n, 2) centre of each arc, mm; nan for lines."""
+        """Centre of each arc, (n, 2), mm; nan for lines."""
         chords = self.chords
         left = np.column_stack([-chords[:, 1], chords[:, 0]])
         height = _divided(1.0 - self.bulge**2, 4.0 * self.bulge)
@@ -102,7 +101,7 @@ class Loop:
 
     @property
     def edge_lengths(self) -> NDArray[np.float64]:
-        """(n,) length of each edge, mm, along the arc where it is one."""
+        """Length of each edge along the curve, (n,), mm."""
         chord = np.linalg.norm(self.chords, axis=1)
         half = 0.5 * np.abs(self.turns)
         lengths: NDArray[np.float64] = chord / np.sinc(half / np.pi)
@@ -110,13 +109,13 @@ class Loop:
 
     @property
     def length(self) -> float:
-        """Length of the whole loop, mm."""
+        """Length of the loop, mm."""
         return float(self.edge_lengths.sum())
 
     @property
     def area(self) -> float:
-        """Area inside, mm^2, exact; negative for a loop that runs clockwise."""
-        # Seen from one of the points, coordinates far from the origin lose no digits.
+        """Exact enclosed area, mm^2; negative for a clockwise loop."""
+        # Relative to one of the points: coordinates far from the origin would lose digits.
         x, y = (self.points - self.points[0]).T
         arc = self.bulge != 0.0
         turn = self.turns[arc]
@@ -126,7 +125,7 @@ class Loop:
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Least x, least y, greatest x, greatest y, mm, arcs included."""
+        """Minimum x and y, maximum x and y, mm, including arcs."""
         arc = self.bulge != 0.0
         centres, radii, turns = self.centres[arc], self.radii[arc], self.turns[arc]
         start = np.arctan2(*(self.points[arc] - centres).T[::-1])
@@ -140,17 +139,17 @@ class Loop:
         return low[0], low[1], high[0], high[1]
 
     def flattened(self, sagitta: float) -> NDArray[np.float64]:
-        """Points along the loop whose chords depart from arcs by at most `sagitta` mm.
+        """Return points along the loop whose chords deviate from arcs by at most `sagitta` mm.
 
         Parameters
         ----------
         sagitta
-            Greatest distance between an arc and its chord, mm.
+            Largest distance between an arc and its chord, mm.
 
         Returns
         -------
         (m, 2) float64, mm
-            Every corner and the points between; the last is joined to the first.
+            All corners and the points between; the last is connected to the first.
 
         Raises
         ------
@@ -167,7 +166,7 @@ class Loop:
         arc = np.flatnonzero(self.bulge)
         radii, turns = self.radii[arc], self.turns[arc]
         step = 2.0 * np.arccos(np.clip(1.0 - sagitta / radii, 0.0, 1.0))
-        # An arc much flatter than the sagitta has a step that rounds to nothing.
+        # For an arc much flatter than the sagitta the step is rounded to 0.
         step = np.maximum(step, np.sqrt(2.0 * sagitta / radii))
         parts = np.ones(len(self.points), dtype=np.int64)
         parts[arc] = np.ceil(np.abs(turns) / step).clip(1)
@@ -186,19 +185,19 @@ class Loop:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """All closed curves that bound a planar part.
+    """The boundary of a planar part.
 
     Parameters
     ----------
     outer
-        Loops round the part from outside, counterclockwise, one for each separate piece.
+        Outer loops, counterclockwise, one for each separate piece.
     holes
-        Loops round its holes, clockwise.
+        Loops around holes, clockwise.
 
     Raises
     ------
     InvalidSettings
-        If there is no outer loop, or a loop runs the wrong way round.
+        If there is no outer loop, or a loop has the wrong orientation.
 
     Examples
     --------
@@ -224,7 +223,7 @@ class Outline:
                 if not sign * loop.area > 0.0:
                     turn = "counterclockwise" if sign > 0.0 else "clockwise"
                     raise InvalidSettings(
-                        f"{name}[{k}]: expected a loop that runs {turn}, got area {loop.area:g}"
+                        f"{name}[{k}]: expected a {turn} loop, got area {loop.area:g}"
                     )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -237,33 +236,33 @@ class Outline:
 
     @property
     def piece_count(self) -> int:
-        """How many separate pieces the part consists of."""
+        """Number of separate pieces."""
         return len(self.outer)
 
     @property
     def hole_count(self) -> int:
-        """How many holes they have altogether."""
+        """Number of holes."""
         return len(self.holes)
 
     @property
     def edge_count(self) -> int:
-        """How many lines and arcs bound the part."""
+        """Number of lines and arcs."""
         return sum(len(loop.points) for loop in self.loops)
 
     @property
     def area(self) -> float:
-        """Area of the part, mm^2, exact."""
+        """Exact area, mm^2."""
         return float(np.sum([loop.area for loop in self.loops]))
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Least x, least y, greatest x, greatest y, mm, arcs included."""
+        """Minimum x and y, maximum x and y, mm, including arcs."""
         every = np.array([loop.bounds for loop in self.outer])
         low, high = every[:, :2].min(axis=0).tolist(), every[:, 2:].max(axis=0).tolist()
         return low[0], low[1], high[0], high[1]
 
     def scaled(self, factor: float) -> Outline:
-        """Return the outline `factor` times as large, measured from the origin.
+        """Return the outline scaled by `factor` about the origin.
 
         Raises
         ------
@@ -286,7 +285,7 @@ class Outline:
         return Outline(outer, holes)
 
     def polygon(self, sagitta: float = 0.01) -> Polygon | MultiPolygon:
-        """Return the outline as polygons whose sides depart from arcs by at most `sagitta` mm.
+        """Return polygons whose sides deviate from the arcs by at most `sagitta` mm.
 
         Returns
         -------
@@ -301,7 +300,7 @@ class Outline:
             return Polygon(shells[0].exterior, holes)
         if holes:
             hole, around = STRtree(shells).query([Polygon(ring) for ring in holes], "within")
-            # Pieces may lie in holes of others: a hole belongs to the least shell around it.
+            # Pieces may be inside holes of others: a hole belongs to the smallest shell around it.
             sizes = np.array([shell.area for shell in shells])
             order = np.lexsort((sizes[around], hole))
             _, first = np.unique(hole[order], return_index=True)
@@ -322,7 +321,7 @@ def _locked(name: str, values: ArrayLike) -> NDArray[np.float64]:
 
 
 def _divided(above: NDArray[np.float64], below: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the quotient, with inf where `below` is 0."""
+    """Return the quotient; inf where `below` is 0."""
     flat = below == 0.0
     quotient: NDArray[np.float64] = np.where(flat, np.inf, above / np.where(flat, 1.0, below))
     return quotient

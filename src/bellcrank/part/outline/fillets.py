@@ -1,4 +1,4 @@
-"""From what lies within reach of struts back to their surface, with re-entrant corners filled."""
+"""The surface of struts with filled re-entrant corners, from the boundary within reach of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.part.outline.boundary import LEAST_EDGE, border
+from bellcrank.part.outline.boundary import MIN_EDGE, border
 from bellcrank.part.outline.curves import Loop, Outline
 
 if TYPE_CHECKING:
@@ -17,36 +17,36 @@ if TYPE_CHECKING:
     from bellcrank.part.outline.boundary import Border
     from bellcrank.part.outline.struts import Struts
 
-# Edges that should meet may miss each other by this part of the reach, where very short
-# edges between them were left out.
-_GREATEST_GAP = 1e-3
+# Largest gap between consecutive edges, where very short edges were left out, relative to the
+# reach.
+_MAX_GAP = 1e-3
 
 
 def filled(struts: Struts, width: float, fillet: float) -> Outline:
-    """Return the outline of struts whose corners are filled, whatever becomes of the holes.
+    """Return the outline of struts with fillets, without checking whether holes close.
 
-    A point is outside the part if a disc of radius `fillet` that touches no strut covers it.
-    The centres of such discs are all points beyond ``width / 2 + fillet`` of the centre lines,
-    and where they are bounded by a corner, the part is bounded by an arc about that corner.
+    A point is outside the part if it is inside a disc of radius `fillet` that touches no strut. The
+    centres of such discs are the points farther than ``width / 2 + fillet`` from the centre lines.
+    Each corner of their boundary gives an arc of the outline around that corner.
 
     Raises
     ------
     InvalidSettings
-        If rounding errors hide how the edges of the outline follow each other.
+        If the order of the edges cannot be determined because of rounding errors.
     """
     reach = 0.5 * width + fillet
     edges = border(struts, reach, width)
-    if not edges.gap < _GREATEST_GAP * reach:
+    if not edges.gap < _MAX_GAP * reach:
         raise InvalidSettings(
             f"width: at {width:g} mm with fillets of {fillet:g} mm the outline does not close, "
-            "where surfaces of struts all but touch; choose a slightly different width"
+            "since surfaces of struts almost touch; choose a slightly different width"
         )
-    points, bulge, loop = _surface(edges, 0.5 * width, reach, LEAST_EDGE * width)
-    points, bulge, loop = _without_flat_corners(points, bulge, loop, 1e-3 * LEAST_EDGE * width)
+    points, bulge, loop = _surface(edges, 0.5 * width, reach, MIN_EDGE * width)
+    points, bulge, loop = _without_flat_corners(points, bulge, loop, 1e-3 * MIN_EDGE * width)
     limits = np.searchsorted(loop, np.arange(len(edges.sizes) + 1)).tolist()
     outer, holes = [], []
     for begin, end in pairwise(limits):
-        # What is left of a hole at the very moment when it closes.
+        # A hole that has just closed.
         if end - begin < 2:
             continue
         curve = Loop(points[begin:end] + struts.origin, bulge[begin:end])
@@ -60,7 +60,7 @@ def filled(struts: Struts, width: float, fillet: float) -> Outline:
 def _surface(
     edges: Border, half: float, reach: float, least: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return corners, bulges and loop numbers of the surface, with an arc for each corner."""
+    """Return corners, bulges and loop numbers of the surface, with one arc for each fillet."""
     surface = edges.foot + half * edges.normal
     count = len(surface)
     sizes = np.array(edges.sizes)
@@ -73,15 +73,15 @@ def _surface(
     fillet = np.arctan2(-cross, np.sum(leaving * entering, axis=1))
     gap = np.linalg.norm(surface[onward, 0] - surface[:, 1], axis=1)
     filled_corner = (gap > least) & (fillet > 0.0) & (reach > half)
-    # Without a fillet between them, two edges share one corner.
+    # Edges without a fillet between them share one corner.
     joint = np.where(
         filled_corner[:, None], surface[:, 1], 0.5 * (surface[:, 1] + surface[onward, 0])
     )
     start = np.where(filled_corner[before, None], surface[:, 0], joint[before])
     points = np.stack([start, joint], axis=1).reshape(-1, 2)
     bulge = np.column_stack([np.tan(0.25 * edges.turn), -np.tan(0.25 * fillet)]).ravel()
-    kept = np.column_stack([np.ones(count, dtype=np.bool_), filled_corner]).ravel()
-    return points[kept], bulge[kept], np.repeat(loop, 2)[kept]
+    used = np.column_stack([np.ones(count, dtype=np.bool_), filled_corner]).ravel()
+    return points[used], bulge[used], np.repeat(loop, 2)[used]
 
 
 def _without_flat_corners(
@@ -90,7 +90,7 @@ def _without_flat_corners(
     loop: NDArray[np.int64],
     least: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Make one line of consecutive lines in the same direction."""
+    """Merge consecutive lines of the same direction."""
     _, sizes = np.unique(loop, return_counts=True)
     onward = _onward(sizes)
     before = np.empty_like(onward)
@@ -103,7 +103,7 @@ def _without_flat_corners(
 
 
 def _onward(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the number of the next element of each, round loops of the given sizes."""
+    """Return the index of the next element of each, in loops of the given sizes."""
     onward = np.arange(1, int(sizes.sum()) + 1)
     ends = np.cumsum(sizes)
     onward[ends - 1] = ends - sizes

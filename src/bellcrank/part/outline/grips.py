@@ -1,8 +1,8 @@
-"""Exact changes of an outline where a part is held, pushed and read.
+"""Plates, pads and pointers: exact changes of an outline.
 
-Lines and arcs stay what they are: holes between the nodes of a block are filled, so that it
-becomes a plate to clamp or a pad to push, and a strut can be added that points out how an output
-moves. `bellcrank.part.outline.screws` drills holes into plates.
+Filling the holes between the nodes of a block makes a plate for clamping or a pad for pushing. An
+additional strut at the output makes its motion visible. Lines and arcs remain exact.
+`bellcrank.part.outline.screws` adds screw holes to plates.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ if TYPE_CHECKING:
     Ids = NDArray[np.int64]
 
 _CLOSE = 1e-6
-"""Struts whose distances differ by this part of them are equally far."""
+"""Relative tolerance of equal distances."""
 
 
 def filled(outline: Outline, positions: ArrayLike, beams: ArrayLike, nodes: ArrayLike) -> Outline:
-    """Return an outline without the holes that lie between given nodes.
+    """Return an outline without the holes between given nodes.
 
-    A hole goes if every strut around it joins two of the nodes, and with it whatever lies in it.
+    A hole is filled, with its content, if every strut around it connects two of the nodes.
 
     Parameters
     ----------
     outline
-        Of the struts.
+        Outline of the struts.
     positions : (N, 2) array_like, mm
         Nodes.
     beams : (M, 2) array_like of int
         The two nodes of each strut.
     nodes : (k,) array_like of int
-        The nodes of the block, such as all supports.
+        Nodes of the block, for example all supports.
 
     Raises
     ------
     InvalidSettings
-        If there is no such node.
+        If a node does not exist.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def filled(outline: Outline, positions: ArrayLike, beams: ArrayLike, nodes: Arra
 def with_pointer(
     positions: ArrayLike, beams: ArrayLike, node: int, direction: ArrayLike, length: float
 ) -> tuple[Reals, Ids]:
-    """Return nodes and beams with one strut more, that points from a node into a direction.
+    """Return nodes and beams with an additional strut from a node in a given direction.
 
     Parameters
     ----------
@@ -88,21 +88,21 @@ def with_pointer(
     beams : (M, 2) array_like of int
         The two nodes of each strut.
     node
-        Where the pointer begins, such as an output node.
+        Node at which the pointer begins, for example an output node.
     direction : (2,) array_like
-        Where it points, such as the wanted motion; its length does not matter.
+        Direction of the pointer, not normalised.
     length : float, mm
-        Of the pointer.
+        Length of the pointer.
 
     Returns
     -------
     (N + 1, 2) float64, mm, and (M + 1, 2) int64
-        For `strut_outline`.
+        Arguments for `strut_outline`.
 
     Raises
     ------
     InvalidSettings
-        If there is no such node, or the direction or the length is none.
+        If the node does not exist, or the direction or the length is not valid.
 
     Examples
     --------
@@ -123,9 +123,9 @@ def with_pointer(
 
 
 def _probes(hole: Loop) -> Reals:
-    """Return a point for each edge of a hole, to which those struts are nearest that bound it.
+    """Return a point for each edge of a hole to which the bounding struts are nearest.
 
-    These are both struts whose corner a fillet fills, if one looks from its centre.
+    The point of a fillet is its centre, which has the same distance from two struts.
     """
     chords = hole.chords
     left = np.column_stack([-chords[:, 1], chords[:, 0]])
@@ -135,7 +135,7 @@ def _probes(hole: Loop) -> Reals:
 
 
 def _without_holes(outline: Outline, gone: NDArray[np.bool_]) -> Outline:
-    """Return an outline without some of its holes and without what lies in them."""
+    """Return an outline without some of its holes and their content."""
     import shapely
 
     holes = [hole for hole, away in zip(outline.holes, gone, strict=True) if not away]
@@ -153,7 +153,7 @@ def _without_holes(outline: Outline, gone: NDArray[np.bool_]) -> Outline:
 
 
 def read_nodes(nodes: ArrayLike, count: int) -> Ids:
-    """Return (k,) numbers of nodes; InvalidSettings if there is no such node."""
+    """Return valid node numbers, (k,) int64; InvalidSettings if a node does not exist."""
     ids = np.asarray(nodes)
     if ids.ndim != 1 or not len(ids) or not np.issubdtype(ids.dtype, np.integer):
         raise InvalidSettings(f"nodes: expected one or more numbers of nodes, got {nodes!r}")

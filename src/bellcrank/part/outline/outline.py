@@ -1,4 +1,4 @@
-"""The outline of a part that consists of struts."""
+"""The outline of a set of struts."""
 
 from __future__ import annotations
 
@@ -24,28 +24,27 @@ def strut_outline(
 ) -> Outline:
     """Return the outline of struts with round ends and filled corners.
 
-    The part is the union of all points within half a width of the centre lines, with all
-    corners between struts filled as far as a disc of radius `fillet` does not reach into
-    them. Its lines and arcs are exact. Where `fillet` is above 0, they meet without kinks.
+    The part is the set of all points within half a width of the centre lines. Corners between
+    struts are filled where a disc of radius `fillet` does not reach. Lines and arcs are exact.
+    They are tangent to each other if `fillet` is above 0.
 
-    Lines shorter than 1e-5 of the width are left out, and arcs likewise, which may move their
-    neighbours' ends as far. Nodes within 1e-8 of the size of the whole are in one place, and
-    holes narrower than 1e-5 of it do not count as such.
+    Lines and arcs shorter than 1e-5 of the width are left out, which moves the ends of their
+    neighbours by at most this length. Nodes closer than 1e-8 of the size of the part coincide.
+    Holes narrower than 1e-5 of it are ignored.
 
     Parameters
     ----------
     positions : (N, 2) array_like, mm
-        Nodes. Those that no beam touches are left out.
+        Nodes. Nodes without beams are ignored.
     beams : (M, 2) array_like of int
-        The two nodes of each strut. Struts may cross, overlap and end anywhere.
+        The two nodes of each strut. Struts may cross and overlap.
     width : float, mm
-        Width of the struts.
+        Strut width.
     fillet : float, mm
-        Radius of the fillets; 0 leaves corners sharp.
+        Fillet radius; 0 for sharp corners.
     keep_holes
-        Whether to refuse struts so wide that holes between them close, or that they touch
-        where no node joins them. If false, fillets too may close holes, but still not split
-        them nor join struts.
+        Whether to refuse a width at which holes close or struts without a common node touch. If
+        false, fillets may close holes as well, but may not split them or connect struts.
 
     Returns
     -------
@@ -55,8 +54,8 @@ def strut_outline(
     Raises
     ------
     InvalidSettings
-        If an array or a length makes no sense, a beam has no length, or `width` or `fillet`
-        is larger than the holes permit.
+        If an array or a length is not valid, a beam has no length, or `width` or `fillet` is too
+        large for the holes.
 
     Examples
     --------

@@ -1,11 +1,10 @@
-"""How wide struts may be, and how large their fillets, before holes close or struts join.
+"""Largest strut width and fillet radius at which no hole closes and no struts join.
 
-As all struts swell at the same rate, what they enclose changes its connections only where
-the distance to the nearest centre line has a critical point. Its maxima are the centres of
-holes, which close there. At its saddles two surfaces meet, halfway between a node and the
-node or strut opposite it, with no other strut between them; a hole splits there or a new one
-arises. Up to there, fillets that fill different corners stay apart, too: two that met would
-enclose something new.
+When the width of all struts increases, the topology of the outline changes only at critical points
+of the distance to the nearest centre line. Its maxima are the centres of holes, which close there.
+At its saddle points two surfaces meet, midway between a node and the node or strut opposite to it,
+with no other strut between them: a hole splits or a new one is enclosed. Below these widths fillets
+of different corners do not touch either, since touching fillets would enclose a new hole.
 """
 
 from __future__ import annotations
@@ -26,40 +25,40 @@ if TYPE_CHECKING:
 
     from bellcrank.part.outline.struts import Struts
 
-# Struts this narrow, as a part of the whole, enclose all holes there are. What is closer to
-# each other touches.
+# Width of struts, relative to the size of the part, at which all holes are open. Surfaces closer
+# than this touch.
 _HAIR = 1e-5
 
-# A radius closer to the greatest would leave holes that are too small to draw.
+# Relative margin to the critical radius, at which holes would be too small to draw.
 _MARGIN = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Half-widths of struts at which holes close and surfaces meet.
+    """Half-widths of struts at which holes close or surfaces meet.
 
     Parameters
     ----------
     depths : (H,) float64, mm
-        Of each hole, the radius of the largest circle in it.
+        Radius of the largest circle in each hole.
     bottlenecks : (B,) float64, mm
-        Half-widths at which surfaces meet that no node joins, ascending.
-    places : (B, 2) float64, mm
-        Where they meet.
+        Half-widths at which surfaces without a common node meet, ascending.
+    points : (B, 2) float64, mm
+        Points at which they meet.
     """
 
     depths: NDArray[np.float64]
     bottlenecks: NDArray[np.float64]
-    places: NDArray[np.float64]
+    points: NDArray[np.float64]
 
     @property
     def least(self) -> float:
-        """The first change of all, mm; inf if there is none."""
+        """Smallest half-width at which the topology changes, mm; inf if there is none."""
         return float(min(self.depths.min(initial=np.inf), self.bottlenecks.min(initial=np.inf)))
 
 
 def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> float:
-    """Return the largest radius of fillets with which no hole closes, splits or is added.
+    """Return the largest fillet radius at which no hole closes, splits or is added.
 
     Parameters
     ----------
@@ -73,7 +72,7 @@ def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> flo
     Returns
     -------
     float, mm
-        To within a thousandth, and never too large; inf where nothing limits it.
+        Accurate to 0.1 % and never too large; inf if there is no limit.
 
     Raises
     ------
@@ -82,8 +81,8 @@ def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> flo
 
     Examples
     --------
-    The circle inscribed in an equilateral triangle with sides of 12 mm has a radius of
-    3.46 mm, of which half a strut takes 1 mm.
+    The inscribed circle of an equilateral triangle with sides of 12 mm has a radius of 3.46 mm.
+    Half a strut covers 1 mm of it.
 
     >>> triangle = [[0.0, 0.0], [12.0, 0.0], [6.0, 108.0**0.5]], [[0, 1], [1, 2], [2, 0]]
     >>> round(room_for_fillet(*triangle, width=2.0), 2)
@@ -97,7 +96,7 @@ def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> flo
 
 
 def check_sizes(width: float, fillet: float) -> None:
-    """Raise unless both are lengths that struts and fillets may have."""
+    """Check that a width is above 0 and a fillet radius is not negative."""
     if not 0.0 < width < math.inf:
         raise InvalidSettings(f"width: expected a length above 0 mm, got {width!r}")
     if not 0.0 <= fillet < math.inf:
@@ -105,19 +104,19 @@ def check_sizes(width: float, fillet: float) -> None:
 
 
 def check_room(limits: Limits, width: float, fillet: float) -> None:
-    """Raise if what is between struts changes its connections.
+    """Check that no hole closes, splits or is added.
 
     Parameters
     ----------
     limits
-        Half-widths at which it does.
+        Half-widths at which the topology changes.
     width, fillet : float, mm
         Width of the struts and radius of the fillets.
 
     Raises
     ------
     InvalidSettings
-        If holes close, split or are added; says how wide or large at most.
+        If one does; names the largest width or radius.
     """
     half, most = 0.5 * width, _allowed(limits.least)
     if half >= most:
@@ -125,7 +124,7 @@ def check_room(limits: Limits, width: float, fillet: float) -> None:
             f"width: struts {width:g} mm wide would {_change(limits, half)}; "
             f"choose at most {_floored(2.0 * most)} mm"
         )
-    # What `room_for_fillet` returned must pass, whichever way the sum was rounded.
+    # The result of `room_for_fillet` is accepted despite rounding errors.
     if fillet > 0.0 and half + fillet > (1.0 + 1e-12) * most:
         raise InvalidSettings(
             f"fillet: a radius of {fillet:g} mm would {_change(limits, half + fillet)}; "
@@ -134,35 +133,35 @@ def check_room(limits: Limits, width: float, fillet: float) -> None:
 
 
 def find_limits(struts: Struts, reach: float = math.inf) -> Limits:
-    """Find at which half-widths holes close and surfaces meet.
+    """Return the half-widths at which holes close and surfaces meet.
 
-    Of the surfaces that meet, the first are found, unless all holes or `reach` come before.
+    Only the first meeting surfaces are listed, up to the smallest hole and `reach`.
 
     Parameters
     ----------
     struts
         Struts.
     reach : float, mm
-        Half-width beyond which it does not matter.
+        Largest half-width considered.
     """
     import shapely
 
     depths = _depths(struts)
     most = min(1.001 * reach, float(depths.min(initial=struts.extent)))
-    # The search goes ever further: pairs of distant nodes are many, and seldom the first.
+    # The distance is increased step by step: pairs of distant nodes are many and seldom first.
     limit = min(most, float(shapely.length(struts.tree.geometries).mean()))
-    values, places = _bottlenecks(struts, limit)
+    values, points = _bottlenecks(struts, limit)
     while not len(values) and limit < most:
         limit = min(2.0 * limit, most)
-        values, places = _bottlenecks(struts, limit)
-    return Limits(depths, values, places)
+        values, points = _bottlenecks(struts, limit)
+    return Limits(depths, values, points)
 
 
 def find_joins(struts: Struts, half: float, reach: float) -> Limits:
-    """Find where surfaces meet between two half-widths, whatever becomes of holes."""
-    values, places = _bottlenecks(struts, 1.001 * reach)
+    """Return the points at which surfaces meet between two half-widths, without holes."""
+    values, points = _bottlenecks(struts, 1.001 * reach)
     later = values > half
-    return Limits(np.empty(0), values[later], places[later])
+    return Limits(np.empty(0), values[later], points[later])
 
 
 def _depths(struts: Struts) -> NDArray[np.float64]:
@@ -175,13 +174,13 @@ def _depths(struts: Struts) -> NDArray[np.float64]:
         [shapely.Polygon(loop.flattened(0.1 * hair)) for loop in outline.holes], object
     )
     if outline.piece_count > 1 and len(rings):
-        # A piece that lies in a hole of another takes part of it.
+        # A piece inside a hole of another covers a part of it.
         pieces = np.array([shapely.Polygon(loop.flattened(0.1 * hair)) for loop in outline.outer])
         around, within = shapely.STRtree(pieces).query(rings, "contains")
         for ring in np.unique(around):
             inside = shapely.union_all(pieces[within[around == ring]])
             rings[ring] = shapely.difference(rings[ring], inside)
-    # No circle in a convex hole is smaller than its area divided by its length.
+    # Area divided by length is a lower bound of the radius in a convex hole.
     fine = 2e-4 * shapely.area(rings) / shapely.length(rings)
     circles = shapely.maximum_inscribed_circle(rings, fine)
     centres = shapely.points(shapely.get_coordinates(shapely.get_point(circles, 0)) - struts.origin)
@@ -192,7 +191,7 @@ def _depths(struts: Struts) -> NDArray[np.float64]:
 
 
 def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return at which half-widths up to `limit` surfaces meet, and where, ascending."""
+    """Return the half-widths up to `limit` at which surfaces meet, ascending, and the points."""
     import shapely
 
     nodes = struts.positions
@@ -210,7 +209,7 @@ def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDA
     _, distance = struts.tree.query_nearest(
         shapely.points(middle), all_matches=False, return_distance=True
     )
-    # What is closer than a hair is one, be it only by rounding.
+    # Closer points coincide, up to rounding.
     apart = (half > _HAIR * struts.extent) & (half <= limit)
     found = np.flatnonzero(apart & (distance > (1.0 - 1e-9) * half))
     found = found[np.argsort(half[found], kind="stable")]
@@ -218,20 +217,20 @@ def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDA
 
 
 def _allowed(critical: float) -> float:
-    """Return the greatest half-width that is safely below a critical one."""
+    """Return the largest half-width allowed for a critical one."""
     return (1.0 - _MARGIN) * critical
 
 
 def _change(limits: Limits, reach: float) -> str:
-    """Say what becomes of the space between struts within `reach`."""
+    """Return the change of topology at a half-width, as text."""
     closed = int(np.count_nonzero(reach > _allowed(1.0) * limits.depths))
     if closed:
         return f"close {closed} of {len(limits.depths)} holes"
-    x, y = limits.places[0]
-    return f"join struts that share no node, first at ({x:.4g}, {y:.4g}) mm"
+    x, y = limits.points[0]
+    return f"join struts without a common node, first at ({x:.4g}, {y:.4g}) mm"
 
 
 def _floored(length: float) -> str:
-    """Return a length with three digits, never rounded up."""
+    """Return a length with three digits, rounded down."""
     step = 10.0 ** (math.floor(math.log10(length)) - 2)
     return f"{math.floor(length / step) * step:.3g}"

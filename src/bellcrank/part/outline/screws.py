@@ -1,4 +1,4 @@
-"""Screw holes in a plate, as exact as the outline: where there is room for them, and where best."""
+"""Screw holes in a plate, and their best positions."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     Ids = NDArray[np.int64]
 
 _ACROSS = 120
-"""How many candidates for a screw are tried along the longer side of a plate."""
+"""Number of candidate positions along the longer side of a plate."""
 _INSIDE = 0.75
-"""How far inside a plate screws should be, as a part of what its middle permits."""
+"""Preferred clearance of screws, as a fraction of the largest clearance in the plate."""
 
 
 def drilled(outline: Outline, centres: ArrayLike, diameter: float, wall: float) -> Outline:
@@ -28,16 +28,16 @@ def drilled(outline: Outline, centres: ArrayLike, diameter: float, wall: float) 
     Parameters
     ----------
     outline
-        Of the part.
+        Outline of the part.
     centres : (k, 2) array_like, mm
-        Where to drill.
+        Centres of the holes.
     diameter, wall : float, mm
-        Of the holes, and what must be left around them everywhere.
+        Diameter of the holes, and smallest thickness of the material around them.
 
     Raises
     ------
     InvalidSettings
-        If some hole would leave too thin a wall, or a length makes no sense.
+        If a hole leaves too thin a wall, or a length is not valid.
 
     Examples
     --------
@@ -48,7 +48,7 @@ def drilled(outline: Outline, centres: ArrayLike, diameter: float, wall: float) 
     Traceback (most recent call last):
         ...
     bellcrank.errors.InvalidSettings: centres[0]: a hole of 4 mm at (3, 10) mm would leave a wall \
-of 1 mm, less than 2 mm; move it, fill a larger plate, or choose a smaller screw
+of 1 mm, less than 2 mm; move it, choose a larger plate or a smaller screw
     """
     radius = _read_screw(diameter, wall)
     places = np.asarray(centres, dtype=np.float64).reshape(-1, 2)
@@ -61,8 +61,8 @@ of 1 mm, less than 2 mm; move it, fill a larger plate, or choose a smaller screw
         x, y = places[thin[0]]
         raise InvalidSettings(
             f"centres[{thin[0]}]: a hole of {diameter:g} mm at ({x:.4g}, {y:.4g}) mm would leave "
-            f"{_left_over(left[thin[0]])}, less than {wall:g} mm; move it, fill a larger plate, "
-            "or choose a smaller screw"
+            f"{_left_over(left[thin[0]])}, less than {wall:g} mm; move it, choose a larger plate "
+            "or a smaller screw"
         )
     side = np.array([radius, 0.0])
     turn = np.array([-1.0, -1.0])
@@ -78,20 +78,20 @@ def screw_places(
     diameter: float,
     wall: float,
 ) -> Reals:
-    """Return where screws hold a plate best: far from each other and well inside.
+    """Return the best positions of screws in a plate: far from each other and from the boundary.
 
     Parameters
     ----------
     outline
-        Of the part, with its plate (`filled`).
+        Outline of the part with its plate (`filled`).
     positions : (N, 2) array_like, mm
         All nodes of the lattice.
     nodes : (k,) array_like of int
-        Those of the plate: screws are nearer to one of them than to any other node.
+        Nodes of the plate: screws are nearer to one of them than to any other node.
     count
-        How many screws.
+        Number of screws.
     diameter, wall : float, mm
-        Of their holes, and what must be left around them everywhere.
+        Diameter of the holes, and smallest thickness of the material around them.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def screw_places(
     Raises
     ------
     InvalidSettings
-        If the plate has no room for them.
+        If the plate has no room for the screws.
 
     Examples
     --------
@@ -134,24 +134,25 @@ def screw_places(
             return places
     raise InvalidSettings(
         f"count: no room for {count} screw holes of {diameter:g} mm with {wall:g} mm of wall; the "
-        f"largest circle in the plate is {2.0 * max(deepest, 0.0):.3g} mm wide; fill a larger "
-        "plate, or choose fewer or smaller screws"
+        f"largest circle in the plate is {2.0 * max(deepest, 0.0):.3g} mm wide; choose a "
+        "larger plate, or fewer or smaller screws"
     )
 
 
 def clearance(outline: Outline, points: ArrayLike) -> Reals:
-    """Return the distance of points from the boundary of a part, exact.
+    """Return the exact distance of points from the boundary of a part.
 
     Parameters
     ----------
     outline
-        Of the part.
+        Outline of the part.
     points : (k, 2) array_like, mm
+        The points.
 
     Returns
     -------
     (k,) float64, mm
-        Above 0 within the part, below 0 outside.
+        Positive inside the part, negative outside.
 
     Examples
     --------
@@ -169,13 +170,13 @@ def clearance(outline: Outline, points: ArrayLike) -> Reals:
     distance = np.full(len(places), np.inf)
     for loop in outline.loops:
         distance = np.minimum(distance, _distance(loop, places))
-    # So near to an arc that its chord decides, the sign means nothing.
+    # The sign is not exact within the distance of an arc and its chord.
     signed: Reals = np.where(inside, distance, -distance)
     return signed
 
 
 def _distance(loop: Loop, places: Reals) -> Reals:
-    """Return how far points are from a loop."""
+    """Return the distance of points from a loop."""
     nearest = np.full(len(places), np.inf)
     for start, chord, centre, radius, turn in zip(
         loop.points, loop.chords, loop.centres, loop.radii, loop.turns, strict=True
@@ -198,7 +199,7 @@ def _distance(loop: Loop, places: Reals) -> Reals:
 
 
 def _far_apart(places: Reals, count: int) -> Reals:
-    """Choose places, each as far as can be from those before, beginning with two extremes."""
+    """Return points, each as far as possible from the previous ones."""
     if not len(places):
         return places
     middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
@@ -213,7 +214,7 @@ def _far_apart(places: Reals, count: int) -> Reals:
 
 
 def _are_apart(places: Reals, count: int, least: float) -> bool:
-    """Whether there are enough places, and none nearer to another than permitted."""
+    """Return whether there are enough points with the least distance."""
     if len(places) < count:
         return False
     away = np.linalg.norm(places[:, None] - places[None], axis=2)

@@ -1,4 +1,4 @@
-"""Struts as they come in: checked, and cut wherever a node lies on them."""
+"""Validated struts, divided at every node that lies on them."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from shapely import STRtree
 
-# Nodes closer to each other than this part of the whole are in one place, and those closer
-# to a strut lie on it.
-_ONE_PLACE = 1e-8
+# Nodes closer than this distance, relative to the size of the part, coincide; nodes closer to a
+# strut lie on it.
+_COINCIDENT = 1e-8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Struts:
-    """Straight struts between nodes, none of which coincides with another or lies on a strut.
+    """Straight struts between distinct nodes, none of which lies inside a strut.
 
-    Struts may cross, but no two of them share more than a point.
+    Struts may cross, but do not overlap.
 
     Parameters
     ----------
     positions : (N, 2) float64, mm
-        Nodes, all of them touched by a strut, measured from `origin`.
+        Nodes relative to `origin`; each has a strut.
     beams : (M, 2) int64
         The two nodes of each strut.
     tree
-        Their centre lines, in the order of `beams`.
+        Spatial index of the centre lines, in the order of `beams`.
     origin : (2,) float64, mm
-        A point amid the nodes: coordinates from there lose the fewest digits.
+        Centre of the bounding box, which minimises rounding errors of coordinates.
     extent : float, mm
-        Size of the whole, against which rounding errors are measured.
+        Size of the part, the reference of relative tolerances.
     """
 
     positions: NDArray[np.float64]
@@ -49,7 +49,7 @@ class Struts:
 
 
 def read_struts(positions: ArrayLike, beams: ArrayLike) -> Struts:
-    """Check nodes and beams, leave out nodes that no beam touches, and cut beams at nodes.
+    """Validate nodes and beams, remove nodes without beams, and divide beams at nodes.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def read_struts(positions: ArrayLike, beams: ArrayLike) -> Struts:
     Raises
     ------
     InvalidSettings
-        If a shape is wrong, a number is not finite, or a beam names a node that does not
-        exist or has no length.
+        If a shape is wrong, a number is not finite, or a beam names an unknown node or has no
+        length.
     """
     import shapely
 
@@ -76,31 +76,31 @@ def read_struts(positions: ArrayLike, beams: ArrayLike) -> Struts:
     nodes = nodes[touched]
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     origin, extent = 0.5 * (low + high), float((high - low).max())
-    place = _places(nodes, _ONE_PLACE * extent)
-    without = np.flatnonzero(place[pairs[:, 0]] == place[pairs[:, 1]])
+    label = _coincident(nodes, _COINCIDENT * extent)
+    without = np.flatnonzero(label[pairs[:, 0]] == label[pairs[:, 1]])
     if len(without):
         a, b = touched[pairs[without[0]]]
         raise InvalidSettings(
-            f"beams[{without[0]}]: has no length, nodes {a} and {b} are in one place; leave it out"
+            f"beams[{without[0]}]: has no length, nodes {a} and {b} coincide; remove it"
         )
-    _, first = np.unique(place, return_index=True)
+    _, first = np.unique(label, return_index=True)
     nodes = nodes[first] - origin
-    pairs = _cut_at_nodes(nodes, place[pairs], _ONE_PLACE * extent)
+    pairs = _cut_at_nodes(nodes, label[pairs], _COINCIDENT * extent)
     tree = shapely.STRtree(shapely.linestrings(nodes[pairs]))
     return Struts(nodes, pairs, tree, origin, extent)
 
 
 def pieces_of(beams: NDArray[np.int64], node_count: int) -> NDArray[np.int64]:
-    """Return a number for each node that it shares with all nodes that beams lead to."""
+    """Return the number of the connected piece of each node."""
     graph = coo_array((np.ones(len(beams)), (beams[:, 0], beams[:, 1])), (node_count,) * 2)
     labels: NDArray[np.int64] = connected_components(graph, directed=False)[1].astype(np.int64)
     return labels
 
 
 def expected_holes(positions: ArrayLike, beams: ArrayLike) -> int:
-    """Count the holes between struts that are very narrow and cross nowhere.
+    """Return the number of holes between very narrow struts that do not cross.
 
-    By Euler's formula these are beams - touched nodes + separate pieces.
+    By Euler's formula it is beams - nodes with beams + pieces.
 
     Parameters
     ----------
@@ -127,25 +127,25 @@ def expected_holes(positions: ArrayLike, beams: ArrayLike) -> int:
 def _cut_at_nodes(
     nodes: NDArray[np.float64], pairs: NDArray[np.int64], tolerance: float
 ) -> NDArray[np.int64]:
-    """Return the struts between neighbouring nodes along each strut, each of them once."""
+    """Return the distinct struts between neighbouring nodes along each strut."""
     import shapely
 
     tree = shapely.STRtree(shapely.linestrings(nodes[pairs]))
     node, strut = tree.query(shapely.points(nodes), "dwithin", tolerance)
-    # Both ends of every strut belong, whatever rounding says of their distance.
+    # Both ends of every strut are included despite rounding errors.
     node = np.concatenate([pairs[:, 0], pairs[:, 1], node])
     strut = np.concatenate([np.tile(np.arange(len(pairs)), 2), strut])
     strut, node = np.unique(np.column_stack([strut, node]), axis=0).T
     tail, head = nodes[pairs[strut, 0]], nodes[pairs[strut, 1]]
-    place = np.sum((nodes[node] - tail) * (head - tail), axis=1)
-    order = np.lexsort((place, strut))
+    position = np.sum((nodes[node] - tail) * (head - tail), axis=1)
+    order = np.lexsort((position, strut))
     strut, node = strut[order], node[order]
     parts = np.column_stack([node[:-1], node[1:]])[strut[:-1] == strut[1:]]
     return np.unique(np.sort(parts, axis=1), axis=0)
 
 
-def _places(nodes: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
-    """Return a number for each node that nodes in one place have in common."""
+def _coincident(nodes: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
+    """Return a label for each node, equal for coincident nodes."""
     close = cKDTree(nodes).query_pairs(tolerance, output_type="ndarray")
     return pieces_of(close, len(nodes))
 
@@ -171,7 +171,7 @@ def _read_positions(positions: ArrayLike) -> NDArray[np.float64]:
 def _read_beams(beams: ArrayLike) -> NDArray[np.int64]:
     pairs = np.asarray(beams)
     if pairs.size == 0:
-        raise InvalidSettings("beams: expected one or more, got none; there is no part to outline")
+        raise InvalidSettings("beams: expected one or more, got none")
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise InvalidSettings(f"beams: expected shape (M, 2), got shape {pairs.shape}")
     if not np.issubdtype(pairs.dtype, np.integer):
