@@ -1,4 +1,4 @@
-"""What files, G-code and movies cost: ``python -m benchmarks.fabrication [--quick]``."""
+"""Time and size of files, G-code and movies: ``python -m benchmarks.fabrication [--quick]``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bellcrank.workflows.animate import MotionOptions, animate_motion
 from bellcrank.workflows.fabricate import print_design
 
 SLOW = ("step",)
-"""Formats that take minutes for thousands of struts."""
+"""Formats that need minutes for thousands of struts."""
 
 
 def main() -> None:

@@ -2,15 +2,14 @@
 A first design
 ==============
 
-A lattice of beams is pushed down on its right; its top left should move to the left. Which beams
-should be there?
+The upper right of a lattice of beams is pushed down, and its upper left is to move to the left. A
+search selects the beams.
 """
 
 # %%
-# The task
-# --------
-# Some problems come with the package. This one is called the crane: 352 beams, of which a search
-# may take away 203.
+# The problem
+# -----------
+# The crane is a bundled problem: 352 beams, of which a search may remove 203.
 
 from pathlib import Path
 
@@ -20,29 +19,29 @@ from bellcrank.search import HoppingSettings
 from bellcrank.workflows import complete_design, motion_of, start_design
 
 crane = find_problem("crane")
-print(crane.lattice.beam_count, "beams, of which", len(crane.designable), "may go")
+print(crane.lattice.beam_count, "beams, of which", len(crane.designable), "are designable")
 
 # %%
 # Searching
 # ---------
-# A search runs in a folder, from which it goes on after any interruption. More steps and more
-# chains find better designs; ``bellcrank design crane`` takes four chains of 20,000.
+# A search is stored in a folder, from which it can be resumed after an interruption. More steps and
+# chains find better designs; ``bellcrank design crane`` runs four chains of 20,000 steps.
 
 folder = start_design(crane, HoppingSettings(steps=4000, chains=1, seed=1), Path("crane"))
 report = complete_design(folder)
 machine = report.selection.design
 
 # %%
-# What it found
-# -------------
-# The *efficiency* is how far the output goes, the wanted way, over how far the input is pushed.
-# Beside it, a lever that a person cut out of the same lattice.
+# The result
+# ----------
+# The *efficiency* is the displacement of the output in the wanted direction divided by the
+# displacement of the input. The human design is a lever drawn by hand in the same lattice.
 
 print(f"machine {report.selection.efficiency_after:.2f}, {machine.beam_count} beams")
 print(f"human   {report.human_response.efficiency:.2f}")
 
 # %%
-# Grey is at rest, black is pushed.
+# The designs are drawn at rest in grey and at full stroke in black.
 
 draw_comparison(
     motion_of(human_design("crane"), name="human"),
@@ -51,4 +50,4 @@ draw_comparison(
 )
 
 # %%
-# On the command line, all of that is ``bellcrank design crane``.
+# The command ``bellcrank design crane`` does all of this.

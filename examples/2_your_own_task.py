@@ -1,14 +1,14 @@
 """
-A task of your own
-==================
+Your own problem
+================
 
-A problem is a lattice, what holds it, what pushes it, and what should move.
+A problem is a lattice with supports, an input and an output.
 """
 
 # %%
 # In a file
 # ---------
-# Regions are named by rows, boxes or numbers of nodes.
+# Regions are rows, boxes, nearest nodes or node numbers. Lengths are in lattice units.
 
 from pathlib import Path
 
@@ -41,10 +41,10 @@ nodes = [{ row = -1, leftmost = 2 }]
 direction = [0, 1]
 """)
 lift = find_problem("lift.toml")
-draw_design(lift.full_design(), "task.png", title="the task")
+draw_design(lift.full_design(), "task.png", title="the problem")
 
 # %%
-# The whole lattice is stiff, and its output hardly moves.
+# The full lattice is stiff, and its output hardly moves.
 
 whole = SpringEvaluator(lift).evaluate(lift.initial)
 print(f"all beams: efficiency {whole.efficiency:.3f}")
@@ -52,8 +52,8 @@ print(f"all beams: efficiency {whole.efficiency:.3f}")
 # %%
 # Goals
 # -----
-# What a design must keep is said in words (see :doc:`/goals`): here, at most two thirds of the
-# material, and no strut that stretches by more than a tenth.
+# Constraints are written as text (see :doc:`/goals`): here, at most two thirds of the material, and
+# a strain of at most 0.1 in each beam.
 
 settings = HoppingSettings(
     steps=3000, chains=1, seed=3, goals=("mass <= 0.67", "strain <= 0.1", "connected")

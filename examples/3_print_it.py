@@ -1,14 +1,14 @@
 """
-Print it
-========
+Export and printing
+===================
 
-A design becomes a part: struts of some width, a thickness, a scale, a material.
+A part is a design with a strut width, a thickness, a scale and a material.
 """
 
 # %%
-# How large
-# ---------
-# One lattice unit becomes ``scale``; lengths are in millimetres.
+# The part
+# --------
+# ``scale`` is the length of a lattice unit; lengths are in millimetres.
 
 from pathlib import Path
 
@@ -23,14 +23,14 @@ from bellcrank.workflows.pictures import draw_validations
 crane = gallery_design("machine", "crane")
 spec = PartSpec(width=1.6, thickness=5.0, scale=10.0, material="ninjaflex")
 part = spec.of(crane)
-for finding in check_print(part):
-    print(finding.sentence)
+for warning in check_print(part):
+    print(warning.sentence)
 
 # %%
-# Does the part move like that?
-# -----------------------------
-# Finite elements of the struts, bent and stretched along the whole stroke, answer in a second
-# (see :doc:`/validation` for plane and solid ones).
+# Validation
+# ----------
+# Nonlinear beam finite elements compute the motion of the part along the whole stroke in about a
+# second (see :doc:`/validation` for plane and solid elements).
 
 validation = validate(crane, spec, [("frame", FemSettings())])
 frame = validation.analyses[0]
@@ -40,7 +40,7 @@ draw_validations([validation], ["machine:crane"], Path("stress.png"))
 # %%
 # Files
 # -----
-# The suffix says what is written: ``.stl`` and ``.3mf`` for printers, ``.dxf``, ``.svg`` and
+# The suffix determines the format: ``.stl`` and ``.3mf`` for printers, ``.dxf``, ``.svg`` and
 # ``.step`` for cutters and drawings.
 
 for name in ("crane.3mf", "crane.stl", "crane.dxf"):
@@ -48,7 +48,7 @@ for name in ("crane.3mf", "crane.stl", "crane.dxf"):
     print(name, Path(name).stat().st_size // 1000, "kB")
 
 # %%
-# A card goes with the part: how it moves, how large and heavy it is, how to print it.
+# The card of the part shows its motion, size, mass and print settings.
 
 make_card(crane, spec, Path("card.png"))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.export import Export, Finding, PrintRules, check_print, checks
+from bellcrank.export import Export, PrintRules, PrintWarning, check_print, checks
 from bellcrank.model import (
     Design,
     Input,
@@ -42,8 +42,8 @@ def part_of(positions: list, beams: list, mask: list | None = None, **spec: obje
 SQUARE = ([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 2], [2, 3], [3, 0]])
 
 
-def found(part: Part | Export, **rules: float) -> dict[str, Finding]:
-    return {finding.kind: finding for finding in check_print(part, PrintRules(**rules))}
+def found(part: Part | Export, **rules: float) -> dict[str, PrintWarning]:
+    return {warning.kind: warning for warning in check_print(part, PrintRules(**rules))}
 
 
 def test_nothing_is_said_of_a_part_that_prints() -> None:
@@ -58,10 +58,10 @@ def test_every_check_says_what_it_finds_in_whole_sentences(name: str) -> None:
     )
     part = part_of(*tail, width=0.7, thickness=5.0, fillet=0.01)
     rules = {"bead_width": 12.0, "nozzle": 12.0} if name in {"gaps", "holes"} else {}
-    finding = found(part, **rules)[name]
-    assert finding.kind == name
-    assert finding.sentence[0].isupper() or finding.sentence[0].isdigit()
-    assert finding.sentence.endswith(".")
+    warning = found(part, **rules)[name]
+    assert warning.kind == name
+    assert warning.sentence[0].isupper() or warning.sentence[0].isdigit()
+    assert warning.sentence.endswith(".")
 
 
 def test_four_beads_of_045_make_a_strut_of_16_and_of_040_do_not() -> None:

@@ -80,7 +80,7 @@ def test_random_layouts_print_with_small_and_large_fillets(kind: str, seed: int)
     holes = expected_holes(*layout)
     for share in FILLETS:
         outline = strut_outline(*layout, width, share * room)
-        solid = extruded(outline, 5.12, sagitta=0.02).on_the_bed()
+        solid = extruded(outline, 5.12, sagitta=0.02).on_bed()
         assert outline.hole_count == holes
         for made, read in ((stl, read_stl), (threemf, read_3mf)):
             assert_sound(read(made.solid_to_bytes(solid, "random")), holes, outline.area * 5.12)

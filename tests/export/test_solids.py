@@ -74,7 +74,7 @@ def test_polygons_are_finer_where_surfaces_almost_touch(kind: str, seed: int) ->
 
 def test_corners_lie_where_numbers_of_single_precision_hold_them() -> None:
     outline = strut_outline(*triangular(12, 9), 2.0, 0.5).translated([-20.2, 1.0 / 3.0])
-    on_bed = extruded(outline, 5.12).on_the_bed()
+    on_bed = extruded(outline, 5.12).on_bed()
     flat = on_bed.vertices[:, :2]
     assert (flat.astype(np.float32) == flat).all()
     assert on_bed.vertices.min(axis=0).tolist() == [0.0, 0.0, 0.0]

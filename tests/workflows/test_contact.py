@@ -12,7 +12,7 @@ from bellcrank.part import PartSpec
 from bellcrank.search import Verdict
 from bellcrank.search.constraints import ConstrainedEvaluator, LoadCase
 from bellcrank.workflows.candidate_ranking import fault_of
-from bellcrank.workflows.fabricate import findings_about, profile_for
+from bellcrank.workflows.fabricate import print_warnings, profile_for
 
 SPEC = PartSpec(width=1.5)
 
@@ -72,5 +72,5 @@ def test_no_contact_is_verified_along_the_stroke(sweep: Design) -> None:
 
 def test_the_report_before_printing_names_contact_along_the_stroke(sweep: Design) -> None:
     bundle = Export(part=SPEC.of(sweep))
-    findings = " ".join(findings_about(bundle, profile_for(None, SPEC)))
+    findings = " ".join(print_warnings(bundle, profile_for(None, SPEC)))
     assert "beams 1 and 2 from 38% of the stroke" in findings

@@ -98,5 +98,5 @@ def export(
     write(bundle, out, overwrite=overwrite)
     notes.print(f"wrote {plain(out)}, {bundle.thickness:g} mm thick")
     if out.suffix.lower() in PRINTED:
-        for finding in check_print(bundle):
-            notes.print(f"[yellow]printing:[/] {plain(finding.sentence)}")
+        for warning in check_print(bundle):
+            notes.print(f"[yellow]printing:[/] {plain(warning.sentence)}")

@@ -59,8 +59,8 @@ def print_(
     from bellcrank.workflows import spec_for
     from bellcrank.workflows.fabricate import (
         bundle_of,
-        findings_about,
         print_design,
+        print_warnings,
         profile_for,
     )
 
@@ -76,7 +76,7 @@ def print_(
     job = print_design(bundle, printer, target, slicer=slicer, overwrite=overwrite)
     _print(job)
     announce_compilation()
-    for sentence in findings_about(bundle, printer):
+    for sentence in print_warnings(bundle, printer):
         notes.print(f"[yellow]printing:[/] {plain(sentence)}")
     notes.print(f"wrote {plain(target)}")
 

@@ -23,22 +23,22 @@ The suffix determines the format of a file:
 Features that a printer cannot reproduce are listed:
 
 >>> rules = PrintRules(bead_width=0.40, layer=0.32)
->>> for finding in check_print(bundle, rules)[:2]:
-...     print(finding.sentence)  # doctest: +ELLIPSIS
+>>> for warning in check_print(bundle, rules)[:2]:
+...     print(warning.sentence)  # doctest: +ELLIPSIS
 Struts 1.6 mm wide are no whole number of 0.4 mm beads in 0.32 mm layers: 1.39 or 1.73 mm would ...
 A thickness of 5 mm is no whole number of layers of 0.32 mm; 16 of them are 5.12 mm.
 """
 
 from bellcrank.export.beads import PrintRules
-from bellcrank.export.checks import Finding, check_print, checks
+from bellcrank.export.checks import PrintWarning, check_print, checks
 from bellcrank.export.formats import Export, Exporter, export, exporters
 from bellcrank.export.solid import Solid, extruded, whole_layers
 
 __all__ = [
     "Export",
     "Exporter",
-    "Finding",
     "PrintRules",
+    "PrintWarning",
     "Solid",
     "check_print",
     "checks",

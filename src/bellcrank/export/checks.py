@@ -29,7 +29,7 @@ WIDTH_TOLERANCE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class PrintWarning:
     """A feature of a part that a printer cannot reproduce, or that has no function.
 
     Parameters
@@ -39,7 +39,7 @@ class Finding:
     sentence
         Description and recommendation.
     points : tuple of (x, y), mm
-        Positions, the worst first; empty if the finding concerns the whole part.
+        Positions, the worst first; empty if the warning concerns the whole part.
     """
 
     kind: str
@@ -47,12 +47,14 @@ class Finding:
     points: Points = ()
 
 
-checks: Registry[Callable[[Part, Outline, PrintRules], Finding | None]] = Registry("print check")
-"""Functions from a part, its outline and the print rules to a finding or None."""
+checks: Registry[Callable[[Part, Outline, PrintRules], PrintWarning | None]] = Registry(
+    "print check"
+)
+"""Functions from a part, its outline and the print rules to a warning or None."""
 
 
-def check_print(what: Part | Export, rules: PrintRules | None = None) -> list[Finding]:
-    """Return the findings of all checks of a part.
+def check_print(what: Part | Export, rules: PrintRules | None = None) -> list[PrintWarning]:
+    """Return the warnings of all checks of a part.
 
     Parameters
     ----------
@@ -71,25 +73,25 @@ def check_print(what: Part | Export, rules: PrintRules | None = None) -> list[Fi
     >>> from bellcrank.model import human_design
     >>> from bellcrank.part import PartSpec
     >>> part = PartSpec(width=1.6).of(human_design("crane"))
-    >>> [finding.kind for finding in check_print(part, PrintRules(layer=0.2, bead_width=0.4))]
+    >>> [warning.kind for warning in check_print(part, PrintRules(layer=0.2, bead_width=0.4))]
     ['struts', 'dead-ends']
     """
     rules = rules or PrintRules()
     bundle = what if isinstance(what, Export) else Export(part=what)
     outline = bundle.outline()
-    found = [check(bundle.part, outline, rules) for check in checks.values()]
-    return [finding for finding in found if finding is not None]
+    warnings = [check(bundle.part, outline, rules) for check in checks.values()]
+    return [warning for warning in warnings if warning is not None]
 
 
 @checks.register("struts")
-def check_struts(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
+def check_struts(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check that struts consist of a whole number of lines, and of enough of them."""
     width = part.section.width
     lines, least = rules.lines_in(width), rules.width_of(rules.min_lines)
     short = WIDTH_TOLERANCE * rules.bead_width
     bead = f"{rules.bead_width:g} mm beads in {rules.layer:g} mm layers"
     if width < least - short:
-        return Finding(
+        return PrintWarning(
             "struts",
             f"Struts {width:g} mm wide are narrower than {_counted(rules.min_lines, 'line')} of "
             f"{bead}; choose a width of at least {least:.2f} mm, or a smaller nozzle.",
@@ -100,7 +102,7 @@ def check_struts(part: Part, outline: Outline, rules: PrintRules) -> Finding | N
     below = lines if off > 0.0 else lines - 1
     fitting = " or ".join(f"{rules.width_of(n):.2f}" for n in (below, below + 1) if n > 0)
     bead_width = (width - rules.overlap) / lines + rules.overlap
-    return Finding(
+    return PrintWarning(
         "struts",
         f"Struts {width:g} mm wide are not a whole number of {bead}; choose {fitting} mm, or "
         f"{lines} beads of {bead_width:.2f} mm.",
@@ -108,13 +110,13 @@ def check_struts(part: Part, outline: Outline, rules: PrintRules) -> Finding | N
 
 
 @checks.register("layers")
-def check_layers(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
+def check_layers(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check that the thickness is a whole number of layers."""
     wanted = part.section.thickness
     printed = whole_layers(wanted, rules.layer)
     if abs(printed - wanted) <= 1e-6 * wanted:
         return None
-    return Finding(
+    return PrintWarning(
         "layers",
         f"The thickness of {wanted:g} mm is not a whole number of layers of {rules.layer:g} mm; "
         f"{round(printed / rules.layer)} layers are {printed:g} mm.",
@@ -122,7 +124,7 @@ def check_layers(part: Part, outline: Outline, rules: PrintRules) -> Finding | N
 
 
 @checks.register("gaps")
-def check_gaps(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:
+def check_gaps(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:
     """Check that gaps between struts without a common node are wide enough to stay open."""
     import shapely
 
@@ -136,7 +138,7 @@ def check_gaps(part: Part, outline: Outline, rules: PrintRules) -> Finding | Non
     open_ = (width < least) & ~shapely.contains_xy(solid, *joins.points.T)
     if not open_.any():
         return None
-    return Finding(
+    return PrintWarning(
         "gaps",
         f"{_counted(int(open_.sum()), 'gap')} between struts that share no node, narrower than "
         f"{least:g} mm, may close in printing; the narrowest is {width[open_][0]:.2g} mm "
@@ -146,24 +148,24 @@ def check_gaps(part: Part, outline: Outline, rules: PrintRules) -> Finding | Non
 
 
 @checks.register("holes")
-def check_holes(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
+def check_holes(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check that a circle of the width of a bead fits into each hole."""
     import shapely
 
     if not outline.holes:
         return None
     least = _smallest_gap(rules)
-    rings = np.array([shapely.Polygon(loop.flattened(0.01 * least)) for loop in outline.holes])
+    polygons = np.array([shapely.Polygon(loop.flattened(0.01 * least)) for loop in outline.holes])
     # A circle of the radius area / length fits into every hole.
-    small = np.flatnonzero(shapely.area(rings) < 0.5 * least * shapely.length(rings))
-    circles = shapely.maximum_inscribed_circle(rings[small], 0.01 * least)
+    small = np.flatnonzero(shapely.area(polygons) < 0.5 * least * shapely.length(polygons))
+    circles = shapely.maximum_inscribed_circle(polygons[small], 0.01 * least)
     across = 2.0 * shapely.length(circles)
     narrow = across < least
     if not narrow.any():
         return None
     order = np.argsort(across[narrow], kind="stable")
     points = shapely.get_coordinates(shapely.get_point(circles[narrow][order], 0))
-    return Finding(
+    return PrintWarning(
         "holes",
         f"{_counted(int(narrow.sum()), 'hole')} less than {least:g} mm across may close in "
         f"printing; the smallest is {across[narrow].min():.2g} mm at {_format(points[0])}. Choose "
@@ -173,12 +175,12 @@ def check_holes(part: Part, outline: Outline, rules: PrintRules) -> Finding | No
 
 
 @checks.register("fillets")
-def check_fillets(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
+def check_fillets(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check that fillets are not smaller than half a bead."""
     radius, least = part.fillet_radius, 0.5 * rules.bead_width
     if radius >= least:
         return None
-    return Finding(
+    return PrintWarning(
         "fillets",
         f"Fillets of {radius:.3g} mm are smaller than half a bead ({least:.3g} mm): "
         "printed corners are rounder than computed; choose larger fillets.",
@@ -186,13 +188,13 @@ def check_fillets(part: Part, outline: Outline, rules: PrintRules) -> Finding | 
 
 
 @checks.register("pieces")
-def check_pieces(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
+def check_pieces(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check that the part is one piece."""
     if outline.piece_count == 1:
         return None
     loose = sorted(outline.outer, key=lambda loop: loop.area)[:-1]
     points = np.array([loop.points[0] for loop in loose])
-    return Finding(
+    return PrintWarning(
         "pieces",
         f"The part is in {outline.piece_count} pieces, the smallest at "
         f"{_format(points[0])}; remove loose pieces.",
@@ -201,7 +203,7 @@ def check_pieces(part: Part, outline: Outline, rules: PrintRules) -> Finding | N
 
 
 @checks.register("dead-ends")
-def check_dead_ends(part: Part, outline: Outline, rules: PrintRules) -> Finding | None:  # noqa: ARG001
+def check_dead_ends(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check for struts that end in a free node."""
     problem = part.design.problem
     degree = np.bincount(part.struts.ravel(), minlength=problem.lattice.node_count)
@@ -210,7 +212,7 @@ def check_dead_ends(part: Part, outline: Outline, rules: PrintRules) -> Finding 
     if not len(ends):
         return None
     end, carry = ("ends", "carries") if len(ends) == 1 else ("end", "carry")
-    return Finding(
+    return PrintWarning(
         "dead-ends",
         f"{_counted(len(ends), 'strut')} {end} in a free node and {carry} no load, the first in "
         f"node {ends[0]} at {_format(part.positions[ends[0]])}; removing them saves material.",

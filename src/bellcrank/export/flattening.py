@@ -80,10 +80,10 @@ def polygons_of(outline: Outline, sagitta: float = SAGITTA) -> list[Reals]:
     loops = outline.loops
     fine = np.full(len(loops), sagitta)
     for _ in range(_REFINEMENTS):
-        rings = _on_grid(_followed(loops, fine), grid, outline.area)
-        touching, point = _touching(rings)
+        polygons = _on_grid(_approximated(loops, fine), grid, outline.area)
+        touching, point = _touching(polygons)
         if not len(touching):
-            return rings
+            return polygons
         fine[touching] *= 0.25
     raise InvalidSettings(
         f"fillet: surfaces almost touch at ({point[0]:.4g}, {point[1]:.4g}) mm; choose narrower "
@@ -91,7 +91,7 @@ def polygons_of(outline: Outline, sagitta: float = SAGITTA) -> list[Reals]:
     )
 
 
-def _followed(loops: Sequence[Loop], sagitta: Reals) -> list[Reals]:
+def _approximated(loops: Sequence[Loop], sagitta: Reals) -> list[Reals]:
     """Return a polygon for each loop, with the sagitta of the loop."""
     sizes = np.array([len(loop.points) for loop in loops])
     start = np.concatenate([loop.points for loop in loops])
@@ -116,7 +116,7 @@ def _followed(loops: Sequence[Loop], sagitta: Reals) -> list[Reals]:
     between = number > 0
     which = of_arc[edge[between]]
     angle = turn[which] * number[between] / parts[arc][which]
-    out = _swelling(parts[arc], turn)[which]
+    out = _corner_ratio(parts[arc], turn)[which]
     spokes = spoke[which]
     corners[between] += (
         (out * np.cos(angle) - 1.0)[:, None] * spokes
@@ -126,7 +126,7 @@ def _followed(loops: Sequence[Loop], sagitta: Reals) -> list[Reals]:
     return np.split(corners, points_before[:-1])
 
 
-def _swelling(parts: Ids, turn: Reals) -> Reals:
+def _corner_ratio(parts: Ids, turn: Reals) -> Reals:
     """Return the ratio q of corner distance to radius for each arc."""
     share = turn / parts
     sector = parts / np.sinc(share / np.pi)
@@ -139,36 +139,37 @@ def _left(vectors: Reals) -> Reals:
     return np.column_stack([-vectors[:, 1], vectors[:, 0]])
 
 
-def _on_grid(rings: list[Reals], grid: float, area: float) -> list[Reals]:
+def _on_grid(polygons: list[Reals], grid: float, area: float) -> list[Reals]:
     """Return polygons on a grid with a given total area, without repeated corners.
 
     Lines parallel to the grid are rounded as a whole, which changes the area of a regular lattice.
     Some corners are therefore moved to a neighbouring grid point until the area is correct.
     """
-    sizes = np.array([len(ring) for ring in rings])
-    exact = np.concatenate(rings) / grid
-    placed = np.round(exact)
+    sizes = np.array([len(polygon) for polygon in polygons])
+    exact = np.concatenate(polygons) / grid
+    rounded = np.round(exact)
     first = np.repeat(np.cumsum(sizes) - sizes, sizes)
     number = np.arange(len(exact)) - first
     count = np.repeat(sizes, sizes)
     onward, before = first + (number + 1) % count, first + (number - 1) % count
-    missing = area / grid**2 - _area(placed, onward, first)
+    missing = area / grid**2 - _area(rounded, onward, first)
     # Neighbours depend on each other: first every second corner, then those between.
     for nearer, parity in ((True, 0), (True, 1), (False, 0), (False, 1)):
         chosen = (number % 2 == parity) & ((number < count - 1) | (parity == 1))
-        missing -= _step(
-            placed, exact, 0.5 * (placed[onward] - placed[before]), chosen, missing, nearer
+        missing -= _move_corners(
+            rounded, exact, 0.5 * (rounded[onward] - rounded[before]), chosen, missing, nearer
         )
-    twice = np.all(placed == placed[before], axis=1)
-    kept = grid * placed
+    repeated = np.all(rounded == rounded[before], axis=1)
+    scaled = grid * rounded
     ends = np.cumsum(sizes)[:-1]
     return [
-        ring[~same] for ring, same in zip(np.split(kept, ends), np.split(twice, ends), strict=True)
+        polygon[~same]
+        for polygon, same in zip(np.split(scaled, ends), np.split(repeated, ends), strict=True)
     ]
 
 
-def _step(
-    placed: Reals,
+def _move_corners(
+    rounded: Reals,
     exact: Reals,
     span: Reals,
     chosen: NDArray[np.bool_],
@@ -180,7 +181,7 @@ def _step(
     If `nearer` is set, corners move to the other side of the exact point, otherwise anywhere.
     """
     gain = np.column_stack([span[:, 1], -span[:, 0]])
-    step = np.where(exact > placed, 1.0, -1.0) if nearer else np.sign(gain) * np.sign(missing)
+    step = np.where(exact > rounded, 1.0, -1.0) if nearer else np.sign(gain) * np.sign(missing)
     gain = np.where(chosen[:, None], step * gain, 0.0) * np.sign(missing)
     axis = np.argmax(gain, axis=1)
     gains = np.take_along_axis(gain, axis[:, None], axis=1)[:, 0]
@@ -191,7 +192,7 @@ def _step(
             break
         if adds <= left:
             left -= adds
-            placed[corner, axis[corner]] += step[corner, axis[corner]]
+            rounded[corner, axis[corner]] += step[corner, axis[corner]]
     return float(np.sign(missing) * (abs(missing) - left))
 
 
@@ -201,17 +202,17 @@ def _area(corners: Reals, onward: Ids, first: Ids) -> float:
     return float(0.5 * np.sum(x * y[onward] - x[onward] * y))
 
 
-def _touching(rings: list[Reals]) -> tuple[Ids, Reals]:
+def _touching(polygons: list[Reals]) -> tuple[Ids, Reals]:
     """Return the polygons that touch others or themselves or have vanished, and one point."""
     import shapely
 
-    sizes = np.array([len(ring) for ring in rings])
+    sizes = np.array([len(polygon) for polygon in polygons])
     vanished = np.flatnonzero(sizes < 3)
     if len(vanished):
-        return vanished, rings[vanished[0]].reshape(-1, 2).mean(axis=0)
-    loop = np.repeat(np.arange(len(rings)), sizes)
-    start = np.concatenate(rings)
-    end = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+        return vanished, polygons[vanished[0]].reshape(-1, 2).mean(axis=0)
+    loop = np.repeat(np.arange(len(polygons)), sizes)
+    start = np.concatenate(polygons)
+    end = np.concatenate([np.roll(polygon, -1, axis=0) for polygon in polygons])
     sides = shapely.linestrings(np.stack([start, end], axis=1))
     one, two = shapely.STRtree(sides).query(sides, predicate="intersects")
     first = np.repeat(np.cumsum(sizes) - sizes, sizes)

@@ -54,7 +54,7 @@ class Solid:
         """Vertices - edges + triangles: 2 for each piece, minus 2 for each hole."""
         return len(self.vertices) - len(self.triangles) // 2
 
-    def on_the_bed(self) -> Solid:
+    def on_bed(self) -> Solid:
         """Return the solid translated so that its smallest coordinates are 0."""
         return Solid(self.vertices - self.vertices.min(axis=0), self.triangles)
 
@@ -94,13 +94,13 @@ def extruded(outline: Outline, thickness: float, sagitta: float = SAGITTA) -> So
 
     if not 0.0 < thickness < float("inf"):
         raise InvalidSettings(f"thickness: expected a length above 0 mm, got {thickness!r}")
-    rings = polygons_of(outline, sagitta)
-    flat = np.concatenate(rings)
+    polygons = polygons_of(outline, sagitta)
+    flat = np.concatenate(polygons)
     count = len(flat)
     # Triangulated near the origin to minimise rounding errors.
     middle = flat[0]
-    top = manifold3d.triangulate([ring - middle for ring in rings]).astype(np.int64)
-    sizes = np.array([len(ring) for ring in rings])
+    top = manifold3d.triangulate([polygon - middle for polygon in polygons]).astype(np.int64)
+    sizes = np.array([len(polygon) for polygon in polygons])
     first = np.repeat(np.cumsum(sizes) - sizes, sizes)
     here = np.arange(count)
     onward = first + (here - first + 1) % np.repeat(sizes, sizes)

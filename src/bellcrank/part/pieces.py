@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from bellcrank.model import Design
 
 
-def piece_of_beams(design: Design) -> NDArray[np.int64]:
+def beam_pieces(design: Design) -> NDArray[np.int64]:
     """Return the number of the piece of each present beam, (b,) int64 from 0.
 
     Examples
     --------
     >>> from bellcrank.model import find_problem
-    >>> int(piece_of_beams(find_problem("crane").full_design()).max())
+    >>> int(beam_pieces(find_problem("crane").full_design()).max())
     0
     """
     from scipy.sparse import coo_array
@@ -34,7 +34,7 @@ def piece_of_beams(design: Design) -> NDArray[np.int64]:
     return numbered
 
 
-def require_held(design: Design) -> None:
+def check_supported(design: Design) -> None:
     """Check that all pieces of a design are supported.
 
     Raises
@@ -44,7 +44,7 @@ def require_held(design: Design) -> None:
     """
     problem = design.problem
     present = np.flatnonzero(design.mask)
-    piece = piece_of_beams(design)
+    piece = beam_pieces(design)
     supported = np.isin(problem.lattice.beams[present], problem.supports.nodes).any(axis=1)
     loose = ~np.isin(piece, piece[supported])
     if loose.any():
@@ -56,13 +56,13 @@ def require_held(design: Design) -> None:
         )
 
 
-def doubts_about(design: Design) -> list[str]:
+def connection_warnings(design: Design) -> list[str]:
     """Return warnings about the connections of a design, as sentences.
 
     Examples
     --------
     >>> from bellcrank.model import find_problem
-    >>> doubts_about(find_problem("crane").full_design())
+    >>> connection_warnings(find_problem("crane").full_design())
     []
     """
     problem = design.problem
@@ -73,7 +73,7 @@ def doubts_about(design: Design) -> list[str]:
         if len(missing):
             every = "none" if len(missing) == len(region) else f"not all {len(region)}"
             found.append(f"{every} of the {name} nodes have beams, node {missing[0]} has none")
-    piece = piece_of_beams(design)
+    piece = beam_pieces(design)
     ends = [
         set(piece[np.isin(beams, region).any(axis=1)].tolist())
         for region in (problem.input.nodes, problem.output.nodes)

@@ -93,7 +93,7 @@ def _export(design: Design, spec: PartSpec, path: Path) -> None:
 def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     """Return size, mass and stroke of a part, and remarks on its printability."""
     from bellcrank.part import PartSpec
-    from bellcrank.workflows.fabricate import Grips, bundle_of, findings_about, profile_for
+    from bellcrank.workflows.fabricate import Grips, bundle_of, print_warnings, profile_for
 
     spec = PartSpec.from_dict(part)
     bundle = bundle_of(design_of(text, mask), spec, Grips(), layer=0.32)
@@ -105,7 +105,7 @@ def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
         "volume": round(volume / 1000.0, 3),
         "mass": round(mass, 2) if math.isfinite(mass) else None,
         "stroke": bundle.part.stroke if math.isfinite(bundle.part.stroke) else None,
-        "remarks": findings_about(bundle, profile_for(None, spec)),
+        "remarks": print_warnings(bundle, profile_for(None, spec)),
     }
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings, PathStatus, levels
-from bellcrank.part.pieces import require_held
+from bellcrank.part.pieces import check_supported
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -97,7 +97,7 @@ def is_held(design: Design) -> bool:
     True
     """
     try:
-        require_held(design)
+        check_supported(design)
     except InvalidSettings:
         return False
     return True

@@ -16,8 +16,8 @@ from bellcrank.mechanics import StrokeEvaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.part.outline import strut_outline
 from bellcrank.part.outline.grips import filled, with_pointer
-from bellcrank.part.outline.screws import drilled, screw_places
-from bellcrank.part.pieces import doubts_about, require_held
+from bellcrank.part.outline.screws import drilled, screw_positions
+from bellcrank.part.pieces import check_supported, connection_warnings
 from bellcrank.workflows.loading import loading_path
 
 if TYPE_CHECKING:
@@ -88,10 +88,10 @@ class Grips:
         if self.pad:
             outline = filled(outline, shown, drawn, problem.input.nodes)
         if self.screws:
-            places = screw_places(
+            points = screw_positions(
                 outline, shown, problem.supports.nodes, self.screws, self.screw_diameter, self.wall
             )
-            outline = drilled(outline, places, self.screw_diameter, self.wall)
+            outline = drilled(outline, points, self.screw_diameter, self.wall)
         return outline
 
     @staticmethod
@@ -138,7 +138,7 @@ def bundle_of(
     """
     part = spec.of(design)
     if whole:
-        require_held(design)
+        check_supported(design)
     frames = None
     if moved:
         way = loading_path(design, np.linspace(0.0, 1.0, FRAMES))
@@ -152,11 +152,11 @@ def bundle_of(
     )
 
 
-def findings_about(bundle: Export, profile: PrintProfile) -> list[str]:
-    """Return findings about printing and motion of a part, as sentences."""
+def print_warnings(bundle: Export, profile: PrintProfile) -> list[str]:
+    """Return warnings about printing and motion of a part, as sentences."""
     part = bundle.part
-    sentences = [finding.sentence for finding in check_print(bundle, profile.rules)]
-    sentences += doubts_about(part.design)
+    sentences = [warning.sentence for warning in check_print(bundle, profile.rules)]
+    sentences += connection_warnings(part.design)
     stroke = (
         (load, centre_lines((part.positions + part.scale * response.displacement)[part.struts]))
         for load, response in StrokeEvaluator(part.design.problem).evaluate(part.design.mask)

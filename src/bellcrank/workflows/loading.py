@@ -88,8 +88,8 @@ def loading_path(
     for k, fraction in enumerate(fractions.tolist()):
         share = max(fraction, SMALL)
         amount = share * problem.input.amount
-        driven = replace(problem, input=replace(problem.input, amount=amount))
-        evaluator = SpringEvaluator(driven, objective)
+        scaled = replace(problem, input=replace(problem.input, amount=amount))
+        evaluator = SpringEvaluator(scaled, objective)
         # A power of two, so that the increments add up to the whole without a remainder.
         increment = min(1.0, 2.0 ** math.floor(math.log2(VERIFICATION_INCREMENT / share)))
         response = evaluator.evaluate(design.mask, increment)

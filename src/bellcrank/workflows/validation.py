@@ -19,7 +19,7 @@ from bellcrank.mechanics import (
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.part import PartSpec, read_length
-from bellcrank.part.pieces import doubts_about, require_held
+from bellcrank.part.pieces import connection_warnings, check_supported
 from bellcrank.provenance import provenance
 from bellcrank.storage.locking import locked
 
@@ -70,7 +70,7 @@ class Validation:
     @property
     def doubts(self) -> list[str]:
         """Defects of the design itself that a builder should know of, as sentences."""
-        return doubts_about(self.design)
+        return connection_warnings(self.design)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; the figures of the first analysis are repeated at the top."""
@@ -158,7 +158,7 @@ def check_plan(design: Design, spec: PartSpec, plan: Plan) -> None:
         If there is no such level, theory or law.
     """
     part = spec.of(design)
-    require_held(design)
+    check_supported(design)
     for level, settings in plan:
         levels[level].check(part, settings)
 

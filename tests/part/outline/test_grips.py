@@ -13,7 +13,7 @@ from bellcrank.model import find_problem, human_design
 from bellcrank.part import PartSpec
 from bellcrank.part.outline import Loop, Outline, room_for_fillet, strut_outline
 from bellcrank.part.outline.grips import filled, with_pointer
-from bellcrank.part.outline.screws import clearance, drilled, screw_places
+from bellcrank.part.outline.screws import clearance, drilled, screw_positions
 from tests.part.outline.layouts import random_layout, triangular
 
 SHEET = Outline((Loop([[0, 0], [40, 0], [40, 12], [0, 12]], [0, 0, 0, 0]),))
@@ -78,7 +78,7 @@ def test_supports_of_the_crane_become_a_plate_for_screws() -> None:
     nodes = design.problem.supports.nodes
     plate = filled(part.outline(), part.positions, part.struts, nodes)
     assert plate.hole_count < part.outline().hole_count
-    places = screw_places(plate, part.positions, nodes, 2, 3.2, 2.0)
+    places = screw_positions(plate, part.positions, nodes, 2, 3.2, 2.0)
     assert np.linalg.norm(places[1] - places[0]) > 50.0
     screwed = drilled(plate, places, 3.2, 2.0)
     assert screwed.hole_count == plate.hole_count + 2
@@ -114,7 +114,7 @@ def test_holes_with_too_thin_a_wall_are_refused_with_their_place(
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
 def test_screws_are_far_apart_and_well_inside(count: int) -> None:
-    places = screw_places(SHEET, CORNERS, [0, 1, 2, 3], count, 3.0, 1.5)
+    places = screw_positions(SHEET, CORNERS, [0, 1, 2, 3], count, 3.0, 1.5)
     assert places.shape == (count, 2)
     assert clearance(SHEET, places).min() >= 4.5 - 1e-9
     apart = [math.dist(a, b) for k, a in enumerate(places) for b in places[:k]]
@@ -128,17 +128,17 @@ def test_screws_stay_in_the_plate_that_they_are_for() -> None:
     left = [k for k, (x, _) in enumerate(layout[0]) if x < 22.0]
     right = [k for k, (x, _) in enumerate(layout[0]) if x > 44.0]
     plates = filled(filled(outline, *layout, left), *layout, right)
-    assert screw_places(plates, layout[0], left, 2, 3.0, 1.0)[:, 0].max() < 25.0
-    assert screw_places(plates, layout[0], right, 2, 3.0, 1.0)[:, 0].min() > 40.0
+    assert screw_positions(plates, layout[0], left, 2, 3.0, 1.0)[:, 0].max() < 25.0
+    assert screw_positions(plates, layout[0], right, 2, 3.0, 1.0)[:, 0].min() > 40.0
 
 
 def test_plates_without_room_for_screws_are_refused() -> None:
     with pytest.raises(InvalidSettings, match=r"no room for 2 screw holes of 8 mm .* 12 mm"):
-        screw_places(SHEET, CORNERS, [0, 1, 2, 3], 2, 8.0, 3.0)
+        screw_positions(SHEET, CORNERS, [0, 1, 2, 3], 2, 8.0, 3.0)
     with pytest.raises(InvalidSettings, match="no room for 30 screw holes"):
-        screw_places(SHEET, CORNERS, [0, 1, 2, 3], 30, 5.0, 2.0)
+        screw_positions(SHEET, CORNERS, [0, 1, 2, 3], 30, 5.0, 2.0)
     with pytest.raises(InvalidSettings, match="count: expected at least 1 screw, got 0"):
-        screw_places(SHEET, CORNERS, [0, 1, 2, 3], 0, 3.0, 2.0)
+        screw_positions(SHEET, CORNERS, [0, 1, 2, 3], 0, 3.0, 2.0)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -111,7 +111,7 @@ class Export:
         """
         # Validated before the outline, which takes longer.
         thickness = self.thickness
-        return extruded(self.outline(), thickness, self.sagitta).on_the_bed()
+        return extruded(self.outline(), thickness, self.sagitta).on_bed()
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,7 @@ def pliers() -> Problem:
     handle = rightmost(lattice, -1, 5)
     jaw = leftmost(lattice, 2, 3)
     # Rollers represent the other half, so that beams at them may be removed, unlike at supports.
-    kept = lattice.beams_touching(np.concatenate([pivot, handle, jaw]))
+    fixed_beams = lattice.beams_touching(np.concatenate([pivot, handle, jaw]))
     return Problem(
         name="pliers",
         lattice=lattice,
@@ -53,6 +53,6 @@ def pliers() -> Problem:
         output=Output(
             nodes=jaw, direction=np.array([0.0, -1.0]), spring=10.0, spring_kind="directional"
         ),
-        designable=np.flatnonzero(~kept),
+        designable=np.flatnonzero(~fixed_beams),
         aggregate="sum",
     )

@@ -119,8 +119,8 @@ def _covered_lines(
     forward = (head - tail) / span[:, None]
     ahead = axis[near]
     offset = origin[near] - tail
-    beside, slope = _cross(forward, offset), _cross(forward, ahead)
-    low, high = _between(beside, slope, -reach, reach)
+    across, slope = _cross(forward, offset), _cross(forward, ahead)
+    low, high = _between(across, slope, -reach, reach)
     bottom, top = _between(_dot(forward, offset), _dot(forward, ahead), 0.0, span)
     low, high = np.maximum(low, bottom), np.minimum(high, top)
     empty = low >= high

@@ -299,7 +299,7 @@ class Outline:
         if len(shells) == 1:
             return Polygon(shells[0].exterior, holes)
         if holes:
-            hole, around = STRtree(shells).query([Polygon(ring) for ring in holes], "within")
+            hole, around = STRtree(shells).query([Polygon(corners) for corners in holes], "within")
             # Pieces may be inside holes of others: a hole belongs to the smallest shell around it.
             sizes = np.array([shell.area for shell in shells])
             order = np.lexsort((sizes[around], hole))
@@ -307,7 +307,7 @@ class Outline:
             for k in order[first].tolist():
                 inside[around[k]].append(holes[hole[k]])
         return MultiPolygon(
-            [Polygon(shell.exterior, rings) for shell, rings in zip(shells, inside, strict=True)]
+            [Polygon(shell.exterior, inner) for shell, inner in zip(shells, inside, strict=True)]
         )
 
 

@@ -170,19 +170,19 @@ def _depths(struts: Struts) -> NDArray[np.float64]:
 
     hair = _HAIR * struts.extent
     outline = filled(struts, 2.0 * hair, 0.0)
-    rings = np.array(
+    polygons = np.array(
         [shapely.Polygon(loop.flattened(0.1 * hair)) for loop in outline.holes], object
     )
-    if outline.piece_count > 1 and len(rings):
+    if outline.piece_count > 1 and len(polygons):
         # A piece inside a hole of another covers a part of it.
         pieces = np.array([shapely.Polygon(loop.flattened(0.1 * hair)) for loop in outline.outer])
-        around, within = shapely.STRtree(pieces).query(rings, "contains")
-        for ring in np.unique(around):
-            inside = shapely.union_all(pieces[within[around == ring]])
-            rings[ring] = shapely.difference(rings[ring], inside)
+        around, within = shapely.STRtree(pieces).query(polygons, "contains")
+        for index in np.unique(around):
+            inside = shapely.union_all(pieces[within[around == index]])
+            polygons[index] = shapely.difference(polygons[index], inside)
     # Area divided by length is a lower bound of the radius in a convex hole.
-    fine = 2e-4 * shapely.area(rings) / shapely.length(rings)
-    circles = shapely.maximum_inscribed_circle(rings, fine)
+    fine = 2e-4 * shapely.area(polygons) / shapely.length(polygons)
+    circles = shapely.maximum_inscribed_circle(polygons, fine)
     centres = shapely.points(shapely.get_coordinates(shapely.get_point(circles, 0)) - struts.origin)
     depths: NDArray[np.float64] = struts.tree.query_nearest(
         centres, all_matches=False, return_distance=True

@@ -51,26 +51,26 @@ def drilled(outline: Outline, centres: ArrayLike, diameter: float, wall: float) 
 of 1 mm, less than 2 mm; move it, choose a larger plate or a smaller screw
     """
     radius = _read_screw(diameter, wall)
-    places = np.asarray(centres, dtype=np.float64).reshape(-1, 2)
-    left = clearance(outline, places) - radius
-    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    points = np.asarray(centres, dtype=np.float64).reshape(-1, 2)
+    left = clearance(outline, points) - radius
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
     np.fill_diagonal(apart, np.inf)
     left = np.minimum(left, apart.min(axis=1, initial=np.inf) - 2.0 * radius)
     thin = np.flatnonzero(left < wall * (1.0 - 1e-9))
     if len(thin):
-        x, y = places[thin[0]]
+        x, y = points[thin[0]]
         raise InvalidSettings(
             f"centres[{thin[0]}]: a hole of {diameter:g} mm at ({x:.4g}, {y:.4g}) mm would leave "
-            f"{_left_over(left[thin[0]])}, less than {wall:g} mm; move it, choose a larger plate "
+            f"{_wall_text(left[thin[0]])}, less than {wall:g} mm; move it, choose a larger plate "
             "or a smaller screw"
         )
     side = np.array([radius, 0.0])
     turn = np.array([-1.0, -1.0])
-    holes = [Loop(np.stack([place - side, place + side]), turn) for place in places]
+    holes = [Loop(np.stack([centre - side, centre + side]), turn) for centre in points]
     return Outline(outline.outer, (*outline.holes, *holes))
 
 
-def screw_places(
+def screw_positions(
     outline: Outline,
     positions: ArrayLike,
     nodes: ArrayLike,
@@ -106,8 +106,8 @@ def screw_places(
     --------
     >>> plate = Outline((Loop([[0, 0], [40, 0], [40, 12], [0, 12]], [0, 0, 0, 0]),))
     >>> corners = [[0, 0], [40, 0], [40, 12], [0, 12]]
-    >>> places = screw_places(plate, corners, [0, 1, 2, 3], 2, 3.0, 1.5)
-    >>> drilled(plate, places, 3.0, 1.5).hole_count
+    >>> points = screw_positions(plate, corners, [0, 1, 2, 3], 2, 3.0, 1.5)
+    >>> drilled(plate, points, 3.0, 1.5).hole_count
     2
     """
     from scipy.spatial import cKDTree
@@ -129,9 +129,9 @@ def screw_places(
     least = radius + wall
     deepest = float(depth.max(initial=-np.inf))
     for limit in (max(least, _INSIDE * deepest), least):
-        places = _far_apart(grid[depth >= limit], count)
-        if _are_apart(places, count, diameter + wall):
-            return places
+        points = _far_apart(grid[depth >= limit], count)
+        if _are_apart(points, count, diameter + wall):
+            return points
     raise InvalidSettings(
         f"count: no room for {count} screw holes of {diameter:g} mm with {wall:g} mm of wall; the "
         f"largest circle in the plate is {2.0 * max(deepest, 0.0):.3g} mm wide; choose a "
@@ -162,62 +162,62 @@ def clearance(outline: Outline, points: ArrayLike) -> Reals:
     """
     import shapely
 
-    places = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     fine = 1e-4 * min(loop.length for loop in outline.loops)
     solid = outline.polygon(fine)
     shapely.prepare(solid)
-    inside = shapely.contains_xy(solid, *places.T)
-    distance = np.full(len(places), np.inf)
+    inside = shapely.contains_xy(solid, *points.T)
+    distance = np.full(len(points), np.inf)
     for loop in outline.loops:
-        distance = np.minimum(distance, _distance(loop, places))
+        distance = np.minimum(distance, _distance(loop, points))
     # The sign is not exact within the distance of an arc and its chord.
     signed: Reals = np.where(inside, distance, -distance)
     return signed
 
 
-def _distance(loop: Loop, places: Reals) -> Reals:
+def _distance(loop: Loop, points: Reals) -> Reals:
     """Return the distance of points from a loop."""
-    nearest = np.full(len(places), np.inf)
+    nearest = np.full(len(points), np.inf)
     for start, chord, centre, radius, turn in zip(
         loop.points, loop.chords, loop.centres, loop.radii, loop.turns, strict=True
     ):
-        offset = places - start
+        offset = points - start
         if turn == 0.0:
             share = np.clip(offset @ chord / (chord @ chord), 0.0, 1.0)
             away = np.linalg.norm(offset - share[:, None] * chord, axis=1)
         else:
-            spoke, arm = start - centre, places - centre
+            spoke, arm = start - centre, points - centre
             angle = np.arctan2(spoke[0] * arm[:, 1] - spoke[1] * arm[:, 0], arm @ spoke)
             ahead = np.mod(np.sign(turn) * angle, 2.0 * np.pi)
             ends = np.minimum(
                 np.linalg.norm(offset, axis=1), np.linalg.norm(offset - chord, axis=1)
             )
-            beside = np.abs(np.linalg.norm(arm, axis=1) - radius)
-            away = np.where(ahead <= np.abs(turn), beside, ends)
+            radial = np.abs(np.linalg.norm(arm, axis=1) - radius)
+            away = np.where(ahead <= np.abs(turn), radial, ends)
         nearest = np.minimum(nearest, away)
     return nearest
 
 
-def _far_apart(places: Reals, count: int) -> Reals:
+def _far_apart(points: Reals, count: int) -> Reals:
     """Return points, each as far as possible from the previous ones."""
-    if not len(places):
-        return places
-    middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    if not len(points):
+        return points
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     if count == 1:
-        return places[[int(np.argmin(np.linalg.norm(places - middle, axis=1)))]]
-    chosen = [int(np.argmax(np.linalg.norm(places - middle, axis=1)))]
-    away = np.linalg.norm(places - places[chosen[0]], axis=1)
+        return points[[int(np.argmin(np.linalg.norm(points - middle, axis=1)))]]
+    chosen = [int(np.argmax(np.linalg.norm(points - middle, axis=1)))]
+    away = np.linalg.norm(points - points[chosen[0]], axis=1)
     while len(chosen) < count:
         chosen.append(int(np.argmax(away)))
-        away = np.minimum(away, np.linalg.norm(places - places[chosen[-1]], axis=1))
-    return places[chosen]
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return points[chosen]
 
 
-def _are_apart(places: Reals, count: int, least: float) -> bool:
+def _are_apart(points: Reals, count: int, least: float) -> bool:
     """Return whether there are enough points with the least distance."""
-    if len(places) < count:
+    if len(points) < count:
         return False
-    away = np.linalg.norm(places[:, None] - places[None], axis=2)
+    away = np.linalg.norm(points[:, None] - points[None], axis=2)
     np.fill_diagonal(away, np.inf)
     return bool(away.min() >= least)
 
@@ -230,5 +230,5 @@ def _read_screw(diameter: float, wall: float) -> float:
     return 0.5 * diameter
 
 
-def _left_over(wall: float) -> str:
+def _wall_text(wall: float) -> str:
     return f"a wall of {wall:.3g} mm" if wall > 0.0 else "no wall"
