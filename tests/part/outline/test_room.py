@@ -72,9 +72,7 @@ def test_struts_that_close_holes_are_refused_with_the_greatest_width() -> None:
 
 
 def test_struts_that_touch_are_refused_with_the_place() -> None:
-    expected = (
-        r"width: struts 4.5 mm wide would join struts that share no node, first at \(10, 10\)"
-    )
+    expected = r"width: struts 4.5 mm wide would join struts .* first at \(10, 10\)"
     with pytest.raises(InvalidSettings, match=expected):
         strut_outline(*WAIST, width=4.5, fillet=0.0)
 
@@ -107,11 +105,11 @@ def test_holes_may_close_where_that_is_asked_for() -> None:
         ({"width": math.inf}, "width: expected a length above 0 mm, got inf"),
         ({"fillet": -0.1}, "fillet: expected a radius of 0 mm or more, got -0.1"),
         ({"fillet": math.nan}, "fillet: expected a radius of 0 mm or more, got nan"),
-        ({"beams": []}, "beams: expected one or more, got none; there is no part to outline"),
+        ({"beams": []}, "beams: expected one or more, got none"),
         ({"beams": [[0, 1, 2]]}, r"beams: expected shape \(M, 2\), got shape \(1, 3\)"),
         ({"beams": [[0.0, 1.0]]}, "beams: expected integers, got values of type float64"),
         ({"beams": [[0, 1], [1, 4]]}, r"beams\[1\]: names node 4, but nodes are 0 to 3"),
-        ({"beams": [[0, 1], [2, 2]]}, r"beams\[1\]: has no length, nodes 2 and 2 are in one"),
+        ({"beams": [[0, 1], [2, 2]]}, r"beams\[1\]: has no length, nodes 2 and 2"),
         ({"positions": [[0, 0, 0]]}, r"positions: expected shape \(N, 2\), .* \(1, 3\)"),
         ({"positions": [[0, 0], [math.inf, 0]]}, r"positions\[1\]\[0\]: expected a finite number"),
         ({"positions": [["a", 0]]}, "positions: expected numbers"),
@@ -128,5 +126,5 @@ def test_nodes_in_one_place_are_one_node() -> None:
     beams = [[0, 1], [4, 2], [2, 3], [3, 0]]
     assert expected_holes(positions, beams) == 1
     assert strut_outline(positions, beams, 1.0, 0.5).hole_count == 1
-    with pytest.raises(InvalidSettings, match=r"beams\[4\]: .* nodes 1 and 4 are in one place"):
+    with pytest.raises(InvalidSettings, match=r"beams\[4\]: .* nodes 1 and 4"):
         strut_outline(positions, [*beams, [1, 4]], 1.0, 0.5)
