@@ -19,7 +19,7 @@ from bellcrank.mechanics import (
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.part import PartSpec, read_length
-from bellcrank.part.pieces import connection_warnings, check_supported
+from bellcrank.part.pieces import check_supported, connection_warnings
 from bellcrank.provenance import provenance
 from bellcrank.storage.locking import locked
 
