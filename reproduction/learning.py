@@ -45,7 +45,7 @@ def run(settings: Settings, store: ResultStore) -> Figures:
 def _training_records() -> dict[str, Any]:
     """Return the results of longer trainings and searches from their records."""
     found: dict[str, Any] = {}
-    for name, read in (("resnet50", _resnet50), ("driven", _search), ("costs", _costs)):
+    for name, read in (("resnet50", _resnet50), ("surrogate-search", _search), ("costs", _costs)):
         path = RECORDS / f"{name}.json"
         if path.is_file():
             record = json.loads(path.read_text(encoding="utf-8"))
@@ -147,7 +147,7 @@ def _density_chart(figures: Mapping[str, Any]) -> Chart:
 def _designs_chart(figures: Mapping[str, Any]) -> Chart:
     """Chart the designs found with the network or, without a record, all predictions."""
     groups = [("mechanics", style.INPUT), ("network", style.BEST)]
-    made = figures["records"].get("driven")
+    made = figures["records"].get("surrogate-search")
     if made is None:
         ends = np.linspace(figures["ends"][0], figures["ends"][1], BINS + 1)
         total = sum(figures["spread"]["mechanics"])
@@ -187,7 +187,11 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
             f"{number(accuracy['determination'], 3)}",
         ),
     ]
-    for name, rows in (("resnet50", _recipe_claims), ("driven", _design_claims), ("costs", _speed)):
+    for name, rows in (
+        ("resnet50", _recipe_claims),
+        ("surrogate-search", _design_claims),
+        ("costs", _speed),
+    ):
         if name in records:
             found += rows(records[name])
     return found
@@ -268,7 +272,7 @@ STUDY = register(
             ),
             (
                 "Designs found with the network, distances and times are taken from "
-                "`docs/surrogate/driven.json` and `docs/surrogate/costs.json`."
+                "`docs/surrogate/surrogate-search.json` and `docs/surrogate/costs.json`."
             ),
         ),
     )

@@ -165,15 +165,13 @@ def costs() -> Rows:
         if each["where"] == "one core"
     }
     fire, newton = cost["`fire` response", 1], cost["Newton response (default)", 1]
-    batch, one = "torch bfloat16", "ONNX Runtime float32"
+    batch = "torch bfloat16"
     for words, value in (
         ("`fire` response (what the published code does)", fire),
         ("Newton response from rest (default)", newton),
-        ("low-rank screening, per flip", cost["low-rank screening, per flip", 1]),
+        ("low-rank update, per flip", cost["low-rank screening, per flip", 1]),
         ("`mlp`, batches of 256, bfloat16", cost[f"mlp, {batch}", 256]),
         ("`resnet18-w16`, batches of 256, bfloat16", cost[f"resnet18-w16, {batch}", 256]),
-        ("`resnet18-w16`, one at a time, ONNX Runtime", cost[f"resnet18-w16, {one}", 1]),
-        ("`grid`, batches of 256, bfloat16", cost[f"grid, {batch}", 256]),
         ("`resnet50`, batches of 256, bfloat16", cost[f"resnet50, {batch}", 256]),
     ):
         yield row(words, *map(three, (value, fire / value, newton / value)))
@@ -198,24 +196,15 @@ def epochs() -> Rows:
     for told in read("surrogate/learning")["rows"]:
         runs = next(size for size in (25, 100, 400) if told["runs"] <= size)
         found[told["model"], runs] = f"{told['r_squared']:.2f} ({told['seconds']:.0f})"
-    for model in ("linear", "mlp", "grid", "resnet18-w16"):
+    for model in ("linear", "mlp", "resnet18-w16"):
         name = "linear in the bits" if model == "linear" else f"`{model}`"
         cells = [found.get((model, runs), "") for runs in (25, 100, 400)]
         yield row(name, *cells).replace("|  |", "| |")
 
 
-def flips() -> Rows:
-    for name, words in (
-        ("network", "the network, R² 0.985 on 20,000 designs of these runs"),
-        ("screening", "low-rank screening"),
-    ):
-        told = read("surrogate/flips")["flips"][name]
-        yield row(words, *(f"{told[key]['mean']:.2f}" for key in ("pearson", "spearman", "recall")))
-
-
-def driven() -> Rows:
-    medians = read("surrogate/driven")["medians"]
-    for name, words in (("final", "its end"), ("checked", "the best of ten as checked")):
+def surrogate_search() -> Rows:
+    medians = read("surrogate/surrogate-search")["medians"]
+    for name, words in (("final", "last"), ("verified", "best of ten as verified")):
         told = medians[name]
         yield row(
             words, *(f"{told[key]:.2f}" for key in ("network", "predicted", "mechanics")),
@@ -237,7 +226,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "goals": (goals,),
     "validation": (levels, meshes, widths, correlation, searched),
     "machines": (bundled, contact, lengths, two_ports),
-    "surrogate": (costs, shipped, epochs, flips, driven, elsewhere),
+    "surrogate": (costs, shipped, epochs, surrogate_search, elsewhere),
 }
 
 

@@ -119,7 +119,7 @@ def test_designs_without_a_unique_response_are_left_out_and_counted(
 def test_another_dataset_in_the_folder_is_never_written_over(
     built: Path, spec: DatasetSpec, tmp_path: Path
 ) -> None:
-    with pytest.raises(InvalidSettings, match="another spec"):
+    with pytest.raises(InvalidSettings, match="another"):
         build_dataset(replace(spec, steps=400), built, engine="serial")
     lonely = tmp_path / "lonely"
     lonely.mkdir()
@@ -142,12 +142,12 @@ def test_another_dataset_in_the_folder_is_never_written_over(
         ({"seed": -1}, "seed: expected at least 0, got -1"),
         (
             {"search": {"unloaded_beams": "prune_dead_ends"}},
-            "unloaded_beams: with 'prune_dead_ends' the search would see",
+            "unloaded_beams: .*prune_dead_ends.*'keep'",
         ),
-        ({"search": {"objective": "directional:4"}}, "objective: with 'directional:4' the"),
-        ({"search": {"strokes": [0.5, 1.0]}}, "strokes: with"),
-        ({"search": {"steps": 7}}, "steps: a dataset sets it for each run"),
-        ({"search": {"chains": 7}}, "chains: a dataset sets it for each run"),
+        ({"search": {"objective": "directional:4"}}, "objective: .*directional:4"),
+        ({"search": {"strokes": [0.5, 1.0]}}, "strokes: "),
+        ({"search": {"steps": 7}}, "^steps: "),
+        ({"search": {"chains": 7}}, "^chains: "),
         ({"search": {"colour": 1}}, "has no setting 'colour'"),
     ],
 )

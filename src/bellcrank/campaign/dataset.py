@@ -1,4 +1,4 @@
-"""Datasets from campaigns: many short runs of a search, both ways, and all that they proposed."""
+"""Datasets from campaigns of short searches, half of them with the reversed output."""
 
 from __future__ import annotations
 
@@ -30,42 +30,42 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 CAMPAIGN = "campaign"
-"""Folder of the campaign, beside the dataset."""
+"""Folder of the campaign in the folder of the dataset."""
 PAPER_RUNS = 2000
 PAPER_STEPS = 582
-"""Of a run: 2000 of them make the paper's 1,163,733 configurations, within a few hundred."""
+"""Proposals of a run: 2000 runs give the paper's 1,163,733 configurations within a few hundred."""
 ODD_EXPONENT = 2.0
-"""n of the only f_n(gamma) = 2 cos(gamma/2)^n - 1 that changes its sign with the motion."""
+"""Exponent n for which f_n(gamma) = 2 cos(gamma/2)^n - 1 changes its sign with the motion."""
 OWN = ("steps", "seed", "chains")
-"""Settings of a search that a dataset decides about; the last two a campaign does."""
+"""Settings of a search that the dataset sets; the campaign sets the last two."""
 LABELS: dict[str, Any] = {"objective": None, "unloaded_beams": "keep", "strokes": [1.0]}
-"""Settings of a search that decide what an efficiency is: those of `bellcrank evaluate`."""
+"""Settings of a search that define the efficiency, with the values of `bellcrank evaluate`."""
 COLUMNS = ("seed", "step", "mask", "efficiency", "accepted", "status")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DatasetSpec:
-    """What a dataset is made of; the defaults are the paper's.
+    """Specification of a dataset; the defaults are the paper's.
 
     Parameters
     ----------
     problem
-        What the designs are for.
+        The problem.
     runs
         Number of runs; the second half of them searches for the most negative efficiency.
     steps
         Proposals of a run.
     seed
-        Of the first run; each run has the next.
+        Seed of the first run; each further run has the next.
     search
-        Settings of the search, where they differ from those of ``paper``.
+        Settings that differ from those of the search ``paper``.
 
     Raises
     ------
     InvalidSettings
-        If a number is too small, the search would see other efficiencies than the problem's, or
-        the efficiency of the reversed motion is not the negative one, so that runs backwards
-        would say nothing about the problem.
+        If a number is too small, a setting changes the definition of the efficiency, or the
+        efficiency of the reversed motion is not the negative efficiency, so that runs with the
+        reversed output do not apply to the problem.
     """
 
     problem: Problem
@@ -83,18 +83,18 @@ class DatasetSpec:
         exponent = objective_of(self.problem).exponent
         if self.runs > 1 and exponent != ODD_EXPONENT:
             raise InvalidSettings(
-                f"{self.problem.name!r}: by its objective with the exponent {exponent:g}, a motion "
-                f"and its reverse are not opposite; datasets need runs both ways, so use the "
-                f"objective 'displacement', or a single run"
+                f"{self.problem.name!r}: with the exponent {exponent:g} of its objective, the "
+                f"efficiencies of a motion and its reverse are not opposite; use the objective "
+                f"'displacement', or a single run"
             )
         if taken := [key for key in OWN if key in (self.search or {})]:
-            raise InvalidSettings(f"{taken[0]}: a dataset sets it for each run; leave it out here")
+            raise InvalidSettings(f"{taken[0]}: set by the dataset for each run; leave it out")
         settings = self._settings()
         for key, value in LABELS.items():
             if settings[key] != value:
                 raise InvalidSettings(
-                    f"{key}: with {settings[key]!r} the search would see other efficiencies than "
-                    f"those of {self.problem.name!r}; a dataset needs {value!r}"
+                    f"{key}: {settings[key]!r} changes the efficiencies of "
+                    f"{self.problem.name!r}; expected {value!r}"
                 )
 
     def _settings(self) -> dict[str, Any]:
@@ -102,7 +102,7 @@ class DatasetSpec:
         return plain("settings", read_settings(given).to_dict())
 
     def campaign(self) -> Spec:
-        """Return the campaign: one task forward, one for the reversed output."""
+        """Return the campaign: one task with the output as given, one with the reversed output."""
         settings = {key: value for key, value in self._settings().items() if key not in OWN[1:]}
         half = (self.runs + 1) // 2
         tasks = [_task(self.problem, "forward", settings, self.seed, half)]
@@ -113,7 +113,7 @@ class DatasetSpec:
 
 
 def reverse(problem: Problem) -> Problem:
-    """Return a problem that asks for the opposite motion: its efficiencies have the other sign.
+    """Return the problem with the reversed output: its efficiencies have the opposite sign.
 
     Examples
     --------
@@ -138,35 +138,34 @@ def build_dataset(
     tell: Callable[[CampaignStatus], None] = lambda _status: None,
     stop: threading.Event | None = None,
 ) -> Dataset | None:
-    """Run the campaign, or what is left of it, and gather what it found.
+    """Run the campaign, or the rest of it, and write its proposals as a dataset.
 
-    Called again after a stop or a kill, it goes on where it was; called after its end, it leaves
-    the same bytes.
+    Call it again to resume after a stop or a kill. A call after the end writes the same bytes.
 
     Parameters
     ----------
     folder
-        Gets ``dataset.parquet``, and the campaign in a folder of its own.
+        Folder for ``dataset.parquet`` and the folder of the campaign.
     engine
-        Of the campaign; by default as many processes as there are workers.
+        Engine of the campaign; by default local processes.
     workers
-        Processes; all cores by default.
+        Number of processes; all cores by default.
     tell
         Called now and then with how the campaign stands.
     stop
-        Set it to end soon; what is done is kept.
+        Stops the campaign when set; finished work is kept.
 
     Returns
     -------
     Dataset or None
-        None if it was stopped.
+        None if stopped.
 
     Raises
     ------
     InvalidSettings
-        If the campaign that lies there is another one, or there is to be no worker.
+        If the folder contains another campaign, or the number of workers is less than 1.
     OutputExists
-        If a dataset lies there without the campaign that it comes from.
+        If the folder contains a dataset without its campaign.
     StorageError, CorruptRun
     """
     options = EngineOptions(workers=workers)
@@ -187,21 +186,21 @@ def build_dataset(
 
 
 def gather(store: Store, problem: Problem) -> Dataset:
-    """Return all designs that a campaign has proposed and that have a unique, stable response.
+    """Return all proposals of a campaign that have a unique, stable response.
 
     Parameters
     ----------
     store
-        Of runs forward and backward.
+        Store of the campaign.
     problem
-        The one that runs forward.
+        The problem with the output as given.
 
     Raises
     ------
     CorruptRun
         If a file is damaged.
     InvalidDataset
-        If there is nothing in it.
+        If it is empty.
     """
     forward = store.spec.tasks[0]
     parts: list[dict[str, NDArray[Any]]] = []
@@ -209,7 +208,7 @@ def gather(store: Store, problem: Problem) -> Dataset:
         kept = part["status"] == int(Status.CONVERGED)
         parts.append({**{name: part[name][kept] for name in COLUMNS}, "left": ~kept})
     if not parts:
-        raise InvalidDataset(f"{store.path}: nothing is stored yet")
+        raise InvalidDataset(f"{store.path}: the campaign has no results yet")
     found = {name: np.concatenate([part[name] for part in parts]) for name in (*COLUMNS, "left")}
     backwards = found["seed"] > forward.last_seed
     origin = {
@@ -240,10 +239,10 @@ def _tables(store: Store) -> Iterator[dict[str, NDArray[Any]]]:
 
 
 def _task(problem: Problem, name: str, settings: dict[str, Any], first: int, count: int) -> Task:
-    told = plain("problem", problem_to_dict(problem))
-    return Task(name, told, settings, first, first + count - 1)
+    data = plain("problem", problem_to_dict(problem))
+    return Task(name, data, settings, first, first + count - 1)
 
 
 def _segment(steps: int) -> int:
-    """Return a size of segments that holds a whole run where that is not much."""
+    """Return the size of a segment: a whole run, up to a limit."""
     return min(-(-steps // 250) * 250, 4000)

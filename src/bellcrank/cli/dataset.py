@@ -1,4 +1,4 @@
-"""`bellcrank dataset`: designs with their efficiencies, to learn from."""
+"""`bellcrank dataset`: designs with their efficiencies, to train networks."""
 
 from __future__ import annotations
 
@@ -24,29 +24,31 @@ if TYPE_CHECKING:
 
 dataset = typer.Typer(
     name="dataset",
-    help="Designs with their efficiencies, for networks to learn from.",
+    help="Designs with their efficiencies, to train networks.",
     rich_markup_mode="rich",
 )
 app.add_typer(dataset)
 
-DatasetFile = Annotated[Path, typer.Argument(help="A dataset, or the folder it was built in.")]
+DatasetFile = Annotated[Path, typer.Argument(help="Dataset, or the folder it was built in.")]
 
 
 @dataset.command()
 def build(
-    problem: Annotated[str, typer.Argument(help="A built-in problem, or a problem file.")],
+    problem: Annotated[str, typer.Argument(help="Bundled problem or problem file.")],
     out: Annotated[
-        Path | None, typer.Option(help="Folder; default: NAME-dataset. Again to go on.")
+        Path | None, typer.Option(help="Folder; rerun to resume. \\[NAME-dataset]")
     ] = None,
-    runs: Annotated[int, typer.Option(help="Searches, half of them backwards.")] = 2000,
-    steps: Annotated[int, typer.Option(help="Proposals of each.")] = 582,
-    seed: Annotated[int, typer.Option(help="Of the first run.")] = 0,
-    workers: Annotated[int | None, typer.Option(help="Processes. \\[all cores]")] = None,
+    runs: Annotated[
+        int, typer.Option(help="Number of searches, half of them with the reversed output.")
+    ] = 2000,
+    steps: Annotated[int, typer.Option(help="Proposals of each search.")] = 582,
+    seed: Annotated[int, typer.Option(help="Seed of the first run.")] = 0,
+    workers: Annotated[int | None, typer.Option(help="Number of processes. \\[all cores]")] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE: a setting of the search.")
     ] = None,
 ) -> None:
-    """Run many short searches, and keep all that they proposed."""
+    """Run many short searches, and store all their proposals."""
     from bellcrank.campaign.dataset import DatasetSpec, build_dataset
     from bellcrank.cli.campaign_view import CampaignProgress
     from bellcrank.cli.stopping import stopping_on_interrupt
@@ -61,7 +63,7 @@ def build(
     with stopping_on_interrupt() as stop, CampaignProgress() as progress:
         data = build_dataset(spec, folder, workers=workers, tell=progress, stop=stop)
     if data is None:
-        notes.print("Stopped; what is done is kept. The same command goes on with it.")
+        notes.print("Stopped; finished runs are kept. Rerun the same command to resume.")
         sys.exit(INTERRUPTED)
     _print_summary(summary_of(data))
     results.print(f"written to {plain(folder)}/")
@@ -72,25 +74,25 @@ def info(
     file: DatasetFile,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Say what is in a dataset."""
+    """Print the size and the efficiencies of a dataset."""
     from bellcrank.surrogate.dataset import read_dataset
 
-    told = summary_of(read_dataset(file))
+    summary = summary_of(read_dataset(file))
     if as_json:
-        print_json(json.dumps(told, indent=1))
+        print_json(json.dumps(summary, indent=1))
     else:
-        _print_summary(told)
+        _print_summary(summary)
 
 
 def summary_of(data: Dataset) -> dict[str, Any]:
-    """Return what is in a dataset, as plain data."""
+    """Return the size and the efficiencies of a dataset as plain data."""
     import numpy as np
 
     from bellcrank.surrogate.recipes import Recipe
     from bellcrank.surrogate.splitting import overlap, split_by_run
 
     recipe = Recipe()
-    told: dict[str, Any] = {
+    summary: dict[str, Any] = {
         "problem": data.problem.name,
         "beams": data.problem.lattice.beam_count,
         "designs": len(data),
@@ -107,25 +109,25 @@ def summary_of(data: Dataset) -> dict[str, Any]:
     }
     if data.run_count > 1:
         found = overlap(data, split_by_run(data, recipe.held_out, recipe.split_seed))
-        told |= {
+        summary |= {
             "distinct": found.distinct, "held_out": found.held_out, "repeated": found.repeated,
         }  # fmt: skip
-    return told
+    return summary
 
 
-def _print_summary(told: dict[str, Any]) -> None:
-    spread = told["efficiency"]
+def _print_summary(summary: dict[str, Any]) -> None:
+    spread = summary["efficiency"]
     results.print(
-        f"{told['designs']} designs of {plain(told['problem'])} ({told['beams']} beams) from "
-        f"{told['runs']} runs; {told['left_out']} without a unique response left out"
+        f"{summary['designs']} designs of {plain(summary['problem'])} ({summary['beams']} beams) "
+        f"from {summary['runs']} runs; {summary['left_out']} without a unique response left out"
     )
     results.print(
         f"efficiency from {spread['least']:.3f} to {spread['most']:.3f}, half of them from "
         f"{spread['lower_quartile']:.3f} to {spread['upper_quartile']:.3f}"
     )
-    if "distinct" in told:
-        share = 100.0 * told["repeated"] / told["held_out"]
+    if "distinct" in summary:
+        share = 100.0 * summary["repeated"] / summary["held_out"]
         results.print(
-            f"{told['distinct']} of them distinct; of {told['held_out']} held out for tests, "
-            f"{told['repeated']} ({share:.1f} %) occur in the training runs too"
+            f"{summary['distinct']} distinct; of {summary['held_out']} held out for tests, "
+            f"{summary['repeated']} ({share:.1f} %) also occur in the training runs"
         )
