@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from bellcrank.cli import live
 from bellcrank.plots.movies import movie_settings
 from bellcrank.search import read_settings
 from bellcrank.storage import RunFolder
@@ -32,7 +33,7 @@ def filmed(here: Path, *words: object) -> Path:
     assert outcome.code == 0, outcome.err
     assert outcome.out == ""
     (name,) = set(files(here)) - set(before)
-    assert outcome.err == f"wrote {name}\n"
+    assert outcome.err.splitlines()[-1] == f"wrote {name}"
     return here / name
 
 
@@ -46,6 +47,16 @@ def test_a_motion_is_filmed_as_long_and_as_large_as_asked_for(here: Path, small:
     assert [frame.shape for frame in frames] == [(180, 320)] * 8
     assert np.abs(frames[0].astype(int) - frames[-1]).mean() < 0.5
     assert np.abs(frames[0].astype(int) - frames[4]).mean() > 0.5
+
+
+def test_progress_lines_of_a_slow_machine_come_before_the_name_of_the_file(
+    here: Path, small: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "QUIET_INTERVAL", 0.0)
+    outcome = call("animate", small, "motion.gif", *QUICK)
+    lines = outcome.err.splitlines()
+    assert lines[-1] == "wrote motion.gif"
+    assert len(lines) > 2
 
 
 def test_the_suffix_chooses_the_format(here: Path, small: str) -> None:

@@ -21,12 +21,13 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("here")
 
 
-@pytest.mark.parametrize("name", ["card.pdf", "card.png"])
-@pytest.mark.parametrize("design", ["human:crane", "machine:pliers"])
+@pytest.mark.parametrize(
+    ("design", "name"), [("human:crane", "card.pdf"), ("machine:pliers", "card.png")]
+)
 def test_a_card_is_drawn_on_one_page(here: Path, design: str, name: str) -> None:
     outcome = call("card", design, name)
     assert outcome.code == 0, outcome.err
-    assert outcome.err == f"wrote {name}\n"
+    assert outcome.err.splitlines()[-1] == f"wrote {name}"
     content = (here / name).read_bytes()
     if name.endswith("pdf"):
         assert content.startswith(b"%PDF")
@@ -35,6 +36,7 @@ def test_a_card_is_drawn_on_one_page(here: Path, design: str, name: str) -> None
         assert colours(here / name) > 100
 
 
+@pytest.mark.slow
 def test_a_card_takes_up_the_record_of_a_run(copy: Path, here: Path) -> None:
     call("validate", copy, "--elements", 2)
     without = call("card", copy / "design.json", "one.png")
@@ -54,7 +56,7 @@ def overlaps(boxes: list[tuple[str, Bbox]]) -> list[tuple[str, str]]:
     return found
 
 
-@pytest.mark.parametrize("name", ["human:crane", "human:pliers", "machine:scaling-8"])
+@pytest.mark.parametrize("name", ["human:crane", "human:pliers"])
 def test_nothing_on_a_card_overlaps_and_nothing_is_cut(name: str) -> None:
     design = find_design(name)
     entry = {

@@ -101,7 +101,7 @@ def test_the_summary_for_people_shows_figures_and_pictures(whole: Path) -> None:
     text = (whole / "summary.md").read_text()
     design = design_of(whole)
     assert text.startswith(f"# {PROBLEM}\n")
-    assert f"| efficiency of the design | {design['efficiency']:.6f} |" in text
+    assert f"spring model | {design['efficiency']:.6f} |" in text
     assert f"| designs evaluated | {ROWS} |" in text
     for picture in ("motion.png", "efficiency.png"):
         assert f"]({picture})" in text

@@ -211,6 +211,7 @@ def test_a_part_is_described_in_a_file_and_changed_on_the_command_line(here: Pat
     assert (part["width"], part["thickness"], part["material"]) == (1.6, 5.12, "petg")
 
 
+@pytest.mark.slow
 def test_a_search_for_struts_is_validated_as_what_it_searched_for(here: Path) -> None:
     words = ("--strut-width", "1.6mm", "--material", "tpu-95a", "--scale", "12mm")
     outcome = call("design", PROBLEM, "--steps", 500, "--chains", 1, *words, "--out", "run")
@@ -338,6 +339,7 @@ def test_without_ngsolve_the_other_levels_are_computed_and_recorded(
     assert "pip install 'bellcrank[fem]'" in outcome.err
 
 
+@pytest.mark.slow
 def test_all_levels_stand_in_one_table() -> None:
     pytest.importorskip("ngsolve", reason="NGSolve is not installed")
     words = ("human:crane", "--level", "frame,plane,solid", "--linear", "--size", "3mm")

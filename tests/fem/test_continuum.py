@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+pytestmark = pytest.mark.slow
+
     from bellcrank.fem.continuum.mesh import ContinuumMesh
     from bellcrank.fem.continuum.response import ContinuumResponse
 

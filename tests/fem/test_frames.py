@@ -115,6 +115,7 @@ def diluted(name: str, seed: int) -> Part:
     return Part(Design(problem, mask), RUBBER, Section(rng.uniform(1.0, 2.5), 4.8))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("theory", "nonlinear"),
     [("euler-bernoulli", False), ("euler-bernoulli", True), ("timoshenko", False)],

@@ -62,6 +62,7 @@ def test_a_bent_bar_is_stressed_most_where_it_is_clamped() -> None:
     assert last.strain == pytest.approx(last.stress / 12.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["crane", "anti-parallel"])
 def test_short_strokes_are_small_motions_whatever_the_mesh(name: str) -> None:
     design = human_design(name)
@@ -84,6 +85,7 @@ def test_the_same_shape_moves_the_same_way_at_any_scale(scale: float) -> None:
     assert analysis.efficiency == pytest.approx(1.2100339656, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_very_fine_meshes_converge_too() -> None:
     design = human_design("crane")
     assert design is not None

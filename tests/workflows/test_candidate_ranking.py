@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -73,14 +74,14 @@ def finalist(task: Problem, mask: str, chain: int = 0) -> Finalist:
 def test_a_part_that_turns_over_is_passed_over(task: Problem) -> None:
     best, second = finalist(task, TURNS_OVER), finalist(task, WORKS)
     assert best.response.efficiency > second.response.efficiency
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     choice = CandidateRanking(
-        SPEC, HoppingSettings(), lambda done, total: told.append((done, total))
+        SPEC, HoppingSettings(), lambda done, total: reported.append((done, total))
     )
     chosen, refused = choice([best, second])
     assert chosen is second
     assert refused == [(best.response.efficiency, "struts touch as a frame")]
-    assert told == [(0, 2), (1, 2), (2, 2)]
+    assert reported == [(0, 2), (1, 2), (2, 2)]
 
 
 def test_the_more_efficient_of_two_sound_parts_is_chosen(task: Problem) -> None:
@@ -161,13 +162,12 @@ def test_each_chain_has_its_turn(task: Problem) -> None:
 
 def designed(task_file: Path, out: Path, **settings: Any) -> RunFolder:
     """A short search for a part."""
-    told = read_settings({"steps": 500, "chains": 2, **settings})
-    folder = start_design(read_problem(task_file), told, out, SPEC)
+    search = read_settings({"steps": 500, "chains": 2, **settings})
+    folder = start_design(read_problem(task_file), search, out, SPEC)
     assert complete_design(folder, workers=1) is not None
     return folder
 
 
-@pytest.mark.slow
 def test_a_search_for_a_part_ends_with_its_validation(task: Problem, tmp_path: Path) -> None:
     folder = designed(tmp_path / "lift.toml", tmp_path / "out")
     record = json.loads((folder.path / "validation.json").read_text())
@@ -176,12 +176,13 @@ def test_a_search_for_a_part_ends_with_its_validation(task: Problem, tmp_path: P
     [result] = record["results"]
     assert summary["as_part"]["efficiency"] == result["efficiency"]
     assert result["part"]["width"] == 2.0
-    told = (folder.path / "summary.md").read_text()
-    assert f"| as 2 mm struts | {result['efficiency']:.4f} |" in told
-    assert f"| stress and strain there | {result['von_mises_MPa']:.2g} MPa" in told
+    text = (folder.path / "summary.md").read_text()
+    assert re.search(rf"efficiency, frame of 2 mm struts \| {result['efficiency']:.4f} ", text)
+    assert f"| {result['von_mises_MPa']:.2g} MPa" in text
 
 
-def test_the_record_of_a_former_winner_goes(task: Problem, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_the_record_of_another_design_is_removed(task: Problem, tmp_path: Path) -> None:
     folder = designed(tmp_path / "lift.toml", tmp_path / "out")
     path = folder.path / "validation.json"
     record = json.loads(path.read_text())

@@ -154,7 +154,7 @@ def design(
         stop.hint = f"Stopped. To continue: {plain(command)}"
         with SearchProgress(read_settings(folder.settings)) as progress:
             report = complete_design(
-                folder, workers=workers, tell=progress, trying=progress.trying, stop=stop
+                folder, workers=workers, tell=progress, ranking=progress.ranking, stop=stop
             )
         if report is None:
             stop.exit()  # a thread may still compute a block, which delays a usual exit
@@ -223,11 +223,15 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
 
 def _print_report(report: DesignReport) -> None:
     """Print the results in a table, with warnings."""
+    from bellcrank.mechanics import objective_name
     from bellcrank.workflows.report import part_rows
 
     selection = report.selection
     table = Table.grid(padding=(0, 2))
-    table.add_row("efficiency", f"[bold]{selection.efficiency_after:.4f}[/]")
+    objective = objective_name(selection.design.problem)
+    table.add_row(
+        f"efficiency ({objective}), spring model", f"[bold]{selection.efficiency_after:.4f}[/]"
+    )
     for name, value in part_rows(report):
         table.add_row(name, value)
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")

@@ -1,4 +1,4 @@
-"""How far a long job is: a live line on a terminal, a line now and then elsewhere."""
+"""Progress of long jobs: a live line on a terminal, occasional lines elsewhere."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ QUIET_INTERVAL = 10.0
 
 
 class Live:
-    """A line on standard error that tells how far a job is.
+    """Progress of a job on standard error.
 
     Parameters
     ----------
     title
-        What is being done.
+        Name of the job.
     total
-        How much there is to do; None as long as that is unknown.
+        Total amount of work; None if it is not known yet.
     columns
-        To stand after the elapsed time.
+        Columns after the elapsed time.
     """
 
     def __init__(self, title: str, total: int | None, *columns: ProgressColumn) -> None:
@@ -56,7 +56,7 @@ class Live:
         self._bar.stop()
 
     def _show(self, done: int, total: int, figures: str, line: str) -> None:
-        """Show how much is done, with figures; `line` says it where there is no terminal."""
+        """Show the amount of work done, with figures; `line` is printed without a terminal."""
         self._bar.update(self._task, completed=done, total=total, figures=figures)
         now = time.monotonic()
         if not notes.is_terminal and now - self._last_line > QUIET_INTERVAL:

@@ -11,17 +11,17 @@ from bellcrank.cli.live import Live
 from bellcrank.search import Progress as Step
 from bellcrank.search import SearchSettings
 
-NOT_KEPT = -50.0
-"""Below it a score is that of a design that breaks goals."""
+VIOLATED = -50.0
+"""Score below which a design violates goals."""
 
 
 class SearchProgress(Live):
-    """Collects what the chains tell, from their threads, and shows it.
+    """Progress of the chains of a search, reported from their threads.
 
     Parameters
     ----------
     settings
-        Of the search, for how much there is to do.
+        Settings of the search.
     """
 
     def __init__(self, settings: SearchSettings) -> None:
@@ -36,7 +36,7 @@ class SearchProgress(Live):
         super().__init__("searching", self._total, TextColumn("left"), TimeRemainingColumn())
 
     def __call__(self, step: Step) -> None:
-        """Take in the news of one chain."""
+        """Update the progress of one chain."""
         with self._lock:
             self._done[step.chain] = step.state.step
             self._made += step.steps
@@ -49,16 +49,16 @@ class SearchProgress(Live):
             line = f"searching {share:3.0f} %  {figures}  left {self._time_left():.0f} s"
             self._show(done, self._total, figures, line)
 
-    def trying(self, done: int, total: int) -> None:
-        """Say how many of the best designs have been tried as parts."""
-        self._bar.update(self._task, description="as parts")
-        line = f"trying the best designs as parts: {done} of {total}"
-        self._show(done, total, f"the best designs, {done} of {total}", line)
+    def ranking(self, done: int, total: int) -> None:
+        """Show the number of candidates that have been analysed as frames."""
+        self._bar.update(self._task, description="ranking")
+        figures = f"frame analysis of candidates: {done} of {total}"
+        self._show(done, total, figures, figures)
 
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)
         temperature = f"T {self._temperature:.4f}  " if self._temperature > 0.0 else ""
-        best = f"best {self._best:6.3f}" if self._best > NOT_KEPT else "goals not kept yet"
+        best = f"best {self._best:6.3f}" if self._best > VIOLATED else "goals not satisfied yet"
         return (
             f"{best}  {temperature}"
             f"accepted {100.0 * self._accepted / self._made:2.0f} %  {speed:6.0f} steps/s"

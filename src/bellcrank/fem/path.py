@@ -280,14 +280,14 @@ class _Continuation:
             linear = self._linearise(unknowns, load)
             if linear is None:
                 return None
-            excess = float((np.abs(linear.residual) / linear.tolerance).max(initial=0.0))
+            relative_residual = float((np.abs(linear.residual) / linear.tolerance).max(initial=0.0))
             if iteration < MAX_RESIDUAL_INCREASES:
-                allowed = max(allowed, excess)
-            if excess > allowed:
+                allowed = max(allowed, relative_residual)
+            if relative_residual > allowed:
                 return None
             tangent = linear.stiffness
             unknowns = unknowns - tangent.solve(linear.residual)
-            if excess <= 1.0:
+            if relative_residual <= 1.0:
                 return PathState(load, unknowns, tangent.negative_eigenvalues), iteration, tangent
         return None
 
@@ -308,9 +308,9 @@ class _Continuation:
         from the last tangent, where the path bends too sharply for it.
         """
         step = load - here.load
-        straight = step * rate
+        linear_prediction = step * rate
         if before is None:
-            return straight
+            return linear_prediction
         last, slope = before
         taken = here.load - last.load
         ratio = step / taken
@@ -318,9 +318,9 @@ class _Continuation:
         chord, begin, end = here.unknowns - last.unknowns, taken * slope, taken * rate
         second, third = 3.0 * chord - 2.0 * begin - end, begin + end - 2.0 * chord
         curved = ratio * (begin + (2.0 + ratio) * second + (3.0 + ratio * (3.0 + ratio)) * third)
-        departure = self.equations.distance(curved - straight)
-        is_smooth = departure < LARGEST_CURVATURE * self.equations.distance(straight)
-        return curved if is_smooth else straight
+        departure = self.equations.distance(curved - linear_prediction)
+        is_smooth = departure < LARGEST_CURVATURE * self.equations.distance(linear_prediction)
+        return curved if is_smooth else linear_prediction
 
     def _departs(self, state: PathState, here: PathState, predicted: NDArray[np.float64]) -> bool:
         """Return whether a state is so far from its prediction that it may be on another path."""

@@ -227,7 +227,7 @@ def _search(
     settings = read_settings(folder.settings)
     with ProgressReporter(pipe, folder, settings) as reporter:
         report = complete_design(
-            folder, workers=workers, tell=reporter, trying=reporter.trying, stop=listener.stop
+            folder, workers=workers, tell=reporter, ranking=reporter.trying, stop=listener.stop
         )
         if report is None and listener.command == "stop":
             try:

@@ -135,7 +135,7 @@ def _print_table(bundle: Export, profile: PrintProfile) -> Table:
         ("lines", f"{profile.bead_width:g} mm wide"),
         ("temperature", f"{profile.temperature} C, bed {profile.bed_temperature} C"),
         ("speed", f"{profile.speed:g} mm/s"),
-        ("warnings", ", ".join(finding.kind for finding in findings) or "none"),
+        ("warnings", ", ".join(warning.kind for warning in findings) or "none"),
     ]
     return "Printing", rows
 

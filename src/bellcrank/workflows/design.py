@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 def prepare(problem: Problem, settings: SearchSettings) -> None:
-    """Compile what a search needs, and refuse a problem that it cannot start from.
+    """Compile the kernels of a search and check that it can start from the initial design.
 
     Raises
     ------
@@ -48,27 +48,34 @@ def prepare(problem: Problem, settings: SearchSettings) -> None:
         If the initial design has no unique, stable response.
     """
     evaluator = make_evaluator(problem, settings)
-    few = replace(settings, steps=2)  # of which one may only ask, the other predict
+    few = replace(
+        settings, steps=2
+    )  # one evaluates the initial design, the other may predict flips
     advance_chain(evaluator, few, 0, start_chain(evaluator, few))
 
 
 def start_design(
     problem: Problem, settings: SearchSettings, out: Path, part: PartSpec | None = None
 ) -> RunFolder:
-    """Prepare a design job for `problem` in the new folder `out`.
+    """Create the folder of a design job.
 
     Parameters
     ----------
+    problem
+        Problem to be solved.
+    settings
+        Settings of the search.
+    out
+        New folder.
     part
-        What the design will be made as: the problem's springs are given the stiffness of its
-        struts.
+        Part to be designed; the springs of the problem are given the stiffness of its struts.
 
     Raises
     ------
     OutputExists
-        If the folder holds something already.
+        If the folder contains a run.
     InvalidSettings
-        If the initial design has no unique, stable response, or the part makes no sense.
+        If the initial design has no unique, stable response, or the part cannot be built.
     StorageError
         If the folder cannot be written.
     """
@@ -83,12 +90,12 @@ def start_design(
 
 
 def reopen_design(out: Path) -> RunFolder:
-    """Open the folder of a design job that was stopped or killed, to go on with it.
+    """Open the folder of an interrupted design job to resume it.
 
     Raises
     ------
     InvalidFile, CorruptRun
-        If the folder is not that of a run, or is damaged.
+        If the folder is not the folder of a run, or is damaged.
     """
     folder = RunFolder.open(out)
     prepare(folder.problem, read_settings(folder.settings))
@@ -100,23 +107,23 @@ def complete_design(
     *,
     workers: int | None = None,
     tell: Callable[[Progress], None] = lambda _progress: None,
-    trying: Callable[[int, int], None] = lambda _done, _total: None,
+    ranking: Callable[[int, int], None] = lambda _done, _total: None,
     stop: threading.Event | None = None,
 ) -> DesignReport | None:
-    """Make what is left of a design job, and leave the results in its folder.
+    """Run or resume a design job and write its results.
 
     Parameters
     ----------
+    folder
+        Folder of the job.
     workers
-        Chains that run at the same time; all cores by default. Changes nothing in the
-        results.
+        Number of chains that run in parallel, all cores by default; does not change results.
     tell
-        Called with the progress of a chain, from its own thread.
-    trying
-        Called with how many of the best designs have been tried as parts, and of how many, where
-        the design is for a part.
+        Called with the progress of a chain, from the thread of that chain.
+    ranking
+        For a part: called with the number of candidates analysed as frames, and their total number.
     stop
-        Set it to end the search after the steps at hand; what is done is kept.
+        Event that stops the search after the current block of steps; completed steps are stored.
 
     Returns
     -------
@@ -126,7 +133,7 @@ def complete_design(
     Raises
     ------
     StorageError, CorruptRun
-        If the folder cannot be written, is damaged, or another process is at work on it.
+        If the folder cannot be written, is damaged or is in use by another process.
     """
     settings = read_settings(folder.settings)
     with locked(folder.path / LOCK, wait=False):
@@ -134,7 +141,7 @@ def complete_design(
         try:
             done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
             if done:
-                report = conclude(folder, settings, trying)
+                report = conclude(folder, settings, ranking)
                 folder.finish()
                 return report
         except BaseException:
@@ -145,7 +152,7 @@ def complete_design(
 
 
 def _try_to_mark_stopped(folder: RunFolder) -> None:
-    """Note that a run stopped; the reason it did may keep even that from being written."""
+    """Set the status of a run to stopped, if it can still be written."""
     try:
         folder.status = "stopped"
     except (BellcrankError, OSError):
@@ -189,11 +196,11 @@ def verify(design: Design, settings: SearchSettings, response: Response) -> dict
 def conclude(
     folder: RunFolder,
     settings: SearchSettings,
-    trying: Callable[[int, int], None] = lambda _done, _total: None,
+    ranking: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> DesignReport:
-    """Choose, clean, verify and compare, and write the result files.
+    """Select, clean, verify and compare a design, and write the result files.
 
-    Finite elements have the last word on what is designed for a part (`choosing`).
+    For a part, the best candidates are ranked by nonlinear frame analysis (`candidate_ranking`).
 
     Raises
     ------
@@ -207,7 +214,7 @@ def conclude(
     spec = _part_of(folder)
     candidates, proposals, best = accepted_candidates(folder, settings)
     evaluator = verification_evaluator(problem, settings)
-    choose = most_efficient if spec is None else CandidateRanking(spec, settings, trying)
+    choose = most_efficient if spec is None else CandidateRanking(spec, settings, ranking)
     selection = select(problem, candidates, settings.objective, evaluator, choose)
     literal = verification_evaluator(problem, settings, goals=())
     human = human_counterpart(problem)
@@ -241,20 +248,20 @@ def conclude(
 
 
 def _validated(design: Design, spec: PartSpec | None) -> Validation | None:
-    """Return what a frame says of a design for a part; None if it is for none, or is none."""
+    """Return the frame analysis of a part; None without a part, or if it is not supported."""
     if spec is None or not is_held(design):
         return None
     return validate(design, spec, [(LEVEL, FINE)])
 
 
 def _part_of(folder: RunFolder) -> PartSpec | None:
-    """Return the part that a run was begun for, if any."""
-    told = folder.provenance.get("part")
-    return None if told is None else PartSpec.from_dict(told, f"{folder.path}: part")
+    """Return the part of a run, if it has one."""
+    data = folder.provenance.get("part")
+    return None if data is None else PartSpec.from_dict(data, f"{folder.path}: part")
 
 
 def _origin(report: DesignReport) -> dict[str, Any]:
-    """How a design came about, for its provenance."""
+    """Return the origin of a design, for its provenance."""
     return {
         "kind": "machine",
         "settings": report.settings.to_dict(),

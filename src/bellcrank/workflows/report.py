@@ -8,6 +8,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bellcrank.mechanics import objective_name
 from bellcrank.model.storage import write_text
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 RESULTS = re.compile(
     r"(design|validation)\.json|summary\.(md|json)|(comparison|efficiency|motion)\.png"
 )
-"""Names of the files that conclude a design job."""
+"""Names of the result files of a design job."""
 
 
 AGREEMENT = 1e-6
@@ -129,25 +130,29 @@ def _as_part(report: DesignReport) -> dict[str, Any] | None:
     if report.validation is None:
         return None
     data = report.validation.to_dict()["results"][0]
-    kept = ("level", "theory", "status", "efficiency", "von_mises_MPa", "principal_strain")
-    return {key: data[key] for key in (*kept, "contacts", "warnings", "part")}
+    figures = ("level", "theory", "status", "efficiency", "von_mises_MPa", "principal_strain")
+    return {key: data[key] for key in (*figures, "contacts", "warnings", "part")}
 
 
 def part_rows(report: DesignReport) -> list[tuple[str, str]]:
     """Return the figures of the frame analysis as rows of a name and a value."""
     if report.part is None:
         return []
-    name = f"as {report.part.width:g} mm struts"
+    name = f"frame of {report.part.width:g} mm struts"
     if report.validation is None:
-        return [(name, "it hangs on no support, and is no part")]
+        return [(name, "not analysed: a piece is not supported")]
     analysis = report.validation.analyses[0]
     if not math.isfinite(analysis.efficiency):
         return [(name, f"not stable: {analysis.status.message}")]
     last = analysis.last
-    touching = "struts touch" if len(analysis.contacts.pairs) else "nothing touches"
+    first = analysis.contacts.first
+    contact = "no contact" if first is None else f"contact from {first:.0%} of the stroke"
     return [
-        (name, f"{analysis.efficiency:.4f}"),
-        ("stress and strain there", f"{last.stress:.2g} MPa, {last.strain:.0%}; {touching}"),
+        (f"efficiency, {name}", f"{analysis.efficiency:.4f}"),
+        (
+            "largest stress and strain, frame",
+            f"{last.stress:.2g} MPa, {last.strain:.0%}; {contact}",
+        ),
     ]
 
 
@@ -158,12 +163,13 @@ def _finite(number: float) -> float | None:
 def summary_text(report: DesignReport) -> str:
     """Return the summary as Markdown (``summary.md``)."""
     selection = report.selection
-    began = ("initial design", f"{report.initial_efficiency:.6f}")
+    initial = ("initial design", f"{report.initial_efficiency:.6f}")
+    objective = objective_name(selection.design.problem)
     rows = [
-        ("efficiency of the design", f"{selection.efficiency_after:.6f}"),
+        (f"efficiency ({objective}), spring model", f"{selection.efficiency_after:.6f}"),
         *part_rows(report),
-        ("the same before cleaning", f"{selection.efficiency_before:.6f}"),
-        began,
+        ("before cleaning", f"{selection.efficiency_before:.6f}"),
+        initial,
         *((f"from rest by {name}", f"{value:.9f}") for name, value in report.checks.items()),
         ("beams", str(selection.design.beam_count)),
         ("found by chain, at step", f"{selection.found.chain}, {selection.found.step}"),
@@ -172,11 +178,11 @@ def summary_text(report: DesignReport) -> str:
     if report.settings.goals:
         rows.append(("goals satisfied", ", ".join(report.settings.goals).replace("|", "/")))
     if report.human_response is not None:
-        human = ("human-designed counterpart", f"{report.human_response.efficiency:.6f}")
-        rows.insert(rows.index(began) + 1, human)
+        human = ("human design", f"{report.human_response.efficiency:.6f}")
+        rows.insert(rows.index(initial) + 1, human)
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
     refused = "".join(
-        f"\nRefused, though better in the model: {count} ({reason})."
+        f"\nNot chosen, though better in the spring model: {count} ({reason})."
         for reason, count in selection.refused.items()
     )
     return f"""# {selection.design.problem.name}
@@ -185,11 +191,11 @@ def summary_text(report: DesignReport) -> str:
 |---|---|
 {table}
 
-Cleaning leaves out what no load can reach: loose pieces, dead-end beams, and parts that hang
-by a single node or stand on supports alone. A dead end softens the joint it sits at in the
-model but not in a real part, so the efficiency after cleaning is the one to expect.
+Cleaning removes beams without load: loose pieces, dead ends, and pieces that are connected by a
+single node or to supports only. Dead ends soften joints in the spring model but not in a real part,
+so the efficiency after cleaning is the one to expect.
 {refused}
-![the design at rest and moved](motion.png)
+![the design at rest and displaced](motion.png)
 
 ![efficiency along the chains](efficiency.png)
 """

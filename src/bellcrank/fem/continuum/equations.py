@@ -227,18 +227,18 @@ class ContinuumEquations:
         system = self.system
         module, thickness = ngsolve(), system.mesh.thickness
         dimension = system.mesh.dimension
-        trial = self.space.TrialFunction()
+        functions = self.space.TrialFunction()
         rules = integration(dimension, system.order)
         mean_rules = integration(dimension, MEAN_ORDER)
-        stretched = module.Id(dimension) + module.Grad(trial[0])
+        stretched = module.Id(dimension) + module.Grad(functions[0])
         stored = thickness * system.law.energy(stretched, system.lame)
         form = module.BilinearForm(self.space, symmetric=False)
         form += module.Variation(stored.Compile() * module.dx(intrules=rules))
         for constraint, multiplier, compliance in zip(
-            system.boundary.means, trial[1:], self.compliance.tolist(), strict=True
+            system.boundary.means, functions[1:], self.compliance.tolist(), strict=True
         ):
             moved = sum(
-                part * trial[0][axis] for axis, part in enumerate(constraint.direction) if part
+                part * functions[0][axis] for axis, part in enumerate(constraint.direction) if part
             )
             work = system.unit * (multiplier * moved - 0.5 * compliance * multiplier * multiplier)
             hub = module.dx(definedon=system.mesh.hub(constraint.node), intrules=mean_rules)

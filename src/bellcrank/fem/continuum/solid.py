@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SIZE = 1.0
 """Default edge length of triangles as a fraction of the strut width."""
-STRAIGHT = ArcAngles(outline=math.radians(60.0), hub=math.radians(90.0))
+STRAIGHT_EDGES = ArcAngles(outline=math.radians(60.0), hub=math.radians(90.0))
 
 
 def solid_mesh(part: Part, size: float | None = None, layers: int = 1) -> ContinuumMesh:
@@ -42,7 +42,7 @@ def solid_mesh(part: Part, size: float | None = None, layers: int = 1) -> Contin
     if layers < 1:
         raise InvalidSettings(f"layers: expected at least 1 across the thickness, got {layers}")
     size = SIZE * part.section.width if size is None else size
-    plane = plane_mesh(part, size, STRAIGHT)
+    plane = plane_mesh(part, size, STRAIGHT_EDGES)
     vertices = raised(plane.vertices, part.section.thickness, layers)
     elements = tetrahedra(plane.elements, len(plane.vertices), layers)
     hubs = np.repeat(plane.hub_of_element, 3 * layers)

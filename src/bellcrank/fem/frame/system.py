@@ -103,7 +103,7 @@ class Assembly:
 
     Parameters
     ----------
-    kept : (k,) int64
+    selected : (k,) int64
         Entries of free degrees of freedom only.
     slot : (k,) int64
         Value of the matrix to which each of them is added.
@@ -113,7 +113,7 @@ class Assembly:
         Number of rows of the matrix.
     """
 
-    kept: NDArray[np.int64]
+    selected: NDArray[np.int64]
     slot: NDArray[np.int64]
     rows: NDArray[np.int64]
     starts: NDArray[np.int64]
@@ -121,7 +121,7 @@ class Assembly:
 
     def matrix(self, entries: NDArray[np.float64]) -> csc_matrix:
         """Return the matrix of the free degrees of freedom from the entries of all blocks."""
-        data = np.bincount(self.slot, weights=entries[self.kept], minlength=len(self.rows))
+        data = np.bincount(self.slot, weights=entries[self.selected], minlength=len(self.rows))
         return csc_matrix((data, self.rows, self.starts), shape=(self.size, self.size))
 
 
@@ -131,10 +131,10 @@ def assembly_of(blocks: list[NDArray[np.int64]], free: NDArray[np.int64], count:
     number[free] = np.arange(len(free))
     rows = np.concatenate([np.repeat(number[dof], dof.shape[1], axis=1).ravel() for dof in blocks])
     columns = np.concatenate([np.tile(number[dof], (1, dof.shape[1])).ravel() for dof in blocks])
-    kept = np.flatnonzero((rows >= 0) & (columns >= 0))
-    key, slot = np.unique(columns[kept] * len(free) + rows[kept], return_inverse=True)
+    selected = np.flatnonzero((rows >= 0) & (columns >= 0))
+    key, slot = np.unique(columns[selected] * len(free) + rows[selected], return_inverse=True)
     starts = np.searchsorted(key, np.arange(len(free) + 1) * len(free))
-    return Assembly(kept, slot, key % len(free), starts, len(free))
+    return Assembly(selected, slot, key % len(free), starts, len(free))
 
 
 def dofs_of(nodes: NDArray[np.int64], each: int = 3) -> NDArray[np.int64]:
