@@ -44,10 +44,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-pytestmark = pytest.mark.slow
-
     from bellcrank.fem.continuum.mesh import ContinuumMesh
     from bellcrank.fem.continuum.response import ContinuumResponse
+
+pytestmark = pytest.mark.slow
 
 RUBBER = Material(name="rubber", young=12.0, poisson=0.48)
 NONLINEAR = [name for name, law in laws.items() if not law.small]
