@@ -19,8 +19,7 @@ from bellcrank.machines import (
     trace,
     two_port_at,
 )
-from bellcrank.mechanics import Conditions, SpringEvaluator, Status, follow
-from bellcrank.mechanics.strain import strain_of
+from bellcrank.mechanics import Conditions, SpringEvaluator, Status, follow, strain_of
 from bellcrank.model import Design
 
 from .test_two_port import actuator

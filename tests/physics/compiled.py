@@ -9,8 +9,8 @@ from bellcrank.mechanics.kernels.energy import (
     find_stiffness,
     measure_held_beams,
 )
+from bellcrank.mechanics.kernels.newton import find_tension
 from bellcrank.mechanics.kernels.structure import build_structure
-from bellcrank.mechanics.kernels.tension import find_tension
 
 
 @entry

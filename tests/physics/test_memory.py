@@ -79,7 +79,7 @@ def test_the_estimate_covers_what_is_allocated(name: str) -> None:
     problem = find_problem(name)
     evaluator = SpringEvaluator(problem)
     plain = sum(a.nbytes for a in arrays((*evaluator.system, *evaluator.structure,
-                                          *evaluator.scratch, *evaluator.known)))  # fmt: skip
+                                          *evaluator.scratch, *evaluator.reference)))  # fmt: skip
     flips = sum(
         a.nbytes for a in arrays(allocate_flip_workspace(evaluator.system, evaluator.structure))
     )

@@ -20,8 +20,8 @@ from bellcrank.mechanics import (
     Substructure,
     Superelement,
     follow,
+    strain_of,
 )
-from bellcrank.mechanics.strain import strain_of
 from bellcrank.model import Design, Output, Problem, find_problem, gallery_design
 
 from .problems import arm_on, frame, patch, random_masks

@@ -11,8 +11,7 @@ import pytest
 from PIL import Image
 
 from bellcrank.errors import InvalidProblem, InvalidSettings, OutputExists, StorageError
-from bellcrank.mechanics import SpringEvaluator
-from bellcrank.mechanics.strain import strain_of
+from bellcrank.mechanics import SpringEvaluator, strain_of
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Stiffness, Supports
 from bellcrank.plots.movies import (
     Graph,

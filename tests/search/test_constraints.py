@@ -10,7 +10,13 @@ from scipy.stats import spearmanr
 
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.machines import mean_ports, two_port_at
-from bellcrank.mechanics import Core, SpringEvaluator, Status, foresee_stiffness, output_stiffness
+from bellcrank.mechanics import (
+    Core,
+    SpringEvaluator,
+    Status,
+    output_stiffness,
+    predict_output_stiffness,
+)
 from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem
 from bellcrank.search.constraints import (
     ConstrainedEvaluator,
@@ -396,7 +402,7 @@ def test_the_predicted_stiffness_ranks_flips_like_the_true_one(name: str) -> Non
     before = output_stiffness(evaluator)
     evaluator.predict_flips(mask)
     beams = problem.designable[:: max(1, len(problem.designable) // 120)]
-    predicted = foresee_stiffness(evaluator, beams, mask[beams])
+    predicted = predict_output_stiffness(evaluator, beams, mask[beams])
     real = []
     for beam in beams:
         flipped = mask.copy()

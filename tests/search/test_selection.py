@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import NoDesignFound
-from bellcrank.mechanics import SpringEvaluator, Status
+from bellcrank.mechanics import SpringEvaluator, Status, loaded_beams
 from bellcrank.model import Problem, find_problem
 from bellcrank.search import (
     Candidate,
     candidates_of,
     clean,
     confirmed,
-    loaded_beams,
     pieces,
     plateaus,
     select,

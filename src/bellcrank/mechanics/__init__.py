@@ -1,7 +1,7 @@
 """Energy, equilibrium, efficiency and sensitivity of a design.
 
-The work flow, in four lines:
-
+Examples
+--------
 >>> from bellcrank.mechanics import SpringEvaluator
 >>> from bellcrank.model import find_problem
 >>> evaluator = SpringEvaluator(find_problem("anti-parallel"))
@@ -9,7 +9,15 @@ The work flow, in four lines:
 0.0420422
 """
 
-from bellcrank.mechanics.carrying import Core, foresee_stiffness, output_stiffness
+from bellcrank.mechanics.analysis import (
+    Core,
+    Strain,
+    load_bearing_core,
+    loaded_beams,
+    output_stiffness,
+    predict_output_stiffness,
+    strain_of,
+)
 from bellcrank.mechanics.conditions import Conditions, Linear
 from bellcrank.mechanics.evaluator import (
     VERIFICATION_INCREMENT,
@@ -17,7 +25,6 @@ from bellcrank.mechanics.evaluator import (
     Response,
     SpringEvaluator,
     UnloadedBeams,
-    load_bearing_core,
 )
 from bellcrank.mechanics.following import Arrival, follow
 from bellcrank.mechanics.grips import Grip, Loose, Rigid, Sliding
@@ -52,6 +59,7 @@ __all__ = [
     "SpringEvaluator",
     "State",
     "Status",
+    "Strain",
     "StrokeEvaluator",
     "Substructure",
     "Superelement",
@@ -61,10 +69,12 @@ __all__ = [
     "efficiency_of",
     "evaluators_that_fit",
     "follow",
-    "foresee_stiffness",
     "load_bearing_core",
+    "loaded_beams",
     "objective_name",
     "objective_of",
     "objectives",
     "output_stiffness",
+    "predict_output_stiffness",
+    "strain_of",
 ]

@@ -1,4 +1,4 @@
-"""The response of designs: the public face of the mechanics."""
+"""Responses of designs: the main interface of the mechanics."""
 
 from __future__ import annotations
 
@@ -9,18 +9,13 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from bellcrank.errors import InvalidProblem, InvalidSettings
-from bellcrank.mechanics.kernels.arrays import (
-    IGNORED,
-    Known,
-    Structure,
-    System,
-)
+from bellcrank.mechanics.kernels.arrays import PRUNE_DEAD_ENDS, Reference, Structure, System
 from bellcrank.mechanics.memory import check_memory
 from bellcrank.mechanics.objectives import objective_of
 from bellcrank.mechanics.status import Status
 from bellcrank.mechanics.system import (
     allocate_flip_workspace,
-    allocate_known,
+    allocate_reference,
     allocate_scratch,
     allocate_structure,
     build_system,
@@ -31,19 +26,20 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics.kernels.flip_prediction import FlipWorkspace
     from bellcrank.mechanics.status import Outcome
-    from bellcrank.model import Design, Problem
+    from bellcrank.model import Problem
 
 UnloadedBeams = Literal["keep", "prune_dead_ends", "prune_all"]
-
+"""Treatment of beams that carry no load; see `SpringEvaluator`."""
 
 VERIFICATION_INCREMENT = 1 / 32
-"""Largest increment of the load for a design that somebody will build: a search may take longer
-strides, and miss that one in a hundred of the designs near a loss of stability snaps."""
+"""Largest load increment for a design that will be built. Searches use larger increments, with
+which about one in a hundred of the designs near a loss of stability is not recognised as
+snapping."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """What a design does at full load.
+    """Response of a design at full load.
 
     Parameters
     ----------
@@ -55,9 +51,9 @@ class Response:
     energy
         Elastic energy of beams, angular springs and output springs; nan if not computed.
     displacement : (N, 2)
-        Of each node, in lattice units. Loose pieces are at rest.
+        Displacement of each node, in lattice units. Loose pieces are at rest.
     penalty
-        For breaking the goals of a search, in units of the efficiency; 0 if they are kept.
+        Penalty for violated constraints of a search, in units of the efficiency; else 0.
     """
 
     status: Outcome
@@ -68,28 +64,28 @@ class Response:
 
     @property
     def score(self) -> float:
-        """What a search raises: the efficiency, less the penalty for broken goals."""
+        """The quantity that a search maximises: the efficiency less the penalty."""
         return self.efficiency - self.penalty
 
     @property
     def is_admissible(self) -> bool:
-        """Whether a search may go there: the equilibrium is stable and reached from rest."""
+        """Whether a search may accept the design: a stable equilibrium, reached from rest."""
         return self.status.is_admissible
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlipPrediction:
-    """What one Newton step tells of each flip of some beams.
+    """Prediction of the effect of flips by one Newton step.
 
     Parameters
     ----------
     beams : (n,) int64
-        Which.
+        The flipped beams.
     change : (n,)
-        Of the efficiency, as predicted; exactly zero for flips that no load can feel.
+        Predicted change of the efficiency; exactly zero for beams that carry no load.
     strain : (n,)
-        Of the beam, or of an absent one put between its ends as they are. Predictions for
-        absent beams of large strain are wrong.
+        Strain of the beam, or of an absent one between its ends as they are. Predictions for
+        absent beams of large strain are inaccurate.
     """
 
     beams: NDArray[np.int64]
@@ -97,21 +93,37 @@ class FlipPrediction:
     strain: NDArray[np.float64]
 
 
+def core_code(unloaded_beams: UnloadedBeams) -> int:
+    """Return the code of a treatment of unloaded beams for the kernels.
+
+    Raises
+    ------
+    InvalidSettings
+        If it is unknown.
+    """
+    known = get_args(UnloadedBeams)
+    if unloaded_beams not in known:
+        raise InvalidSettings(
+            f"unloaded_beams must be one of {', '.join(known)}; got {unloaded_beams!r}"
+        )
+    return known.index(unloaded_beams)
+
+
 class SpringEvaluator:
-    """Computes responses of designs of one problem; one instance for each thread.
+    """Responses of designs of one problem; one instance for each thread.
 
     Parameters
     ----------
     problem
-        What is driven, held and measured.
+        Lattice, supports, input and output.
     objective
-        Name of an efficiency (see `bellcrank.mechanics.objectives`); the problem's own
-        by default.
+        Name of an objective (see `bellcrank.mechanics.objectives`); that of the problem by
+        default.
     unloaded_beams
         ``"keep"``: the literal model. ``"prune_dead_ends"``: the load-bearing core, without
-        dead-end beams, whose splitting of angular springs no real part has.
-        ``"prune_all"``: also without what hangs by a single node or stands on supports
-        alone, which splits them as well.
+        dead ends, which split angular springs although a part is not affected by them.
+        ``"prune_all"``: also without pieces that hang by a single node or rest on supports
+        alone, which split them as well.
 
     Examples
     --------
@@ -128,20 +140,15 @@ class SpringEvaluator:
         objective: str | None = None,
         unloaded_beams: UnloadedBeams = "keep",
     ) -> None:
-        if unloaded_beams not in get_args(UnloadedBeams):
-            raise InvalidSettings(
-                f"unloaded_beams must be one of {', '.join(get_args(UnloadedBeams))}; "
-                f"got {unloaded_beams!r}"
-            )
+        self.core = core_code(unloaded_beams)
         check_memory(problem)
         self.problem = problem
-        self.core = get_args(UnloadedBeams).index(unloaded_beams)
         self.system: System = build_system(problem, objective_of(problem, objective))
         self.structure: Structure = allocate_structure(self.system)
         self.scratch = allocate_scratch(self.system, self.structure)
-        self.known: Known = allocate_known(self.system)
+        self.reference: Reference = allocate_reference(self.system)
         self.displacement = np.zeros_like(self.system.positions)
-        self._screen: FlipWorkspace | None = None
+        self._workspace: FlipWorkspace | None = None
 
     def _checked(self, mask: ArrayLike) -> NDArray[np.uint8]:
         given = np.asarray(mask)
@@ -167,8 +174,8 @@ class SpringEvaluator:
         mask : (M,) bool
             Which beams are present.
         largest_increment
-            Upper bound on the load increments, as a fraction of the full load; smaller
-            values follow the path more finely than the step control asks for.
+            Upper bound on the load increments, as a fraction of the full load. The step control
+            chooses smaller ones where needed.
         warm_start
             Start from the reference equilibrium of a similar design (`set_reference`). The
             response is the same to within the tolerance, and computed faster.
@@ -181,29 +188,34 @@ class SpringEvaluator:
         InvalidProblem
             If the mask has the wrong length.
         """
-        return self._load(mask, self.core, warm_start, lower_bound, largest_increment)
+        return self._load(mask, self.core, largest_increment, warm_start, lower_bound)
 
     def _load(
-        self, mask: ArrayLike, core: int, nearby: bool, least: float, largest_increment: float
+        self,
+        mask: ArrayLike,
+        core: int,
+        largest_increment: float = 1.0,
+        warm_start: bool = False,
+        lower_bound: float = -math.inf,
     ) -> Response:
         from bellcrank.mechanics.kernels.response import respond
 
         status, efficiency, energy = respond(
-            self.system, self._checked(mask), core, self.known, nearby, least,
+            self.system, self._checked(mask), core, self.reference, warm_start, lower_bound,
             largest_increment, self.structure, self.displacement, self.scratch,
         )  # fmt: skip
         return Response(Status(status), efficiency, energy, self.displacement.copy())
 
     def set_reference(self) -> None:
-        """Keep the equilibrium computed last, which must have converged, for warm starts."""
-        self.known.present[:] = self.structure.present
-        self.known.active[:] = self.structure.active
-        self.known.u[:] = self.displacement
+        """Make the equilibrium computed last, which must have converged, the reference."""
+        self.reference.present[:] = self.structure.present
+        self.reference.active[:] = self.structure.active
+        self.reference.u[:] = self.displacement
 
     def load_bearing(self, mask: ArrayLike) -> NDArray[np.bool_]:
-        """Return which beams of a design can carry load: no loose pieces, no dead ends.
+        """Return the beams of a design that can carry load: no loose pieces, no dead ends.
 
-        What remains when pieces that the drive cannot reach and, repeatedly, beams that
+        The remainder after pieces that the drive cannot reach and, repeatedly, beams that
         end in a free node of degree one are left out. Supports, input and output nodes
         are not free in this sense.
 
@@ -211,58 +223,60 @@ class SpringEvaluator:
         -------
         (M,) bool
         """
-        self._load(mask, IGNORED, False, -math.inf, 1.0)
+        self._load(mask, PRUNE_DEAD_ENDS)
         ends_move = self.structure.active[self.system.beams].astype(bool).any(axis=1)
         core: NDArray[np.bool_] = (self.structure.present != 0) & ends_move
         return core
 
     def sensitivity(self, mask: ArrayLike) -> NDArray[np.float64]:
-        """First-order change of the efficiency by flipping each beam, from one adjoint solve.
+        """Return the first-order change of the efficiency by flipping each beam.
+
+        From one adjoint solution.
 
         Returns
         -------
         (M,)
             For a present beam, the change on removing it; for an absent one, on adding
-            it. Zero for flips that no load can feel.
+            it. Zero for beams that carry no load.
 
         Raises
         ------
         InvalidSettings
-            If the design has no stable equilibrium to differentiate at.
+            If the design has no stable equilibrium at which to differentiate.
         """
-        from bellcrank.mechanics.kernels.sensitivity import find_sensitivity
-
         response = self.evaluate(mask)
-        sensitivity = np.zeros(len(self.system.beams))
-        found = response.status in (Status.CONVERGED, Status.SNAPPED) and find_sensitivity(
-            self.system, self._checked(mask), self.core,
-            self.structure, self.displacement, self.scratch,
-            np.zeros(len(self.displacement), np.uint8), sensitivity,
-        )  # fmt: skip
-        if not found:
+        found = None
+        if response.status in (Status.CONVERGED, Status.SNAPPED):
+            workspace = allocate_flip_workspace(self.system, self.structure, first_order=True)
+            found = self._predict(mask, np.arange(len(self.system.beams)), workspace)
+        if found is None:
             raise InvalidSettings(f"no sensitivity: {response.status.message}")
-        return sensitivity
+        return found.change
 
     def predict_flips(
         self, mask: ArrayLike, beams: ArrayLike | None = None
     ) -> FlipPrediction | None:
         """Predict the change of the efficiency by each flip, from the response computed last.
 
-        One Newton step from the equilibrium of `mask`, which must be the design that
-        `evaluate` was last called with, to that of each flipped design,
-        by a low-rank change of its stiffness. Much nearer to the truth than `sensitivity`,
-        and for the price of one or two responses.
+        One Newton step from the equilibrium of `mask`, which must be the design evaluated last,
+        to that of each flipped design, by a low-rank update of its stiffness. Far more accurate
+        than `sensitivity`, at the cost of one or two responses.
 
         Parameters
         ----------
         mask : (M,) bool
         beams : (n,) int64
-            Which to flip; the designable ones by default.
+            Beams to flip; the designable ones by default.
 
         Returns
         -------
         FlipPrediction or None
-            None if the equilibrium is unstable, so that there is nothing to start from.
+            None if the equilibrium is unstable.
+
+        Raises
+        ------
+        InvalidSettings
+            If the dense inverse of the stiffness does not fit into the available memory.
 
         Examples
         --------
@@ -270,54 +284,56 @@ class SpringEvaluator:
         >>> crane = find_problem("crane")
         >>> evaluator = SpringEvaluator(crane)
         >>> efficiency = evaluator.evaluate(crane.initial).efficiency
-        >>> screening = evaluator.predict_flips(crane.initial)
-        >>> best = screening.change.argmax()
+        >>> prediction = evaluator.predict_flips(crane.initial)
+        >>> best = prediction.change.argmax()
         >>> flipped = crane.initial.copy()
-        >>> flipped[screening.beams[best]] = False
+        >>> flipped[prediction.beams[best]] = False
         >>> gained = evaluator.evaluate(flipped).efficiency - efficiency
-        >>> print(f"{screening.change[best]:.3f} predicted, {gained:.3f} gained")
+        >>> print(f"{prediction.change[best]:.3f} predicted, {gained:.3f} gained")
         0.026 predicted, 0.026 gained
         """
+        chosen = self.problem.designable if beams is None else np.asarray(beams, dtype=np.int64)
+        if self._workspace is None:
+            check_memory(self.problem, predict_flips=True)
+            self._workspace = allocate_flip_workspace(self.system, self.structure)
+        return self._predict(mask, chosen, self._workspace)
+
+    def _predict(
+        self, mask: ArrayLike, beams: NDArray[np.int64], workspace: FlipWorkspace
+    ) -> FlipPrediction | None:
         from bellcrank.mechanics.kernels.flip_prediction import predict_flips
 
-        chosen = self.problem.designable if beams is None else np.asarray(beams, dtype=np.int64)
-        if self._screen is None:
-            check_memory(self.problem, predict_flips=True)
-            self._screen = allocate_flip_workspace(self.system, self.structure)
-        change, strain = np.zeros(len(chosen)), np.zeros(len(chosen))
+        change, strain = np.zeros(len(beams)), np.zeros(len(beams))
         found = predict_flips(
-            self.system, self._checked(mask), self.core, chosen, self.structure,
-            self.displacement, self.scratch, self._screen, change, strain,
+            self.system, self._checked(mask), self.core, beams, not len(workspace.inverse),
+            self.structure, self.displacement, self.scratch, workspace, change, strain,
         )  # fmt: skip
-        return FlipPrediction(chosen, change, strain) if found else None
+        return FlipPrediction(beams, change, strain) if found else None
 
-    def flexibility(self) -> NDArray[np.float64]:
-        """Return (n, 2, n, 2) the inverse of the stiffness that `screen` looked at last.
+    def inverse_blocks(
+        self, rows: NDArray[np.int64], columns: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Return blocks of the inverse stiffness of the last flip prediction.
 
-        By elimination index of the nodes, ``system.block``.
+        Parameters
+        ----------
+        rows, columns : (...) int64
+            Elimination indices of nodes, ``system.block``; broadcast.
+
+        Returns
+        -------
+        (..., 2, 2)
 
         Raises
         ------
         InvalidSettings
-            If nothing was screened yet.
+            If no flips were predicted yet.
         """
-        if self._screen is None:
-            raise InvalidSettings("flexibility: screen a design first")
-        nodes = len(self._screen.inverse)
-        square = self._screen.inverse.reshape(nodes, nodes, 2, 2).transpose(0, 2, 1, 3)
-        lower = np.tril(square.reshape(2 * nodes, 2 * nodes))
-        whole: NDArray[np.float64] = lower + np.tril(lower, -1).T
-        return whole.reshape(nodes, 2, nodes, 2)
-
-
-def load_bearing_core(design: Design) -> NDArray[np.bool_]:
-    """Return the mask of the beams that can carry load: see `SpringEvaluator.load_bearing`.
-
-    Examples
-    --------
-    >>> from bellcrank.model import find_problem
-    >>> crane = find_problem("crane").full_design()
-    >>> bool(load_bearing_core(crane).all())
-    True
-    """
-    return SpringEvaluator(design.problem, "displacement").load_bearing(design.mask)
+        if self._workspace is None:
+            raise InvalidSettings("inverse_blocks: call predict_flips first")
+        low, high = np.minimum(rows, columns), np.maximum(rows, columns)
+        found = self._workspace.inverse[high, low].reshape(*low.shape, 2, 2)
+        # Diagonal blocks are symmetric to rounding; their lower triangle is used.
+        found[..., 0, 1] = np.where(low == high, found[..., 1, 0], found[..., 0, 1])
+        transposed = np.swapaxes(found, -1, -2)
+        return np.where((rows < columns)[..., None, None], transposed, found)

@@ -189,9 +189,9 @@ def settle(
         None if steps grow too long, do not settle, or end where it is not stable.
     """
     z, displacement = start.z.copy(), start.displacement.copy()
-    last = foreseen = False
+    last = predicted = False
     for _ in range(MOST_ITERATIONS):
-        found = element.condense(z, displacement, foreseen=foreseen and not last)
+        found = element.condense(z, displacement, predicted=predicted and not last)
         whole = found is not None
         found = found or element.condense(z, displacement, softened=False)
         if found is None:
@@ -207,8 +207,8 @@ def settle(
             return (element.state(z, displacement, found), found) if good else None
         if not size < LONGEST_STEP:
             return None
-        element.cut.foresee(moved)
-        foreseen = True
+        element.cut.predict_tension(moved)
+        predicted = True
         z, displacement = z + step, displacement + moved
         element.place(z, displacement)
         last = size <= SETTLED and whole

@@ -121,7 +121,7 @@ class Substructure:
         self._find_structure(get_args(UnloadedBeams).index(unloaded_beams))
 
     def _find_structure(self, core: int) -> None:
-        from bellcrank.mechanics.kernels.condensation import find_structure
+        from bellcrank.mechanics.kernels.structure import find_structure
 
         # Pieces are judged with the gripped nodes held, and beams between them still move.
         judged = self.system._replace(held=self._held)
@@ -146,7 +146,7 @@ class Substructure:
         motions: NDArray[np.float64],
         *,
         softened: bool = True,
-        foreseen: bool = False,
+        predicted: bool = False,
     ) -> Condensed | None:
         """Condense the tangent stiffness to motions of the gripped nodes.
 
@@ -159,8 +159,8 @@ class Substructure:
         softened
             False leaves out what can make the stiffness indefinite: a safe slope far from
             equilibrium.
-        foreseen
-            Take the tension that `foresee` has told instead of that at the displacement.
+        predicted
+            Use the tension of `predict_tension` instead of that at the displacement.
 
         Returns
         -------
@@ -175,7 +175,7 @@ class Substructure:
         forcing, responses = np.zeros_like(ordered), np.zeros_like(ordered)
         lowest = condense(
             self.system, self.structure, self._held, displacement, 1.0 if softened else 0.0,
-            foreseen, ordered, forcing, responses, self._mode, self.scratch,
+            predicted, ordered, forcing, responses, self._mode, self.scratch,
         )  # fmt: skip
         if lowest < 0.0:
             return None
@@ -188,17 +188,16 @@ class Substructure:
         force = whole.reshape(count, -1) @ gradient.ravel()
         return Condensed(stiffness, force, whole, settling, gradient, lowest)
 
-    def foresee(self, step: NDArray[np.float64]) -> None:
-        """Tell the tension after a step (N, 2) from where the stiffness was condensed last.
+    def predict_tension(self, step: NDArray[np.float64]) -> None:
+        """Compute the tension to first order after a step (N, 2) from the last condensation.
 
-        To first order, which is nearer to the truth than after the step itself: see
-        `bellcrank.mechanics.kernels.tension`.
+        See `bellcrank.mechanics.kernels.newton.predict_tension`.
         """
-        from bellcrank.mechanics.kernels.condensation import foresee
+        from bellcrank.mechanics.kernels.condensation import tension_after
 
         ordered = np.zeros_like(self.scratch.step)
         ordered[self._order] = step[self._free]
-        foresee(self.system, self.structure, ordered, self.scratch)
+        tension_after(self.system, self.structure, ordered, self.scratch)
 
 
 def _checked(gripped: NDArray[np.int64], design: Design) -> NDArray[np.int64]:

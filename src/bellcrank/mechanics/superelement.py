@@ -143,14 +143,14 @@ class Superelement:
         displacement: NDArray[np.float64],
         *,
         softened: bool = True,
-        foreseen: bool = False,
+        predicted: bool = False,
     ) -> Condensed | None:
         """Condense to z; what grips add to the stiffness by turning under force included.
 
         As `Substructure.condense`, whose keywords it has.
         """
         found = self.cut.condense(
-            displacement, self.motions(z), softened=softened, foreseen=foreseen
+            displacement, self.motions(z), softened=softened, predicted=predicted
         )
         if found is not None:
             for grip, part in zip(self.grips, self._parts, strict=True):

@@ -1,4 +1,4 @@
-"""From a problem to the arrays the kernels work on."""
+"""Arrays of a problem for the kernels."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from bellcrank.mechanics.kernels.arrays import (
     HELD,
     HELD_X,
     HELD_Y,
+    MAX_KNOTS,
     Bytes,
     Floats,
     Ints,
-    Known,
+    Reference,
     Scratch,
     Structure,
     System,
+    Vectors,
 )
 from bellcrank.mechanics.kernels.flip_prediction import PANEL, RANK, FlipWorkspace
-from bellcrank.mechanics.kernels.tangents import MOST_KNOTS, ROWS
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
 
 if TYPE_CHECKING:
@@ -29,11 +30,11 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 EFFICIENCY_TOLERANCE = 1e-9
-"""Error in efficiency at which an equilibrium counts as settled."""
+"""Error in efficiency at which an equilibrium counts as converged."""
 
 
-def rings(positions: Floats, beams: Ints) -> tuple[Ints, Ints]:
-    """List the beams around each node, counter-clockwise at rest.
+def incident_beams(positions: Floats, beams: Ints) -> tuple[Ints, Ints]:
+    """List the beams incident to each node, counter-clockwise at rest.
 
     Returns
     -------
@@ -61,7 +62,7 @@ def _held_coordinates(problem: Problem) -> Bytes:
 
 
 def _output_springs(problem: Problem) -> Floats:
-    """(N, 3) components xx, xy, yy of the stiffness of the springs on the output nodes."""
+    """Return (N, 3) components xx, xy, yy of the stiffness of the springs on the output nodes."""
     ground = np.zeros((problem.lattice.node_count, 3))
     output = problem.output
     if output.spring:
@@ -75,22 +76,22 @@ def _output_springs(problem: Problem) -> Floats:
 
 
 def build_system(problem: Problem, objective: Objective) -> System:
-    """Translate a problem into arrays.
+    """Convert a problem to arrays.
 
     Raises
     ------
     InvalidProblem
-        If the lattice is not planar: the equations are written for two dimensions.
+        If the lattice is not planar.
     """
     lattice = problem.lattice
     if lattice.positions.shape[1] != 2:
         raise InvalidProblem(
-            f"problem {problem.name!r}: mechanics needs planar positions (N, 2), "
+            f"problem {problem.name!r}: expected planar positions (N, 2), "
             f"got {lattice.positions.shape}"
         )
     beams = lattice.beams.astype(np.int64)
     positions = np.array(lattice.positions)
-    ring_start, ring_beam = rings(positions, beams)
+    incident_start, incident_beam = incident_beams(positions, beams)
     held = _held_coordinates(problem)
     protected = (held != 0).astype(np.uint8)
     protected[problem.input.nodes] = 1
@@ -108,8 +109,8 @@ def build_system(problem: Problem, objective: Objective) -> System:
         rest_vector=positions[beams[:, 1]] - positions[beams[:, 0]],
         rest_length=np.array(lattice.rest_length),
         movable=(held[beams] != HELD).any(axis=1).astype(np.uint8),
-        ring_start=ring_start,
-        ring_beam=ring_beam,
+        incident_start=incident_start,
+        incident_beam=incident_beam,
         held=held,
         protected=protected,
         grounded=grounded,
@@ -132,18 +133,18 @@ def build_system(problem: Problem, objective: Objective) -> System:
 
 
 def allocate_structure(system: System) -> Structure:
-    """Room for the load-bearing graph of any design of a system."""
+    """Allocate the load-bearing graph of any design of a system."""
     nodes, beams = len(system.positions), len(system.beams)
     blocks = int(system.block.max(initial=-1)) + 1
     words = blocks // 64 + 1
     return Structure(
         present=np.zeros(beams, np.uint8),
         loaded=np.zeros(beams, np.uint8),
-        walk=np.zeros((nodes, 6), np.int64),
+        search=np.zeros((nodes, 6), np.int64),
         active=np.zeros(nodes, np.uint8),
         order=np.zeros(nodes, np.int64),
         parent=np.full(nodes, -1),
-        around=np.zeros(int(np.diff(system.ring_start).max(initial=0)), np.int64),
+        around=np.zeros(int(np.diff(system.incident_start).max(initial=0)), np.int64),
         beam=np.zeros(beams, np.int64),
         beam_entry=np.full(beams, -1),
         spring_beams=np.zeros((2 * beams, 2), np.int64),
@@ -158,9 +159,9 @@ def allocate_structure(system: System) -> Structure:
     )
 
 
-def allocate_known(system: System) -> Known:
-    """Room for an equilibrium to start from."""
-    return Known(
+def allocate_reference(system: System) -> Reference:
+    """Allocate a reference equilibrium."""
+    return Reference(
         present=np.zeros(len(system.beams), np.uint8),
         active=np.zeros(len(system.positions), np.uint8),
         u=np.zeros((len(system.positions), 2)),
@@ -168,7 +169,7 @@ def allocate_known(system: System) -> Known:
 
 
 def allocate_scratch(system: System, structure: Structure) -> Scratch:
-    """Working memory for one thread."""
+    """Allocate working memory for one thread."""
     nodes, beams = len(system.positions), len(system.beams)
     blocks, entries = len(structure.column_bits), len(structure.row)
     return Scratch(
@@ -187,18 +188,41 @@ def allocate_scratch(system: System, structure: Structure) -> Scratch:
         column=np.zeros((blocks, 4)),
         link=np.zeros((blocks, 3), np.int64),
         step=np.zeros((blocks, 2)),
-        vectors=np.zeros((ROWS, nodes, 2)),
-        knots=np.zeros((MOST_KNOTS, 2)),
+        vectors=_allocate_vectors(nodes),
     )
 
 
-def allocate_flip_workspace(system: System, structure: Structure) -> FlipWorkspace:
-    """Working memory for the prediction of all flips; grows with the square of the nodes."""
-    blocks = len(structure.column_bits)
+def _allocate_vectors(nodes: int) -> Vectors:
+    single = {
+        name: np.zeros((nodes, 2))
+        for name in Vectors._fields
+        if name != "rotation" and not name.startswith("knot")
+    }
+    return Vectors(
+        **single,
+        rotation=np.zeros(nodes),
+        knot=np.zeros((MAX_KNOTS, nodes, 2)),
+        knot_tangent=np.zeros((MAX_KNOTS, nodes, 2)),
+        knot_load=np.zeros(MAX_KNOTS),
+        knot_stiffness=np.zeros(MAX_KNOTS),
+    )
+
+
+def allocate_flip_workspace(
+    system: System, structure: Structure, *, first_order: bool = False
+) -> FlipWorkspace:
+    """Allocate working memory for flip prediction.
+
+    Parameters
+    ----------
+    first_order
+        Leave out the dense inverse of the stiffness, which the sensitivity does not need.
+    """
+    blocks = 0 if first_order else len(structure.column_bits)
     return FlipWorkspace(
         inverse=np.zeros((blocks, blocks, 4)),
         panel=np.zeros((blocks, 2, 2 * PANEL)),
-        counts=np.zeros(len(system.positions), np.uint8),
+        anchored=np.zeros(len(system.positions), np.uint8),
         around=np.zeros(RANK, np.int64),
         ends=np.zeros((RANK, 2), np.int64),
         vectors=np.zeros((RANK, 2)),

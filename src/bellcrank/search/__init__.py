@@ -19,7 +19,7 @@ Examples
 """
 
 from bellcrank.search.blocks import BLOCK
-from bellcrank.search.cleaning import clean, loaded_beams, pieces
+from bellcrank.search.cleaning import clean, pieces
 from bellcrank.search.evaluator import Evaluator, make_evaluator
 from bellcrank.search.hopping import HoppingSettings, HoppingState
 from bellcrank.search.markov import (
@@ -93,7 +93,6 @@ __all__ = [
     "costs",
     "default_workers",
     "is_done",
-    "loaded_beams",
     "make_evaluator",
     "most_efficient",
     "moves",

@@ -6,89 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import SpringEvaluator
+from bellcrank.mechanics import SpringEvaluator, loaded_beams
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Design, Problem
-
-
-def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the beams on a path between two nodes that are input, output or supported.
-
-    A part connected by a single node is in equilibrium without any force at that node, and so
-    carries no load. The same holds for a part that touches fixed supports only. Merge all fixed
-    supports into one root node and add a virtual edge from it to each input, output and roller
-    node: the load-bearing beams are those of the biconnected components at the root that
-    contain a virtual edge. Beams between two fixed supports are kept, since they join the part
-    to one piece.
-
-    Parameters
-    ----------
-    mask : (M,) bool
-
-    Returns
-    -------
-    (M,) bool
-        Subset of `mask`.
-    """
-    root = problem.lattice.node_count
-    place = np.arange(root)
-    place[problem.supports.fixed] = root
-    links: list[list[tuple[int, int]]] = [[] for _ in range(root + 1)]
-    kept = np.zeros(len(mask), dtype=bool)
-    for beam in np.flatnonzero(mask).tolist():
-        first, second = place[problem.lattice.beams[beam]].tolist()
-        if first == second:
-            kept[beam] = True
-        else:
-            links[first].append((second, beam))
-            links[second].append((first, beam))
-    terminals = {*problem.supports.nodes, *problem.input.nodes, *problem.output.nodes}
-    for number, node in enumerate(sorted(set(place[list(terminals)].tolist()) - {root})):
-        tie = -1 - number
-        links[root].append((node, tie))
-        links[node].append((root, tie))
-    for component in _components_at(links, root):
-        if min(component) < 0:
-            kept[[beam for beam in component if beam >= 0]] = True
-    return kept
-
-
-def _components_at(links: list[list[tuple[int, int]]], root: int) -> list[list[int]]:
-    """Return the biconnected components that contain the root, as lists of edges.
-
-    Depth-first search with low points (Hopcroft and Tarjan, Commun. ACM 16, 372, 1973):
-    a component is complete when the subtree below a node reaches no node above it.
-    """
-    depth = {root: 0}
-    low = {root: 0}
-    edges: list[int] = []
-    found: list[list[int]] = []
-    stack = [(root, 0, iter(links[root]), 0)]
-    while stack:
-        node, came_by, rest, mark = stack[-1]
-        for far, edge in rest:
-            if far not in depth:
-                depth[far] = low[far] = depth[node] + 1
-                stack.append((far, edge, iter(links[far]), len(edges)))
-                edges.append(edge)
-                break
-            if edge != came_by and depth[far] < depth[node]:
-                edges.append(edge)
-                low[node] = min(low[node], depth[far])
-        else:
-            stack.pop()
-            if stack:
-                parent = stack[-1][0]
-                low[parent] = min(low[parent], low[node])
-                if low[node] >= depth[parent]:
-                    component = edges[mark:]
-                    del edges[mark:]
-                    if parent == root:
-                        found.append(component)
-    return found
 
 
 def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
-from bellcrank.mechanics.strain import strain_of
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status, strain_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,11 +1,10 @@
-"""What the kernels work on: three bundles of arrays and nothing else.
+"""Bundles of arrays that the kernels work on.
 
-`System` is fixed by the problem, `Structure` by the design (the mask),
-`Scratch` is working memory. All are allocated once, by
-`bellcrank.mechanics.system`; kernels only fill them.
+`System` is fixed by the problem, `Structure` by the design (the mask), `Scratch` is working
+memory. All are allocated once, by `bellcrank.mechanics.system`; kernels only fill them.
 
-N nodes, M beams; n free nodes (at least one free coordinate), each a 2 x 2
-*block* of the stiffness matrix, numbered in elimination order.
+N nodes, M beams; n free nodes (with at least one free coordinate). Each free node is a 2 x 2
+*block* of the stiffness matrix; blocks are numbered in elimination order.
 """
 
 from __future__ import annotations
@@ -20,19 +19,19 @@ Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 Words = NDArray[np.uint64]
 
-HELD_X = 1
-HELD_Y = 2
-HELD = 3
+HELD_X, HELD_Y, HELD = 1, 2, 3
+"""Bits of `System.held`."""
 
-CONVERGED = 0
-SNAPPED = 1
-MECHANISM = 2
-UNCONVERGED = 3
-UNVERIFIED = 6
+CONVERGED, SNAPPED, MECHANISM, UNCONVERGED, UNVERIFIED = 0, 1, 2, 3, 6
+"""Codes of `bellcrank.mechanics.Status`."""
 
-COUNTED = 0
-IGNORED = 1
-STRIPPED = 2
+KEEP, PRUNE_DEAD_ENDS, PRUNE_ALL = 0, 1, 2
+"""Codes of `bellcrank.mechanics.UnloadedBeams`."""
+
+ACTIVE = 1
+"""A node of a piece that the drive moves."""
+HANGING = 2
+"""A node of a piece that hangs from one held node: it follows as a rigid body, without stress."""
 
 
 class System(NamedTuple):
@@ -48,10 +47,10 @@ class System(NamedTuple):
     """(M,)"""
     movable: Bytes
     """(M,) 1 for beams with a free end."""
-    ring_start: Ints
-    """(N + 1,) where each node's beams begin in `ring_beam`."""
-    ring_beam: Ints
-    """(2 M,) beams around each node, counter-clockwise at rest."""
+    incident_start: Ints
+    """(N + 1,) index in `incident_beam` at which the beams of each node begin."""
+    incident_beam: Ints
+    """(2 M,) beams incident to each node, counter-clockwise at rest."""
     held: Bytes
     """(N,) bits HELD_X, HELD_Y: coordinates prescribed by a support or the drive."""
     protected: Bytes
@@ -87,27 +86,27 @@ class Structure(NamedTuple):
     """The load-bearing graph of one design, and the pattern of its stiffness."""
 
     present: Bytes
-    """(M,) beams that count: the mask, less dead ends where these are ignored."""
+    """(M,) beams of the mask that are not pruned."""
     loaded: Bytes
-    """(M,) beams on some way between two nodes that are driven, watched or held."""
-    walk: Ints
-    """(N, 6) how a walk through the beams came by each node, and its stack."""
+    """(M,) beams on a path between two nodes that are driven, watched or held."""
+    search: Ints
+    """(N, 6) state of each node in a depth-first search; columns in `core`."""
     active: Bytes
-    """(N,) 1 for nodes that the drive can move through present beams."""
+    """(N,) ACTIVE or HANGING for nodes that the drive reaches through present beams, else 0."""
     order: Ints
     """(N,) active nodes in the order of discovery."""
     parent: Ints
     """(N,) node from which each was discovered, -1 for the first of a piece."""
     around: Ints
-    """(largest degree,) beams around the node at hand."""
+    """(largest degree,) beams incident to the current node."""
     beam: Ints
     """(M,) active beams."""
     beam_entry: Ints
-    """(M,) where beam's off-diagonal block lies, -1 if an end is held."""
+    """(M,) index of the off-diagonal block of each beam, -1 if an end is held."""
     spring_beams: Ints
     """(2 M, 2) the two beams of each angular spring."""
     spring_node: Ints
-    """(2 M,) the node it sits at."""
+    """(2 M,) the node of the spring."""
     spring_weight: Floats
     """(2 M,) lambda, doubled at a node of two beams."""
     spring_entry: Ints
@@ -115,7 +114,7 @@ class Structure(NamedTuple):
     column_bits: Words
     """(n, W) rows below the diagonal in each column of the factor, as bits."""
     word_start: Ints
-    """(n, W) entry at which each word's rows begin."""
+    """(n, W) entry at which the rows of each word begin."""
     column_start: Ints
     """(n + 1,)"""
     row: Ints
@@ -125,19 +124,60 @@ class Structure(NamedTuple):
     the same two for springs."""
 
 
-class Known(NamedTuple):
-    """An equilibrium at full load from which that of a similar design can be found."""
+class Reference(NamedTuple):
+    """Equilibrium at full load of a reference design, from which warm starts begin."""
 
     present: Bytes
     """(M,) as in `Structure`."""
     active: Bytes
-    """(N,)"""
+    """(N,) as in `Structure`."""
     u: Floats
     """(N, 2) displacement."""
 
 
+MAX_KNOTS = 8
+
+
+class Vectors(NamedTuple):
+    """Displacements and directions on the loading path; (N, 2) each unless stated."""
+
+    previous: Floats
+    """Equilibrium at the start of the increment, or another point to compare with."""
+    shifted: Floats
+    """Displacement with the held nodes at a slightly larger load."""
+    tangent: Floats
+    """Tangent of the path at the start of the increment."""
+    next_tangent: Floats
+    """Tangent at its end."""
+    last_tangent: Floats
+    """Tangent one increment before."""
+    tangent_at_rest: Floats
+    mode: Floats
+    """Softest motion."""
+    softest_mode: Floats
+    """Softest motion where the stiffness along the path is lowest."""
+    at_softest: Floats
+    """Displacement there."""
+    trial: Floats
+    """Displacement after a trial step."""
+    guess: Floats
+    """Displacement at which a warm start begins."""
+    adjoint: Floats
+    """K^-1 d(efficiency)/du."""
+    rotation: Floats
+    """(N,) rigid rotation of nodes that the reference does not move."""
+    knot: Floats
+    """(MAX_KNOTS, N, 2) equilibria between rest and full load."""
+    knot_tangent: Floats
+    """(MAX_KNOTS, N, 2) tangents there."""
+    knot_load: Floats
+    """(MAX_KNOTS,) fractions of the load there."""
+    knot_stiffness: Floats
+    """(MAX_KNOTS,) lowest stiffness there."""
+
+
 class Scratch(NamedTuple):
-    """Working memory, and the factor of the stiffness last computed."""
+    """Working memory, and the factor of the stiffness computed last."""
 
     length: Floats
     rotation: Floats
@@ -147,7 +187,7 @@ class Scratch(NamedTuple):
     turn: Floats
     """(M, 2) derivative of omega by the second end."""
     tension: Floats
-    """(M,) derivative of the energy by the length, as the stiffness is to see it."""
+    """(M,) derivative of the energy by the length with which the stiffness is assembled."""
     torque: Floats
     """(M,) derivative of the energy by omega."""
     turn_weight: Floats
@@ -168,7 +208,4 @@ class Scratch(NamedTuple):
     """(n, 3) lists of columns that reach a row: head, next, position."""
     step: Floats
     """(n, 2) right-hand side and solution."""
-    vectors: Floats
-    """(ROWS, N, 2) displacements and directions kept by the minimisers."""
-    knots: Floats
-    """(MOST_KNOTS, 2) load and lowest stiffness of equilibria between rest and full load."""
+    vectors: Vectors

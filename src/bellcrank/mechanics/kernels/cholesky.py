@@ -1,11 +1,10 @@
 """Sparse Cholesky factorisation in 2 x 2 blocks, for a pattern that changes with every flip.
 
-Left-looking: each column gathers what earlier columns contribute, in a dense
-column that stays in the first-level cache. A lattice with half its beams gone
-is nearly a tree, so skipping what is zero beats any banded or dense method: the
-full crane needs 25 thousand multiplications against 320 thousand in a band.
-A failure means that the stiffness is not positive definite, which is how an
-unstable equilibrium is recognised.
+Left-looking: each column gathers the contributions of earlier columns in a dense column that
+stays in the first-level cache. A lattice without half of its beams is nearly a tree, for which a
+sparse factorisation is faster than a banded or dense one: the full crane needs 25 thousand
+multiplications, a band 320 thousand. The factorisation fails where the stiffness is not positive
+definite; unstable equilibria are recognised by that.
 """
 
 from __future__ import annotations
@@ -19,12 +18,12 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.kernels.arrays import Scratch, Structure
 
 SMALLEST_PIVOT = 1e-13
-"""Relative to the diagonal: below it a stiffness counts as singular."""
+"""Pivot, relative to the diagonal, below which a stiffness counts as singular."""
 
 
 @kernel
 def gather_column(structure: Structure, column: int, scratch: Scratch) -> None:
-    """Subtract from the dense column what earlier columns of the factor contribute."""
+    """Subtract the contributions of earlier columns of the factor from the dense column."""
     w, link, row, factor = scratch.column, scratch.link, structure.row, scratch.factor
     earlier = link[column, 0]
     w00, w10, w11 = w[column, 0], w[column, 1], w[column, 3]

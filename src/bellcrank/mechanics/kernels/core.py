@@ -1,13 +1,19 @@
-"""Which beams of a design can carry load at all: its core, known before any equilibrium."""
+"""The load-bearing core of a design, found before any equilibrium."""
 
 from __future__ import annotations
 
 from bellcrank.mechanics.kernels._compile import kernel
-from bellcrank.mechanics.kernels.arrays import IGNORED, STRIPPED, Bytes, Structure, System
+from bellcrank.mechanics.kernels.arrays import (
+    PRUNE_ALL,
+    PRUNE_DEAD_ENDS,
+    Bytes,
+    Structure,
+    System,
+)
 from bellcrank.mechanics.kernels.fields import pair
 
-DEPTH, LOW, SLOT, CAME_BY, MARK, STACK = range(6)
-"""Columns of `structure.walk`."""
+DEPTH, LOW, SLOT, ARRIVED_BY, MARK, STACK = range(6)
+"""Columns of `structure.search`."""
 
 
 @kernel
@@ -20,8 +26,8 @@ def other_end(system: System, beam: int, node: int) -> int:
 def only_beam(system: System, present: Bytes, node: int) -> int:
     """Return the beam of a node that has exactly one present beam, else -1."""
     found = -1
-    for slot in range(system.ring_start[node], system.ring_start[node + 1]):
-        beam = system.ring_beam[slot]
+    for slot in range(system.incident_start[node], system.incident_start[node + 1]):
+        beam = system.incident_beam[slot]
         if present[beam]:
             if found >= 0:
                 return -1
@@ -30,7 +36,7 @@ def only_beam(system: System, present: Bytes, node: int) -> int:
 
 
 @kernel
-def strip_dead_ends(system: System, present: Bytes) -> None:
+def prune_dead_ends(system: System, present: Bytes) -> None:
     """Remove, repeatedly, beams that end in an unprotected node of degree one."""
     for start in range(len(system.held)):
         node = start
@@ -43,14 +49,14 @@ def strip_dead_ends(system: System, present: Bytes) -> None:
 
 
 @kernel
-def strip_unloaded(system: System, structure: Structure) -> None:
-    """Keep of the present beams those on some way between two nodes driven, watched or held.
+def prune_unloaded(system: System, structure: Structure) -> None:
+    """Keep the present beams on a path between two nodes that are driven, watched or held.
 
-    With all fixed supports as one root, to which driven, watched and rolling nodes are tied,
-    these are the biconnected components that hold the root and a tie; and beams between two
-    fixed supports. A walk in depth that begins with a tie finds one of them: what a branch
-    has left on the trail is dropped if it reaches no higher than where the branch began
-    (Hopcroft and Tarjan, Commun. ACM 16, 372, 1973).
+    All fixed supports are merged into one root, and a virtual edge (a tie) joins the root to each
+    driven, watched and rolling node. The beams to keep are those of the biconnected components
+    that contain the root and a tie, and beams between two fixed supports. A depth-first search
+    that starts with a tie finds one component: the edges below a node are dropped if the subtree
+    reaches no node above it (Hopcroft and Tarjan, Commun. ACM 16, 372, 1973).
     """
     loaded = structure.loaded
     for beam in range(len(loaded)):
@@ -59,11 +65,11 @@ def strip_unloaded(system: System, structure: Structure) -> None:
             system.grounded[first] and system.grounded[second]
         )
     for node in range(len(system.held)):
-        structure.walk[node, DEPTH] = 0
+        structure.search[node, DEPTH] = 0
     for start in range(len(system.held)):
         tied = system.protected[start] and not system.grounded[start]
-        if tied and structure.walk[start, DEPTH] == 0:
-            length = walk_from(system, structure, start)
+        if tied and structure.search[start, DEPTH] == 0:
+            length = component_of(system, structure, start)
             for index in range(length):
                 loaded[structure.beam[index]] = 1
     for beam in range(len(loaded)):
@@ -71,67 +77,66 @@ def strip_unloaded(system: System, structure: Structure) -> None:
 
 
 @kernel
-def enter(system: System, structure: Structure, node: int, depth: int, by: int, mark: int) -> None:
-    """Note how the walk came to a node; a tie leads back to the root at once."""
-    walk = structure.walk
-    walk[node, DEPTH] = depth
-    walk[node, LOW] = 0 if system.protected[node] and depth > 1 else depth
-    walk[node, SLOT] = system.ring_start[node]
-    walk[node, CAME_BY] = by
-    walk[node, MARK] = mark
-    walk[depth - 1, STACK] = node
+def visit(system: System, structure: Structure, node: int, depth: int, by: int, mark: int) -> None:
+    """Record the arrival of the search at a node; a tie leads back to the root."""
+    search = structure.search
+    search[node, DEPTH] = depth
+    search[node, LOW] = 0 if system.protected[node] and depth > 1 else depth
+    search[node, SLOT] = system.incident_start[node]
+    search[node, ARRIVED_BY] = by
+    search[node, MARK] = mark
+    search[depth - 1, STACK] = node
 
 
 @kernel
-def walk_from(system: System, structure: Structure, start: int) -> int:
-    """Leave on the trail (`structure.beam`) the component of the tie of `start`; its length."""
-    walk, trail = structure.walk, structure.beam
+def component_of(system: System, structure: Structure, start: int) -> int:
+    """List in `structure.beam` the component of the tie of `start`; return its length."""
+    search, edges = structure.search, structure.beam
     depth, length = 1, 0
-    enter(system, structure, start, 1, -1, 0)
+    visit(system, structure, start, 1, -1, 0)
     while depth > 0:
-        node = walk[depth - 1, STACK]
-        slot = walk[node, SLOT]
-        if slot == system.ring_start[node + 1]:
+        node = search[depth - 1, STACK]
+        slot = search[node, SLOT]
+        if slot == system.incident_start[node + 1]:
             depth -= 1
             if depth > 0:
-                parent = walk[depth - 1, STACK]
-                walk[parent, LOW] = min(walk[parent, LOW], walk[node, LOW])
-                if walk[node, LOW] >= depth:
-                    length = walk[node, MARK]
+                parent = search[depth - 1, STACK]
+                search[parent, LOW] = min(search[parent, LOW], search[node, LOW])
+                if search[node, LOW] >= depth:
+                    length = search[node, MARK]
             continue
-        walk[node, SLOT] = slot + 1
-        beam = system.ring_beam[slot]
-        if not structure.present[beam] or beam == walk[node, CAME_BY]:
+        search[node, SLOT] = slot + 1
+        beam = system.incident_beam[slot]
+        if not structure.present[beam] or beam == search[node, ARRIVED_BY]:
             continue
         far = other_end(system, beam, node)
-        reach = 0 if system.grounded[far] else walk[far, DEPTH]
+        reach = 0 if system.grounded[far] else search[far, DEPTH]
         if not system.grounded[far] and reach == 0:
-            enter(system, structure, far, depth + 1, beam, length)
+            visit(system, structure, far, depth + 1, beam, length)
             depth += 1
-        elif reach < walk[node, DEPTH]:
-            walk[node, LOW] = min(walk[node, LOW], reach)
+        elif reach < search[node, DEPTH]:
+            search[node, LOW] = min(search[node, LOW], reach)
         else:
             continue
-        trail[length] = beam
+        edges[length] = beam
         length += 1
     return length
 
 
 @kernel
 def keep_core(system: System, mask: Bytes, core: int, structure: Structure) -> None:
-    """Mark as present the beams of a design that are in its core of one kind.
+    """Mark as present the beams of a design that are in its core.
 
     Parameters
     ----------
     mask
         (M,) uint8, 1 where the beam is in the design.
     core
-        What to leave out: nothing, dead ends, or all that no load can reach
-        (`COUNTED`, `IGNORED`, `STRIPPED`).
+        KEEP, PRUNE_DEAD_ENDS or PRUNE_ALL.
     """
     for beam in range(len(mask)):
         structure.present[beam] = mask[beam]
-    if core == IGNORED:
-        strip_dead_ends(system, structure.present)
-    elif core == STRIPPED:
-        strip_unloaded(system, structure)
+    if core == PRUNE_DEAD_ENDS:
+        prune_dead_ends(system, structure.present)
+    elif core == PRUNE_ALL:
+        prune_unloaded(system, structure)

@@ -17,6 +17,7 @@ import math
 
 from bellcrank.mechanics.kernels._compile import kernel
 from bellcrank.mechanics.kernels.arrays import (
+    ACTIVE,
     HELD,
     HELD_X,
     HELD_Y,
@@ -28,12 +29,11 @@ from bellcrank.mechanics.kernels.arrays import (
 )
 from bellcrank.mechanics.kernels.core import other_end
 from bellcrank.mechanics.kernels.fields import clear, pair, triple
-from bellcrank.mechanics.kernels.structure import ACTIVE
 
 
 @kernel
 def beam_rotation(system: System, u: Floats, beam: int) -> float:
-    """Rotation of a beam from its rest direction, in (-pi, pi]."""
+    """Return the rotation of a beam from its rest direction, in (-pi, pi]."""
     first, second = pair(system.beams, beam)
     rest_x, rest_y = pair(system.rest_vector, beam)
     x = rest_x + u[second, 0] - u[first, 0]
@@ -43,7 +43,7 @@ def beam_rotation(system: System, u: Floats, beam: int) -> float:
 
 @kernel
 def measure_beam(system: System, u: Floats, beam: int, scratch: Scratch) -> None:
-    """Length, direction, rotation and its derivative of one beam at displacement `u`."""
+    """Compute length, direction, rotation and its derivative of one beam at displacement `u`."""
     first, second = pair(system.beams, beam)
     rest_x, rest_y = pair(system.rest_vector, beam)
     x = rest_x + (u[second, 0] - u[first, 0])
@@ -62,7 +62,7 @@ def measure_beam(system: System, u: Floats, beam: int, scratch: Scratch) -> None
 
 @kernel
 def measure_held_beams(system: System, structure: Structure, u: Floats, scratch: Scratch) -> None:
-    """Measure the beams that cannot move at a fixed load; once a load is enough."""
+    """Measure the beams between held nodes, which do not move at a fixed load."""
     for index in range(structure.sizes[2], len(structure.beam)):
         measure_beam(system, u, structure.beam[index], scratch)
 
@@ -71,7 +71,7 @@ def measure_held_beams(system: System, structure: Structure, u: Floats, scratch:
 def find_gradient(
     system: System, structure: Structure, fraction: float, u: Floats, scratch: Scratch
 ) -> None:
-    """Gradient of the energy by the free coordinates, at `fraction` of the load."""
+    """Compute the gradient of the energy by the free coordinates, at `fraction` of the load."""
     torque, turn_weight, gradient = scratch.torque, scratch.turn_weight, scratch.gradient
     movable = structure.sizes[1]
     clear(gradient, len(gradient))
@@ -91,9 +91,9 @@ def find_gradient(
     for index in range(movable):
         beam = structure.beam[index]
         first, second = pair(system.beams, beam)
-        pull = 2.0 * system.bond * (scratch.length[beam] - system.rest_length[beam])
+        tension = 2.0 * system.bond * (scratch.length[beam] - system.rest_length[beam])
         for axis in range(2):
-            force = pull * scratch.axis[beam, axis] + torque[beam] * scratch.turn[beam, axis]
+            force = tension * scratch.axis[beam, axis] + torque[beam] * scratch.turn[beam, axis]
             gradient[second, axis] += force
             gradient[first, axis] -= force
     add_loads(system, structure, fraction, u, gradient)
@@ -103,7 +103,7 @@ def find_gradient(
 def add_loads(
     system: System, structure: Structure, fraction: float, u: Floats, gradient: Floats
 ) -> None:
-    """Add output springs and forces; clear what supports and drive hold."""
+    """Add output springs and forces to the gradient; clear its held coordinates."""
     for index in range(structure.sizes[0]):
         node = structure.order[index]
         if structure.active[node] != ACTIVE or system.held[node] == HELD:
@@ -131,7 +131,7 @@ def add_to_off_diagonal(
     yy: float,
     scratch: Scratch,
 ) -> None:
-    """Add a block whose rows belong to node `row`; the lower triangle is what is stored."""
+    """Add a block whose rows belong to node `row`; the lower triangle is stored."""
     target = scratch.off_diagonal
     if system.block[row] < system.block[column]:
         xy, yx = yx, xy
@@ -172,12 +172,11 @@ def add_beam_stiffness(
 def add_spring_stiffness(
     system: System, structure: Structure, spring: int, scratch: Scratch
 ) -> None:
-    """Add what an angular spring couples between its two beams.
+    """Add the coupling of the two beams of an angular spring.
 
-    The springs' own share in each beam is already in `turn_weight`. With q_a, q_b
-    the derivatives of the rotations by the far ends and X = q_a q_b', the rest is
-    -2 w X between the far ends, +2 w X between far end and node, and
-    -2 w (X + X') at the node.
+    The contribution of the spring to each beam alone is already in `turn_weight`. With q_a, q_b
+    the derivatives of the rotations by the far ends and X = q_a q_b', the coupling is -2 w X
+    between the far ends, +2 w X between far end and node, and -2 w (X + X') at the node.
     """
     node = structure.spring_node[spring]
     a, b = pair(structure.spring_beams, spring)
@@ -213,13 +212,13 @@ def find_stiffness(
 ) -> None:
     """Assemble the second derivative of the energy.
 
-    Call `find_gradient` first, and `find_tension` or `foresee_tension`.
+    Call `find_gradient` first, and `find_tension` or `predict_tension`.
 
     Parameters
     ----------
     softening
-        1 for the stiffness; 0 to leave out what can make it indefinite, the softening by
-        compression and by moments: a safe slope to walk down on.
+        1 for the stiffness; 0 to leave out the softening by compression and by moments, which
+        can make it indefinite.
     """
     clear(scratch.diagonal, len(scratch.diagonal))
     clear(scratch.off_diagonal, structure.column_start[len(scratch.diagonal)])
@@ -252,7 +251,7 @@ def hold_coordinates(
     Parameters
     ----------
     coordinates
-        (N,) bits HELD_X, HELD_Y: those of rollers, or of nodes that are moved from outside.
+        (N,) bits HELD_X, HELD_Y: those of rollers, or of boundary nodes.
     """
     diagonal, off_diagonal = scratch.diagonal, scratch.off_diagonal
     held = scratch.link[:, 0]
@@ -281,7 +280,7 @@ def hold_coordinates(
 
 @kernel
 def elastic_energy(system: System, structure: Structure, u: Floats, scratch: Scratch) -> float:
-    """Energy of beams, angular springs and output springs, without the work of the load."""
+    """Return the energy of beams, angular springs and output springs, without the load."""
     total = 0.0
     beams = structure.beam
     for index in range(len(beams)):
@@ -306,7 +305,7 @@ def elastic_energy(system: System, structure: Structure, u: Floats, scratch: Scr
 
 @kernel
 def work_of_load(system: System, fraction: float, u: Floats) -> float:
-    """Work of the forces of a force drive at `fraction` of the load."""
+    """Return the work of the forces of a force drive at `fraction` of the load."""
     total = 0.0
     for node in system.input_nodes:
         total += system.load[node, 0] * u[node, 0] + system.load[node, 1] * u[node, 1]

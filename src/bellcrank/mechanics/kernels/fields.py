@@ -1,7 +1,7 @@
-"""Small helpers on arrays, written out as loops.
+"""Elementary operations on arrays, written as loops.
 
-numba can do ``a, b = array[i]`` and ``array[:] = other``, but compiles checks and
-error messages into each place that does, which costs seconds of compilation.
+numba supports ``a, b = array[i]`` and ``array[:] = other``, but compiles checks and error
+messages into each such statement, which adds seconds of compilation.
 """
 
 from __future__ import annotations

@@ -1,21 +1,22 @@
-"""What each flip would do to the efficiency, nearly exactly, for all flips at once.
+"""Change of the efficiency by each flip, predicted by one Newton step for all flips at once.
 
 At an equilibrium, a flip of beam b between nodes i and j changes the energy by s times
 
     k (r - r0)^2 + sum over i, j of 2 lambda (omega_b - omega_p) (omega_b - omega_n),
 
 p and n the beams before and after b around the node, s = 1 for adding and -1 for removing:
-two angular springs instead of the one they split. It thus depends on few quantities, the
-length of b and the rotations of five beams; with their gradients as the columns of V, the
-gradient changes by V h and the stiffness by V C V', and one Newton step from the old
+two angular springs instead of the one that they split. It depends on few quantities, the length
+of b and the rotations of five beams. With their gradients as the columns of V, the gradient
+changes by V h and the stiffness by V C V' (a low-rank update), and one Newton step from the old
 equilibrium is
 
     du = -(K + V C V')^-1 V h = -K^-1 V (I + C G)^-1 h,   G = V' K^-1 V.
 
-All flips share K^-1, of which G takes what belongs to the ends of those beams, and the
-adjoint a = K^-1 d(efficiency)/du; each flip costs a system of six equations. What a change of
-torque does to the stiffness of the neighbours is left out: with it, in rank ten, the
-predictions for the crane rank the flips no better (correlations equal to 0.002).
+All flips share K^-1, of which G needs the blocks of the ends of those beams, and the adjoint
+a = K^-1 d(efficiency)/du; each flip costs a system of six equations. The effect of a change of
+torque on the stiffness of the neighbours is left out: with it, in rank ten, the predictions for
+the crane rank the flips no better (correlations equal to 0.002). The first-order change, the
+sensitivity, is -a.(V h).
 """
 
 from __future__ import annotations
@@ -23,33 +24,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from bellcrank.mechanics.kernels._compile import entry, kernel
+from bellcrank.mechanics.kernels.adjoint import find_anchored, neighbours_around, solve_adjoint
+from bellcrank.mechanics.kernels.arrays import ACTIVE
 from bellcrank.mechanics.kernels.energy import measure_beam
 from bellcrank.mechanics.kernels.fields import clear
-from bellcrank.mechanics.kernels.sensitivity import (
-    find_anchored,
-    neighbours_around,
-    solve_adjoint,
-)
-from bellcrank.mechanics.kernels.structure import ACTIVE
 from bellcrank.mechanics.kernels.tangents import stiffness_is_definite
 
 if TYPE_CHECKING:
-    from bellcrank.mechanics.kernels.arrays import (
-        Bytes,
-        Floats,
-        Ints,
-        Scratch,
-        Structure,
-        System,
-    )
+    from bellcrank.mechanics.kernels.arrays import Bytes, Floats, Ints, Scratch, Structure, System
 
 PANEL = 8
-"""Blocks of right-hand sides that are solved for together."""
+"""Number of blocks of right-hand sides that are solved together."""
 RANK = 6
 SMALLEST_PIVOT = 1e-14
-KEPT = 1e-6
-"""Part of a removed beam that stays in the equations: pieces that it held alone then follow
-without stress, instead of making the equations singular."""
+REMAINDER = 1e-6
+"""Part of a removed beam that remains in the equations: pieces that it held alone follow without
+stress, instead of making the equations singular."""
 
 
 class FlipWorkspace(NamedTuple):
@@ -59,8 +49,8 @@ class FlipWorkspace(NamedTuple):
     """(n, n, 4) lower triangle of the inverse stiffness, in blocks."""
     panel: Floats
     """(n, 2, 2 PANEL) right-hand sides and solutions."""
-    counts: Bytes
-    """(N,) nodes that something holds."""
+    anchored: Bytes
+    """(N,) nodes that are moved by the drive or connected to a support."""
     around: Ints
     """(RANK,) the beam that each column of V belongs to, -1 for none."""
     ends: Ints
@@ -78,9 +68,9 @@ class FlipWorkspace(NamedTuple):
 
 
 @kernel
-def set_unit_vectors(screen: FlipWorkspace, first: int, width: int) -> None:
+def set_unit_vectors(space: FlipWorkspace, first: int, width: int) -> None:
     """Fill the panel with the unit vectors of the blocks from `first` on."""
-    x = screen.panel
+    x = space.panel
     for column in range(first, len(x)):
         for k in range(width):
             x[column, 0, k] = 0.0
@@ -92,10 +82,10 @@ def set_unit_vectors(screen: FlipWorkspace, first: int, width: int) -> None:
 
 @kernel
 def solve_panel(
-    structure: Structure, scratch: Scratch, screen: FlipWorkspace, first: int, width: int
+    structure: Structure, scratch: Scratch, space: FlipWorkspace, first: int, width: int
 ) -> None:
-    """Solve for the panel, whose rows before `first` are zero; from there on it is then right."""
-    x, row, start = screen.panel, structure.row, structure.column_start
+    """Solve for the panel, whose rows before `first` are zero; rows from `first` on are valid."""
+    x, row, start = space.panel, structure.row, structure.column_start
     factor, diagonal = scratch.factor, scratch.factor_diagonal
     for column in range(first, len(diagonal)):
         d0, l10, d1 = diagonal[column, 0], diagonal[column, 1], diagonal[column, 3]
@@ -124,18 +114,18 @@ def solve_panel(
 
 
 @kernel
-def find_inverse(structure: Structure, scratch: Scratch, screen: FlipWorkspace) -> None:
-    """Fill the lower triangle of the inverse stiffness from the factor at hand.
+def find_inverse(structure: Structure, scratch: Scratch, space: FlipWorkspace) -> None:
+    """Fill the lower triangle of the inverse stiffness from the current factor.
 
-    A panel of unit vectors at a time; what lies before the panel's first column is not
-    looked at, since the inverse is symmetric.
+    By panels of unit vectors. Rows before the first column of a panel are skipped, since the
+    inverse is symmetric.
     """
-    x, inverse = screen.panel, screen.inverse
+    x, inverse = space.panel, space.inverse
     columns = len(x)
     for first in range(0, columns, PANEL):
         width = 2 * min(PANEL, columns - first)
-        set_unit_vectors(screen, first, width)
-        solve_panel(structure, scratch, screen, first, width)
+        set_unit_vectors(space, first, width)
+        solve_panel(structure, scratch, space, first, width)
         for row in range(first, columns):
             for k in range(0, width, 2):
                 column = first + k // 2
@@ -146,72 +136,72 @@ def find_inverse(structure: Structure, scratch: Scratch, screen: FlipWorkspace) 
 
 
 @kernel
-def add_coupling(screen: FlipWorkspace, i: int, j: int, p: int, q: int, sign: float) -> float:
-    """One of the four shares of v_p' K^-1 v_q: that between an end of each beam, as blocks."""
+def add_coupling(space: FlipWorkspace, i: int, j: int, p: int, q: int, sign: float) -> float:
+    """Return the contribution of one end of each of two beams, as blocks, to v_p' K^-1 v_q."""
     if i < 0 or j < 0:
         return 0.0
-    px, py = screen.vectors[p, 0], screen.vectors[p, 1]
-    qx, qy = screen.vectors[q, 0], screen.vectors[q, 1]
+    px, py = space.vectors[p, 0], space.vectors[p, 1]
+    qx, qy = space.vectors[q, 0], space.vectors[q, 1]
     if i < j:
         i, j = j, i
         px, qx = qx, px
         py, qy = qy, py
-    inverse = screen.inverse
+    inverse = space.inverse
     along = inverse[i, j, 0] * qx + inverse[i, j, 1] * qy
     across = inverse[i, j, 2] * qx + inverse[i, j, 3] * qy
     return sign * (px * along + py * across)
 
 
 @kernel
-def find_coupling(screen: FlipWorkspace) -> None:
-    """G = V' K^-1 V of the flip at hand."""
-    ends = screen.ends
+def find_coupling(space: FlipWorkspace) -> None:
+    """Compute G = V' K^-1 V of the current flip."""
+    ends = space.ends
     for p in range(RANK):
         for q in range(p + 1):
             total = 0.0
-            if screen.around[p] >= 0 and screen.around[q] >= 0:
-                total += add_coupling(screen, ends[p, 1], ends[q, 1], p, q, 1.0)
-                total += add_coupling(screen, ends[p, 0], ends[q, 0], p, q, 1.0)
-                total += add_coupling(screen, ends[p, 1], ends[q, 0], p, q, -1.0)
-                total += add_coupling(screen, ends[p, 0], ends[q, 1], p, q, -1.0)
-            screen.coupling[p, q] = total
-            screen.coupling[q, p] = total
+            if space.around[p] >= 0 and space.around[q] >= 0:
+                total += add_coupling(space, ends[p, 1], ends[q, 1], p, q, 1.0)
+                total += add_coupling(space, ends[p, 0], ends[q, 0], p, q, 1.0)
+                total += add_coupling(space, ends[p, 1], ends[q, 0], p, q, -1.0)
+                total += add_coupling(space, ends[p, 0], ends[q, 1], p, q, -1.0)
+            space.coupling[p, q] = total
+            space.coupling[q, p] = total
 
 
 @kernel
 def set_column(
     system: System,
     structure: Structure,
-    screen: FlipWorkspace,
+    space: FlipWorkspace,
     column: int,
     beam: int,
     directions: Floats,
 ) -> None:
-    """Make a gradient of `beam` a column of V."""
-    screen.around[column] = beam
+    """Set a column of V to a gradient of `beam`."""
+    space.around[column] = beam
     for end in range(2):
         node = system.beams[beam, end]
         moves = structure.active[node] == ACTIVE
-        screen.ends[column, end] = system.block[node] if moves else -1
-    screen.vectors[column, 0] = directions[beam, 0]
-    screen.vectors[column, 1] = directions[beam, 1]
+        space.ends[column, end] = system.block[node] if moves else -1
+    space.vectors[column, 0] = directions[beam, 0]
+    space.vectors[column, 1] = directions[beam, 1]
 
 
 @kernel
 def add_springs(
     scratch: Scratch,
-    screen: FlipWorkspace,
+    space: FlipWorkspace,
     beam: int,
     before: int,
     after: int,
     column: int,
     weight: float,
 ) -> float:
-    """Change of h and C by the springs at one end of the flipped beam; return its torque."""
+    """Add the springs at one end of the flipped beam to h and C; return its torque."""
     p = scratch.rotation[beam] - scratch.rotation[before]
     q = scratch.rotation[beam] - scratch.rotation[after]
     b, n = column, column + 1
-    c, h = screen.change, screen.force
+    c, h = space.change, space.force
     h[1] += weight * (p + q)
     h[b] -= weight * q
     h[n] -= weight * p
@@ -227,7 +217,7 @@ def add_springs(
 
 @kernel
 def eliminate(m: Floats, column: int) -> bool:
-    """Clear a column below the diagonal, its largest entry the pivot; False if there is none."""
+    """Eliminate a column below the diagonal, with pivoting; False if the matrix is singular."""
     pivot = column
     for p in range(column + 1, RANK):
         if abs(m[p, column]) > abs(m[pivot, column]):
@@ -244,14 +234,14 @@ def eliminate(m: Floats, column: int) -> bool:
 
 
 @kernel
-def solve_small(screen: FlipWorkspace) -> bool:
-    """Replace h in `force` by (I + C G)^-1 h; False if that is singular."""
-    m, h = screen.matrix, screen.force
+def solve_small(space: FlipWorkspace) -> bool:
+    """Replace h in `force` by (I + C G)^-1 h; False if the matrix is singular."""
+    m, h = space.matrix, space.force
     for p in range(RANK):
         for q in range(RANK):
             total = 1.0 if p == q else 0.0
             for k in range(RANK):
-                total += screen.change[p, k] * screen.coupling[k, q]
+                total += space.change[p, k] * space.coupling[k, q]
             m[p, q] = total
         m[p, RANK] = h[p]
     for column in range(RANK):
@@ -270,32 +260,32 @@ def find_change(
     system: System,
     structure: Structure,
     scratch: Scratch,
-    screen: FlipWorkspace,
+    space: FlipWorkspace,
     beam: int,
     sign: float,
 ) -> None:
     """Fill V, C and h for the flip of one beam."""
-    clear(screen.change, RANK)
+    clear(space.change, RANK)
     for p in range(RANK):
-        screen.force[p] = 0.0
-        screen.around[p] = -1
+        space.force[p] = 0.0
+        space.around[p] = -1
     first, second = system.beams[beam, 0], system.beams[beam, 1]
-    dead_end = not (screen.counts[first] and screen.counts[second])
+    dead_end = not (space.anchored[first] and space.anchored[second])
     length = scratch.length[beam]
-    set_column(system, structure, screen, 0, beam, scratch.axis)
-    set_column(system, structure, screen, 1, beam, scratch.turn)
+    set_column(system, structure, space, 0, beam, scratch.axis)
+    set_column(system, structure, space, 1, beam, scratch.turn)
     torque = 0.0
     for end in range(2):
         node = system.beams[beam, end]
         before, after = neighbours_around(system, structure, beam, node)
-        if before < 0 or not screen.counts[node]:
+        if before < 0 or not space.anchored[node]:
             continue
         column = 2 + 2 * end
-        set_column(system, structure, screen, column, before, scratch.turn)
-        set_column(system, structure, screen, column + 1, after, scratch.turn)
+        set_column(system, structure, space, column, before, scratch.turn)
+        set_column(system, structure, space, column + 1, after, scratch.turn)
         if dead_end:
             weight = -sign * system.angle
-            c, h = screen.change, screen.force
+            c, h = space.change, space.force
             bend = scratch.rotation[after] - scratch.rotation[before]
             h[column + 1] += weight * bend
             h[column] -= weight * bend
@@ -305,32 +295,29 @@ def find_change(
             c[column + 1, column] -= weight
         else:
             torque += add_springs(
-                scratch, screen, beam, before, after, column, sign * 2.0 * system.angle
+                scratch, space, beam, before, after, column, sign * 2.0 * system.angle
             )
     if not dead_end:
-        pull = sign * 2.0 * system.bond * (length - system.rest_length[beam])
-        screen.force[0] += pull
-        screen.change[0, 0] += sign * 2.0 * system.bond
-        screen.change[1, 1] += pull * length
-        screen.change[0, 1] -= torque / length
-        screen.change[1, 0] -= torque / length
+        tension = sign * 2.0 * system.bond * (length - system.rest_length[beam])
+        space.force[0] += tension
+        space.change[0, 0] += sign * 2.0 * system.bond
+        space.change[1, 1] += tension * length
+        space.change[0, 1] -= torque / length
+        space.change[1, 0] -= torque / length
 
 
 @kernel
-def predicted_change(system: System, screen: FlipWorkspace, adjoint: Floats) -> float:
-    """Change of the efficiency by the Newton step after the flip at hand."""
-    find_coupling(screen)
-    if not solve_small(screen):
-        return 0.0
+def adjoint_change(system: System, space: FlipWorkspace, adjoint: Floats) -> float:
+    """Return -a.(V h), with h in `force`."""
     change = 0.0
     for p in range(RANK):
-        beam = screen.around[p]
+        beam = space.around[p]
         if beam >= 0:
             first, second = system.beams[beam, 0], system.beams[beam, 1]
             rate = 0.0
             for axis in range(2):
-                rate += screen.vectors[p, axis] * (adjoint[second, axis] - adjoint[first, axis])
-            change -= rate * screen.force[p]
+                rate += space.vectors[p, axis] * (adjoint[second, axis] - adjoint[first, axis])
+            change -= rate * space.force[p]
     return change
 
 
@@ -340,36 +327,49 @@ def predict_flips(
     mask: Bytes,
     core: int,
     beams: Ints,
+    first_order: bool,
     structure: Structure,
     u: Floats,
     scratch: Scratch,
-    screen: FlipWorkspace,
+    space: FlipWorkspace,
     change: Floats,
     strain: Floats,
 ) -> bool:
     """Fill `change` with the predicted change of the efficiency by flipping each of `beams`.
 
     `structure` and `u` must be those of the design's equilibrium. False if it is unstable.
-    `strain` is that of each of `beams`, or what it would be if an absent one were put between
-    its ends as they are: the larger it is, the less can one Newton step tell.
+
+    Parameters
+    ----------
+    first_order
+        Compute the sensitivity only; `space.inverse` may then be empty.
+    strain
+        Filled with the strain of each of `beams`, or of an absent one between its ends as they
+        are. The larger it is, the less accurate is one Newton step.
     """
     if not stiffness_is_definite(system, structure, 1.0, u, scratch):
         return False
-    adjoint = scratch.vectors[0]
+    adjoint = scratch.vectors.adjoint
     solve_adjoint(system, structure, u, adjoint, scratch)
-    find_inverse(structure, scratch, screen)
+    if not first_order:
+        find_inverse(structure, scratch, space)
     for beam in range(len(mask)):
         measure_beam(system, u, beam, scratch)
-    find_anchored(system, structure, screen.counts)
+    find_anchored(system, structure, space.anchored)
     for index in range(len(beams)):
         beam = beams[index]
         first, second = system.beams[beam, 0], system.beams[beam, 1]
         change[index] = 0.0
         strain[index] = scratch.length[beam] / system.rest_length[beam] - 1.0
         moved = structure.active[first] == ACTIVE or structure.active[second] == ACTIVE
-        felt = moved and (not core or (screen.counts[first] and screen.counts[second]))
-        if felt and mask[beam] == structure.present[beam]:
-            sign = -(1.0 - KEPT) if mask[beam] else 1.0
-            find_change(system, structure, scratch, screen, beam, sign)
-            change[index] = predicted_change(system, screen, adjoint)
+        loaded = moved and (not core or (space.anchored[first] and space.anchored[second]))
+        if not loaded or mask[beam] != structure.present[beam]:
+            continue
+        removed = -1.0 if first_order else -(1.0 - REMAINDER)
+        find_change(system, structure, scratch, space, beam, removed if mask[beam] else 1.0)
+        if not first_order:
+            find_coupling(space)
+            if not solve_small(space):
+                continue
+        change[index] = adjoint_change(system, space, adjoint)
     return True

@@ -1,4 +1,4 @@
-"""The way from rest to the full load, which defines the response of a design."""
+"""The path from rest to full load, which defines the response of a design."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from bellcrank.mechanics.kernels._compile import inlined, kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
+    HANGING,
     SNAPPED,
     UNCONVERGED,
     Floats,
@@ -15,51 +16,42 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
 )
 from bellcrank.mechanics.kernels.fields import clear, copy, dot, largest_difference, move, pair
-from bellcrank.mechanics.kernels.newton import descend, newton
-from bellcrank.mechanics.kernels.structure import HANGING
+from bellcrank.mechanics.kernels.newton import add_tension_at, clear_tension, descend, newton
 from bellcrank.mechanics.kernels.tangents import (
     FINE_INCREMENT,
     LARGEST_DEPARTURE,
     LARGEST_INCREMENT,
     LARGEST_SOFTENING,
-    LAST_TANGENT,
     LONGEST_STEP,
-    MODE,
-    NEXT_TANGENT,
     PATH_TOLERANCE,
-    PREVIOUS,
     SOFT,
     SOFTENING_WHERE_SOFT,
-    SOFTEST_MODE,
-    TANGENT,
-    TANGENT_AT_REST,
-    TURNED,
-    curvature_left,
     find_tangent,
     is_joined,
-    is_mild,
+    is_nearly_linear,
     lowest_stiffness,
     move_held_nodes,
     nonlinearity_of,
+    path_departure,
     stiffness_is_definite,
 )
-from bellcrank.mechanics.kernels.tension import add_tension_at, clear_tension
 
-REMNANT = 1e-12
+REMAINDER = 1e-12
+"""Part of the load that is not left as an increment of its own."""
 SMALLEST_INCREMENT = 1.0 / 1024.0
 DIP = 0.5
-"""A path whose lowest stiffness falls below this part of its values at rest and at full load
-has passed near a loss of stability; whether a second equilibrium exists is then looked up."""
+"""Lowest stiffness on the path, as a part of its values at rest and at full load, below which the
+path has passed near a loss of stability, and a second equilibrium is searched for."""
 DISTINCT = 1e-3
-"""Distance, in lattice units, at which two equilibria are two."""
+"""Distance, in lattice units, of two equilibria that count as different."""
 
 
 @kernel
 def place_hanging_pieces(system: System, structure: Structure, u: Floats) -> None:
-    """Let a piece that hangs from one moved node follow as a rigid body.
+    """Move pieces that hang from one moved node as rigid bodies.
 
-    Of all stress-free positions it takes the one nearest to rest (least sum of
-    squared displacements), which is where vanishing springs to rest would hold it.
+    Of all stress-free positions each takes the one closest to rest (least sum of squared
+    displacements), which is the limit of vanishing springs to rest.
     """
     nodes = structure.sizes[0]
     for first in range(nodes):
@@ -75,7 +67,7 @@ def place_hanging_pieces(system: System, structure: Structure, u: Floats) -> Non
 def place_hanging_piece(
     system: System, structure: Structure, first: int, last: int, u: Floats
 ) -> None:
-    """Turn one piece about the node it hangs from, the first of its piece."""
+    """Rotate one piece about the node from which it hangs, the first of the piece."""
     pivot = structure.order[first]
     pivot_x, pivot_y = pair(system.positions, pivot)
     shift_x, shift_y = pair(u, pivot)
@@ -101,7 +93,7 @@ def extrapolate(
 ) -> None:
     """Advance `u` along the path to second order.
 
-    The path's curvature comes from the tangents here and one increment ago.
+    The curvature of the path is the difference of the tangents here and one increment ago.
     """
     bend = 0.5 * increment * increment / last_increment
     for node in range(len(u)):
@@ -114,7 +106,7 @@ def extrapolate(
 def next_increment(
     increment: float, departure: float, before: float, after: float, softening: float
 ) -> float:
-    """Increment that brings departure and softening well within what is allowed."""
+    """Return the increment that brings departure and softening well within their limits."""
     by_departure = (0.5 * LARGEST_DEPARTURE / max(departure, 1e-9)) ** (1.0 / 3.0)
     change = abs(math.log(max(after, 1e-9 * before) / before))
     by_softening = -0.8 * math.log(softening) / max(change, 1e-9)
@@ -123,25 +115,26 @@ def next_increment(
 
 
 @inlined
-def arrive(
+def correct(
     system: System, structure: Structure, increment: float, end: float, u: Floats, scratch: Scratch
 ) -> tuple[float, float]:
     """Bring an extrapolated `u` to the equilibrium at the end of an increment.
 
-    Returns the lowest stiffness there, and how far the increment departs from the tangents
-    at both ends; 0 and infinity if there is no equilibrium.
+    Returns the lowest stiffness there, and the departure of the increment from the tangents at
+    both ends; 0 and infinity if there is no equilibrium.
     """
-    previous, tangent = scratch.vectors[PREVIOUS], scratch.vectors[TANGENT]
-    next_tangent = scratch.vectors[NEXT_TANGENT]
+    vectors = scratch.vectors
     move_held_nodes(system, end, u)
     clear_tension(scratch)
-    add_tension_at(system, structure, previous, 1.0, scratch)
+    add_tension_at(system, structure, vectors.previous, 1.0, scratch)
     tolerance = system.tolerance if end == 1.0 else PATH_TOLERANCE
     now, departure = 0.0, math.inf
     if newton(system, structure, end, u, scratch, tolerance, LONGEST_STEP) == CONVERGED:
-        now = lowest_stiffness(system, structure, scratch.vectors[MODE], scratch)
-        find_tangent(system, structure, end, u, next_tangent, scratch)
-        departure = curvature_left(previous, u, tangent, next_tangent, increment)
+        now = lowest_stiffness(system, structure, vectors.mode, scratch)
+        find_tangent(system, structure, end, u, vectors.next_tangent, scratch)
+        departure = path_departure(
+            vectors.previous, u, vectors.tangent, vectors.next_tangent, increment
+        )
     return now, departure
 
 
@@ -149,19 +142,19 @@ def arrive(
 def has_second_equilibrium(
     system: System, structure: Structure, u: Floats, scratch: Scratch
 ) -> bool:
-    """Whether a design that has nearly lost its stability could have gone the other way.
+    """Whether a design that nearly loses its stability has an equilibrium on another branch.
 
-    What the structure has moved along its softest motion since it was softest is
-    reflected, and the energy is followed down from there.
+    The movement along the softest motion since the point of lowest stiffness is reflected, and
+    the energy is followed downwards from there.
     """
-    other, mode = scratch.vectors[PREVIOUS], scratch.vectors[SOFTEST_MODE]
-    turned = scratch.vectors[TURNED]
+    other, mode = scratch.vectors.previous, scratch.vectors.softest_mode
+    at_softest = scratch.vectors.at_softest
     copy(u, other)
     along = 0.0
     size = dot(mode, mode)
     for node in range(len(u)):
         for axis in range(2):
-            along += (u[node, axis] - turned[node, axis]) * mode[node, axis]
+            along += (u[node, axis] - at_softest[node, axis]) * mode[node, axis]
     move(other, -2.0 * along / size, mode)
     move_held_nodes(system, 1.0, other)
     if descend(system, structure, 1.0, other, scratch) != CONVERGED:
@@ -170,12 +163,12 @@ def has_second_equilibrium(
 
 
 @inlined
-def could_go_elsewhere(system: System, structure: Structure, u: Floats, scratch: Scratch) -> bool:
+def is_ambiguous(system: System, structure: Structure, u: Floats, scratch: Scratch) -> bool:
     """Whether a response is far from linear and not the only equilibrium."""
-    rest, at_rest = scratch.vectors[PREVIOUS], scratch.vectors[TANGENT_AT_REST]
+    rest, at_rest = scratch.vectors.previous, scratch.vectors.tangent_at_rest
     clear(rest, len(rest))
-    detour = curvature_left(rest, u, at_rest, scratch.vectors[TANGENT], 1.0)
-    return not is_mild(nonlinearity_of(u, at_rest), detour) and has_second_equilibrium(
+    detour = path_departure(rest, u, at_rest, scratch.vectors.tangent, 1.0)
+    return not is_nearly_linear(nonlinearity_of(u, at_rest), detour) and has_second_equilibrium(
         system, structure, u, scratch
     )
 
@@ -186,18 +179,19 @@ def follow_path(
 ) -> int:
     """Load from rest in increments that stay on one stable path.
 
-    An increment counts only if it ends at a stable equilibrium that is joined to the one
-    before; else it is halved. SNAPPED means that even the smallest increment fails, or
-    that the path comes so near to a loss of stability that there is another way to go; `u`
-    is then one of the equilibria at full load.
+    An increment is accepted only if it ends at a stable equilibrium that is connected to the one
+    before; otherwise it is halved. SNAPPED means that even the smallest increment fails, or that
+    the path comes so close to a loss of stability that another branch opens; `u` is then one of
+    the equilibria at full load.
 
     Parameters
     ----------
     largest
-        Upper bound on the increment (1 for none); small for a slow, fine check.
+        Upper bound on the increment (1 for none); small for a fine verification.
     """
-    previous, mode = scratch.vectors[PREVIOUS], scratch.vectors[MODE]
-    tangent, last_tangent = scratch.vectors[TANGENT], scratch.vectors[LAST_TANGENT]
+    vectors = scratch.vectors
+    previous, mode = vectors.previous, vectors.mode
+    tangent, last_tangent = vectors.tangent, vectors.last_tangent
     for node in range(len(u)):
         for axis in range(2):
             u[node, axis] = 0.0
@@ -208,37 +202,35 @@ def follow_path(
     at_rest = softest = stiffness = lowest_stiffness(system, structure, mode, scratch)
     find_tangent(system, structure, 0.0, u, tangent, scratch)
     copy(tangent, last_tangent)
-    copy(tangent, scratch.vectors[TANGENT_AT_REST])
+    copy(tangent, vectors.tangent_at_rest)
     fraction = 0.0
     increment = last_increment = min(LARGEST_INCREMENT, largest)
     while fraction < 1.0 and increment >= SMALLEST_INCREMENT:
         increment = min(increment, 1.0 - fraction)
         end = fraction + increment
-        # Rounding must not leave a last increment too small to be judged.
-        if 1.0 - end < REMNANT:
+        # Rounding must not leave a last increment that is too small.
+        if 1.0 - end < REMAINDER:
             end = 1.0
         copy(u, previous)
         extrapolate(u, tangent, last_tangent, increment, last_increment)
-        now, departure = arrive(system, structure, increment, end, u, scratch)
+        now, departure = correct(system, structure, increment, end, u, scratch)
         soft = min(stiffness, now) < SOFT * at_rest
         softening = SOFTENING_WHERE_SOFT if soft else LARGEST_SOFTENING
         following = next_increment(increment, departure, stiffness, now, softening)
         if is_joined(departure, stiffness, now, softening, increment):
             fraction, stiffness, last_increment = end, now, increment
             copy(tangent, last_tangent)
-            copy(scratch.vectors[NEXT_TANGENT], tangent)
+            copy(vectors.next_tangent, tangent)
             if now < softest:
                 softest = now
-                copy(mode, scratch.vectors[SOFTEST_MODE])
-                copy(u, scratch.vectors[TURNED])
+                copy(mode, vectors.softest_mode)
+                copy(u, vectors.at_softest)
             increment = min(following, LARGEST_INCREMENT, largest)
         else:
             copy(previous, u)
             increment = following
     if fraction == 1.0:
-        if softest < DIP * min(at_rest, stiffness) and could_go_elsewhere(
-            system, structure, u, scratch
-        ):
+        if softest < DIP * min(at_rest, stiffness) and is_ambiguous(system, structure, u, scratch):
             return SNAPPED
         return CONVERGED
     move_held_nodes(system, 1.0, u)

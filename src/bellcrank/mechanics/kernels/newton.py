@@ -1,7 +1,7 @@
-"""Newton's method at a fixed load, and a descent for what Newton cannot do.
+"""Newton's method at a fixed load, with predicted tensions, and a descent in energy.
 
-Near the solution the last factor is used again (chord steps): a gradient and a
-substitution cost a third of a new stiffness and its factorisation.
+Near the solution the last factor is used again (chord steps): a gradient and a substitution cost
+a third of a new stiffness and its factorisation.
 """
 
 from __future__ import annotations
@@ -27,20 +27,71 @@ from bellcrank.mechanics.kernels.energy import (
     measure_held_beams,
     work_of_load,
 )
-from bellcrank.mechanics.kernels.fields import copy, largest_component
-from bellcrank.mechanics.kernels.tension import find_tension, foresee_tension
+from bellcrank.mechanics.kernels.fields import copy, largest_component, pair
 
-MOST_ITERATIONS = 10
-HOPELESS = 1e30
+MAX_ITERATIONS = 10
+MAX_SHIFT = 1e30
 CHORD_STEP = 2e-3
-"""Below this step the stiffness is good enough to be used once more."""
+"""Largest step after which the factor is used once more."""
 CHORD_RATIO = 0.05
-"""Unless steps no longer shrink by this factor."""
+"""Ratio of successive steps above which the factor is renewed all the same."""
+
+
+@kernel
+def find_tension(system: System, structure: Structure, scratch: Scratch) -> None:
+    """Compute the tension of the movable beams at the displacement where they were measured."""
+    for index in range(structure.sizes[1]):
+        beam = structure.beam[index]
+        stretch = scratch.length[beam] - system.rest_length[beam]
+        scratch.tension[beam] = 2.0 * system.bond * stretch
+
+
+@kernel
+def clear_tension(scratch: Scratch) -> None:
+    """Set all tensions to zero."""
+    for beam in range(len(scratch.tension)):
+        scratch.tension[beam] = 0.0
+
+
+@kernel
+def add_tension_at(
+    system: System, structure: Structure, u: Floats, share: float, scratch: Scratch
+) -> None:
+    """Add `share` times the tension of the movable beams at the displacement `u`."""
+    for index in range(structure.sizes[1]):
+        beam = structure.beam[index]
+        first, second = pair(system.beams, beam)
+        x = system.rest_vector[beam, 0] + (u[second, 0] - u[first, 0])
+        y = system.rest_vector[beam, 1] + (u[second, 1] - u[first, 1])
+        stretch = math.sqrt(x * x + y * y) - system.rest_length[beam]
+        scratch.tension[beam] += share * 2.0 * system.bond * stretch
+
+
+@kernel
+def predict_tension(system: System, structure: Structure, scale: float, scratch: Scratch) -> None:
+    """Compute the tension to first order after `scale` times the step.
+
+    A Newton step rotates beams along straight lines and so stretches them, by far more than at
+    the equilibrium that it leads to. With the tension as an unknown of its own, taken from the
+    linear step, the stiffness after the step is accurate (Magisano, Leonetti and Garcea, Comput.
+    Methods Appl. Mech. Eng. 313, 2017).
+    """
+    for index in range(structure.sizes[1]):
+        beam = structure.beam[index]
+        first, second = pair(system.beams, beam)
+        stretch = scratch.length[beam] - system.rest_length[beam]
+        for end in range(2):
+            block = system.block[second if end else first]
+            if block >= 0:
+                sign = scale if end else -scale
+                stretch += sign * scratch.axis[beam, 0] * scratch.step[block, 0]
+                stretch += sign * scratch.axis[beam, 1] * scratch.step[block, 1]
+        scratch.tension[beam] = 2.0 * system.bond * stretch
 
 
 @kernel
 def find_step(system: System, structure: Structure, scratch: Scratch) -> float:
-    """Solve K step = -gradient with the factor at hand; return the largest component."""
+    """Solve K step = -gradient with the current factor; return the largest component."""
     for node in range(len(system.block)):
         block = system.block[node]
         if block >= 0:
@@ -70,24 +121,24 @@ def newton(
     tolerance: float,
     longest_step: float,
 ) -> int:
-    """Move `u` to the stable equilibrium next to it at `fraction` of the load.
+    """Move `u` to the nearest stable equilibrium at `fraction` of the load.
 
-    The stiffness of the first step is that with the tensions in `scratch.tension`.
-    Stops when the displacement is settled to within `tolerance`. Steps longer than
-    `longest_step` are shortened; where the stiffness is not positive definite, the part of
-    it that always is shows the way. The equilibrium it ends at is stable. UNCONVERGED
-    means that it was not reached: the caller then comes from nearer by.
+    The stiffness of the first step has the tensions in `scratch.tension`. Steps longer than
+    `longest_step` are shortened. Where the stiffness is not positive definite, its part without
+    softening is used. The iteration stops when the error of the displacement is below
+    `tolerance`; the equilibrium is then stable. UNCONVERGED means that it was not reached and
+    that a start closer to it is needed.
     """
     measure_held_beams(system, structure, u, scratch)
     size = before = math.inf
-    renew = True
-    for _ in range(MOST_ITERATIONS):
+    refactorise = True
+    for _ in range(MAX_ITERATIONS):
         find_gradient(system, structure, fraction, u, scratch)
-        settled = True
-        if renew:
+        stable = True
+        if refactorise:
             find_stiffness(system, structure, 1.0, scratch)
             if not factorise(structure, scratch):
-                settled = False
+                stable = False
                 find_stiffness(system, structure, 0.0, scratch)
                 if not factorise(structure, scratch):
                     return UNCONVERGED
@@ -97,12 +148,12 @@ def newton(
             return UNCONVERGED
         scale = min(1.0, longest_step / size)
         take_step(system, scale, u, scratch)
-        foresee_tension(system, structure, scale, scratch)
+        predict_tension(system, structure, scale, scratch)
         ratio = size / before if before < math.inf else 1.0
-        left = 0.1 * size * min(1.0, ratio) if renew else size
-        if settled and left <= 0.1 * tolerance:
+        error = 0.1 * size * min(1.0, ratio) if refactorise else size
+        if stable and error <= 0.1 * tolerance:
             return CONVERGED
-        renew = size > CHORD_STEP or not settled or (ratio > CHORD_RATIO and before < math.inf)
+        refactorise = size > CHORD_STEP or not stable or (ratio > CHORD_RATIO and before < math.inf)
     return UNCONVERGED
 
 
@@ -110,10 +161,10 @@ def newton(
 def shift_until_definite(structure: Structure, scratch: Scratch, shift: float) -> float:
     """Factorise the stiffness, adding to its diagonal until it is positive definite.
 
-    Returns what was added; infinity if nothing helps, as where the stiffness is not finite.
+    Returns the number added; infinity if no shift suffices, as where the stiffness is not finite.
     """
     added = 0.0
-    while added < HOPELESS:
+    while added < MAX_SHIFT:
         if factorise(structure, scratch):
             return added
         more = max(shift, 2.0 * added)
@@ -128,15 +179,14 @@ def shift_until_definite(structure: Structure, scratch: Scratch, shift: float) -
 def descend(
     system: System, structure: Structure, fraction: float, u: Floats, scratch: Scratch
 ) -> int:
-    """Slide down in energy to some stable equilibrium, from anywhere.
+    """Move `u` downwards in energy to a stable equilibrium, from any displacement.
 
-    Newton steps, shortened until the energy falls, with a shifted stiffness where
-    it is not positive definite; at an unstable equilibrium a fixed small push
-    decides the side. Used after a loss of stability, when no neighbouring
-    equilibrium exists.
+    Newton steps, shortened until the energy falls, with a shifted stiffness where it is not
+    positive definite. At an unstable equilibrium a fixed small disturbance decides the branch.
+    Used after a loss of stability, when no neighbouring equilibrium exists.
     """
     measure_held_beams(system, structure, u, scratch)
-    trial = scratch.vectors[8]
+    trial = scratch.vectors.trial
     energy = elastic_energy(system, structure, u, scratch) - work_of_load(system, fraction, u)
     for _ in range(500):
         find_gradient(system, structure, fraction, u, scratch)

@@ -19,7 +19,7 @@ ONE = np.uint64(1)
 
 @kernel
 def couple(structure: Structure, first: int, second: int) -> None:
-    """Note that two blocks interact, unless one of them is held."""
+    """Mark two blocks as coupled, unless one of them is held."""
     if first >= 0 and second >= 0 and first != second:
         low = min(first, second)
         high = max(first, second)
@@ -28,7 +28,7 @@ def couple(structure: Structure, first: int, second: int) -> None:
 
 @kernel
 def entry_of(structure: Structure, first: int, second: int) -> int:
-    """Return where the block of two interacting nodes is stored, -1 if one of them is held."""
+    """Return the entry of the block of two coupled nodes, -1 if one of them is held."""
     if first < 0 or second < 0:
         return -1
     low = min(first, second)
@@ -40,7 +40,7 @@ def entry_of(structure: Structure, first: int, second: int) -> int:
 
 @kernel
 def fill_in(structure: Structure) -> None:
-    """Symbolic Cholesky factorisation: a column hands its rows on to its parent."""
+    """Symbolic Cholesky factorisation: the rows of a column are added to its parent column."""
     bits = structure.column_bits
     columns, words = bits.shape
     count = 0
@@ -66,7 +66,7 @@ def fill_in(structure: Structure) -> None:
 
 @kernel
 def find_pattern(system: System, structure: Structure) -> None:
-    """Find the pattern of the stiffness and of its factor, and where each part adds to it."""
+    """Find the pattern of the stiffness and of its factor, and the entries of beams and springs."""
     clear(structure.column_bits, len(structure.column_bits))
     block, beams = system.block, system.beams
     for index in range(structure.sizes[1]):

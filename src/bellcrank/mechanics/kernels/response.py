@@ -1,4 +1,4 @@
-"""The efficiency of a design: from rest, or from the equilibrium of a neighbour."""
+"""Response of a design, from rest or from the equilibrium of a reference design."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import math
 
 from bellcrank.mechanics.kernels._compile import entry, inlined, kernel
 from bellcrank.mechanics.kernels.arrays import (
+    ACTIVE,
     CONVERGED,
     MECHANISM,
     UNCONVERGED,
     UNVERIFIED,
     Bytes,
     Floats,
-    Known,
+    Reference,
     Scratch,
     Structure,
     System,
@@ -20,21 +21,18 @@ from bellcrank.mechanics.kernels.arrays import (
 from bellcrank.mechanics.kernels.branch import is_reached_from_rest
 from bellcrank.mechanics.kernels.energy import beam_rotation, elastic_energy
 from bellcrank.mechanics.kernels.fields import clear, copy, pair
-from bellcrank.mechanics.kernels.loading import (
-    follow_path,
-    place_hanging_pieces,
-)
-from bellcrank.mechanics.kernels.newton import newton
-from bellcrank.mechanics.kernels.structure import ACTIVE, build_structure
-from bellcrank.mechanics.kernels.tangents import GUESS, LONGEST_STEP, move_held_nodes
-from bellcrank.mechanics.kernels.tension import add_tension_at, clear_tension
+from bellcrank.mechanics.kernels.loading import follow_path, place_hanging_pieces
+from bellcrank.mechanics.kernels.newton import add_tension_at, clear_tension, newton
+from bellcrank.mechanics.kernels.structure import build_structure
+from bellcrank.mechanics.kernels.tangents import LONGEST_STEP, move_held_nodes
 
 
 @kernel
 def output_motion(system: System, u: Floats) -> float:
-    """Sum over output nodes of |u| (2 cos(gamma/2)^n - 1), gamma the angle to the wanted direction.
+    """Return the sum over output nodes of |u| (2 cos(gamma/2)^n - 1).
 
-    For n = 2 this is the projection t_out . u (Bonfanti et al. 2020, eqs. 1 and 2).
+    Here gamma is the angle of u to the wanted direction. For n = 2 this is the projection
+    t_out . u (Bonfanti et al. 2020, eqs. 1 and 2).
     """
     total = 0.0
     for index in range(len(system.output_nodes)):
@@ -52,7 +50,7 @@ def output_motion(system: System, u: Floats) -> float:
 
 @kernel
 def input_motion(system: System, u: Floats) -> float:
-    """Sum over input nodes of t_in . u."""
+    """Return the sum over input nodes of t_in . u."""
     total = 0.0
     for index in range(len(system.input_nodes)):
         node = system.input_nodes[index]
@@ -65,7 +63,7 @@ def input_motion(system: System, u: Floats) -> float:
 
 @kernel
 def efficiency_of(system: System, u: Floats) -> float:
-    """Efficiency at displacement `u`."""
+    """Return the efficiency at displacement `u`."""
     denominator = system.denominator
     if math.isnan(denominator):
         denominator = system.denominator_scale * input_motion(system, u)
@@ -73,41 +71,37 @@ def efficiency_of(system: System, u: Floats) -> float:
 
 
 @kernel
-def rotation_at(system: System, known: Known, node: int) -> float:
-    """Rotation of some beam at a node of the known equilibrium."""
-    for slot in range(system.ring_start[node], system.ring_start[node + 1]):
-        beam = system.ring_beam[slot]
-        if known.present[beam]:
-            return beam_rotation(system, known.u, beam)
+def rotation_at(system: System, reference: Reference, node: int) -> float:
+    """Return the rotation of some beam at a node in the reference equilibrium."""
+    for slot in range(system.incident_start[node], system.incident_start[node + 1]):
+        beam = system.incident_beam[slot]
+        if reference.present[beam]:
+            return beam_rotation(system, reference.u, beam)
     return 0.0
 
 
 @kernel
-def guess_from_neighbour(
-    system: System,
-    known: Known,
-    structure: Structure,
-    u: Floats,
-    scratch: Scratch,
+def extend_reference(
+    system: System, reference: Reference, structure: Structure, u: Floats, scratch: Scratch
 ) -> None:
-    """Start from the known equilibrium; pieces that were loose follow where they attach.
+    """Fill `u` with the reference displacement, extended to nodes that were loose there.
 
-    A node that moved neither before nor is held takes the displacement of its parent
-    plus the turn of its offset by the parent's rotation.
+    Such a node takes the displacement of its parent, and its offset from the parent is rotated
+    with the parent.
     """
-    rotation = scratch.vectors[8, :, 0]
+    rotation = scratch.vectors.rotation
     for node in range(len(u)):
         active = structure.active[node] == ACTIVE
         for axis in range(2):
-            u[node, axis] = known.u[node, axis] if active else 0.0
+            u[node, axis] = reference.u[node, axis] if active else 0.0
     move_held_nodes(system, 1.0, u)
     for index in range(structure.sizes[0]):
         node = structure.order[index]
         parent = structure.parent[node]
-        if known.active[node] == ACTIVE or parent < 0 or system.block[node] < 0:
+        if reference.active[node] == ACTIVE or parent < 0 or system.block[node] < 0:
             continue
-        if known.active[parent] == ACTIVE:
-            angle = rotation_at(system, known, parent)
+        if reference.active[parent] == ACTIVE:
+            angle = rotation_at(system, reference, parent)
         else:
             angle = rotation[parent]
         rotation[node] = angle
@@ -119,22 +113,22 @@ def guess_from_neighbour(
 
 
 @kernel
-def remember(structure: Structure, u: Floats, known: Known) -> None:
-    """Keep an equilibrium as the one to start from."""
-    copy(u, known.u)
-    for beam in range(len(known.present)):
-        known.present[beam] = structure.present[beam]
-    for node in range(len(known.active)):
-        known.active[node] = structure.active[node]
+def set_reference(structure: Structure, u: Floats, reference: Reference) -> None:
+    """Make an equilibrium the reference."""
+    copy(u, reference.u)
+    for beam in range(len(reference.present)):
+        reference.present[beam] = structure.present[beam]
+    for node in range(len(reference.active)):
+        reference.active[node] = structure.active[node]
 
 
 @kernel
-def is_known(system: System, structure: Structure, known: Known) -> bool:
-    """Whether the drive moves the same beams as in the known equilibrium, and no others."""
+def equals_reference(system: System, structure: Structure, reference: Reference) -> bool:
+    """Whether the drive moves the same beams as in the reference, and no others."""
     for beam in range(len(structure.present)):
         node = system.beams[beam, 0]
         now = structure.present[beam] and structure.active[node] != 0
-        before = known.present[beam] and known.active[node] != 0
+        before = reference.present[beam] and reference.active[node] != 0
         if now != before:
             return False
     return True
@@ -145,9 +139,9 @@ def find_response(
     system: System,
     mask: Bytes,
     core: int,
-    known: Known,
-    nearby: bool,
-    least: float,
+    reference: Reference,
+    warm_start: bool,
+    lower_bound: float,
     largest_increment: float,
     structure: Structure,
     u: Floats,
@@ -155,30 +149,30 @@ def find_response(
 ) -> tuple[int, float]:
     """Fill `structure` and the displacement `u` of the design `mask`; return status, efficiency.
 
-    With `nearby`, start from the known equilibrium of a similar design. Only an
-    accelerator: if no moving beam differs it is that equilibrium, and one found from there
-    must be judged to be the one reached from rest, else the design is loaded from rest after
-    all. Neither is done for one that is not more efficient than `least`: it is UNVERIFIED.
+    With `warm_start`, start from the reference equilibrium. If no moving beam differs from the
+    reference, that is the equilibrium. Another one must be verified to be the one reached from
+    rest; otherwise the design is loaded from rest. An equilibrium that is no more efficient than
+    `lower_bound` is not verified, and UNVERIFIED.
     """
     clear(u, len(u))
     status = build_structure(system, mask, core, structure)
     if status == MECHANISM:
         return status, math.nan
-    if nearby and is_known(system, structure, known):
-        copy(known.u, u)
+    if warm_start and equals_reference(system, structure, reference):
+        copy(reference.u, u)
         return CONVERGED, efficiency_of(system, u)
     status = UNCONVERGED
-    guess = scratch.vectors[GUESS]
-    if nearby:
-        guess_from_neighbour(system, known, structure, u, scratch)
+    guess = scratch.vectors.guess
+    if warm_start:
+        extend_reference(system, reference, structure, u, scratch)
         copy(u, guess)
         clear_tension(scratch)
-        add_tension_at(system, structure, known.u, 1.0, scratch)
+        add_tension_at(system, structure, reference.u, 1.0, scratch)
         for beam in range(len(mask)):
-            if not known.present[beam]:
+            if not reference.present[beam]:
                 scratch.tension[beam] = 0.0
         status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP)
-        if status == CONVERGED and efficiency_of(system, u) <= least:
+        if status == CONVERGED and efficiency_of(system, u) <= lower_bound:
             return UNVERIFIED, efficiency_of(system, u)
     if status != CONVERGED or not is_reached_from_rest(system, structure, guess, u, scratch):
         status = follow_path(system, structure, u, scratch, largest_increment)
@@ -191,9 +185,9 @@ def respond(
     system: System,
     mask: Bytes,
     core: int,
-    known: Known,
-    nearby: bool,
-    least: float,
+    reference: Reference,
+    warm_start: bool,
+    lower_bound: float,
     largest_increment: float,
     structure: Structure,
     u: Floats,
@@ -201,8 +195,9 @@ def respond(
 ) -> tuple[int, float, float]:
     """As `find_response`, for calls from Python; returns the elastic energy too."""
     status, efficiency = find_response(
-        system, mask, core, known, nearby, least, largest_increment, structure, u, scratch
-    )
+        system, mask, core, reference, warm_start, lower_bound, largest_increment,
+        structure, u, scratch,
+    )  # fmt: skip
     energy = math.nan
     if status != MECHANISM:
         energy = elastic_energy(system, structure, u, scratch)

@@ -1,18 +1,21 @@
-"""Which part of a design moves: its pieces, beams and angular springs.
+"""The part of a design that moves: its pieces, beams and angular springs.
 
-Only what the drive can reach through present beams moves; everything else stays
-exactly at rest and is left out of the equations.
+Only pieces that the drive reaches through present beams move; all others stay exactly at rest
+and are left out of the equations.
 """
 
 from __future__ import annotations
 
-from bellcrank.mechanics.kernels._compile import kernel
+from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import (
+    ACTIVE,
     CONVERGED,
+    HANGING,
     HELD,
     HELD_X,
     HELD_Y,
     MECHANISM,
+    PRUNE_ALL,
     Bytes,
     Structure,
     System,
@@ -20,10 +23,6 @@ from bellcrank.mechanics.kernels.arrays import (
 from bellcrank.mechanics.kernels.core import keep_core, other_end
 from bellcrank.mechanics.kernels.fields import pair, triple
 from bellcrank.mechanics.kernels.pattern import find_pattern
-
-ACTIVE = 1
-HANGING = 2
-"""A piece that hangs from one held node: it follows as a rigid body, without stress."""
 
 
 @kernel
@@ -39,8 +38,8 @@ def discover(system: System, structure: Structure, start: int) -> None:
     while head < count:
         node = order[head]
         head += 1
-        for slot in range(system.ring_start[node], system.ring_start[node + 1]):
-            beam = system.ring_beam[slot]
+        for slot in range(system.incident_start[node], system.incident_start[node + 1]):
+            beam = system.incident_beam[slot]
             if structure.present[beam]:
                 far = other_end(system, beam, node)
                 if not active[far]:
@@ -55,10 +54,10 @@ def discover(system: System, structure: Structure, start: int) -> None:
 def rigid_motions_are_prevented(
     system: System, structure: Structure, first: int, last: int
 ) -> bool:
-    """Whether supports, drive and output springs hold a piece against its three rigid motions.
+    """Whether supports, drive and output springs prevent the three rigid motions of a piece.
 
-    The rows (1, 0, -y) and (0, 1, x) of what is held, or their combination along a spring,
-    are summed as a 3 x 3 Gram matrix, which must have full rank.
+    The rows (1, 0, -y) and (0, 1, x) of the held coordinates, or their combination along a
+    spring, are summed as a 3 x 3 Gram matrix, which must have full rank.
     """
     origin_x, origin_y = pair(system.positions, structure.order[first])
     reach = 1e-300
@@ -96,8 +95,8 @@ def rigid_motions_are_prevented(
 
 
 @kernel
-def judge_piece(system: System, structure: Structure, first: int, last: int) -> int:
-    """Decide whether a driven piece is supported, hangs from one node, or is a mechanism."""
+def classify_piece(system: System, structure: Structure, first: int, last: int) -> int:
+    """Return MECHANISM for a driven piece without support; mark one that hangs from a node."""
     order = structure.order
     held_nodes = 0
     constrained = False
@@ -118,7 +117,7 @@ def judge_piece(system: System, structure: Structure, first: int, last: int) -> 
 
 @kernel
 def find_pieces(system: System, structure: Structure) -> int:
-    """Mark the nodes that the drive can move; return CONVERGED or MECHANISM."""
+    """Mark the nodes that the drive moves; return CONVERGED or MECHANISM."""
     for node in range(len(structure.active)):
         structure.active[node] = 0
     status = CONVERGED
@@ -127,13 +126,13 @@ def find_pieces(system: System, structure: Structure) -> int:
         if not structure.active[start]:
             first = structure.sizes[0]
             discover(system, structure, start)
-            status = max(status, judge_piece(system, structure, first, structure.sizes[0]))
+            status = max(status, classify_piece(system, structure, first, structure.sizes[0]))
     return status
 
 
 @kernel
 def list_beams(system: System, structure: Structure) -> None:
-    """List active beams: those with a free end from the front, the others from the back."""
+    """List active beams: movable ones from the front, beams between held nodes from the back."""
     front, back = 0, len(structure.beam)
     for beam in range(len(structure.present)):
         if structure.present[beam] and structure.active[system.beams[beam, 0]] == ACTIVE:
@@ -149,10 +148,10 @@ def list_beams(system: System, structure: Structure) -> None:
 
 @kernel
 def beams_around(system: System, structure: Structure, node: int) -> int:
-    """Collect the present beams of a node in cyclic order; return how many there are."""
+    """List the present beams of a node in cyclic order; return their number."""
     count = 0
-    for slot in range(system.ring_start[node], system.ring_start[node + 1]):
-        beam = system.ring_beam[slot]
+    for slot in range(system.incident_start[node], system.incident_start[node + 1]):
+        beam = system.incident_beam[slot]
         if structure.present[beam]:
             structure.around[count] = beam
             count += 1
@@ -163,8 +162,8 @@ def beams_around(system: System, structure: Structure, node: int) -> int:
 def list_springs(system: System, structure: Structure) -> None:
     """List the angular springs between neighbouring present beams around each active node.
 
-    Springs that can turn stand at the front, those between two held beams at the back.
-    A node of two beams has two equal springs, inside and outside: one of double weight.
+    Springs that can deform are at the front, those between two held beams at the back. A node of
+    two beams has two equal springs, inside and outside; they are one of double weight.
     """
     front, back = 0, len(structure.spring_node)
     for index in range(structure.sizes[0]):
@@ -177,15 +176,15 @@ def list_springs(system: System, structure: Structure) -> None:
             a = structure.around[number - 1 if number > 0 else count - 1]
             b = structure.around[number]
             if system.movable[a] or system.movable[b]:
-                place = front
+                spring = front
                 front += 1
             else:
                 back -= 1
-                place = back
-            structure.spring_beams[place, 0] = a
-            structure.spring_beams[place, 1] = b
-            structure.spring_node[place] = node
-            structure.spring_weight[place] = weight
+                spring = back
+            structure.spring_beams[spring, 0] = a
+            structure.spring_beams[spring, 1] = b
+            structure.spring_node[spring] = node
+            structure.spring_weight[spring] = weight
     structure.sizes[3] = front
     structure.sizes[4] = back
 
@@ -199,7 +198,7 @@ def build_structure(system: System, mask: Bytes, core: int, structure: Structure
     mask
         (M,) uint8, 1 where the beam is present.
     core
-        What to leave out, as in `keep_core`.
+        KEEP, PRUNE_DEAD_ENDS or PRUNE_ALL.
     """
     keep_core(system, mask, core, structure)
     status = find_pieces(system, structure)
@@ -208,3 +207,29 @@ def build_structure(system: System, mask: Bytes, core: int, structure: Structure
         list_springs(system, structure)
         find_pattern(system, structure)
     return status
+
+
+@entry
+def find_core(system: System, mask: Bytes, core: int, structure: Structure, found: Bytes) -> None:
+    """Mark in `found` (M,) the beams in the core of a design that the drive reaches.
+
+    Overwrites `structure`. The parameters are those of `keep_core`.
+    """
+    keep_core(system, mask, core, structure)
+    find_pieces(system, structure)
+    for beam in range(len(mask)):
+        first, second = pair(system.beams, beam)
+        reached = structure.active[first] != 0 or structure.active[second] != 0
+        found[beam] = 1 if structure.present[beam] and reached else 0
+
+
+@entry
+def find_loaded(system: System, mask: Bytes, structure: Structure) -> None:
+    """Leave in `structure.present` the beams of a design on a path between two terminals."""
+    keep_core(system, mask, PRUNE_ALL, structure)
+
+
+@entry
+def find_structure(system: System, mask: Bytes, core: int, structure: Structure) -> int:
+    """As `build_structure`, for calls from Python."""
+    return build_structure(system, mask, core, structure)

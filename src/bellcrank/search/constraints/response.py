@@ -12,8 +12,8 @@ from bellcrank.mechanics import (
     Status,
     StrokeEvaluator,
     UnloadedBeams,
-    foresee_stiffness,
     output_stiffness,
+    predict_output_stiffness,
 )
 from bellcrank.search.constraints.constraint import (
     Constraint,
@@ -43,7 +43,7 @@ def stiffness(_problem: Problem, bound: float) -> Constraint:
     """Bound the output stiffness at full load from below (`mechanics.output_stiffness`)."""
 
     def predicted(deformed: DeformedDesign, beams: NDArray[np.int64]) -> NDArray[np.float64]:
-        after = foresee_stiffness(deformed.evaluator, beams, deformed.mask[beams])
+        after = predict_output_stiffness(deformed.evaluator, beams, deformed.mask[beams])
         violation: NDArray[np.float64] = np.maximum(0.0, 1.0 - after / bound)
         return np.where(violation < MIN_PREDICTED_VIOLATION, 0.0, violation)
 

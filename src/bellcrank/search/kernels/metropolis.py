@@ -12,14 +12,14 @@ from bellcrank.mechanics.kernels.arrays import (
     Bytes,
     Floats,
     Ints,
-    Known,
+    Reference,
     Scratch,
     Structure,
     System,
 )
 from bellcrank.mechanics.kernels.response import (
     find_response,
-    remember,
+    set_reference,
 )
 from bellcrank.search.kernels.acceptance import (
     exponential_cost,
@@ -95,8 +95,8 @@ def is_forbidden(system: System, minimum_degree: int, mask: Bytes, beam: int) ->
         for end in range(2):
             node = system.beams[beam, end]
             degree = 0
-            for slot in range(system.ring_start[node], system.ring_start[node + 1]):
-                degree += mask[system.ring_beam[slot]]
+            for slot in range(system.incident_start[node], system.incident_start[node + 1]):
+                degree += mask[system.incident_beam[slot]]
             if degree < minimum_degree and system.held[node] != HELD:
                 return True
     return False
@@ -110,7 +110,7 @@ def advance(
     temperatures: Floats,
     uniforms: Floats,
     chain: Chain,
-    known: Known,
+    reference: Reference,
     structure: Structure,
     u: Floats,
     scratch: Scratch,
@@ -126,7 +126,7 @@ def advance(
         Temperature after 0, 1, 2, ... accepted steps; the last entry holds afterwards.
     uniforms
         (n, 2) random numbers in [0, 1) that select the beam and decide on acceptance.
-    known
+    reference
         Equilibrium of the current design; updated.
     """
     for step in range(len(uniforms)):
@@ -138,7 +138,7 @@ def advance(
         status, efficiency = FORBIDDEN, math.nan
         if not is_forbidden(system, rules.minimum_degree, chain.mask, beam):
             status, efficiency = find_response(
-                system, chain.mask, rules.core, known, True, -math.inf, 1.0,
+                system, chain.mask, rules.core, reference, True, -math.inf, 1.0,
                 structure, u, scratch,
             )  # fmt: skip
         cost = cost_of(rules.cost, efficiency)
@@ -157,7 +157,7 @@ def advance(
             chain.value[2] = max(efficiency, chain.value[2])
             chain.counts[0] += 1
             chain.counts[1] = 0
-            remember(structure, u, known)
+            set_reference(structure, u, reference)
         else:
             chain.counts[1] += 1
             flip(chain, beam)

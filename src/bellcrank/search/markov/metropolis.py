@@ -215,7 +215,7 @@ def _advance_compiled(
     )
     made = advance(
         evaluator.system, evaluator.problem.designable, rules, settings.temperatures, uniforms,
-        chain, evaluator.known, evaluator.structure, evaluator.displacement, evaluator.scratch,
+        chain, evaluator.reference, evaluator.structure, evaluator.displacement, evaluator.scratch,
         records,
     )  # fmt: skip
     efficiency, cost, best = chain.value.tolist()
