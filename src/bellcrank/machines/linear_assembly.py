@@ -17,7 +17,7 @@ import numpy as np
 from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings
 from bellcrank.machines.bridges import between_ports
 from bellcrank.machines.plan import PORTS
-from bellcrank.mechanics import Loose, Superelement
+from bellcrank.mechanics import Superelement, free_nodes
 from bellcrank.model import Input, Lattice, Output, Problem, Supports
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def _condensed(
         stiffness=problem.stiffness,
         designable=np.array([0]),
     )
-    element = Superelement(piece.full_design(), [Loose(grip)])
+    element = Superelement(piece.full_design(), [free_nodes(grip)])
     reached = element.reached.astype(np.float64)
     condensed: NDArray[np.float64] = element.rest().stiffness * np.outer(reached, reached)
     return condensed

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Loose, Sliding, Superelement
+from bellcrank.mechanics import Superelement, free_nodes, uniform_motion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Grip, UnloadedBeams
+    from bellcrank.mechanics import UnloadedBeams
     from bellcrank.model import Design, Input, Output
 
 INPUT, OUTPUT = 0, 1
@@ -88,12 +88,11 @@ def mean_ports(design: Design, unloaded_beams: UnloadedBeams = "keep") -> Supere
     (2, np.True_)
     """
     given, wanted = design.problem.input, design.problem.output
-    entry: Grip
     if given.drive == "displacement":
-        entry, weights = Sliding(given.nodes, given.direction), np.ones(1)
+        entry, weights = uniform_motion(given.nodes, given.direction), np.ones(1)
     else:
-        entry, weights = Loose(given.nodes), _mean_weights(given)
-    exit_ = Loose(wanted.nodes)
+        entry, weights = free_nodes(given.nodes), _mean_weights(given)
+    exit_ = free_nodes(wanted.nodes)
     measures = np.zeros((2, entry.count + exit_.count))
     measures[INPUT, : entry.count] = weights
     measures[OUTPUT, entry.count :] = _mean_weights(wanted)

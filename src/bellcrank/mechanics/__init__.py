@@ -18,7 +18,7 @@ from bellcrank.mechanics.analysis import (
     predict_output_stiffness,
     strain_of,
 )
-from bellcrank.mechanics.conditions import Conditions, Linear
+from bellcrank.mechanics.conditions import Conditions, LinearEquations
 from bellcrank.mechanics.evaluator import (
     VERIFICATION_INCREMENT,
     FlipPrediction,
@@ -26,8 +26,7 @@ from bellcrank.mechanics.evaluator import (
     SpringEvaluator,
     UnloadedBeams,
 )
-from bellcrank.mechanics.following import Arrival, follow
-from bellcrank.mechanics.grips import Grip, Loose, Rigid, Sliding
+from bellcrank.mechanics.following import PathEnd, follow
 from bellcrank.mechanics.memory import check_memory, evaluators_that_fit
 from bellcrank.mechanics.objectives import (
     Objective,
@@ -38,30 +37,32 @@ from bellcrank.mechanics.objectives import (
 )
 from bellcrank.mechanics.status import Outcome, Status
 from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction
-from bellcrank.mechanics.substructure import Condensed, Substructure
-from bellcrank.mechanics.superelement import State, Superelement
+from bellcrank.mechanics.superelement import (
+    Condensed,
+    Coupling,
+    State,
+    Superelement,
+    free_nodes,
+    uniform_motion,
+)
 
 __all__ = [
     "VERIFICATION_INCREMENT",
-    "Arrival",
     "Condensed",
     "Conditions",
     "Core",
+    "Coupling",
     "FlipPrediction",
-    "Grip",
-    "Linear",
-    "Loose",
+    "LinearEquations",
     "Objective",
     "Outcome",
+    "PathEnd",
     "Response",
-    "Rigid",
-    "Sliding",
     "SpringEvaluator",
     "State",
     "Status",
     "Strain",
     "StrokeEvaluator",
-    "Substructure",
     "Superelement",
     "UnloadedBeams",
     "at_fraction",
@@ -69,6 +70,7 @@ __all__ = [
     "efficiency_of",
     "evaluators_that_fit",
     "follow",
+    "free_nodes",
     "load_bearing_core",
     "loaded_beams",
     "objective_name",
@@ -77,4 +79,5 @@ __all__ = [
     "output_stiffness",
     "predict_output_stiffness",
     "strain_of",
+    "uniform_motion",
 ]

@@ -1,4 +1,4 @@
-"""What is asked of each coordinate of a superelement: a displacement, a force, or a spring."""
+"""Conditions on the coordinates of a superelement: displacements, forces, springs."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from bellcrank.errors import InvalidSettings
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-SMALLEST = 1e-10
-"""Lowest stiffness, as a part of the largest, at which something counts as held."""
+MIN_STIFFNESS = 1e-10
+"""Stiffness, as a part of the largest, below which a motion counts as free."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Conditions:
-    """What is asked of k coordinates.
+    """Conditions on k coordinates.
 
     Parameters
     ----------
     prescribed : (k,) bool
-        Whether its displacement is given; else the force on it is.
+        Whether the displacement of the coordinate is given, instead of the force on it.
     value : (k,)
-        That displacement, or that force.
+        That displacement or force.
     spring : (k,)
-        Stiffness of springs from rest that act on coordinates with a given force, too.
+        Stiffness of springs from rest that act on coordinates with a given force in addition.
 
     Raises
     ------
@@ -37,7 +37,7 @@ class Conditions:
 
     Examples
     --------
-    The first moved by 0.1, the second resisted by a spring:
+    The first coordinate is moved by 0.1, a spring acts on the second:
 
     >>> moved = Conditions(np.array([True, False]), np.array([0.1, 0.0]), np.array([0.0, 2.0]))
     """
@@ -66,14 +66,14 @@ class Conditions:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Linear:
+class LinearEquations:
     """Solutions of the linear equations of m generalised coordinates z under conditions.
 
-    With S the stiffness, q = L z the coordinates the conditions are about and k their springs:
+    With S the stiffness, q = L z the coordinates of the conditions and k their springs:
 
         (S + L_f' k L_f) z - L_p' lambda = right + L_f' force,    L_p z = given,
 
-    lambda the forces at the prescribed ones.
+    lambda the forces at the prescribed coordinates.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Linear:
     measures : (k, m)
         The matrix L.
     conditions
-        Which are prescribed, and the springs.
+        Conditions on q.
     """
 
     stiffness: NDArray[np.float64]
@@ -89,7 +89,7 @@ class Linear:
     conditions: Conditions
 
     def _loaded(self) -> NDArray[np.float64]:
-        """(m, m) the stiffness with the springs."""
+        """Return (m, m) the stiffness with the springs."""
         rows = self.measures * np.sqrt(self.conditions.spring)[:, None]
         total: NDArray[np.float64] = self.stiffness + rows.T @ rows
         return total
@@ -103,7 +103,7 @@ class Linear:
         fixed = self.measures[self.conditions.prescribed]
         if len(fixed):
             _, sizes, directions = np.linalg.svd(fixed)
-            free = directions[np.count_nonzero(sizes > SMALLEST * sizes[0]) :]
+            free = directions[np.count_nonzero(sizes > MIN_STIFFNESS * sizes[0]) :]
             loaded = free @ loaded @ free.T
         if not len(loaded):
             return np.inf, 0.0
@@ -113,7 +113,7 @@ class Linear:
     def is_stable(self) -> bool:
         """Whether every motion that the conditions leave free is resisted."""
         lowest, largest = self.lowest()
-        return lowest > SMALLEST * largest
+        return lowest > MIN_STIFFNESS * largest
 
     def solve(
         self, right: NDArray[np.float64], given: NDArray[np.float64]
@@ -139,7 +139,7 @@ class Linear:
         return solved[: len(right)], solved[len(right) :]
 
     def transfer(self) -> NDArray[np.float64]:
-        """Return (k, k) what every coordinate answers to a unit of what is asked of each.
+        """Return (k, k) the response of every coordinate to a unit of each condition.
 
         Column j is for a unit displacement of coordinate j where that is prescribed, and for a
         unit force on it where not; row i is the force at coordinate i where its displacement is
@@ -154,6 +154,6 @@ class Linear:
         prescribed = self.conditions.prescribed
         unit = np.eye(len(prescribed))
         z, force = self.solve(self.measures.T @ np.where(prescribed, 0.0, unit), unit[prescribed])
-        answer: NDArray[np.float64] = self.measures @ z
-        answer[prescribed] = force
-        return answer
+        response: NDArray[np.float64] = self.measures @ z
+        response[prescribed] = force
+        return response

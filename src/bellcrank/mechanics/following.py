@@ -1,4 +1,4 @@
-"""From one equilibrium of a superelement to another, on one stable path."""
+"""Follow a superelement from one equilibrium to another on one stable path."""
 
 from __future__ import annotations
 
@@ -8,42 +8,41 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics.conditions import Conditions, Linear
+from bellcrank.mechanics.conditions import Conditions, LinearEquations
 from bellcrank.mechanics.status import Status
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics.substructure import Condensed
-    from bellcrank.mechanics.superelement import State, Superelement
+    from bellcrank.mechanics.superelement import Condensed, State, Superelement
 
-MOST_ITERATIONS = 12
-SETTLED = 1e-7
+MAX_ITERATIONS = 12
+SMALL_STEP = 1e-7
 """Step, in lattice units, after which one more Newton step leaves only rounding errors."""
 TOLERANCE = 1e-9
-"""What that last one may still move."""
+"""Largest size of that last step."""
 LONGEST_STEP = 0.5
 LARGEST_DEPARTURE = 0.05
-"""Of an increment from the mean of the tangents at its ends, as a part of the movement, beyond
-which the two states may not be on one path."""
+"""Departure of an increment from the mean of the tangents at its ends, as a part of the movement,
+above which the two states may be on different paths."""
 LARGEST_SOFTENING = 0.7
-"""Least ratio of the lowest stiffnesses at the ends of an increment, in either direction: a
-stability that is lost between them would have been seen to fade."""
+"""Least ratio of the lowest stiffnesses at the ends of an increment, in either direction, so that
+no loss of stability between them is missed."""
 SMALLEST_INCREMENT = 1.0 / 4096.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Arrival:
-    """How far a superelement came on its way to new conditions.
+class PathEnd:
+    """Last state on the path of a superelement to new conditions.
 
     Parameters
     ----------
     state
-        The last stable one.
+        The last stable state.
     fraction
-        Of the way, 0 to 1.
+        Part of the change of conditions at that state, 0 to 1.
     status
-        CONVERGED if it came all the way; SNAPPED if stability is lost beyond `fraction`.
+        CONVERGED at fraction 1; SNAPPED if stability is lost beyond `fraction`.
     """
 
     state: State
@@ -51,46 +50,45 @@ class Arrival:
     status: Status
 
 
-def follow(element: Superelement, state: State, conditions: Conditions) -> Arrival:
-    """Go from a state to new conditions in increments that stay on one stable path.
+def follow(element: Superelement, state: State, conditions: Conditions) -> PathEnd:
+    """Change the conditions on a superelement in increments that stay on one stable path.
 
-    An increment counts if it ends in a stable equilibrium, if the tangents at both of its ends
-    account for the way between them, and if the lowest stiffness, of the interior and against what
-    the conditions leave free, changes little; else it is halved. Conditions may be of another kind
-    than those the state was reached under, which is what makes it possible to hold an output
-    where it is, and then to push.
+    An increment is accepted if it ends in a stable equilibrium, if the tangents at both of its
+    ends account for the movement between them, and if the lowest stiffness, of the interior and
+    against the motions that the conditions leave free, changes little; otherwise it is halved.
+    The conditions may be of another kind than those of the state: an output can, for example, be
+    held where it is before the input is pushed.
 
     Parameters
     ----------
     state
-        Where to begin: at rest, or where an earlier call arrived.
+        First state: at rest, or the result of an earlier call.
     conditions
-        On each of the k coordinates of the element.
+        Conditions on each of the k coordinates of the element.
 
     Returns
     -------
-    Arrival
+    PathEnd
         SNAPPED where even the smallest increment fails.
 
     Raises
     ------
     InvalidSettings
-        If the conditions are not about k coordinates, ask for a motion of what the input does
-        not reach, or leave a motion free that nothing resists at the state.
+        If the conditions are not on k coordinates, prescribe a coordinate that the input does not
+        reach, or leave a motion free that nothing resists at the state.
 
     Examples
     --------
     The full crane, pushed by its whole stroke:
 
-    >>> from bellcrank.mechanics.grips import Sliding
-    >>> from bellcrank.mechanics.superelement import Superelement
+    >>> from bellcrank.mechanics.superelement import Superelement, uniform_motion
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
-    >>> push = Sliding(crane.input.nodes, crane.input.direction)
+    >>> push = uniform_motion(crane.input.nodes, crane.input.direction)
     >>> pushed = Superelement(crane.full_design(), [push])
     >>> stroke = Conditions(np.array([True]), np.array([crane.input.amount]), np.zeros(1))
-    >>> arrival = follow(pushed, pushed.rest(), stroke)
-    >>> arrival.status.label, arrival.state.force.round(4)
+    >>> end = follow(pushed, pushed.rest(), stroke)
+    >>> end.status.label, end.state.force.round(4)
     ('converged', array([4.0187]))
     """
     _check(element, state, conditions)
@@ -100,28 +98,28 @@ def follow(element: Superelement, state: State, conditions: Conditions) -> Arriv
         state.force + conditions.spring * state.coordinates,
     )
     change = conditions.value - start
-    before = element.condense(state.z, state.displacement)
+    before = element.condense(state.displacement)
     fraction, increment = 0.0, 1.0
     while fraction < 1.0 and increment >= SMALLEST_INCREMENT and before is not None:
         end = min(1.0, fraction + increment)
         value = conditions.value if end == 1.0 else start + end * change
         target = Conditions(conditions.prescribed, value, conditions.spring)
-        arrived = settle(element, state, target)
-        if arrived is not None:
-            after, found = arrived
+        reached = find_equilibrium(element, state, target)
+        if reached is not None:
+            after, found = reached
             part = (end - fraction) * change
             mean = 0.5 * (
                 _tangent(element, before, conditions, part)
                 + _tangent(element, found, conditions, part)
             )
             moved = after.displacement - state.displacement
-            if _is_way(mean, moved) and _is_near(element, conditions, before, found):
+            if _is_consistent(mean, moved) and _keeps_stiffness(element, conditions, before, found):
                 state, before, fraction = after, found, end
                 increment *= 2.0
                 continue
         increment *= 0.5
     status = Status.CONVERGED if fraction == 1.0 else Status.SNAPPED
-    return Arrival(state, fraction, status)
+    return PathEnd(state, fraction, status)
 
 
 def _check(element: Superelement, state: State, conditions: Conditions) -> None:
@@ -149,26 +147,26 @@ def _tangent(
     change: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return (N, 2) the motion for a small change of the conditions."""
-    linear = Linear(found.stiffness, element.measures, conditions)
+    linear = LinearEquations(found.stiffness, element.measures, conditions)
     load = element.measures.T @ np.where(conditions.prescribed, 0.0, change)
     step, _ = linear.solve(load, change[conditions.prescribed])
     moved: NDArray[np.float64] = np.tensordot(step, found.responses, axes=1)
     return moved
 
 
-def _is_way(mean: NDArray[np.float64], moved: NDArray[np.float64]) -> bool:
+def _is_consistent(mean: NDArray[np.float64], moved: NDArray[np.float64]) -> bool:
     """Whether the mean of the tangents accounts for a movement."""
     departure = float(np.abs(moved - mean).max())
-    return departure <= LARGEST_DEPARTURE * max(float(np.abs(moved).max()), SETTLED)
+    return departure <= LARGEST_DEPARTURE * max(float(np.abs(moved).max()), SMALL_STEP)
 
 
-def _is_near(
+def _keeps_stiffness(
     element: Superelement, conditions: Conditions, before: Condensed, after: Condensed
 ) -> bool:
-    """Whether the lowest stiffnesses of two states are alike."""
+    """Whether the lowest stiffnesses of two states differ little."""
     pairs = [(before.lowest, after.lowest)]
     both = [
-        Linear(found.stiffness, element.measures, conditions).lowest()[0]
+        LinearEquations(found.stiffness, element.measures, conditions).lowest()[0]
         for found in (before, after)
     ]
     pairs.append((both[0], both[1]))
@@ -178,47 +176,47 @@ def _is_near(
     )
 
 
-def settle(
+def find_equilibrium(
     element: Superelement, start: State, conditions: Conditions
 ) -> tuple[State, Condensed] | None:
-    """Find the stable equilibrium next to a state by Newton's method.
+    """Find the stable equilibrium closest to a state by Newton's method.
 
     Returns
     -------
     (State, Condensed) or None
-        None if steps grow too long, do not settle, or end where it is not stable.
+        None if a step is too long, the iteration does not converge, or the result is not stable.
     """
     z, displacement = start.z.copy(), start.displacement.copy()
     last = predicted = False
-    for _ in range(MOST_ITERATIONS):
-        found = element.condense(z, displacement, predicted=predicted and not last)
+    for _ in range(MAX_ITERATIONS):
+        found = element.condense(displacement, predicted=predicted and not last)
         whole = found is not None
-        found = found or element.condense(z, displacement, softened=False)
+        found = found or element.condense(displacement, softened=False)
         if found is None:
             return None
-        linear = Linear(found.stiffness, element.measures, conditions)
+        linear = LinearEquations(found.stiffness, element.measures, conditions)
         step = _newton_step(linear, found, z)
         if step is None:
             return None
-        moved = found.settling + np.tensordot(step, found.responses, axes=1)
+        moved = found.interior_step + np.tensordot(step, found.responses, axes=1)
         size = float(np.abs(moved).max())
         if last:
             good = whole and size <= TOLERANCE and linear.is_stable()
             return (element.state(z, displacement, found), found) if good else None
         if not size < LONGEST_STEP:
             return None
-        element.cut.predict_tension(moved)
+        element.predict_tension(moved)
         predicted = True
         z, displacement = z + step, displacement + moved
-        element.place(z, displacement)
-        last = size <= SETTLED and whole
+        element.move(z, displacement)
+        last = size <= SMALL_STEP and whole
     return None
 
 
 def _newton_step(
-    linear: Linear, found: Condensed, z: NDArray[np.float64]
+    linear: LinearEquations, found: Condensed, z: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Return (m,) the step towards equilibrium; None if nothing resists it."""
+    """Return (m,) the Newton step; None if the equations are singular."""
     conditions, coordinates = linear.conditions, linear.measures @ z
     missing = conditions.value - coordinates
     load = conditions.value - conditions.spring * coordinates
