@@ -327,7 +327,7 @@ def test_an_output_that_nothing_connects_stays_at_rest() -> None:
 
 def test_what_hangs_loose_between_its_ports_is_refused() -> None:
     roller = arm_on(fixed_x=[0])
-    with pytest.raises(InvalidSettings, match="rigid body, even while its ports are held"):
+    with pytest.raises(InvalidSettings, match="rigid-body motion, even while its ports are held"):
         Superelement(roller.full_design(), [free_nodes(np.array([3]))])
     problem = arm_on()
     hanging = Superelement(problem.full_design(), [free_nodes(np.array([3]))])
