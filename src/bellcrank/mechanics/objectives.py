@@ -1,4 +1,4 @@
-"""What is called efficiency: a registry of objectives.
+"""Objectives: definitions of the efficiency, in a registry.
 
 Every objective is a ratio
 
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """The numbers that make an efficiency out of displacements.
+    """Parameters of an efficiency as a function of the displacements.
 
     Parameters
     ----------
     numerator_scale
         Factor of the sum over the output nodes.
     exponent
-        n >= 2 in f_n; larger n punishes motion off the wanted direction more.
+        n >= 2 in f_n; the larger n, the less counts motion off the wanted direction.
     denominator
-        A constant, or None for the motion of the input, scaled.
+        A constant; None for the scaled motion of the input.
     denominator_scale
         Factor of the sum of t_in . u over the input nodes, if that is the denominator.
     """
@@ -55,19 +55,19 @@ objectives: Registry[Callable[..., Objective]] = Registry("objective")
 
 
 def _share(problem: Problem, count: int) -> float:
-    """Weight of one node: a mean over `count` nodes, or a plain sum."""
+    """Return the weight of one node: 1 / count for a mean, 1 for a sum."""
     return 1.0 / count if problem.aggregate == "mean" else 1.0
 
 
 @objectives.register("displacement")
 def displacement(problem: Problem) -> Objective:
-    """Output motion over input motion, both along their wanted directions (eq. 1)."""
+    """Return output motion over input motion, both along their directions (eq. 1)."""
     return directional(problem, 2.0)
 
 
 @objectives.register("directional")
 def directional(problem: Problem, exponent: float = 4.0) -> Objective:
-    """Output motion over input motion; motion off the direction counts less (eq. 2)."""
+    """Return output motion over input motion; motion off the direction counts less (eq. 2)."""
     inputs, outputs = problem.input, problem.output
     scale = _share(problem, len(inputs.nodes))
     known = inputs.drive == "displacement"
@@ -81,7 +81,7 @@ def directional(problem: Problem, exponent: float = 4.0) -> Objective:
 
 @objectives.register("force")
 def force(problem: Problem, exponent: float = 2.0) -> Objective:
-    """Force in the output springs over input force (eq. 3).
+    """Return the force in the output springs over the input force (eq. 3).
 
     Raises
     ------
@@ -155,16 +155,16 @@ def _usual_objective(problem: Problem) -> str:
 def efficiency_of(
     problem: Problem, displacement: ArrayLike, name: str | None = None, load: float = 1.0
 ) -> float:
-    """Return the efficiency of any motion of the lattice's nodes, whoever computed it.
+    """Return the efficiency of a motion of the nodes of the lattice.
 
     Parameters
     ----------
     displacement : (N, 2)
-        Of the nodes, in lattice units.
+        Displacement of the nodes, in lattice units.
     name
-        Of the objective; by default the problem's own.
+        Objective; by default that of the problem.
     load
-        Part of the full input that makes the motion.
+        Fraction of the full input that causes the motion.
 
     Returns
     -------

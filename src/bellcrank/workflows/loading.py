@@ -33,7 +33,7 @@ class LoadingPath:
     displacement : (K, N, 2) float64
         Displacement of the nodes, lattice units.
     energy : (K, M) float64
-        Strain energy of each beam (see `bellcrank.mechanics.strain.Strain`).
+        Strain energy of each beam (see `bellcrank.mechanics.Strain`).
     efficiency, input_force : (K,) float64
         Efficiency and total input force. The efficiency at rest is that of a small stroke.
     snapped : (K,) bool
