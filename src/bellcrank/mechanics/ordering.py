@@ -37,8 +37,8 @@ def coupled_nodes(beams: Ints, held: NDArray[np.bool_]) -> csc_matrix:
     index[free] = np.arange(len(free))
     rows = np.concatenate([nodes, beams[:, 0], beams[:, 1]])
     columns = index[np.concatenate([nodes, beams[:, 1], beams[:, 0]])]
-    kept = columns >= 0
-    entries = (np.ones(int(kept.sum())), (rows[kept], columns[kept]))
+    free_entry = columns >= 0
+    entries = (np.ones(int(free_entry.sum())), (rows[free_entry], columns[free_entry]))
     around = csc_matrix(entries, shape=(len(held), len(free)))
     pattern = csc_matrix(around.T @ around)
     pattern.sort_indices()
@@ -98,12 +98,12 @@ def factor_capacity(beams: Ints, block: Ints) -> int:
     """
     pattern = coupled_nodes(beams, block < 0)
     order = block[block >= 0]
-    place = np.argsort(order)
+    node_at = np.argsort(order)
     starts, entries = pattern.indptr.tolist(), order[pattern.indices].tolist()
-    parent = [-1] * len(place)
-    visited = [-1] * len(place)
+    parent = [-1] * len(node_at)
+    visited = [-1] * len(node_at)
     total = 0
-    for row, index in enumerate(place.tolist()):
+    for row, index in enumerate(node_at.tolist()):
         visited[row] = row
         for entry in entries[starts[index] : starts[index + 1]]:
             column = entry

@@ -100,7 +100,7 @@ def build_system(problem: Problem, objective: Objective) -> System:
     grounded[problem.supports.fixed] = 1
     motion = np.zeros_like(positions)
     motion[problem.input.nodes] = problem.input.amount * problem.input.direction
-    driven = problem.input.drive == "displacement"
+    displaced = problem.input.drive == "displacement"
     scale = objective.numerator_scale / (objective.denominator or problem.input.amount)
     sensitivity = abs(scale) * len(problem.output.nodes) * max(1.0, objective.exponent - 1.0)
     return System(
@@ -115,8 +115,8 @@ def build_system(problem: Problem, objective: Objective) -> System:
         protected=protected,
         grounded=grounded,
         block=elimination_order(beams, held == HELD),
-        drive=motion if driven else np.zeros_like(motion),
-        load=np.zeros_like(motion) if driven else motion,
+        drive=motion if displaced else np.zeros_like(motion),
+        load=np.zeros_like(motion) if displaced else motion,
         ground=_output_springs(problem),
         bond=float(problem.stiffness.bond),
         angle=float(problem.stiffness.angle),
@@ -136,7 +136,7 @@ def allocate_structure(system: System) -> Structure:
     """Allocate the load-bearing graph of any design of a system."""
     nodes, beams = len(system.positions), len(system.beams)
     blocks = int(system.block.max(initial=-1)) + 1
-    words = blocks // 64 + 1
+    width = blocks // 64 + 1
     return Structure(
         present=np.zeros(beams, np.uint8),
         loaded=np.zeros(beams, np.uint8),
@@ -151,8 +151,8 @@ def allocate_structure(system: System) -> Structure:
         spring_node=np.zeros(2 * beams, np.int64),
         spring_weight=np.zeros(2 * beams),
         spring_entry=np.full(2 * beams, -1),
-        column_bits=np.zeros((blocks, words), np.uint64),
-        word_start=np.zeros((blocks, words), np.int64),
+        column_bits=np.zeros((blocks, width), np.uint64),
+        word_start=np.zeros((blocks, width), np.int64),
         column_start=np.zeros(blocks + 1, np.int64),
         row=np.zeros(factor_capacity(system.beams, system.block), np.int64),
         sizes=np.zeros(5, np.int64),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
-Words = NDArray[np.uint64]
+BitSets = NDArray[np.uint64]
 
 HELD_X, HELD_Y, HELD = 1, 2, 3
 """Bits of `System.held`."""
@@ -111,7 +111,7 @@ class Structure(NamedTuple):
     """(2 M,) lambda, doubled at a node of two beams."""
     spring_entry: Ints
     """(2 M,) block that couples the two far ends, -1 if one is held."""
-    column_bits: Words
+    column_bits: BitSets
     """(n, W) rows below the diagonal in each column of the factor, as bits."""
     word_start: Ints
     """(n, W) entry at which the rows of each word begin."""
@@ -158,8 +158,8 @@ class Vectors(NamedTuple):
     """Softest motion where the stiffness along the path is lowest."""
     at_softest: Floats
     """Displacement there."""
-    trial: Floats
-    """Displacement after a trial step."""
+    tentative: Floats
+    """Displacement after a tentative step."""
     guess: Floats
     """Displacement at which a warm start begins."""
     adjoint: Floats

@@ -186,7 +186,7 @@ def descend(
     Used after a loss of stability, when no neighbouring equilibrium exists.
     """
     measure_held_beams(system, structure, u, scratch)
-    trial = scratch.vectors.trial
+    tentative = scratch.vectors.tentative
     energy = elastic_energy(system, structure, u, scratch) - work_of_load(system, fraction, u)
     for _ in range(500):
         find_gradient(system, structure, fraction, u, scratch)
@@ -207,15 +207,15 @@ def descend(
             continue
         scale = min(1.0, 0.3 / size)
         while scale > 1e-12:
-            copy(u, trial)
-            take_step(system, scale, trial, scratch)
-            lower = elastic_energy(system, structure, trial, scratch)
-            lower -= work_of_load(system, fraction, trial)
+            copy(u, tentative)
+            take_step(system, scale, tentative, scratch)
+            lower = elastic_energy(system, structure, tentative, scratch)
+            lower -= work_of_load(system, fraction, tentative)
             if lower < energy:
                 break
             scale *= 0.5
         if scale <= 1e-12:
             return newton(system, structure, fraction, u, scratch, system.tolerance, 1e-3)
-        copy(trial, u)
+        copy(tentative, u)
         energy = lower
     return UNCONVERGED

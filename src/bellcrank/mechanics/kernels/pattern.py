@@ -42,12 +42,12 @@ def entry_of(structure: Structure, first: int, second: int) -> int:
 def fill_in(structure: Structure) -> None:
     """Symbolic Cholesky factorisation: the rows of a column are added to its parent column."""
     bits = structure.column_bits
-    columns, words = bits.shape
+    columns, width = bits.shape
     count = 0
     for column in range(columns):
         structure.column_start[column] = count
         parent = -1
-        for word in range(column >> 6, words):
+        for word in range(column >> 6, width):
             rest = bits[column, word]
             structure.word_start[column, word] = count
             while rest:
@@ -58,7 +58,7 @@ def fill_in(structure: Structure) -> None:
                 structure.row[count] = row
                 count += 1
         if parent >= 0:
-            for word in range(parent >> 6, words):
+            for word in range(parent >> 6, width):
                 bits[parent, word] |= bits[column, word]
             bits[parent, parent >> 6] &= ~(ONE << np.uint64(parent & 63))
     structure.column_start[columns] = count
