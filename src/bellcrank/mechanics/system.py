@@ -22,7 +22,8 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
     Vectors,
 )
-from bellcrank.mechanics.kernels.flip_prediction import PANEL, RANK, FlipWorkspace
+from bellcrank.mechanics.kernels.cholesky import PANEL
+from bellcrank.mechanics.kernels.flip_prediction import RANK, FlipWorkspace
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
 
 if TYPE_CHECKING:

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.adjoint import find_anchored, neighbours_around, solve_adjoint
 from bellcrank.mechanics.kernels.arrays import ACTIVE
+from bellcrank.mechanics.kernels.cholesky import find_inverse
 from bellcrank.mechanics.kernels.energy import measure_beam
 from bellcrank.mechanics.kernels.fields import clear
 from bellcrank.mechanics.kernels.tangents import stiffness_is_definite
@@ -33,8 +34,6 @@ from bellcrank.mechanics.kernels.tangents import stiffness_is_definite
 if TYPE_CHECKING:
     from bellcrank.mechanics.kernels.arrays import Bytes, Floats, Ints, Scratch, Structure, System
 
-PANEL = 8
-"""Number of blocks of right-hand sides that are solved together."""
 RANK = 6
 SMALLEST_PIVOT = 1e-14
 REMAINDER = 1e-6
@@ -65,74 +64,6 @@ class FlipWorkspace(NamedTuple):
     """(RANK, RANK + 1) I + C G and h."""
     force: Floats
     """(RANK,) h, then the solution."""
-
-
-@kernel
-def set_unit_vectors(space: FlipWorkspace, first: int, width: int) -> None:
-    """Fill the panel with the unit vectors of the blocks from `first` on."""
-    x = space.panel
-    for column in range(first, len(x)):
-        for k in range(width):
-            x[column, 0, k] = 0.0
-            x[column, 1, k] = 0.0
-    for k in range(0, width, 2):
-        x[first + k // 2, 0, k] = 1.0
-        x[first + k // 2, 1, k + 1] = 1.0
-
-
-@kernel
-def solve_panel(
-    structure: Structure, scratch: Scratch, space: FlipWorkspace, first: int, width: int
-) -> None:
-    """Solve for the panel, whose rows before `first` are zero; rows from `first` on are valid."""
-    x, row, start = space.panel, structure.row, structure.column_start
-    factor, diagonal = scratch.factor, scratch.factor_diagonal
-    for column in range(first, len(diagonal)):
-        d0, l10, d1 = diagonal[column, 0], diagonal[column, 1], diagonal[column, 3]
-        for k in range(width):
-            a = x[column, 0, k] * d0
-            x[column, 0, k] = a
-            x[column, 1, k] = (x[column, 1, k] - l10 * a) * d1
-        for t in range(start[column], start[column + 1]):
-            i = row[t]
-            f0, f1, f2, f3 = factor[t, 0], factor[t, 1], factor[t, 2], factor[t, 3]
-            for k in range(width):
-                x[i, 0, k] -= f0 * x[column, 0, k] + f1 * x[column, 1, k]
-                x[i, 1, k] -= f2 * x[column, 0, k] + f3 * x[column, 1, k]
-    for column in range(len(diagonal) - 1, first - 1, -1):
-        for t in range(start[column], start[column + 1]):
-            i = row[t]
-            f0, f1, f2, f3 = factor[t, 0], factor[t, 1], factor[t, 2], factor[t, 3]
-            for k in range(width):
-                x[column, 0, k] -= f0 * x[i, 0, k] + f2 * x[i, 1, k]
-                x[column, 1, k] -= f1 * x[i, 0, k] + f3 * x[i, 1, k]
-        d0, l10, d1 = diagonal[column, 0], diagonal[column, 1], diagonal[column, 3]
-        for k in range(width):
-            b = x[column, 1, k] * d1
-            x[column, 1, k] = b
-            x[column, 0, k] = (x[column, 0, k] - l10 * b) * d0
-
-
-@kernel
-def find_inverse(structure: Structure, scratch: Scratch, space: FlipWorkspace) -> None:
-    """Fill the lower triangle of the inverse stiffness from the current factor.
-
-    By panels of unit vectors. Rows before the first column of a panel are skipped, since the
-    inverse is symmetric.
-    """
-    x, inverse = space.panel, space.inverse
-    columns = len(x)
-    for first in range(0, columns, PANEL):
-        width = 2 * min(PANEL, columns - first)
-        set_unit_vectors(space, first, width)
-        solve_panel(structure, scratch, space, first, width)
-        for row in range(first, columns):
-            for k in range(0, width, 2):
-                column = first + k // 2
-                inverse[row, column, 0] = x[row, 0, k]
-                inverse[row, column, 1] = x[row, 0, k + 1]
-                inverse[row, column, 2] = x[row, 1, k]
-                inverse[row, column, 3] = x[row, 1, k + 1]
 
 
 @kernel
@@ -352,7 +283,7 @@ def predict_flips(
     adjoint = scratch.vectors.adjoint
     solve_adjoint(system, structure, u, adjoint, scratch)
     if not first_order:
-        find_inverse(structure, scratch, space)
+        find_inverse(structure, scratch, space.panel, space.inverse)
     for beam in range(len(mask)):
         measure_beam(system, u, beam, scratch)
     find_anchored(system, structure, space.anchored)
