@@ -170,5 +170,5 @@ def directional_efficiency(problem: Problem, u: NDArray[np.float64], objective: 
 def test_a_mechanism_has_no_sensitivity() -> None:
     problem = arm_on(fixed=[0])
     assert SpringEvaluator(problem).evaluate(problem.initial).status is Status.MECHANISM
-    with pytest.raises(InvalidSettings, match="rigid body"):
+    with pytest.raises(InvalidSettings, match="rigid-body motion"):
         SpringEvaluator(problem).sensitivity(problem.initial)
