@@ -21,7 +21,7 @@ from bellcrank.errors import (
 )
 from bellcrank.export import Export, export, exporters
 from bellcrank.export.formats.step import solid_to_bytes as step_bytes
-from bellcrank.model import find_problem, gallery_design, human_design, read_network
+from bellcrank.model import find_problem, gallery_design, human_design
 from bellcrank.part import PartSpec
 from bellcrank.part.outline import strut_outline
 from bellcrank.part.outline.grips import filled
@@ -166,7 +166,6 @@ def test_a_missing_folder_is_said(part: Part, tmp_path: Path) -> None:
     ("given", "message"),
     [
         ({"moved": np.zeros((3, 2))}, r"moved: expected shape \(\d+, 2\), got \(3, 2\)"),
-        ({"frames": np.zeros((0, 9, 2))}, r"frames: expected shape \(F, \d+, 2\), got \(0, 9, 2\)"),
     ],
 )
 def test_arrays_that_fit_no_part_are_refused(given: dict, message: str, part: Part) -> None:
@@ -289,46 +288,6 @@ def test_vtu_has_the_struts_where_they_have_moved(part: Part, tmp_path: Path) ->
     beam = found.cell_data["beam"][0]
     assert (part.design.problem.lattice.beams[beam] == part.struts).all()
     assert set(still.point_data["role"]) <= {1, 2, 3, 4}
-
-
-def test_lammps_data_are_the_lattice_at_rest_or_moved(part: Part, tmp_path: Path) -> None:
-    rest = part.design.problem.lattice.positions
-    export(part, tmp_path / "rest.lammps")
-    export(Export(part=part, moved=rest + 0.01), tmp_path / "moved.data")
-    network = read_network(tmp_path / "rest.lammps")
-    assert (network.lattice.positions == rest).all()
-    assert (network.lattice.beams == part.struts).all()
-    assert (read_network(tmp_path / "moved.data").lattice.positions == rest + 0.01).all()
-
-
-def test_dumps_hold_all_frames_with_the_numbers_of_the_data_file(
-    part: Part, tmp_path: Path
-) -> None:
-    rest = part.design.problem.lattice.positions
-    frames = np.stack([rest, rest + 0.1, rest - 0.2])
-    export(Export(part=part, frames=frames), tmp_path / "motion.lammpstrj")
-    lines = (tmp_path / "motion.lammpstrj").read_text().splitlines()
-    length = 9 + len(rest)
-    assert len(lines) == 3 * length
-    low, high = (float(word) for word in lines[5].split())
-    for k, nodes in enumerate(frames):
-        block = lines[k * length : (k + 1) * length]
-        assert block[:4] == ["ITEM: TIMESTEP", str(k), "ITEM: NUMBER OF ATOMS", str(len(rest))]
-        assert block[4] == "ITEM: BOX BOUNDS ff ff ff"
-        assert block[8] == "ITEM: ATOMS id type x y z"
-        table = np.array([[float(word) for word in line.split()] for line in block[9:]])
-        assert (table[:, 0] == np.arange(1, len(rest) + 1)).all()
-        assert (table[:, 2:4] == nodes).all()
-        assert low < table[:, 2].min()
-        assert table[:, 2].max() < high
-
-
-def test_dumps_without_frames_show_what_there_is(part: Part) -> None:
-    rest = part.design.problem.lattice.positions
-    still = exporters["dump"].to_bytes(Export(part=part))
-    moved = exporters["dump"].to_bytes(Export(part=part, moved=rest + 1.0))
-    assert still.count(b"TIMESTEP") == 1
-    assert moved.count(b"TIMESTEP") == 2
 
 
 def test_the_thickness_is_in_whole_layers_unless_none_are_wanted() -> None:

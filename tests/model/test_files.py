@@ -19,14 +19,12 @@ from bellcrank.model import (
     Design,
     find_problem,
     lattices,
-    network_of,
     problem_from_dict,
     problem_to_dict,
     read_design,
     read_masks,
     read_problem,
     write_design,
-    write_network,
     write_problem,
 )
 
@@ -157,16 +155,6 @@ def test_a_seed_chooses_a_disordered_lattice(write, gripper):
     problem = read_problem(write(text, "a.toml"))
     same = lattices["displaced-delaunay"](5, 6, rng=np.random.default_rng(7))
     assert (problem.lattice.positions == same.positions).all()
-
-
-def test_an_imported_lattice_lies_beside_the_file_that_names_it(tmp_path, write, gripper):
-    design = find_problem("scaling-8").full_design()
-    write_network(network_of(design), tmp_path / "lattice.data")
-    head, _, tail = gripper.partition("[lattice]")
-    rest = tail[tail.index("[supports]") :].replace("[-0.1, 4.0, 1.1, 5.0]", "[0, 7, 1, 8]")
-    text = f'{head}[lattice]\nkind = "imported"\npath = "lattice.data"\n{rest}'
-    problem = read_problem(write(text, "a.toml"))
-    assert (problem.lattice.positions == design.problem.lattice.positions).all()
 
 
 # ---- what is too large

@@ -1,7 +1,7 @@
 // The page on which a task is drawn, and a design by hand.
 
 import { post, Refusal, session, Solver, bitsOf, hexOf, type Part, type Point, type Problem, type Response } from "./api";
-import { bare, KEY } from "./begin";
+import { KEY } from "./begin";
 import { Canvas, type Tool } from "./canvas";
 import { where } from "./drawing";
 import { choice, clear, download, figure, h, iconButton, say } from "./dom";
@@ -306,13 +306,8 @@ export class Editor {
 
   async load(file: File): Promise<void> {
     const suffix = suffixOf(file.name);
-    if (suffix === ".toml" || suffix === ".json") {
-      const read = await post<{ problem: Problem; lattice: Record<string, unknown> | null; mask: string | null }>("/tasks/read", { text: await file.text(), suffix });
-      this.open({ ...taskOf(read.problem, read.lattice, this.task.scale), hand: read.mask });
-    } else {
-      const read = await post<Pick<Problem, "positions" | "beams">>("/lattices/read", { text: await file.text(), suffix });
-      this.open(bare(read, null, this.task));
-    }
+    const read = await post<{ problem: Problem; lattice: Record<string, unknown> | null; mask: string | null }>("/tasks/read", { text: await file.text(), suffix });
+    this.open({ ...taskOf(read.problem, read.lattice, this.task.scale), hand: read.mask });
   }
 }
 

@@ -99,7 +99,7 @@ export class Panels {
       if (value > 0) editor.set({ ...editor.task, scale: value });
     });
     scale.dataset.key = "scale";
-    const file = h("input", { type: "file", accept: ".toml,.json,.data,.lammps,.lmp,.txt,.csv", class: "unseen", tabindex: -1, "aria-label": "File to open" });
+    const file = h("input", { type: "file", accept: ".toml,.json", class: "unseen", tabindex: -1, "aria-label": "File to open" });
     file.addEventListener("change", () => {
       const picked = file.files?.[0];
       if (picked) void this.attempt("lattice", () => this.editor.load(picked));

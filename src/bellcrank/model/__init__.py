@@ -34,7 +34,6 @@ from bellcrank.model.files import (
     write_design,
     write_problem,
 )
-from bellcrank.model.formats import formats, network_of, read_network, write_network
 from bellcrank.model.gallery import gallery_design, human_counterpart, human_design
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
@@ -55,22 +54,18 @@ __all__ = [
     "design_from_dict",
     "design_to_dict",
     "find_problem",
-    "formats",
     "gallery_design",
     "human_counterpart",
     "human_design",
     "lattices",
-    "network_of",
     "pack_mask",
     "problem_from_dict",
     "problem_to_dict",
     "read_design",
     "read_masks",
-    "read_network",
     "read_problem",
     "regions",
     "unpack_mask",
     "write_design",
-    "write_network",
     "write_problem",
 ]

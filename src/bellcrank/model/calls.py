@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +21,6 @@ _KINDS: dict[str, TypeAdapter[Any]] = {
     "int": TypeAdapter(int, config=_STRICT),
     "int | None": TypeAdapter(int, config=_STRICT),
     "float": TypeAdapter(float, config=_STRICT),
-    "Path": TypeAdapter(str, config=_STRICT),
     "str": TypeAdapter(str, config=_STRICT),
     "Sequence[int]": TypeAdapter(list[int], config=_STRICT),
     "Sequence[float]": TypeAdapter(list[float], config=_STRICT),
@@ -34,7 +32,6 @@ def call_with_keys(
     table: Mapping[str, Any],
     key: str,
     *leading: Any,
-    folder: Path = Path(),
 ) -> Any:
     """Call `function` with the entries of `table` as its parameters.
 
@@ -48,8 +45,6 @@ def call_with_keys(
         Key of the table in the file, for errors.
     leading
         Positional arguments that are not read from the file.
-    folder
-        Folder to which paths in the file are relative.
 
     Raises
     ------
@@ -79,8 +74,6 @@ def call_with_keys(
             arguments[name] = _value(table[name], str(parameter.annotation), f"{key}.{name}")
         elif parameter.default is parameter.empty:
             raise InvalidFile(f"key '{key}.{name}' is missing")
-        if parameter.annotation == "Path" and name in arguments:
-            arguments[name] = folder / arguments[name]
     if takes_rng:
         seed = _value(table.get("seed", 0), "int", f"{key}.seed")
         if seed < 0:

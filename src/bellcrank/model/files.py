@@ -75,7 +75,7 @@ def read_problem(path: str | os.PathLike[str]) -> Problem:
     InvalidProblem
         If the problem is not valid.
     """
-    return problem_from_dict(read_table(path), source=str(path), folder=Path(path).parent)
+    return problem_from_dict(read_table(path), source=str(path))
 
 
 def write_problem(
@@ -112,12 +112,10 @@ def read_design(path: str | os.PathLike[str]) -> Design:
     InvalidProblem
         If its problem is not valid.
     """
-    return design_from_dict(read_json(path), str(path), Path(path).parent)
+    return design_from_dict(read_json(path), str(path))
 
 
-def design_from_dict(
-    data: Mapping[str, Any], source: str = "design", folder: Path = Path()
-) -> Design:
+def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     """Return the design that plain data describes.
 
     Parameters
@@ -126,8 +124,6 @@ def design_from_dict(
         Data as returned by `design_to_dict`.
     source
         Name of the data in errors, usually the file.
-    folder
-        Folder to which paths in the problem are relative.
 
     Raises
     ------
@@ -135,7 +131,7 @@ def design_from_dict(
         As for `read_design`.
     """
     table = parse(DesignTable, data, source)
-    problem = problem_from_dict(table.problem, source=f"{source}: problem", folder=folder)
+    problem = problem_from_dict(table.problem, source=f"{source}: problem")
     return Design(
         problem=problem,
         mask=_mask(table.mask, problem, f"{source}: mask"),

@@ -43,7 +43,6 @@ in addition to those at supports, input and output.
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -122,9 +121,7 @@ class ProblemTable(Table):
     objective: str | None = None
 
 
-def problem_from_dict(
-    data: Mapping[str, Any], source: str = "problem", folder: Path = Path()
-) -> Problem:
+def problem_from_dict(data: Mapping[str, Any], source: str = "problem") -> Problem:
     """Return the problem that plain data describes.
 
     Parameters
@@ -133,8 +130,6 @@ def problem_from_dict(
         Content of a file, as read from TOML or JSON.
     source
         Name of the data in errors, usually the file.
-    folder
-        Folder to which paths in the data are relative.
 
     Raises
     ------
@@ -163,15 +158,15 @@ def problem_from_dict(
     """
     table = parse(ProblemTable, data, source)
     try:
-        return _build(table, folder)
+        return _build(table)
     except (InvalidFile, InvalidProblem) as error:
         raise type(error)(f"{source}: {error}") from None
     except BellcrankError as error:  # an unknown lattice or region
         raise InvalidFile(f"{source}: {error}") from None
 
 
-def _build(table: ProblemTable, folder: Path) -> Problem:
-    lattice = _lattice(table, folder)
+def _build(table: ProblemTable) -> Problem:
+    lattice = _lattice(table)
     supports, inputs, outputs = table.supports, table.input, table.output
     if inputs.drive == "displacement":
         _check_amount(lattice, inputs.amount)
@@ -204,7 +199,7 @@ def _build(table: ProblemTable, folder: Path) -> Problem:
     return _freeze(problem, table)
 
 
-def _lattice(table: ProblemTable, folder: Path) -> Lattice:
+def _lattice(table: ProblemTable) -> Lattice:
     if table.lattice is None:
         if table.positions is None or table.beams is None:
             missing = "positions" if table.positions is None else "beams"
@@ -223,7 +218,7 @@ def _lattice(table: ProblemTable, folder: Path) -> Lattice:
     kind = parameters.pop("kind")
     if not isinstance(kind, str):
         raise InvalidFile(f"lattice.kind: expected a name, got {kind!r}")
-    lattice: Lattice = call_with_keys(lattices[kind], parameters, "lattice", folder=folder)
+    lattice: Lattice = call_with_keys(lattices[kind], parameters, "lattice")
     return lattice
 
 

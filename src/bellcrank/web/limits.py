@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidFile
@@ -46,7 +45,7 @@ def _whole(value: object) -> int:
 
 
 def check_lattice(given: object) -> None:
-    """Refuse a lattice table that is too large or names a file.
+    """Refuse a lattice table that is too large.
 
     Raises
     ------
@@ -57,11 +56,6 @@ def check_lattice(given: object) -> None:
     kind = given.get("kind")
     if not isinstance(kind, str) or kind not in lattices:
         return
-    signature = inspect.signature(lattices[kind])
-    if any(each.annotation == "Path" for each in signature.parameters.values()):
-        raise InvalidFile(
-            f"lattice.kind: {kind!r} reads a file of the server; upload the file instead"
-        )
     if kind not in _SIZES:
         raise InvalidFile(
             f"lattice.kind: {kind!r} is not available on the page; known: {', '.join(_SIZES)}"

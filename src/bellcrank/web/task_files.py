@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.errors import InvalidFile
 from bellcrank.model import (
     Design,
-    Lattice,
     Problem,
     problem_from_dict,
     problem_to_dict,
     read_design,
-    read_network,
 )
 from bellcrank.model.parsing import read_table
 from bellcrank.web.limits import check_lattice, check_size
@@ -83,24 +81,6 @@ def _read(path: Path) -> tuple[Problem, dict[str, Any] | None, Design | None]:
 
 def _check(problem: Problem) -> None:
     check_size(problem.lattice.node_count, problem.lattice.beam_count)
-
-
-def read_lattice(text: str, suffix: str) -> Lattice:
-    """Read an uploaded lattice in one of the exchange formats.
-
-    Raises
-    ------
-    InvalidFile, InvalidProblem, UnknownName
-    """
-    with TemporaryDirectory(prefix="bellcrank-") as folder:
-        path = Path(folder) / f"upload{suffix}"
-        path.write_text(text, encoding="utf-8")
-        try:
-            lattice = read_network(path).lattice
-        except InvalidFile as error:
-            raise InvalidFile(str(error).replace(str(path), UPLOAD)) from None
-    check_size(lattice.node_count, lattice.beam_count)
-    return lattice
 
 
 def write_task(problem: Problem, lattice: Mapping[str, Any] | None, suffix: str) -> str:

@@ -17,7 +17,7 @@ from bellcrank.web import quick_calls
 from bellcrank.web.limits import check_lattice, check_size
 from bellcrank.web.requests import LatticeBody, SaveBody, TaskBody, TextBody
 from bellcrank.web.state import State
-from bellcrank.web.task_files import problem_of, read_lattice, read_task, write_task
+from bellcrank.web.task_files import problem_of, read_task, write_task
 
 router = APIRouter(prefix="/api", tags=["tasks"])
 
@@ -63,14 +63,6 @@ def make_lattice(body: LatticeBody) -> dict[str, Any]:
     lattice = call_with_keys(lattices[kind], given, "lattice")
     check_size(lattice.node_count, lattice.beam_count)
     return {"positions": lattice.positions.tolist(), "beams": lattice.beams.tolist()}
-
-
-@router.post("/lattices/read")
-async def import_lattice(body: TextBody) -> dict[str, Any]:
-    """Read a lattice from a file in an exchange format."""
-    lattice = await run_in_threadpool(read_lattice, body.text, body.suffix)
-    plane = lattice.positions[:, :2]
-    return {"positions": plane.tolist(), "beams": lattice.beams.tolist()}
 
 
 @router.post("/tasks/read")

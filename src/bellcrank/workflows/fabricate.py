@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from bellcrank.part import Part, PartSpec
     from bellcrank.part.outline import Outline
 
-FRAMES = 25
-"""Number of states of a motion that is written to a file."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grips:
@@ -139,16 +136,15 @@ def bundle_of(
     part = spec.of(design)
     if whole:
         check_supported(design)
-    frames = None
+    positions = None
     if moved:
-        way = loading_path(design, np.linspace(0.0, 1.0, FRAMES))
-        frames = design.problem.lattice.positions + way.displacement
+        path = loading_path(design, np.array([0.0, 1.0]))
+        positions = design.problem.lattice.positions + path.displacement[-1]
     return Export(
         part=part,
         shape=grips.applied(part),
         layer=layer,
-        moved=None if frames is None else frames[-1],
-        frames=frames,
+        moved=positions,
     )
 
 

@@ -45,8 +45,6 @@ class Export:
         Largest distance between arcs and the triangles of STL and 3MF.
     moved : (N, 2) float64, lattice units
         Displaced nodes; None for nodes at rest.
-    frames : (F, N, 2) float64, lattice units
-        Nodes in F states of a motion, for formats that contain one.
     title
         Title in the file; None for the name of the problem.
 
@@ -61,24 +59,20 @@ class Export:
     layer: float | None = LAYER
     sagitta: float = SAGITTA
     moved: NDArray[np.float64] | None = None
-    frames: NDArray[np.float64] | None = None
     title: str | None = None
 
     def __post_init__(self) -> None:
-        count = self.part.design.problem.lattice.node_count
-        for name, expected in (("moved", (count, 2)), ("frames", (-1, count, 2))):
-            given = getattr(self, name)
-            if given is None:
-                continue
-            array = np.array(given, dtype=np.float64, order="C")
-            if array.ndim != len(expected) or array.shape[-2:] != (count, 2) or not array.size:
-                wanted = str(expected).replace("-1", "F")
-                raise InvalidSettings(f"{name}: expected shape {wanted}, got {array.shape}")
-            if not np.isfinite(array).all():
-                first = np.argwhere(~np.isfinite(array))[0].tolist()
-                raise InvalidSettings(f"{name}{first}: expected a finite number")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        if self.moved is None:
+            return
+        expected = (self.part.design.problem.lattice.node_count, 2)
+        moved = np.array(self.moved, dtype=np.float64, order="C")
+        if moved.shape != expected:
+            raise InvalidSettings(f"moved: expected shape {expected}, got {moved.shape}")
+        if not np.isfinite(moved).all():
+            first = np.argwhere(~np.isfinite(moved))[0].tolist()
+            raise InvalidSettings(f"moved{first}: expected a finite number")
+        moved.flags.writeable = False
+        object.__setattr__(self, "moved", moved)
 
     @property
     def name(self) -> str:

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.export.formats.base import Export, Exporter, exporters
-from bellcrank.model import network_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
 
     Values = NDArray[Any]
 
@@ -37,9 +38,19 @@ def to_bytes(export: Export) -> bytes:
     return mesh_to_bytes(
         moved,
         part.struts,
-        {"displacement_mm": moved - rest, "role": network_of(part.design).roles},
+        {"displacement_mm": moved - rest, "role": _roles(part.design.problem)},
         {"beam": beam, "designable": designable.astype(np.int64)},
     )
+
+
+def _roles(problem: Problem) -> NDArray[np.int64]:
+    """(N,) role of each node: 1 free, 2 support, 3 input, 4 output."""
+    roles = np.ones(problem.lattice.node_count, dtype=np.int64)
+    for role, nodes in enumerate(
+        (problem.supports.nodes, problem.input.nodes, problem.output.nodes), start=2
+    ):
+        roles[nodes] = role
+    return roles
 
 
 def mesh_to_bytes(

@@ -8,14 +8,12 @@ parameter ``rng``, which is set from the key ``seed``. Generators check the numb
 """
 
 from bellcrank.model.lattices.delaunay import displaced_delaunay
-from bellcrank.model.lattices.imported import imported
 from bellcrank.model.lattices.jammed import jammed_discs
 from bellcrank.model.lattices.registry import lattices
 from bellcrank.model.lattices.triangular import triangular_rectangle, triangular_rows
 
 __all__ = [
     "displaced_delaunay",
-    "imported",
     "jammed_discs",
     "lattices",
     "triangular_rectangle",
