@@ -1,4 +1,4 @@
-"""How well the discrete model foretells finite elements: ``python -m benchmarks.fidelity``.
+"""Agreement of the spring model with finite elements: ``python -m benchmarks.fidelity``.
 
 Five questions, each a part of the script (``--only correlate,width,search,levels,meshes``):
 
@@ -8,7 +8,7 @@ Five questions, each a part of the script (``--only correlate,width,search,level
 - width: which stiffness of the angular springs fits frames of each strut width best, and which
   width does the paper's stand for?
 - search: what is left of the efficiency that a search promises, when it searches with the one
-  stiffness or the other, and when frames choose from what it found?
+  stiffness or the other, and when ranked by frames from what it found?
 - levels: what do all levels of finite elements say about each design that comes with the package?
 - meshes: how far does what the plane says of the full crane depend on the size of its triangles?
 
@@ -194,7 +194,7 @@ def width_study(pool: ProcessPoolExecutor) -> None:
 WAYS = {
     "paper": "the paper's stiffness",
     "calibrated": "that of the struts",
-    "chosen": "that of the struts, frames choose",
+    "chosen": "that of the struts, ranked by frames",
 }
 """How a part is searched for: the last as ``bellcrank design --strut-width`` does it."""
 
