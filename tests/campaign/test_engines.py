@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from bellcrank.campaign import Spec
 
 
+@pytest.mark.slow
 def test_a_campaign_in_processes_is_the_serial_one(tmp_path: Path, tabled: Path) -> None:
     log = tmp_path / "log"
     words = ("run", write_spec(tmp_path), "--out", tmp_path / "store", "--workers", 3)
@@ -109,6 +110,7 @@ seeds = 2
 """Runs whose first segment takes days."""
 
 
+@pytest.mark.slow
 def test_a_stop_does_not_wait_for_the_end_of_a_segment(tmp_path: Path) -> None:
     log, store = tmp_path / "log", tmp_path / "store"
     words = ("run", write_spec(tmp_path, ENDLESS), "--out", store, "--workers", 2)

@@ -132,7 +132,11 @@ def open_gate(running: subprocess.Popen[bytes]) -> None:
 # Ctrl-C and SIGTERM.
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "sigterm"])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)],
+    ids=["sigterm", "ctrl-c"],
+)
 def test_a_search_stops_in_the_middle_of_a_block_and_resumes_to_the_same_end(
     tmp_path: Path, whole: Path, number: signal.Signals
 ) -> None:
@@ -152,6 +156,7 @@ def test_a_search_stops_in_the_middle_of_a_block_and_resumes_to_the_same_end(
     assert_same_run(folder, whole)
 
 
+@pytest.mark.slow
 def test_complete_blocks_that_are_not_stored_yet_survive_a_stop(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     rare = GATED.replace(f"SEGMENT_STEPS = {BLOCK}", f"SEGMENT_STEPS = {100 * BLOCK}")

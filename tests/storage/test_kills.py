@@ -77,6 +77,7 @@ def whole_story(folder: Path, problem: Problem) -> None:
     run.finish()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
 def test_a_run_goes_on_after_a_kill_around_any_call_to_the_system(
     tmp_path: Path, problem: Problem, before: bool
@@ -134,7 +135,7 @@ while True:
 def test_a_real_kill_loses_nothing_that_was_stored(run: RunFolder) -> None:
     command = [sys.executable, "-c", WRITER, str(run.path), str(Path(__file__).parent)]
     reached = 0
-    for wait in (0.02, 0.051, 0.083):
+    for wait in (0.02, 0.083):
         with subprocess.Popen(command, stdout=subprocess.PIPE) as writer:
             assert writer.stdout is not None
             assert writer.stdout.readline() == b"stored\n"

@@ -175,6 +175,7 @@ def test_states_and_settings_that_json_cannot_hold_are_refused(
     assert not (tmp_path / "other").exists()
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_proposals_take_less_than_six_megabytes(tmp_path: Path) -> None:
     crane = find_problem("crane")
     run = RunFolder.create(tmp_path / "crane", crane, {})

@@ -87,6 +87,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(folder)], check=True)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_really_full_is_one_error_and_the_run_goes_on_later(
     small_disk: Path, problem: Problem
 ) -> None:
