@@ -1,4 +1,4 @@
-"""Campaigns that nothing interrupted."""
+"""Fixtures: finished campaigns."""
 
 from __future__ import annotations
 

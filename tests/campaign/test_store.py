@@ -196,3 +196,12 @@ def test_a_whole_store_verifies(where: str, request: pytest.FixtureRequest) -> N
     assert found.damage == []
     assert found.rows == ROWS
     assert found.files == (SEGMENTS if where == "finished" else 1)
+
+
+def test_a_run_can_be_computed_after_the_serial_engine_has_ended(segments: Store) -> None:
+    assert complete(segments, "serial", compacting=False)
+    last = segments.folder_of(segments.spec.run(0)) / "00000500.parquet"
+    before = last.read_bytes()
+    last.unlink()
+    work(str(segments.path), 0)
+    assert last.read_bytes() == before

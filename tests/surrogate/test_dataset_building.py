@@ -74,7 +74,7 @@ def test_a_build_that_was_stopped_goes_on_to_the_same_dataset(
             stop.set()
 
     folder = tmp_path / "stopped"
-    assert build_dataset(spec, folder, engine="serial", tell=tell, stop=stop) is None
+    assert build_dataset(spec, folder, engine="serial", report=tell, stop=stop) is None
     assert not (folder / DATASET_FILE).exists()
     resumed = build_dataset(spec, folder, engine="serial")
     whole = read_dataset(built)

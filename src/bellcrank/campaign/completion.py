@@ -123,7 +123,7 @@ def complete(
     *,
     shard: Shard | None = None,
     compacting: bool = True,
-    tell: Callable[[Status], None] = lambda _status: None,
+    report: Callable[[Status], None] = lambda _status: None,
     announce: Callable[[str], None] = lambda _note: None,
     stop: threading.Event | None = None,
 ) -> bool:
@@ -141,7 +141,7 @@ def complete(
         Part of the runs to compute; all by default.
     compacting
         Whether to make the table when all runs of the campaign are done.
-    tell
+    report
         Called regularly with the status of the campaign.
     announce
         Called with the note of the engine, such as the address of a dashboard.
@@ -169,22 +169,22 @@ def complete(
     part = shard or Shard()
     stop = stop or threading.Event()
     reader = StatusReader(store)
-    tell(reader.read())
+    report(reader.read())
     waiting = deque(run for run in reader.pending() if part.holds(run.number))
     if waiting:
         check_tasks(store.spec)
         with enter(store, options or EngineOptions()) as entered:
             if entered.note:
                 announce(entered.note)
-            _compute(_Progress(reader, entered, waiting), tell, stop)
+            _compute(_Progress(reader, entered, waiting), report, stop)
     status = reader.read()
-    tell(status)
+    report(status)
     if status.done and compacting and not stop.is_set():
         compact(store)
     return not any(part.holds(run.number) for run in reader.pending())
 
 
-def _compute(progress: _Progress, tell: Callable[[Status], None], stop: threading.Event) -> None:
+def _compute(progress: _Progress, report: Callable[[Status], None], stop: threading.Event) -> None:
     """Submit runs and record their ends, until all have ended or `stop` is set."""
     reported = time.monotonic()
     while (progress.running or progress.waiting) and not stop.is_set():
@@ -192,7 +192,7 @@ def _compute(progress: _Progress, tell: Callable[[Status], None], stop: threadin
         for outcome in progress.engine.collect(COLLECT_TIMEOUT):
             progress.record(outcome)
         if time.monotonic() - reported > STATUS_INTERVAL:
-            tell(progress.reader.read())
+            report(progress.reader.read())
             reported = time.monotonic()
     if progress.running:
         progress.engine.request_stop()

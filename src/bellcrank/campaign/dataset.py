@@ -135,7 +135,7 @@ def build_dataset(
     *,
     engine: str = "processes",
     workers: int | None = None,
-    tell: Callable[[CampaignStatus], None] = lambda _status: None,
+    report: Callable[[CampaignStatus], None] = lambda _status: None,
     stop: threading.Event | None = None,
 ) -> Dataset | None:
     """Run the campaign, or the rest of it, and write its proposals as a dataset.
@@ -150,7 +150,7 @@ def build_dataset(
         Engine of the campaign; by default local processes.
     workers
         Number of processes; all cores by default.
-    tell
+    report
         Called now and then with how the campaign stands.
     stop
         Stops the campaign when set; finished work is kept.
@@ -178,7 +178,7 @@ def build_dataset(
             f"(--out)"
         )
     store = Store.create(place / CAMPAIGN, spec.campaign())
-    if not complete(store, engine, options, tell=tell, stop=stop):
+    if not complete(store, engine, options, report=report, stop=stop):
         return None
     data = gather(store, spec.problem)
     data.write(place / DATASET_FILE, overwrite=True)

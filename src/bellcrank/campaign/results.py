@@ -105,8 +105,8 @@ def best_designs(store: Store, count: int, task: str | None = None) -> list[Rank
             if key not in found or design.order < found[key].order:
                 found[key] = design
         if len(found) >= count:
-            kept = sorted(found.items(), key=lambda item: item[1].order)[:count]
-            found, minimum = dict(kept), kept[-1][1].efficiency
+            best = sorted(found.items(), key=lambda item: item[1].order)[:count]
+            found, minimum = dict(best), best[-1][1].efficiency
     return sorted(found.values(), key=lambda design: design.order)
 
 

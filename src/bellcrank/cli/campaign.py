@@ -156,7 +156,7 @@ def _complete(
                 options,
                 shard=part,
                 compacting=not keep_segments,
-                tell=progress,
+                report=progress,
                 announce=lambda note: notes.print(plain(note)),
                 stop=stop,
             )

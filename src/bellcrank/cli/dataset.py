@@ -61,7 +61,7 @@ def build(
     folder = out or Path(f"{found.name}-dataset")
     announce_compilation()
     with stopping_on_interrupt() as stop, CampaignProgress() as progress:
-        data = build_dataset(spec, folder, workers=workers, tell=progress, stop=stop)
+        data = build_dataset(spec, folder, workers=workers, report=progress, stop=stop)
     if data is None:
         notes.print("Stopped; finished runs are kept. Rerun the same command to resume.")
         sys.exit(INTERRUPTED)

@@ -25,6 +25,7 @@ class SerialEngine:
     def __init__(self, store_path: str) -> None:
         self._path = store_path
         self._ended: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        self._thread: threading.Thread | None = None
 
     def capacity(self) -> int:
         """Return 1."""
@@ -41,7 +42,13 @@ class SerialEngine:
             else:
                 self._ended.put(Outcome(number, None))
 
-        threading.Thread(target=run, daemon=True).start()
+        self._thread = threading.Thread(target=run, daemon=True)
+        self._thread.start()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a run is being computed."""
+        return self._thread is not None and self._thread.is_alive()
 
     def collect(self, timeout: float) -> list[Outcome]:
         """Return the attempts that have ended."""
@@ -69,7 +76,11 @@ def serial(store: Store, options: EngineOptions) -> Iterator[Engine]:
         raise InvalidSettings(f"workers: engine 'serial' has one worker; got {options.workers}")
     path = str(store.path)
     allow_work(path)
+    engine = SerialEngine(path)
     try:
-        yield SerialEngine(path)
+        yield engine
     finally:
-        request_stop(path)
+        if engine.busy:
+            request_stop(path)
+        else:
+            allow_work(path)
