@@ -18,14 +18,25 @@ if TYPE_CHECKING:
 
 
 class SerialEngine:
-    """Computes one run at a time in a thread, so that the main thread can react to signals."""
+    """Computes one run at a time in a thread, so that the main thread can react to signals.
+
+    Parameters
+    ----------
+    store_path
+        Folder of the campaign.
+
+    Attributes
+    ----------
+    busy
+        Whether a run is being computed.
+    """
 
     note: str | None = None
 
     def __init__(self, store_path: str) -> None:
         self._path = store_path
         self._ended: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
-        self._thread: threading.Thread | None = None
+        self.busy = False
 
     def capacity(self) -> int:
         """Return 1."""
@@ -42,20 +53,17 @@ class SerialEngine:
             else:
                 self._ended.put(Outcome(number, None))
 
-        self._thread = threading.Thread(target=run, daemon=True)
-        self._thread.start()
-
-    @property
-    def busy(self) -> bool:
-        """Whether a run is being computed."""
-        return self._thread is not None and self._thread.is_alive()
+        self.busy = True
+        threading.Thread(target=run, daemon=True).start()
 
     def collect(self, timeout: float) -> list[Outcome]:
         """Return the attempts that have ended."""
         try:
-            return [self._ended.get(timeout=timeout)]
+            outcome = self._ended.get(timeout=timeout)
         except queue.Empty:
             return []
+        self.busy = False
+        return [outcome]
 
     def request_stop(self) -> None:
         """Let the run end after the current segment."""
