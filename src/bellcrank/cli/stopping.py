@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-EXIT_TIMEOUT = 1.5
+EXIT_TIMEOUT = 1.2
 """Seconds after a request to stop within which a job that can be resumed ends."""
 
 
@@ -28,16 +28,17 @@ class StopRequest(threading.Event):
     Attributes
     ----------
     hint
-        Line to print when the process ends; set it as soon as the job can be resumed.
+        Line to print when the process ends, which names the command that resumes the job. Before
+        it is set there is nothing to store, and a resumable job ends at once.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.hint = "Stopped."
+        self.hint: str | None = None
 
     def exit(self) -> None:
         """Print the hint and end the process at once, whatever its threads are computing."""
-        notes.print(self.hint)
+        notes.print(self.hint or "Stopped.")
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(INTERRUPTED)
@@ -91,7 +92,7 @@ def _watched(stop: StopRequest) -> Iterator[None]:
             return
         notes.print("Stopping ...")
         stop.set()
-        reader.settimeout(EXIT_TIMEOUT)
+        reader.settimeout(0.1 if stop.hint is None else EXIT_TIMEOUT)
         try:
             insists = _signalled(reader)
         except TimeoutError:
