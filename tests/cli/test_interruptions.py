@@ -220,9 +220,10 @@ def test_a_second_run_in_the_same_folder_names_the_process_that_works_there(
 
 def test_a_second_design_of_the_same_name_goes_into_a_numbered_folder(here: Path) -> None:
     words = ("design", PROBLEM, "--steps", "20", "--chains", "1", "--search", "paper")
-    assert call(*words).code == 0
+    # So short a search may end without a design that works (exit code 3).
+    assert call(*words).code in {0, 3}
     outcome = call(*words, "--goal", "mass <= 0.99")
-    assert outcome.code == 0, outcome.err
+    assert outcome.code in {0, 3}, outcome.err
     assert f"{PROBLEM}-2/" in outcome.err
     assert f"{PROBLEM}-2/" in outcome.out
     assert (here / f"{PROBLEM}-2" / "design.json").exists()
