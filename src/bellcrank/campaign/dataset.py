@@ -169,19 +169,19 @@ def build_dataset(
     StorageError, CorruptRun
     """
     options = EngineOptions(workers=workers)
-    place = Path(folder)
-    make_folder(place)
-    check_folder(place / DATASET_FILE)
-    if (place / DATASET_FILE).exists() and not (place / CAMPAIGN).exists():
+    root = Path(folder)
+    make_folder(root)
+    check_folder(root / DATASET_FILE)
+    if (root / DATASET_FILE).exists() and not (root / CAMPAIGN).exists():
         raise OutputExists(
-            f"{place / DATASET_FILE}: exists already, without its campaign; choose another folder "
+            f"{root / DATASET_FILE}: exists already, without its campaign; choose another folder "
             f"(--out)"
         )
-    store = Store.create(place / CAMPAIGN, spec.campaign())
+    store = Store.create(root / CAMPAIGN, spec.campaign())
     if not complete(store, engine, options, report=report, stop=stop):
         return None
     data = gather(store, spec.problem)
-    data.write(place / DATASET_FILE, overwrite=True)
+    data.write(root / DATASET_FILE, overwrite=True)
     return data
 
 
@@ -205,8 +205,8 @@ def gather(store: Store, problem: Problem) -> Dataset:
     forward = store.spec.tasks[0]
     parts: list[dict[str, NDArray[Any]]] = []
     for part in _tables(store):
-        kept = part["status"] == int(Status.CONVERGED)
-        parts.append({**{name: part[name][kept] for name in COLUMNS}, "left": ~kept})
+        converged = part["status"] == int(Status.CONVERGED)
+        parts.append({**{name: part[name][converged] for name in COLUMNS}, "left": ~converged})
     if not parts:
         raise InvalidDataset(f"{store.path}: the campaign has no results yet")
     found = {name: np.concatenate([part[name] for part in parts]) for name in (*COLUMNS, "left")}
