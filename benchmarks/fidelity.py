@@ -1,18 +1,17 @@
 """Agreement of the spring model with finite elements: ``python -m benchmarks.fidelity``.
 
-Five questions, each a part of the script (``--only correlate,width,search,levels,meshes``):
+Five studies, selected by ``--only correlate,width,search,levels,meshes``:
 
-- correlate: over some hundred designs that searches came by, how do the efficiencies of the
-  discrete model, with the paper's stiffness and with that of the struts, agree with nonlinear
-  frames?
-- width: which stiffness of the angular springs fits frames of each strut width best, and which
-  width does the paper's stand for?
-- search: what is left of the efficiency that a search promises, when it searches with the one
-  stiffness or the other, and when ranked by frames from what it found?
-- levels: what do all levels of finite elements say about each design that comes with the package?
-- meshes: how far does what the plane says of the full crane depend on the size of its triangles?
+- correlate: efficiencies of some hundred designs from searches in the spring model, with the
+  paper's stiffness and with that of the struts, compared with nonlinear frames,
+- width: stiffness of the angular springs that fits frames of each strut width best, and the strut
+  width to which the paper's stiffness corresponds,
+- search: efficiency of the best design of a search in the spring model and as a frame, with either
+  stiffness, and with ranking by frames,
+- levels: efficiencies of the bundled designs at all levels of analysis,
+- meshes: dependence of the plane analysis of the full crane on the size of the triangles.
 
-Designs that snap or touch themselves as frames are counted and listed, not averaged.
+Designs that snap or have contact as frames are counted and listed, not averaged.
 Results go to ``docs/validation/*.json`` and ``*.png``, tables to standard output.
 """
 
