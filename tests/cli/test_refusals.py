@@ -181,15 +181,7 @@ def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: 
         (("--seed", "-1"), "seed: expected a whole number of at least 0, got -1"),
         (("--workers", "-1"), "workers: expected at least 1, got -1"),
         (("--workers", "0"), "workers: expected at least 1, got 0"),
-        (
-            ("--search", "paper", "--patience", "0"),
-            "patience: expected a whole number of at least 1, got 0",
-        ),
-        (
-            ("--search", "paper", "--minimum-degree", "-1"),
-            "minimum_degree: expected a whole number of at least 0",
-        ),
-        (("--patience", "9"), "search 'basin-hopping' has no setting 'patience'; it has: chains, "),
+        (("--cost", "negative"), "search 'basin-hopping' has no setting 'cost'; it has: chains, "),
         (("--set", "radius"), "--set radius: expected KEY=VALUE"),
         (("--set", "radius=-1"), "radius: expected a number above 0, got -1"),
         (("--set", "radius=wide"), "radius: expected a number above 0, got 'wide'"),
@@ -225,7 +217,7 @@ def test_a_design_job_needs_either_a_problem_or_a_run(whole: Path) -> None:
     ("words", "what"),
     [
         (("--steps", 9000), "steps"),
-        (("--minimum-degree", 3), "minimum-degree"),
+        (("--cost", "negative"), "cost"),
         (("--set", "depth=3"), "depth"),
         (("--out", "elsewhere"), "out"),
     ],

@@ -64,13 +64,6 @@ def design(
             help="Temperature schedule of a Markov chain: linear (the paper) or constant."
         ),
     ] = None,
-    minimum_degree: Annotated[
-        int | None, typer.Option(help="Minimum number of beams at a free node (search paper).")
-    ] = None,
-    patience: Annotated[
-        int | None,
-        typer.Option(help="Consecutive rejections after which a chain ends (search paper)."),
-    ] = None,
     goal: Annotated[
         list[str] | None,
         typer.Option(help="Constraint on the design, for example 'mass <= 0.6'; repeatable."),
@@ -126,7 +119,6 @@ def design(
         "steps": steps, "chains": chains, "seed": seed, "objective": objective,
         "unloaded_beams": unloaded_beams,
         "cost": cost, "schedule": schedule,
-        "minimum_degree": minimum_degree, "patience": patience,
         "goals": goal and tuple(goal), "strokes": strokes and _numbers("--strokes", strokes),
         **settings_of("--set", more),
     }  # fmt: skip

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import (
     CONVERGED,
-    HELD,
     Bytes,
     Floats,
     Ints,
@@ -26,25 +25,13 @@ from bellcrank.search.kernels.acceptance import (
     metropolis_accepts,
     negative_cost,
 )
-from bellcrank.search.verdict import Verdict
 
-FORBIDDEN = int(Verdict.FORBIDDEN)
 EXPONENTIAL = 0
 """Code of `exponential_cost` in `bellcrank.search.markov.costs`; 1 is `negative_cost`."""
 
 accepts = kernel(metropolis_accepts)
 exponential = kernel(exponential_cost)
 negative = kernel(negative_cost)
-
-
-class Rules(NamedTuple):
-    """Settings of the search, as plain numbers."""
-
-    cost: int
-    core: int
-    minimum_degree: int
-    patience: int
-    """Consecutive rejections after which the chain ends."""
 
 
 class Chain(NamedTuple):
@@ -56,8 +43,8 @@ class Chain(NamedTuple):
     """The current design as packed bits."""
     value: Floats
     """(3,) efficiency and cost of the current design, best efficiency so far."""
-    counts: Ints
-    """(2,) accepted steps, consecutive rejections."""
+    accepted: Ints
+    """(1,) accepted steps."""
 
 
 class Records(NamedTuple):
@@ -88,25 +75,12 @@ def flip(chain: Chain, beam: int) -> None:
     chain.packed[beam >> 3] ^= 128 >> (beam & 7)
 
 
-@kernel
-def is_forbidden(system: System, minimum_degree: int, mask: Bytes, beam: int) -> bool:
-    """Whether the removal of `beam` leaves a free node with fewer beams than the minimum."""
-    if minimum_degree > 0 and not mask[beam]:
-        for end in range(2):
-            node = system.beams[beam, end]
-            degree = 0
-            for slot in range(system.incident_start[node], system.incident_start[node + 1]):
-                degree += mask[system.incident_beam[slot]]
-            if degree < minimum_degree and system.held[node] != HELD:
-                return True
-    return False
-
-
 @entry
 def advance(
     system: System,
     designable: Ints,
-    rules: Rules,
+    cost_code: int,
+    core: int,
     temperatures: Floats,
     uniforms: Floats,
     chain: Chain,
@@ -115,8 +89,8 @@ def advance(
     u: Floats,
     scratch: Scratch,
     records: Records,
-) -> int:
-    """Make one proposal for each row of `uniforms`; return the number of proposals made.
+) -> None:
+    """Make one proposal for each row of `uniforms`.
 
     A design without a unique, stable response is rejected at any temperature.
 
@@ -130,18 +104,13 @@ def advance(
         Equilibrium of the current design; updated.
     """
     for step in range(len(uniforms)):
-        if chain.counts[1] >= rules.patience:
-            return step
         beam = designable[int(uniforms[step, 0] * len(designable))]
         flip(chain, beam)
-        temperature = temperatures[min(chain.counts[0], len(temperatures) - 1)]
-        status, efficiency = FORBIDDEN, math.nan
-        if not is_forbidden(system, rules.minimum_degree, chain.mask, beam):
-            status, efficiency = find_response(
-                system, chain.mask, rules.core, reference, True, -math.inf, 1.0,
-                structure, u, scratch,
-            )  # fmt: skip
-        cost = cost_of(rules.cost, efficiency)
+        temperature = temperatures[min(chain.accepted[0], len(temperatures) - 1)]
+        status, efficiency = find_response(
+            system, chain.mask, core, reference, True, -math.inf, 1.0, structure, u, scratch
+        )
+        cost = cost_of(cost_code, efficiency)
         log_ratio = (chain.value[1] - cost) / temperature
         accepted = status == CONVERGED and accepts(log_ratio, uniforms[step, 1])
         for byte in range(len(chain.packed)):
@@ -155,10 +124,7 @@ def advance(
             chain.value[0] = efficiency
             chain.value[1] = cost
             chain.value[2] = max(efficiency, chain.value[2])
-            chain.counts[0] += 1
-            chain.counts[1] = 0
+            chain.accepted[0] += 1
             set_reference(structure, u, reference)
         else:
-            chain.counts[1] += 1
             flip(chain, beam)
-    return len(uniforms)

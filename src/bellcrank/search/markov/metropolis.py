@@ -27,7 +27,6 @@ from bellcrank.search.markov.moves import moves
 from bellcrank.search.markov.steps import evaluated_design, metropolis_step
 from bellcrank.search.registry import Search, searches
 from bellcrank.search.settings import (
-    NO_LIMIT,
     SearchSettings,
     check_names,
     check_positive,
@@ -56,10 +55,6 @@ class MetropolisSettings(SearchSettings):
         Temperatures at the start and after annealing.
     annealing
         Accepted steps over which the temperature decreases.
-    minimum_degree
-        Minimum number of beams that a removal may leave at a free node; 0 for no minimum.
-    patience
-        Consecutive rejections after which a chain ends; None for no limit.
 
     Raises
     ------
@@ -80,15 +75,10 @@ class MetropolisSettings(SearchSettings):
     hot: float = 0.06
     cold: float = 1e-3
     annealing: int = 100
-    minimum_degree: int = 0
-    patience: int | None = None
 
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
         check_whole("annealing", self.annealing, 0)
-        check_whole("minimum_degree", self.minimum_degree, 0)
-        if self.patience is not None:
-            check_whole("patience", self.patience, 1)
         for name in ("hot", "cold"):
             check_positive(name, getattr(self, name), "a temperature")
         check_names("moves", self.moves, moves)
@@ -117,8 +107,6 @@ class ChainState:
         Highest score of an accepted design so far.
     accepted
         Accepted proposals so far.
-    rejections
-        Rejected proposals since the last accepted one.
     """
 
     step: int
@@ -127,7 +115,6 @@ class ChainState:
     cost: float
     best: float
     accepted: int = 0
-    rejections: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Return the state as plain data."""
@@ -152,14 +139,14 @@ def start(evaluator: Evaluator, settings: MetropolisSettings, _chain: int) -> Ch
 
 
 def is_done(state: ChainState, settings: MetropolisSettings) -> bool:
-    """Whether a chain has made all its steps or reached its limit of rejections."""
-    return state.step >= settings.steps or state.rejections >= (settings.patience or NO_LIMIT)
+    """Whether a chain has made all its steps."""
+    return state.step >= settings.steps
 
 
 def advance(
     evaluator: Evaluator, settings: MetropolisSettings, chain: int, state: ChainState
 ) -> tuple[ChainState, Proposals]:
-    """Advance a chain by one block, or less if it ends within the block."""
+    """Advance a chain by one block."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
     return metropolis_phase(evaluator, settings, state, rng, steps_in_block(settings, state.step))
 
@@ -171,7 +158,7 @@ def metropolis_phase(
     rng: np.random.Generator,
     count: int,
 ) -> tuple[ChainState, Proposals]:
-    """Make `count` steps, at most one block, or less if the limit of rejections is reached.
+    """Make `count` steps, at most one block.
 
     Single flips with the spring model run in a compiled loop.
     """
@@ -187,7 +174,7 @@ def _advance_compiled(
     state: ChainState,
     uniforms: NDArray[np.float64],
 ) -> tuple[ChainState, Proposals]:
-    from bellcrank.search.kernels.metropolis import Chain, Records, Rules, advance
+    from bellcrank.search.kernels.metropolis import Chain, Records, advance
 
     mask = unpack_mask(state.mask, evaluator.problem.lattice.beam_count)
     evaluator.evaluate(mask)
@@ -196,7 +183,7 @@ def _advance_compiled(
         mask=mask.astype(np.uint8),
         packed=np.packbits(mask),
         value=np.array([state.efficiency, state.cost, state.best]),
-        counts=np.array([state.accepted, state.rejections]),
+        accepted=np.array([state.accepted]),
     )
     steps = len(uniforms)
     records = Records(
@@ -207,30 +194,23 @@ def _advance_compiled(
         accepted=np.empty(steps, np.uint8),
         status=np.empty(steps, np.uint8),
     )
-    rules = Rules(
-        cost=costs[settings.cost].code,
-        core=evaluator.core,
-        minimum_degree=settings.minimum_degree,
-        patience=settings.patience or NO_LIMIT,
-    )
-    made = advance(
-        evaluator.system, evaluator.problem.designable, rules, settings.temperatures, uniforms,
-        chain, evaluator.reference, evaluator.structure, evaluator.displacement, evaluator.scratch,
-        records,
+    advance(
+        evaluator.system, evaluator.problem.designable, costs[settings.cost].code, evaluator.core,
+        settings.temperatures, uniforms, chain, evaluator.reference, evaluator.structure,
+        evaluator.displacement, evaluator.scratch, records,
     )  # fmt: skip
     efficiency, cost, best = chain.value.tolist()
-    accepted, rejections = chain.counts.tolist()
     after = ChainState(
-        state.step + made, chain.packed.tobytes().hex(), efficiency, cost, best,
-        accepted, rejections,
+        state.step + steps, chain.packed.tobytes().hex(), efficiency, cost, best,
+        int(chain.accepted[0]),
     )  # fmt: skip
     return after, Proposals(
-        records.mask[:made],
-        records.efficiency[:made],
-        records.cost[:made],
-        records.temperature[:made],
-        records.accepted[:made].astype(bool),
-        records.status[:made].astype(np.int8),
+        records.mask,
+        records.efficiency,
+        records.cost,
+        records.temperature,
+        records.accepted.astype(bool),
+        records.status.astype(np.int8),
     )
 
 
@@ -249,20 +229,19 @@ def advance_in_python(
     temperatures = settings.temperatures
     current = evaluated_design(evaluator, settings.cost, temperatures[0], state.mask)
     rows = ProposalRows()
-    last = state.step + count
-    while state.step < last and not is_done(state, settings):
+    for _ in range(count):
         current.temperature = float(temperatures[min(state.accepted, len(temperatures) - 1)])
         move = chosen[0] if len(chosen) == 1 else chosen[int(rng.random() * len(chosen))]
-        after = metropolis_step(current, move, rng, rows, settings.minimum_degree)
-        state = replace(state, step=state.step + 1, rejections=state.rejections + 1)
+        after = metropolis_step(current, move, rng, rows)
         if after is not current:
             efficiency = after.response.score
             state = replace(
                 state, efficiency=efficiency, cost=after.cost, best=max(state.best, efficiency),
-                accepted=state.accepted + 1, rejections=0,
+                accepted=state.accepted + 1,
             )  # fmt: skip
         current = after
-    return replace(state, mask=pack_mask(current.mask)), rows.proposals(evaluator.problem)
+    state = replace(state, step=state.step + count, mask=pack_mask(current.mask))
+    return state, rows.proposals(evaluator.problem)
 
 
 searches.register("paper")(Search(MetropolisSettings, ChainState, start, advance, is_done))

@@ -93,7 +93,6 @@ def metropolis_step(
     move: Move,
     rng: np.random.Generator,
     rows: ProposalRows,
-    minimum_degree: int = 0,
 ) -> EvaluatedDesign:
     """Make one proposal, record it, and return the current design afterwards.
 
@@ -108,9 +107,6 @@ def metropolis_step(
         return current
     mask = current.mask.copy()
     mask[beams] ^= True
-    if minimum_degree and _violates_minimum_degree(current.problem, minimum_degree, mask, beams):
-        rows.add(mask, math.nan, math.nan, current.temperature, False, Verdict.FORBIDDEN)
-        return current
     response = current.evaluator.evaluate(mask, warm_start=True)
     current.is_last = False
     proposed = EvaluatedDesign(
@@ -128,18 +124,3 @@ def metropolis_step(
         current.evaluator.set_reference()
         return proposed
     return current
-
-
-def _violates_minimum_degree(
-    problem: Problem, minimum_degree: int, mask: NDArray[np.bool_], beams: NDArray[np.int64]
-) -> bool:
-    """Whether a removal leaves a free node with fewer beams than the minimum."""
-    removed = beams[~mask[beams]]
-    if not len(removed):
-        return False
-    held = set(problem.supports.fixed.tolist())
-    if problem.input.drive == "displacement":
-        held.update(problem.input.nodes.tolist())
-    degree = np.bincount(problem.lattice.beams[mask].ravel(), minlength=problem.lattice.node_count)
-    ends = problem.lattice.beams[removed].ravel().tolist()
-    return any(degree[node] < minimum_degree and node not in held for node in ends)
