@@ -132,12 +132,13 @@ def print_entry(entry: Entry, path: Path) -> None:
         ("  matched spring", f"{_figure(rest.matched_spring)}, {rest.best_work_share:.1%} of work"),
     ]  # fmt: skip
     for curve in entry.characterisation.curves:
-        way = "" if curve.reached >= 1.0 else f", {curve.status.label} at {curve.reached:.1%}"
         end = (
-            f"output {_figure(curve.output[-1])}, force {_figure(-curve.output_force[-1])}, "
-            f"for {_figure(curve.motion[-1])} with {_figure(curve.input_force[-1])}"
+            f"output {_figure(curve.output[-1])} (force {_figure(-curve.output_force[-1])}), "
+            f"input {_figure(curve.motion[-1])} (force {_figure(curve.input_force[-1])})"
         )
-        rows.append((f"stroke, {curve.load.label}", end + way))
+        if curve.reached < 1.0:
+            end += f", {curve.status.label} at {curve.reached:.1%}"
+        rows.append((f"stroke, {curve.load.label}", end))
     rows += [("origin", _origin(entry)), ("file", str(path))]
     for label, value in rows:
         table.add_row(label, plain(value))
