@@ -186,10 +186,10 @@ def confirmed(efficiency: NDArray[np.float64], masks: NDArray[np.uint8]) -> list
     >>> confirmed(np.array([0.1, 0.5, 0.5, 0.7]), masks)
     [2]
     """
-    kept = np.flatnonzero((masks[1:] == masks[:-1]).all(axis=1)) + 1
-    limit = efficiency[kept].max() if len(kept) else np.inf
+    verified = np.flatnonzero((masks[1:] == masks[:-1]).all(axis=1)) + 1
+    limit = efficiency[verified].max() if len(verified) else np.inf
     below = [index for index in peaks(efficiency, masks) if efficiency[index] <= limit]
-    return sorted({*kept.tolist(), *below})
+    return sorted({*verified.tolist(), *below})
 
 
 def candidates_of(
