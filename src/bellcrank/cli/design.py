@@ -140,8 +140,8 @@ def design(
                 task = find_problem(problem)
             else:
                 task = _task_from(design_named(str(begin)))
-            _print_stroke(task, 10.0 if part is None else part.scale)
             folder = start_design(task, settings, out or _new_folder(task), part)
+            _print_stroke(task, 10.0 if part is None else part.scale)
         command = f"bellcrank design --resume {shlex.quote(str(folder.path))}"
         stop.hint = f"Stopped. To continue: {plain(command)}"
         with SearchProgress(read_settings(folder.settings)) as progress:
