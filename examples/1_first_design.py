@@ -16,7 +16,8 @@ from pathlib import Path
 from bellcrank.model import find_problem, human_design
 from bellcrank.plots import draw_comparison
 from bellcrank.search import HoppingSettings
-from bellcrank.workflows import complete_design, motion_of, start_design
+from bellcrank.workflows import complete_design, start_design
+from bellcrank.workflows.pictures import motion_of
 
 crane = find_problem("crane")
 print(crane.lattice.beam_count, "beams, of which", len(crane.designable), "are designable")

@@ -16,7 +16,8 @@ from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import find_problem
 from bellcrank.plots import draw_design, draw_motion
 from bellcrank.search import HoppingSettings
-from bellcrank.workflows import complete_design, motion_of, start_design
+from bellcrank.workflows import complete_design, start_design
+from bellcrank.workflows.pictures import motion_of
 
 Path("lift.toml").write_text("""
 schema = "bellcrank/problem/1"

@@ -18,7 +18,7 @@ from bellcrank.machines.library import library
 from bellcrank.machines.plan import read_plan
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.plots import draw_motion
-from bellcrank.workflows import motion_of
+from bellcrank.workflows.pictures import motion_of
 
 loaded = library().find("down-9-loaded").design
 light = library().find("down-9-light").design

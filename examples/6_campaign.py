@@ -20,7 +20,7 @@ from bellcrank.campaign import (
     write_results,
 )
 from bellcrank.plots import draw_comparison
-from bellcrank.workflows import motion_of
+from bellcrank.workflows.pictures import motion_of
 
 Path("sizes.toml").write_text("""
 name = "sizes"

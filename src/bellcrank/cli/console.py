@@ -1,4 +1,4 @@
-"""Where words go: results to standard output, everything else to standard error."""
+"""Output: results to standard output, notes to standard error."""
 
 from __future__ import annotations
 
@@ -19,40 +19,40 @@ notes = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
 def announce_compilation() -> None:
-    """Say that the first use compiles, so that nobody thinks it hangs."""
+    """Print a note if the kernels will be compiled, which delays the first use."""
     from bellcrank.mechanics.kernels._compile import kernels_are_compiled
 
     if not kernels_are_compiled():
         notes.print("Compiling the kernels for this machine, once; this takes about half a minute.")
 
 
-def warn_of_another_version(begun: Mapping[str, Any], what: str) -> None:
-    """Say that what is resumed may not end as it would have, if it was begun elsewhere."""
-    if version := other_version(begun):
+def warn_of_another_version(started: Mapping[str, Any], what: str) -> None:
+    """Print a note if something is resumed that another version started."""
+    if version := other_version(started):
         notes.print(
-            f"[yellow]note:[/] this {what} was begun with another version ({plain(version)}); "
-            "what follows may differ from what it would have found."
+            f"[yellow]note:[/] this {what} was started with another version ({plain(version)}); "
+            "its results may differ from those of that version."
         )
 
 
-def warn_of_other_stiffness(own: Problem, learnt: Problem, done: str) -> None:
-    """Say that a network was asked about other springs than a design has, if it was."""
-    there, here = learnt.stiffness, own.stiffness
+def warn_of_other_stiffness(own: Problem, trained: Problem, done: str) -> None:
+    """Print a note if a network was trained with another stiffness than that of a design."""
+    there, here = trained.stiffness, own.stiffness
     if (here.bond, here.angle) != (there.bond, there.angle):
         notes.print(
-            f"[yellow]note:[/] the design's springs have stiffness {here.bond:g} and "
-            f"{here.angle:g}, for the part that it was made for; it is {done} with {there.bond:g} "
-            f"and {there.angle:g}, which the network has learnt."
+            f"[yellow]note:[/] the springs of the design have stiffness {here.bond:g} and "
+            f"{here.angle:g}; it is {done} with {there.bond:g} and {there.angle:g}, those of the "
+            "training set."
         )
 
 
 def plain(text: object) -> str:
-    """Keep square brackets in a name or message from being read as markup."""
+    """Return a text with its square brackets escaped, so that they are not markup."""
     return escape(str(text))
 
 
 def number_of(count: int, what: str) -> str:
-    """Return how many there are, in words.
+    """Return a count with its noun.
 
     Examples
     --------
@@ -63,5 +63,5 @@ def number_of(count: int, what: str) -> str:
 
 
 def print_json(text: str) -> None:
-    """Print machine-readable output, untouched by any formatting."""
+    """Print machine-readable output without formatting."""
     sys.stdout.write(text + "\n")

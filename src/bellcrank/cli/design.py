@@ -23,7 +23,7 @@ from bellcrank.cli.console import (
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from bellcrank.model import Design, Problem
+    from bellcrank.model import Problem
     from bellcrank.part import PartSpec
     from bellcrank.workflows import DesignReport
 
@@ -100,11 +100,7 @@ def design(
     resume: Annotated[Path | None, typer.Option(help="Folder of a run to resume.")] = None,
 ) -> None:
     """Design an actuator: search, clean, verify and report."""
-    from bellcrank.cli.progress import SearchProgress
     from bellcrank.cli.stopping import stopping_on_interrupt
-    from bellcrank.model import find_problem
-    from bellcrank.search import read_settings
-    from bellcrank.workflows import complete_design, reopen_design, start_design
 
     if sum(given is not None for given in (problem, begin, resume)) != 1:
         raise InvalidSettings(
@@ -129,17 +125,21 @@ def design(
             f"--{what} cannot be changed with --resume; to continue from the design of that run, "
             f"start a new one with --from {resume}"
         )
+    # Input is refused before the modules that take long to import.
+    task = None if resume is not None else _task(problem, str(begin))
+    from bellcrank.search import read_settings
+
+    settings = read_settings({"search": search, **chosen})
+    from bellcrank.cli.progress import SearchProgress
+    from bellcrank.workflows import complete_design, reopen_design, start_design
+
     with stopping_on_interrupt(resumable=True) as stop:
         announce_compilation()
-        if resume is not None:
+        if task is None:
+            assert resume is not None
             folder = reopen_design(resume)
             warn_of_another_version(folder.provenance, "run")
         else:
-            settings = read_settings({"search": search, **chosen})
-            if problem is not None:
-                task = find_problem(problem)
-            else:
-                task = _task_from(design_named(str(begin)))
             folder = start_design(task, settings, out or _new_folder(task), part)
             _print_stroke(task, 10.0 if part is None else part.scale)
         command = f"bellcrank design --resume {shlex.quote(str(folder.path))}"
@@ -186,8 +186,13 @@ def _print_stroke(task: Problem, scale: float) -> None:
         )
 
 
-def _task_from(design: Design) -> Problem:
-    """Return the problem of a design, with that design as the initial one."""
+def _task(problem: str | None, begin: str) -> Problem:
+    """Return the named problem, or the task of a design with that design as the initial one."""
+    from bellcrank.model import find_problem
+
+    if problem is not None:
+        return find_problem(problem)
+    design = design_named(begin)
     return replace(design.problem, initial=design.mask)
 
 

@@ -110,7 +110,7 @@ def show(
         print_entry(entry, known.path(entry.name))
     if out is not None:
         from bellcrank.plots import draw_motion
-        from bellcrank.workflows import motion_of
+        from bellcrank.workflows.pictures import motion_of
 
         announce_compilation()
         draw_motion(motion_of(entry.design), out, title=entry.name, overwrite=overwrite)

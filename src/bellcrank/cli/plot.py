@@ -44,7 +44,7 @@ def plot(
     """Draw a design at rest and at full stroke, a problem, or the chains of a run."""
     from bellcrank.mechanics import objective_name
     from bellcrank.plots import draw_comparison, draw_design, draw_motion
-    from bellcrank.workflows import draw_run, motion_of
+    from bellcrank.workflows.pictures import draw_run, motion_of
 
     if compare is not None and (paths or rest):
         raise InvalidSettings("--compare draws motions; leave out --rest and --paths")

@@ -6,7 +6,6 @@ from bellcrank.workflows.design import (
     start_design,
 )
 from bellcrank.workflows.find import find_design
-from bellcrank.workflows.pictures import draw_run, motion_of
 from bellcrank.workflows.report import DesignReport
 from bellcrank.workflows.validation import (
     Validation,
@@ -26,9 +25,7 @@ __all__ = [
     "add_to_record",
     "check_plan",
     "complete_design",
-    "draw_run",
     "find_design",
-    "motion_of",
     "problem_identity",
     "read_record",
     "reopen_design",

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import splu
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.sparse import csc_matrix
 
     from bellcrank.fem.frame.mesh import FrameMesh
     from bellcrank.part.part import Part
@@ -35,6 +34,9 @@ class SparseFactor:
     """
 
     def __init__(self, matrix: csc_matrix) -> None:
+        from scipy.sparse import csc_matrix
+        from scipy.sparse.linalg import splu
+
         # Scaled to a diagonal of ones, so that pivots do not depend on units.
         diagonal = np.abs(matrix.diagonal())
         self._scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
@@ -121,6 +123,8 @@ class Assembly:
 
     def matrix(self, entries: NDArray[np.float64]) -> csc_matrix:
         """Return the matrix of the free degrees of freedom from the entries of all blocks."""
+        from scipy.sparse import csc_matrix
+
         data = np.bincount(self.slot, weights=entries[self.selected], minlength=len(self.rows))
         return csc_matrix((data, self.rows, self.starts), shape=(self.size, self.size))
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -252,6 +251,8 @@ def _followers(starts: Reals, ends: Reals) -> tuple[Ids, float]:
 
 def _nearest(targets: Reals, points: Reals) -> tuple[Reals, Ids]:
     """Return distance and index of the nearest of `targets` for each of `points`."""
+    from scipy.spatial import cKDTree
+
     distance, which = cKDTree(targets).query(points)
     return np.asarray(distance, dtype=np.float64), np.asarray(which, dtype=np.int64)
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.part.outline.fillets import filled
@@ -202,6 +201,8 @@ def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDA
     share = np.sum((nodes[node] - tail) * axis, axis=1) / np.sum(axis * axis, axis=1)
     facing = (share > 0.0) & (share < 1.0) & ~np.any(struts.beams[strut] == node[:, None], axis=1)
     across = (tail + share[:, None] * axis)[facing]
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(nodes).query_pairs(2.0 * limit, output_type="ndarray")
     one = np.concatenate([nodes[node[facing]], nodes[pairs[:, 0]]])
     two = np.concatenate([across, nodes[pairs[:, 1]]])

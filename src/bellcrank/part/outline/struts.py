@@ -6,9 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from bellcrank.errors import InvalidSettings
 
@@ -92,6 +89,9 @@ def read_struts(positions: ArrayLike, beams: ArrayLike) -> Struts:
 
 def pieces_of(beams: NDArray[np.int64], node_count: int) -> NDArray[np.int64]:
     """Return the number of the connected piece of each node."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     graph = coo_array((np.ones(len(beams)), (beams[:, 0], beams[:, 1])), (node_count,) * 2)
     labels: NDArray[np.int64] = connected_components(graph, directed=False)[1].astype(np.int64)
     return labels
@@ -146,6 +146,8 @@ def _cut_at_nodes(
 
 def _coincident(nodes: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     """Return a label for each node, equal for coincident nodes."""
+    from scipy.spatial import cKDTree
+
     close = cKDTree(nodes).query_pairs(tolerance, output_type="ndarray")
     return pieces_of(close, len(nodes))
 
