@@ -58,6 +58,7 @@ class Commands(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """Return the sections."""
         module, _, attribute = self.arguments[0].partition(":")
+        import_module(module).register_commands()
         program = typer.main.get_command(getattr(import_module(module), attribute))
         found: list[nodes.Node] = []
         for name, command in sorted(entries(program, "bellcrank")):

@@ -1,4 +1,4 @@
-"""The `bellcrank` command, on which each module of this folder registers its own."""
+"""The `bellcrank` command; each module of this folder registers a subcommand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bellcrank import __version__
 FAILED = 1
 BAD_INPUT = 2
 NOT_MET = 3
-"""No design works: the search ended, but its result does not meet what was specified."""
+"""The search ended without a design that meets the specification."""
 INTERRUPTED = 130
 
 app = typer.Typer(
@@ -36,4 +36,4 @@ def bellcrank(
         False, "--version", callback=_print_version, is_eager=True, help="Print the version."
     ),
 ) -> None:
-    """Design mechanical metamaterial actuators: lattices of beams that turn a push into motion."""
+    """Design compliant mechanisms: printable lattices of beams that turn a push into motion."""

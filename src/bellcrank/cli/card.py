@@ -40,10 +40,10 @@ def card(
     ] = False,
 ) -> None:
     """Draw a one-page summary of a design as a part."""
+    chosen = design_named(design)
     from bellcrank.workflows import spec_for
     from bellcrank.workflows.card import make_card
 
-    chosen = design_named(design)
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material)
     target = out or Path(f"{chosen.problem.name}.pdf")

@@ -198,14 +198,14 @@ def _task(problem: str | None, begin: str) -> Problem:
 
 def _part(width: str | None, scale: str | None, material: str | None) -> PartSpec | None:
     """Return the part to design, if its options are given."""
-    from bellcrank.part import PartSpec, materials
-
     if width is None:
         if scale is not None or material is not None:
             raise InvalidSettings(
                 "--scale and --material describe a part: give --strut-width as well"
             )
         return None
+    from bellcrank.part import PartSpec, materials
+
     given = {"width": width, "scale": scale, "material": material and materials[material].name}
     return PartSpec().changed({key: value for key, value in given.items() if value is not None})
 

@@ -1,72 +1,59 @@
-"""Where the command line starts, and how its errors end."""
+"""Entry point of the command line, and conversion of errors to messages and exit codes."""
 
 from __future__ import annotations
 
 import os
 import sys
+from importlib import import_module
 from typing import NoReturn, cast
 
 import typer
 
-from bellcrank.cli import (
-    animate,
-    campaign,
-    card,
-    characterise,
-    dataset,
-    design,
-    evaluate,
-    explain,
-    export,
-    library,
-    machine,
-    plot,
-    predict,
-    print_part,
-    problems,
-    serve,
-    study,
-    surrogate_search,
-    train,
-    validate,
-)
 from bellcrank.cli.app import BAD_INPUT, FAILED, INTERRUPTED, NOT_MET, app
 from bellcrank.cli.console import notes, plain
 from bellcrank.errors import BellcrankError, CorruptRun, NoDesignFound, RunFailed, StorageError
 
-COMMANDS = (
-    design,
-    evaluate,
-    characterise,
-    validate,
-    export,
-    print_part,
-    card,
-    plot,
-    animate,
-    campaign,
-    dataset,
-    train,
-    predict,
-    explain,
-    surrogate_search,
-    machine,
-    library,
-    study,
-    problems,
-    serve,
-)
-"""Modules that register a command."""
+COMMANDS = {
+    "design": "design",
+    "evaluate": "evaluate",
+    "characterise": "characterise",
+    "validate": "validate",
+    "export": "export",
+    "print": "print_part",
+    "card": "card",
+    "plot": "plot",
+    "animate": "animate",
+    "campaign": "campaign",
+    "dataset": "dataset",
+    "train": "train",
+    "predict": "predict",
+    "explain": "explain",
+    "surrogate-search": "surrogate_search",
+    "machine": "machine",
+    "library": "library",
+    "study": "study",
+    "problems": "problems",
+    "serve": "serve",
+}
+"""Module of this folder that registers each command."""
 FAILURES = (StorageError, CorruptRun, RunFailed)
-"""What is not the fault of who typed the command."""
+"""Errors that are not caused by the input."""
 
 
 UsageError = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
-"""What typer raises for a command line that it cannot read; it exports only this child."""
+"""Error of typer for an unreadable command line; typer exports only a subclass."""
+
+
+def register_commands(name: str | None = None) -> None:
+    """Import the module of one command, or of all commands without a known name."""
+    known = name is not None and name in COMMANDS
+    for module in [COMMANDS[str(name)]] if known else COMMANDS.values():
+        import_module(f"bellcrank.cli.{module}")
 
 
 def main() -> None:
     """Run the command line; a known error becomes one line and an exit code."""
+    register_commands(sys.argv[1] if len(sys.argv) > 1 else None)
     try:
         code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
         if code == INTERRUPTED:
@@ -89,6 +76,6 @@ def main() -> None:
 
 
 def _refuse(message: str, code: int) -> NoReturn:
-    """Say what is wrong in one line, and leave."""
+    """Print an error in one line and exit."""
     notes.print(f"[bold red]error:[/] {plain(message)}")
     sys.exit(code)

@@ -101,6 +101,7 @@ def validate(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Analyse a design as a part by finite elements."""
+    chosen = design_named(design)
     from bellcrank.workflows import (
         check_plan,
         spec_for,
@@ -110,7 +111,6 @@ def validate(
     )
     from bellcrank.workflows.pictures import check_targets, draw_validations, write_vtu
 
-    chosen = design_named(design)
     check_targets(picture, vtu, overwrite=overwrite)
     target = record or record_of(design)
     _check_record(target, chosen, required=record is not None)

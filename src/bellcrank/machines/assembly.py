@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 
 from bellcrank.errors import InvalidFile, InvalidProblem
 from bellcrank.machines.boundary import (
@@ -156,6 +155,8 @@ def first_crossing(
     """
     start, end = positions[beams[:, 0]], positions[beams[:, 1]]
     inset = END_INSET * (end - start)
+    import shapely
+
     lines = shapely.linestrings(np.stack([start + inset, end - inset], axis=1))
     first, second = shapely.STRtree(lines).query(lines, predicate="intersects")
     bad = np.flatnonzero((first < second) & (owner[first] != owner[second]))

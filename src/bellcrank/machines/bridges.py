@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
-from scipy.spatial import Delaunay, cKDTree
 
 from bellcrank.errors import InvalidFile
 
@@ -62,6 +60,9 @@ def bridge(
         If another node lies between the ports.
     """
     ends = np.concatenate(ports)
+    import shapely
+    from scipy.spatial import Delaunay, cKDTree
+
     hull = shapely.MultiPoint(positions[ends]).convex_hull
     inside = shapely.contains_xy(hull, *positions.T)
     inside[ends] = False
@@ -91,6 +92,8 @@ def between_ports(
     ports: Sequence[NDArray[np.int64]],
 ) -> NDArray[np.bool_]:
     """(m,) whether the middle of each beam lies in the convex hull of two ports."""
+    import shapely
+
     hull = shapely.MultiPoint(positions[np.concatenate(ports)]).convex_hull
     middle = shapely.points(positions[beams].mean(axis=1))
     near: NDArray[np.bool_] = shapely.distance(middle, hull) < HULL_TOLERANCE * max(

@@ -10,9 +10,6 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from bellcrank.errors import InvalidFile
 from bellcrank.machines.plan import welded_ports
@@ -90,6 +87,8 @@ class _NodeMerger:
         self.positions = np.concatenate([part.positions for part in parts.values()])
         self.owner = np.repeat(np.arange(len(parts)), counts)
         spacing = min(part.spacing for part in parts.values())
+        from scipy.spatial import cKDTree
+
         near = cKDTree(self.positions).query_pairs(MIN_DISTANCE * spacing, output_type="ndarray")
         self.near = near[self.owner[near[:, 0]] != self.owner[near[:, 1]]].reshape(-1, 2)
         apart = self.positions[self.near[:, 0]] - self.positions[self.near[:, 1]]
@@ -138,6 +137,9 @@ class _NodeMerger:
     def result(self) -> tuple[dict[str, NDArray[np.int64]], NDArray[np.float64]]:
         """Return the machine's node numbers of each part, and all positions."""
         pairs, count = self.near[self.merged], len(self.positions)
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
         links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
         _, piece = connected_components(links, directed=False)
         first, number = unique_rows(piece)

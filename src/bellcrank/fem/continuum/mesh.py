@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.continuum.backend import ngsolve
@@ -184,6 +183,8 @@ def check_apart(hubs: dict[int, NDArray[np.float64]], radius: float) -> None:
     if len(hubs) < 2:
         return
     nodes, centres = list(hubs), np.array(list(hubs.values()))
+    from scipy.spatial import cKDTree
+
     close = cKDTree(centres).query_pairs(2.2 * radius)
     for first, second in sorted(close):
         raise InvalidSettings(
