@@ -2,15 +2,16 @@
 Train a network
 ===============
 
-A network can learn to predict the efficiency from a picture of a design. When that pays, and when
-it does not, is told honestly on :doc:`/surrogate`; here is how it goes.
+This example trains a small network to predict the efficiency of designs. :doc:`/surrogate` compares
+networks with the mechanics.
 """
 
 # %%
 # Data
 # ----
-# Searches for and against the wanted motion propose designs; all of them are kept with their
-# efficiency, in runs, so that a network is tested on runs that it has never seen.
+# Searches that maximise and searches that minimise the efficiency propose designs. All proposals are
+# stored with their efficiency and their run, so that a network is tested on other runs than those
+# of its training set.
 
 from pathlib import Path
 
@@ -26,8 +27,8 @@ print(len(data), "designs of", data.run_count, "runs")
 # %%
 # Training
 # --------
-# The simplest network looks at the bits of a design, one for each beam. ``resnet18-w16`` looks at
-# its picture, learns far more from as many designs, and takes 25 times as long (:doc:`/surrogate`).
+# The simplest network takes the bits of a design, one for each beam. ``resnet18-w16`` takes its
+# picture; it is more accurate for the same training set and takes 25 times as long.
 
 training = begin(data, recipe_of("own", model="mlp", epochs=6), Path("network"), device="cpu")
 for _ in training.run():
@@ -37,13 +38,14 @@ for epoch in training.log:
     print(f"epoch {epoch.epoch}: R2 {epoch.r_squared:.3f}")
 
 # %%
-# Asking it
-# ---------
-# Designs of runs that it has never seen, and what the mechanics says of them.
+# Prediction
+# ----------
+# Predicted and exact efficiency of designs of the held-out runs.
 
 held_out = training.split.held_out[:5]
-for told, true in zip(model.predict(data.packed[held_out]), data.efficiency[held_out], strict=True):
-    print(f"predicted {told:+.3f}, in truth {true:+.3f}")
+predictions = model.predict(data.packed[held_out])
+for predicted, exact in zip(predictions, data.efficiency[held_out], strict=True):
+    print(f"predicted {predicted:+.3f}, exact {exact:+.3f}")
 
 # %%
 # On the command line: ``bellcrank dataset build scaling-8``, ``bellcrank train scaling-8-dataset``,
