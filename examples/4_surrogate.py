@@ -9,9 +9,9 @@ networks with the mechanics.
 # %%
 # Data
 # ----
-# Searches that maximise and searches that minimise the efficiency propose designs. All proposals are
-# stored with their efficiency and their run, so that a network is tested on other runs than those
-# of its training set.
+# Searches that maximise and searches that minimise the efficiency propose designs. All proposals
+# are stored with their efficiency and their run, so that a network is tested on other runs than
+# those of its training set.
 
 from pathlib import Path
 
