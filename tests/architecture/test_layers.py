@@ -1,4 +1,4 @@
-"""Imports point downward, and light things stay light."""
+"""Imports point downward, form no circle, and load no slow library before it is needed."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -29,6 +30,18 @@ def test_imports_point_downward_only() -> None:
     command = Path(sys.executable).with_name("lint-imports")
     done = subprocess.run([command], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("package", ["bellcrank", "reproduction"])
+def test_no_modules_import_each_other_in_a_circle(package: str) -> None:
+    graph = grimp.build_graph(package)
+    imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    while leaves := [module for module, others in imports.items() if not others]:
+        for leaf in leaves:
+            del imports[leaf]
+        imports = {module: others & imports.keys() for module, others in imports.items()}
+    circles = {module: sorted(others) for module, others in imports.items()}
+    assert not circles
 
 
 def test_importing_the_package_loads_nothing_heavy() -> None:

@@ -243,6 +243,9 @@ def conclude(
     write_design(design, folder.path / "design.json", overwrite=True)
     if report.validation is not None:
         replace_record(report.validation, folder.path / "validation.json")
+    from bellcrank.workflows.pictures import draw_report
+
+    draw_report(report, folder)
     write_report(report, folder)
     return report
 

@@ -202,10 +202,7 @@ so the efficiency after cleaning is the one to expect.
 
 
 def write_report(report: DesignReport, folder: RunFolder) -> None:
-    """Write summary and pictures into the result folder."""
-    from bellcrank.workflows.pictures import draw_report
-
+    """Write ``summary.json`` and ``summary.md`` into the result folder."""
     path = folder.path
-    draw_report(report, folder)
     write_text(path / "summary.json", json.dumps(summary_data(report), indent=1), overwrite=True)
     write_text(path / "summary.md", summary_text(report), overwrite=True)

@@ -23,8 +23,9 @@ from bellcrank.search.blocks import (
     steps_in_block,
 )
 from bellcrank.search.markov.costs import costs, schedules
+from bellcrank.search.markov.evaluated_design import evaluated_design
 from bellcrank.search.markov.moves import moves
-from bellcrank.search.markov.steps import evaluated_design, metropolis_step
+from bellcrank.search.markov.steps import metropolis_step
 from bellcrank.search.registry import Search, searches
 from bellcrank.search.settings import (
     SearchSettings,

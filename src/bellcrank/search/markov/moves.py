@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
-    from bellcrank.search.markov.steps import EvaluatedDesign
+    from bellcrank.search.markov.evaluated_design import EvaluatedDesign
 
 
 class Move(Protocol):

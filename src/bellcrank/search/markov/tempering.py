@@ -24,8 +24,9 @@ from bellcrank.search.blocks import (
 )
 from bellcrank.search.kernels.acceptance import metropolis_accepts
 from bellcrank.search.markov.costs import costs
+from bellcrank.search.markov.evaluated_design import evaluated_design
 from bellcrank.search.markov.moves import moves
-from bellcrank.search.markov.steps import evaluated_design, metropolis_step
+from bellcrank.search.markov.steps import metropolis_step
 from bellcrank.search.registry import Search, searches
 from bellcrank.search.selection import peaks
 from bellcrank.search.settings import SearchSettings, check_names, check_positive, check_whole
