@@ -1,4 +1,4 @@
-"""The real page in Debian's Chromium, with a server of its own."""
+"""The page in Chromium, with a server of its own."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PATIENCE = 120_000
-"""Milliseconds to wait for what a busy machine may take long for."""
+"""Time limit in milliseconds, for a busy machine."""
 
 
 @dataclass(slots=True)
 class Server:
-    """A server that can be ended and begun again at the same address."""
+    """A server that can be stopped and restarted at the same address."""
 
     folder: Path
     port: int = 0
@@ -37,11 +37,11 @@ class Server:
 
     @property
     def address(self) -> str:
-        """Of the page."""
+        """Address of the page."""
         return f"http://127.0.0.1:{self.port}"
 
     def start(self) -> None:
-        """Begin."""
+        """Start the process and wait for its address."""
         command = [
             sys.executable, "-m", "bellcrank", "serve",
             "--port", str(self.port), "--folder", str(self.folder),
@@ -55,7 +55,7 @@ class Server:
         raise AssertionError("the server did not start")
 
     def end(self, how: int = signal.SIGTERM) -> None:
-        """End it, politely or not."""
+        """End the process by a signal."""
         assert self.process is not None
         assert self.process.stderr is not None
         os.kill(self.process.pid, how)
@@ -86,30 +86,30 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 @pytest.fixture
 def page(chromium: Any, server: Server) -> Iterator[Any]:
-    """Open a page that may ask its own server and nobody else, and must not complain."""
+    """Open a page that may contact its own server only, and must not report errors."""
     context = chromium.new_context(viewport={"width": 1440, "height": 900}, accept_downloads=True)
     context.set_default_timeout(PATIENCE)
     page = context.new_page()
-    asked: list[str] = []
-    trouble: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    page.on("websocket", lambda socket: asked.append(socket.url))
-    page.on("pageerror", lambda error: trouble.append(str(error)))
-    page.on("console", lambda line: trouble.append(line.text) if line.type == "error" else None)
+    requested: list[str] = []
+    errors: list[str] = []
+    page.on("request", lambda request: requested.append(request.url))
+    page.on("websocket", lambda socket: requested.append(socket.url))
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
     page.goto(server.address)
     page.locator("svg.canvas").wait_for()
     ready(page)
     yield page
     context.close()
-    places = {urlsplit(url).hostname for url in asked if not url.startswith(("blob:", "data:"))}
+    places = {urlsplit(url).hostname for url in requested if not url.startswith(("blob:", "data:"))}
     assert places == {"127.0.0.1"}
-    # While a server is restarted, the browser itself writes down that it is not reached.
-    ours = [
+    # While a server is restarted, the browser itself reports failed connections.
+    page_errors = [
         text
-        for text in trouble
+        for text in errors
         if "ERR_" not in text and "WebSocket" not in text and "status of" not in text
     ]
-    assert not ours
+    assert not page_errors
 
 
 def ready(page: Any) -> None:

@@ -1,4 +1,4 @@
-"""What a person does with the page."""
+"""Actions of a user of the page."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ PATIENCE = 120.0
 
 
 def tool(page: Any, name: str) -> None:
-    """Pick a tool above the drawing."""
+    """Select a tool above the drawing."""
     page.locator(".tools label", has_text=name).click()
 
 
 def place(page: Any, x: float, y: float) -> tuple[float, float]:
-    """Return where a point of the lattice is on the screen."""
+    """Return the position of a point of the lattice on the screen."""
     found = page.evaluate(
         """([x, y]) => {
           const svg = document.querySelector("svg.canvas");
@@ -41,17 +41,17 @@ def drag(page: Any, start: tuple[float, float], end: tuple[float, float]) -> Non
 
 
 def summary(page: Any, step: str) -> str:
-    """Return what a section of the panel says."""
+    """Return the summary of a section of the panel."""
     return str(page.locator(f".step.{step} .summary").inner_text())
 
 
 def task(page: Any) -> Any:
-    """Return the task as it is kept."""
+    """Return the stored task."""
     return page.evaluate("JSON.parse(localStorage.getItem('bellcrank-task'))")
 
 
 def start_search(page: Any, effort: str = "Quick") -> str:
-    """Press the button, and return the name of the run."""
+    """Start a search and return the name of its run."""
     page.locator(".search .choice label", has_text=effort).click()
     page.get_by_role("button", name="Design it").click()
     page.wait_for_url("**/#/run/*")

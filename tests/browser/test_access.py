@@ -1,4 +1,4 @@
-"""The page for who uses a keyboard, a small screen or a screen reader."""
+"""Use of the page with a keyboard, a small screen or a screen reader."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def findings(page: Any) -> list[str]:
-    """Return what axe finds that is serious."""
+    """Return the serious findings of axe."""
     found = axe.Axe().run(page).response["violations"]
     return [
         f"{each['id']}: {each['nodes'][0]['html'][:120]}"
@@ -31,15 +31,15 @@ def test_axe_finds_nothing_serious(page: Any, server: Server, scheme: str, width
     page.set_viewport_size({"width": width, "height": 900})
     page.locator(".step.lattice h2 button").click()
     assert findings(page) == []
-    for name in ("Push", "Beams", "By hand"):
+    for name in ("Input", "Beams", "By hand"):
         tool(page, name)
         page.wait_for_timeout(300)
         assert findings(page) == []
     page.goto(f"{server.address}/#/machine")
-    page.get_by_text("Nothing here yet").wait_for()
+    page.get_by_text("No parts", exact=True).wait_for()
     for place, seen in (
         ("gallery", ".tile"),
-        ("machine", ".shelves .tile"),
+        ("machine", ".collections .tile"),
         ("machine/gripper", ".readout strong"),
         ("runs", "h1"),
         ("design/builtin/human-crane", '.player[data-ready="yes"]'),
@@ -61,7 +61,7 @@ def test_axe_finds_nothing_serious_in_a_search_and_its_result(page: Any, width: 
     page.locator(".readout strong").wait_for()
     assert findings(page) == []
     page.get_by_role("button", name="Pause").click()
-    page.get_by_role("button", name="Take the best").click()
+    page.get_by_role("button", name="Choose the best").click()
     page.locator('.player[data-ready="yes"]').wait_for()
     page.locator(".colour label", has_text="Stress").click()
     page.locator(".figures td", has_text="MPa").wait_for()
@@ -69,14 +69,14 @@ def test_axe_finds_nothing_serious_in_a_search_and_its_result(page: Any, width: 
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-def test_a_task_can_be_drawn_with_the_keyboard_alone(page: Any) -> None:
+def test_a_task_can_be_defined_with_the_keyboard_alone(page: Any) -> None:
     page.locator("svg.canvas").focus()
     before = set(task(page)["problem"]["supports"]["fixed"])
     page.keyboard.press("ArrowRight")
     page.keyboard.press("Space")
     after = set(task(page)["problem"]["supports"]["fixed"])
     assert len(before ^ after) == 1
-    assert "node" in page.locator(".unseen[role=status]").inner_text()
+    assert "node" in page.locator(".visually-hidden[role=status]").inner_text()
     page.keyboard.press("Shift+Enter")
     assert set(task(page)["problem"]["supports"]["fixed"]) != after
     page.locator(".tools input").first.focus()

@@ -1,4 +1,4 @@
-"""The way of a person through the page, from an empty lattice to a part."""
+"""Use of the page, from an empty lattice to a part."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ HEIGHT = math.sqrt(3.0) / 2.0
 
 
 def downloaded(page: Any, suffix: str) -> bytes:
-    """Take a file of the design that is shown."""
+    """Download a file of the displayed design."""
     with page.expect_download() as waiting:
         page.locator(f'[data-file="{suffix}"]').click()
     with open(waiting.value.path(), "rb") as file:  # noqa: PTH123
         return file.read()
 
 
-def test_a_task_is_drawn_searched_watched_stopped_played_and_taken(page: Any) -> None:
+def test_a_task_is_defined_searched_followed_stopped_played_and_downloaded(page: Any) -> None:
     top = 8 * HEIGHT
     page.get_by_role("button", name="Clear").click()
-    assert summary(page, "supports") == "nothing yet"
+    assert summary(page, "supports") == "none"
     assert page.get_by_role("button", name="Design it").is_disabled()
     page.mouse.dblclick(*_at(page, 3.5, 0.0))
     assert summary(page, "supports") == "8 nodes"
 
-    tool(page, "Push")
+    tool(page, "Input")
     page.get_by_role("button", name="Clear").click()
     click(page, 7.5, top)
     drag(page, (8.2, top - 1.3), (7.6, top - 0.5))
@@ -58,17 +58,17 @@ def test_a_task_is_drawn_searched_watched_stopped_played_and_taken(page: Any) ->
     assert task(page)["problem"]["input"]["amount"] == amount
     page.keyboard.press("Control+Shift+z")
 
-    tool(page, "Move")
+    tool(page, "Output")
     assert summary(page, "output") == "2 nodes, left"
     page.wait_for_timeout(400)
-    assert not page.locator(".complaint").inner_text()
+    assert not page.locator(".error").inner_text()
 
     start_search(page, "Thorough")
     page.get_by_text("steps/s").wait_for()
     until(page, "document.querySelector('.curve.best')?.getAttribute('d').length > 20")
     page.reload()
     until(page, "document.querySelector('.curve.best')?.getAttribute('d').length > 20")
-    page.get_by_role("button", name="Stop and take the best").click()
+    page.get_by_role("button", name="Stop and choose the best").click()
     page.locator('.player[data-ready="yes"]').wait_for()
     assert float(page.locator(".headline strong").inner_text().replace("−", "-")) > 0.5
     before = page.locator(".player path.plain, .player [class*=heat]").first.get_attribute("d")
@@ -81,8 +81,8 @@ def test_a_task_is_drawn_searched_watched_stopped_played_and_taken(page: Any) ->
     assert mesh.is_watertight
     assert closed_in_3mf(downloaded(page, "3mf"))
     assert downloaded(page, "history")[:4] == b"PAR1"
-    page.get_by_text("Beam worth").click()
-    page.get_by_text("Dark: all depends on it").wait_for()
+    page.locator(".colour label", has_text="Sensitivity").click()
+    page.get_by_text("Dark: removal lowers").wait_for()
 
 
 def closed_in_3mf(content: bytes) -> bool:
@@ -102,7 +102,7 @@ def _at(page: Any, x: float, y: float) -> tuple[float, float]:
     return place(page, x, y)
 
 
-def test_a_design_is_changed_by_hand_and_the_real_solver_answers(page: Any) -> None:
+def test_a_design_is_changed_by_hand_and_evaluated_by_the_solver(page: Any) -> None:
     tool(page, "By hand")
     page.locator(".readout .latency").wait_for()
     before = page.locator(".readout strong").inner_text()
@@ -122,7 +122,7 @@ def test_a_design_is_changed_by_hand_and_the_real_solver_answers(page: Any) -> N
     page.keyboard.press("Control+z")
     page.wait_for_timeout(500)
     assert unpack_mask(task(page)["hand"], problem.lattice.beam_count).sum() == len(mask) - 2
-    page.get_by_role("button", name="Keep this design").click()
+    page.get_by_role("button", name="Save this design").click()
     page.locator('.player[data-ready="yes"]').wait_for()
 
 
@@ -130,15 +130,15 @@ def _free(kept: Any) -> list[int]:
     return [k for k, rule in enumerate(kept["rules"]) if rule == "auto"][:1]
 
 
-def test_beams_are_painted_and_mirrored_and_the_task_is_saved_and_loaded(
+def test_beams_are_marked_and_mirrored_and_the_task_is_saved_and_loaded(
     page: Any, tmp_path: Any
 ) -> None:
     tool(page, "Beams")
     total = summary(page, "beams")
-    page.get_by_label("Mirror left and right").check()
+    page.get_by_label("Mirror symmetry left/right").check()
     click(page, 2.5, 4 * HEIGHT)
     assert task(page)["rules"].count("keep") == 2
-    page.locator(".beams .choice label", has_text="Never").click()
+    page.locator(".beams .choice label", has_text="Absent").click()
     click(page, 4.0, 2 * HEIGHT)
     assert task(page)["rules"].count("never") in {1, 2}
     assert summary(page, "beams") != total
@@ -158,15 +158,15 @@ def test_beams_are_painted_and_mirrored_and_the_task_is_saved_and_loaded(
     assert task(page)["rules"] == rules
 
 
-def test_what_is_wrong_is_said_where_it_is(page: Any) -> None:
+def test_an_error_is_shown_in_its_section(page: Any) -> None:
     page.locator(".step.lattice h2 button").click()
     page.get_by_label("Start from").select_option("discs")
     until(page, "JSON.parse(localStorage.getItem('bellcrank-task')).problem.name === 'discs'")
     tool(page, "Beams")
-    page.get_by_label("Mirror left and right").check()
+    page.get_by_label("Mirror symmetry left/right").check()
     page.locator(".step.beams .fault", has_text="not symmetric").wait_for()
     assert page.get_by_role("button", name="Design it").is_disabled()
-    page.get_by_label("Mirror left and right").uncheck()
+    page.get_by_label("Mirror symmetry left/right").uncheck()
     page.locator(".step.beams .fault").wait_for(state="detached")
 
 
@@ -180,43 +180,43 @@ def test_a_machine_is_made_of_two_parts(page: Any, server: Server) -> None:
         }"""
         page.evaluate(made, f"elementary-{direction}")
     page.goto(f"{server.address}/#/machine")
-    page.get_by_text("Nothing here yet").wait_for()
+    page.get_by_text("No parts", exact=True).wait_for()
     page.locator("button.tile", has_text="elementary-down").click()
     page.get_by_text("first: elementary-down").wait_for()
-    page.get_by_text("Nothing here yet").wait_for(state="hidden")
+    page.get_by_text("No parts", exact=True).wait_for(state="hidden")
     page.locator("button.tile", has_text="elementary-left").click()
     page.get_by_text("second: elementary-left").wait_for()
     until(page, "document.querySelector('.readout strong')?.textContent.length > 3")
-    page.get_by_label("Turned").last.select_option("120")
-    page.locator(".complaint", has_text="second").wait_for()
-    page.get_by_label("Turned").last.select_option("0")
-    page.locator(".complaint:empty").wait_for(state="attached")
-    page.get_by_role("button", name="Build it").click()
+    page.get_by_label("Rotation").last.select_option("120")
+    page.locator(".error", has_text="second").wait_for()
+    page.get_by_label("Rotation").last.select_option("0")
+    page.locator(".error:empty").wait_for(state="attached")
+    page.get_by_role("button", name="Assemble").click()
     page.wait_for_url("**/#/design/kept/*")
     page.locator('.player[data-ready="yes"]').wait_for()
 
 
 def test_the_page_and_its_search_survive_the_end_of_the_server(page: Any, server: Server) -> None:
-    name = start_search(page, "Usual")
+    name = start_search(page, "Standard")
     page.get_by_text("steps/s").wait_for()
     until(page, "document.querySelector('.curve.best')?.getAttribute('d').length > 20")
     server.end(signal.SIGKILL)
-    page.get_by_text("The server does not answer", exact=False).first.wait_for()
+    page.get_by_text("The server cannot be reached", exact=False).first.wait_for()
     server.start()
     page.get_by_text("steps/s").wait_for()
     page.goto(f"{server.address}/#/runs")
     page.locator(f'a[href="#/run/{name}"]').click()
-    page.get_by_role("button", name="Stop and take the best").click()
+    page.get_by_role("button", name="Stop and choose the best").click()
     page.locator('.player[data-ready="yes"]').wait_for()
 
 
-def test_a_machine_that_comes_along_is_taken_apart_and_changed(page: Any, server: Server) -> None:
+def test_a_bundled_machine_is_opened_and_changed(page: Any, server: Server) -> None:
     page.goto(f"{server.address}/#/machine")
     page.locator('button.tile[data-entry="machines/amplifier"]').click()
     page.locator(".readout strong").wait_for()
     whole = page.locator(".readout strong").inner_text()
     page.locator(".panel section", has_text="second").get_by_label("Mirrored").check()
-    page.locator(".complaint", has_text="second").wait_for()
+    page.locator(".error", has_text="second").wait_for()
     page.keyboard.press("Control+z")
     until(page, f"document.querySelector('.readout strong')?.textContent === '{whole}'")
     page.reload()
@@ -224,14 +224,14 @@ def test_a_machine_that_comes_along_is_taken_apart_and_changed(page: Any, server
     page.get_by_role("button", name="Remove second").click()
     until(page, f"document.querySelector('.readout strong')?.textContent !== '{whole}'")
     assert page.locator(".panel h2", has_text="second").count() == 0
-    shelf = page.locator('.shelf[data-source="library"]')
-    shelf.get_by_label("Moves").select_option("up")
-    shelf.get_by_label("Size").select_option("9 wide")
-    assert shelf.locator(".note[role=status]").inner_text() == "3 designs"
-    shelf.locator("button.tile", has_text="easy to drive").click()
+    library = page.locator('.collection[data-source="library"]')
+    library.get_by_label("Moves").select_option("up")
+    library.get_by_label("Size").select_option("9 wide")
+    assert library.locator(".note[role=status]").inner_text() == "3 designs"
+    library.locator("button.tile", has_text="easy to drive").click()
     page.locator(".panel h2", has_text="second: Up, 9 wide").wait_for()
     page.goto(f"{server.address}/#/design/machines/gripper")
-    page.get_by_role("button", name="Open its parts").click()
+    page.get_by_role("button", name="Open its plan").click()
     page.locator(".panel h2", has_text="left-fore").wait_for()
     page.locator(".readout strong").wait_for()
 
@@ -246,8 +246,8 @@ def test_a_whole_search_is_compared_checked_by_finite_elements_and_leaves_its_hi
     start_search(page)
     page.locator(".status.finished").wait_for()
     page.locator('.player[data-ready="yes"]').wait_for()
-    assert page.locator(".figures tr", has_text="Your own design").count() == 1
-    row = page.locator(".figures tr", has_text="Frame")  # it was chosen by its frame
+    assert page.locator(".figures tr", has_text="Your design").count() == 1
+    row = page.locator(".figures tr", has_text="Frame")  # selected by frame analysis
     row.get_by_text("MPa").wait_for()
     (tmp_path / "design.json").write_bytes(downloaded(page, "json"))
     design = read_design(tmp_path / "design.json")
@@ -261,7 +261,9 @@ def test_a_whole_search_is_compared_checked_by_finite_elements_and_leaves_its_hi
     assert downloaded(page, "svg").lstrip()[:1] == b"<"
 
 
-def test_a_search_that_finds_nothing_says_why_and_what_to_try(page: Any, server: Server) -> None:
+def test_a_search_without_a_design_shows_the_reason_and_suggestions(
+    page: Any, server: Server
+) -> None:
     name = page.evaluate("""async () => {
       const problem = await (await fetch("/api/problems/scaling-8")).json();
       const body = {title: "hopeless", session: "s", problem, steps: 50, chains: 1,
@@ -271,12 +273,12 @@ def test_a_search_that_finds_nothing_says_why_and_what_to_try(page: Any, server:
       return (await (await fetch("/api/runs", sent)).json()).id;
     }""")
     page.goto(f"{server.address}/#/run/{name}")
-    said = page.locator(".panel .fault", has_text="What may help")
-    said.wait_for()
-    assert "accepted no design" in said.inner_text()
-    assert "Search longer" in said.inner_text()
-    assert "--" not in said.inner_text()
-    page.get_by_role("link", name="Back to the drawing").click()
+    message = page.locator(".panel .fault", has_text="Suggestions")
+    message.wait_for()
+    assert "accepted no design" in message.inner_text()
+    assert "Search longer" in message.inner_text()
+    assert "--" not in message.inner_text()
+    page.get_by_role("link", name="Back to the task").click()
     page.locator("svg.canvas").wait_for()
 
 
@@ -299,9 +301,7 @@ def test_a_link_carries_the_task_to_another_browser(page: Any, server: Server) -
 
 
 @pytest.mark.parametrize("kind", ["Disordered", "Discs", "Crane"])
-def test_a_lattice_of_another_kind_keeps_what_is_held_pushed_and_to_move(
-    page: Any, kind: str
-) -> None:
+def test_another_kind_of_lattice_keeps_supports_input_and_output(page: Any, kind: str) -> None:
     page.locator(".step.lattice h2 button").click()
     page.locator(".lattice .choice label", has_text=kind).click()
     until(

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from bellcrank.fem import levels
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model import find_problem, human_design, problem_to_dict
-from bellcrank.part import calibrated
+from bellcrank.part import calibrated, materials
+from bellcrank.search import DEFAULT_SEARCH, searches
+from bellcrank.web.page_files import page_files
 from bellcrank.web.task_files import read_task, write_task
 
 if TYPE_CHECKING:
@@ -256,9 +259,9 @@ def test_a_design_by_hand_is_kept_and_found_in_the_gallery(
     found = client.get(f"/api/gallery/{kept['source']}/{kept['key']}").json()
     assert found["title"] == "mine <b>"
     assert found["mask"] == crane["mask"]
-    shelves = {shelf["source"]: shelf["entries"] for shelf in client.get("/api/gallery").json()}
-    assert kept["key"] in {entry["key"] for entry in shelves["kept"]}
-    assert {"human-crane", "machine-discs"} <= {entry["key"] for entry in shelves["builtin"]}
+    collections = {each["source"]: each["entries"] for each in client.get("/api/gallery").json()}
+    assert kept["key"] in {entry["key"] for entry in collections["kept"]}
+    assert {"human-crane", "machine-discs"} <= {entry["key"] for entry in collections["builtin"]}
 
 
 def test_two_parts_make_a_machine_and_parts_that_do_not_fit_are_named(client: TestClient) -> None:
@@ -298,3 +301,36 @@ def test_a_task_for_a_part_is_answered_with_the_stiffness_of_its_struts(client: 
     message, about = refusal(wide)
     assert message.startswith("width: expected more than 0 and less than")
     assert about == "width"
+
+
+def test_the_page_is_served_every_registered_search_material_and_level(client: TestClient) -> None:
+    served = client.get("/api/registries").json()
+    registries = {
+        "searches": searches,
+        "materials": materials,
+        "files": page_files,
+        "levels": levels,
+    }
+    for kind, registry in registries.items():
+        assert {each["name"] for each in served[kind]} == set(registry), kind
+        assert all(each["title"] for each in served[kind]), kind
+    assert served["searches"][0]["name"] == DEFAULT_SEARCH
+    assert all(each["summary"] for each in served["searches"])
+    assert all(each["duration"] for each in served["levels"])
+
+
+@pytest.mark.parametrize(
+    ("address", "changes", "key", "known"),
+    [
+        ("validation", {"level": "shell"}, "level", "frame"),
+        ("files/docx", {}, "suffix", "3mf"),
+    ],
+)
+def test_an_unknown_name_is_refused_with_the_registered_ones(
+    client: TestClient, crane: dict[str, Any], address: str, changes: dict[str, Any], key: str,
+    known: str,
+) -> None:  # fmt: skip
+    body = {"problem": crane["problem"], "mask": crane["mask"], **changes}
+    message, named = refusal(client.post(f"/api/{address}", json=body))
+    assert named == key
+    assert known in message

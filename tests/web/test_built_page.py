@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import shutil
 import subprocess
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -26,6 +28,15 @@ def test_the_page_was_built_from_its_sources() -> None:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     noted = (STATIC / "sources.sha256").read_text().strip()
     assert noted == digest.hexdigest(), "build the page again: cd web && npm run build"
+
+
+def test_the_sources_import_each_other_without_a_circle() -> None:
+    imports = {
+        path.stem: re.findall(r'from "\./(\w+)"', path.read_text(encoding="utf-8"))
+        for path in (WEB / "src").glob("*.ts")
+    }
+    order = TopologicalSorter(imports)
+    assert set(order.static_order()) == set(imports)  # raises CycleError for a circle
 
 
 def test_the_page_is_light() -> None:

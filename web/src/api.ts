@@ -1,4 +1,4 @@
-// What the server is asked, and what it answers.
+// Requests to the server, and the types of its responses.
 
 export type Point = [number, number];
 
@@ -41,7 +41,7 @@ export interface Run {
   message: string;
   efficiency: number | null;
   method: string;
-  settings: { steps: number; chains: number; seed: number; goals: string[]; hot?: number; cold?: number };
+  settings: { steps: number; chains: number; seed: number; goals: string[]; hot?: number; cold?: number; replicas?: number };
   part: Part | null;
   reference: string | null;
   done: number;
@@ -52,7 +52,7 @@ export interface Run {
 
 export interface Comparison { title: string; mask: string; efficiency: number | null }
 
-export interface WholeRun extends Run {
+export interface RunDetails extends Run {
   problem: Problem;
   mask: string | null;
   provenance: Record<string, unknown>;
@@ -61,7 +61,7 @@ export interface WholeRun extends Run {
 
 export type TracePoint = [number, number | null, number | null, number];
 
-export interface News {
+export interface RunUpdate {
   run: Run;
   reset: boolean;
   points: Record<string, TracePoint[]>;
@@ -75,7 +75,7 @@ export interface News {
 
 export interface Part { width: number; thickness: number; scale: number; material: string; fillet?: number | null }
 
-export interface Small {
+export interface GalleryEntry {
   source: string;
   key: string;
   title: string;
@@ -87,75 +87,89 @@ export interface Small {
   picture: { lines: number[]; supports: number[]; input: number[]; output: number[]; box: number[] };
 }
 
-export interface Shelf { source: string; title: string; entries: Small[] }
+export interface Collection { source: string; title: string; entries: GalleryEntry[] }
 
-export interface WholeDesign {
-  title: string;
-  note: string;
-  problem: Problem;
-  mask: string;
-  efficiency: number | null;
-  provenance: Record<string, unknown>;
+export interface Named { name: string; title: string }
+
+/** Registered entries of the server, from which the page builds its choices. */
+export interface Registries {
+  searches: (Named & { summary: string; running_best: boolean })[];
+  materials: Named[];
+  files: (Named & { purpose: string })[];
+  levels: (Named & { duration: string; missing: string })[];
 }
 
-/** What the server refused, in a sentence, and what the sentence is about. */
-export class Refusal extends Error {
+/** An error reported by the server: a sentence, and the key of the request that it concerns. */
+export class ServerError extends Error {
   constructor(message: string, readonly key: string, readonly status: number) {
     super(message);
   }
 }
 
-async function refusal(answer: globalThis.Response): Promise<Refusal> {
+async function serverError(response: globalThis.Response): Promise<ServerError> {
   try {
-    const said = (await answer.json()) as { message?: string; key?: string };
-    return new Refusal(said.message ?? answer.statusText, said.key ?? "", answer.status);
+    const { message, key } = (await response.json()) as { message?: string; key?: string };
+    return new ServerError(message ?? response.statusText, key ?? "", response.status);
   } catch {
-    return new Refusal(`the server answered ${answer.status}`, "", answer.status);
+    return new ServerError(`the server returned status ${response.status}`, "", response.status);
   }
 }
 
-async function ask(method: string, path: string, body?: unknown, signal?: AbortSignal): Promise<globalThis.Response> {
-  let answer: globalThis.Response;
+async function send(method: string, path: string, body?: unknown, signal?: AbortSignal): Promise<globalThis.Response> {
+  let response: globalThis.Response;
   try {
-    answer = await fetch(`/api${path}`, {
+    response = await fetch(`/api${path}`, {
       method,
       signal: signal ?? null,
       ...(body === undefined ? {} : { body: JSON.stringify(body), headers: { "content-type": "application/json" } }),
     });
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new Refusal("the server does not answer; is bellcrank serve still running?", "", 0);
+    throw new ServerError("the server cannot be reached; check that bellcrank serve is running", "", 0);
   }
-  if (!answer.ok) throw await refusal(answer);
-  return answer;
+  if (!response.ok) throw await serverError(response);
+  return response;
 }
 
 export async function get<T>(path: string): Promise<T> {
-  return (await ask("GET", path)).json() as Promise<T>;
+  return (await send("GET", path)).json() as Promise<T>;
+}
+
+let registries: Promise<Registries> | null = null;
+
+/** Fetch the registries; later calls reuse the result. */
+export async function fetchRegistries(): Promise<Registries> {
+  registries ??= get<Registries>("/registries");
+  try {
+    return await registries;
+  } catch (error) {
+    registries = null;
+    throw error;
+  }
 }
 
 export async function post<T>(path: string, body?: unknown, signal?: AbortSignal): Promise<T> {
-  return (await ask("POST", path, body ?? undefined, signal)).json() as Promise<T>;
+  return (await send("POST", path, body ?? undefined, signal)).json() as Promise<T>;
 }
 
 export async function remove(path: string): Promise<void> {
-  await ask("DELETE", path);
+  await send("DELETE", path);
 }
 
 export async function fetchFile(suffix: string, body: unknown): Promise<Blob> {
-  return (await ask("POST", `/files/${suffix}`, body)).blob();
+  return (await send("POST", `/files/${suffix}`, body)).blob();
 }
 
 export async function fetchBlob(path: string): Promise<Blob> {
-  return (await ask("GET", path)).blob();
+  return (await send("GET", path)).blob();
 }
 
 function address(path: string): string {
   return `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api${path}`;
 }
 
-/** Follow something over a websocket that is opened again when it breaks. */
-export function follow(path: string, hear: (news: News) => void, lost: (yes: boolean) => void): () => void {
+/** Receive updates over a websocket, which is reopened after it closes. */
+export function follow(path: string, receive: (update: RunUpdate) => void, setLost: (lost: boolean) => void): () => void {
   let socket: WebSocket | null = null;
   let ended = false;
   let wait = 300;
@@ -163,12 +177,12 @@ export function follow(path: string, hear: (news: News) => void, lost: (yes: boo
     socket = new WebSocket(address(path));
     socket.onmessage = (event: MessageEvent<string>) => {
       wait = 300;
-      lost(false);
-      hear(JSON.parse(event.data) as News);
+      setLost(false);
+      receive(JSON.parse(event.data) as RunUpdate);
     };
     socket.onclose = () => {
       if (ended) return;
-      lost(true);
+      setLost(true);
       setTimeout(() => { if (!ended) open(); }, wait);
       wait = Math.min(wait * 1.6, 4000);
     };
@@ -180,57 +194,57 @@ export function follow(path: string, hear: (news: News) => void, lost: (yes: boo
   };
 }
 
-type Answer = Response & { id: number; error?: { message: string; key: string } };
+type Evaluation = Response & { id: number; error?: { message: string; key: string } };
 
-/** Asks for the response of one design after the other; while one is under way only the latest waits. */
+/** Evaluates designs one after the other; while one is being evaluated, only the latest is queued. */
 export class Solver {
   private socket: WebSocket | null = null;
   private sent = "";
-  private waiting: { problem: Problem; mask: string } | null = null;
+  private queued: { problem: Problem; mask: string } | null = null;
   private busy = false;
   private number = 0;
   private since = 0;
-  /** Milliseconds of the last answer, from question to answer. */
+  /** Milliseconds between the last request and its result. */
   latency = 0;
 
-  constructor(private readonly hear: (answer: Answer, latency: number) => void) {}
+  constructor(private readonly onResult: (result: Evaluation, latency: number) => void) {}
 
-  ask(problem: Problem, mask: string): void {
-    this.waiting = { problem, mask };
+  evaluate(problem: Problem, mask: string): void {
+    this.queued = { problem, mask };
     this.next();
   }
 
   close(): void {
-    this.waiting = null;
+    this.queued = null;
     this.socket?.close();
     this.socket = null;
   }
 
   private next(): void {
-    if (this.busy || !this.waiting) return;
+    if (this.busy || !this.queued) return;
     if (!this.socket || this.socket.readyState > WebSocket.OPEN) {
       this.sent = "";
       this.socket = new WebSocket(address("/edit"));
       this.socket.onopen = () => this.next();
-      this.socket.onmessage = (event: MessageEvent<string>) => this.answered(JSON.parse(event.data) as Answer);
+      this.socket.onmessage = (event: MessageEvent<string>) => this.receive(JSON.parse(event.data) as Evaluation);
       this.socket.onclose = () => { this.busy = false; };
       return;
     }
     if (this.socket.readyState !== WebSocket.OPEN) return;
-    const { problem, mask } = this.waiting;
-    this.waiting = null;
+    const { problem, mask } = this.queued;
+    this.queued = null;
     this.busy = true;
     this.since = performance.now();
     const text = JSON.stringify(problem);
-    const fresh = text !== this.sent;
+    const changed = text !== this.sent;
     this.sent = text;
-    this.socket.send(JSON.stringify({ id: ++this.number, mask, ...(fresh ? { problem } : {}) }));
+    this.socket.send(JSON.stringify({ id: ++this.number, mask, ...(changed ? { problem } : {}) }));
   }
 
-  private answered(answer: Answer): void {
+  private receive(result: Evaluation): void {
     this.busy = false;
     this.latency = performance.now() - this.since;
-    this.hear(answer, this.latency);
+    this.onResult(result, this.latency);
     this.next();
   }
 }
@@ -252,7 +266,7 @@ export function hexOf(bits: ArrayLike<number>): string {
   return text;
 }
 
-/** Who this browser is, so that searches of several people take turns. */
+/** Identifier of this browser; the server alternates between the searches of several browsers. */
 export function session(): string {
   let known = localStorage.getItem("bellcrank-session");
   if (!known || !/^[a-z0-9-]{1,64}$/.test(known)) {

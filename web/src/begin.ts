@@ -1,14 +1,14 @@
-// Tasks to begin with: from a link, from the last visit, or an example.
+// The task that is shown first: from a link, from the last visit, or an example.
 
 import { get, hexOf, post, type Problem } from "./api";
 import { isEach } from "./drawing";
 import { fromLink, isTask, taskOf, type Task } from "./task";
 
-/** Under which the task at hand is kept in the browser. */
-export const KEY = "bellcrank-task";
+/** Key of the current task in the storage of the browser. */
+export const TASK_KEY = "bellcrank-task";
 
-/** A task on a lattice of which nothing is said yet. */
-export function bare(lattice: Pick<Problem, "positions" | "beams">, table: Record<string, unknown> | null, like: Task): Task {
+/** A task on a lattice without supports, input and output. */
+export function emptyTask(lattice: Pick<Problem, "positions" | "beams">, table: Record<string, unknown> | null, like: Task): Task {
   const { input, output } = like.problem;
   const problem: Problem = {
     ...like.problem, ...lattice,
@@ -20,22 +20,22 @@ export function bare(lattice: Pick<Problem, "positions" | "beams">, table: Recor
   return { ...like, problem, lattice: table, rules: lattice.beams.map(() => "auto"), hand: null };
 }
 
-/** A task to begin with: an empty-handed visitor gets one that works. */
+/** Return the task of a link, else the stored one, else an example that can be searched. */
 export async function firstTask(link: string): Promise<Task> {
   if (link) {
     try {
       const given = await fromLink(link);
       if (isTask(given)) return given;
-    } catch { /* not a link of ours: begin as usual */ }
+    } catch { /* not a link to a task: ignored */ }
   }
   try {
-    const kept = JSON.parse(localStorage.getItem(KEY) ?? "null") as unknown;
-    if (isTask(kept)) return kept;
-  } catch { /* what was kept is no task */ }
+    const stored = JSON.parse(localStorage.getItem(TASK_KEY) ?? "null") as unknown;
+    if (isTask(stored)) return stored;
+  } catch { /* the stored text is no task: ignored */ }
   return exampleTask();
 }
 
-/** A rectangle that stands on its lowest row: pushed down on the right, it should move left. */
+/** A rectangle supported at its lowest row: input down at the upper right, output to the left at the upper left. */
 export async function exampleTask(): Promise<Task> {
   const lattice = { kind: "triangular-rectangle", columns: 8, rows: 9 };
   const made = await post<Pick<Problem, "positions" | "beams">>("/lattices", { lattice });

@@ -1,18 +1,18 @@
-// The drawing that is drawn on: nodes and beams are picked, arrows are dragged.
+// The drawing of the task, on which nodes and beams are selected and arrows are dragged.
 
 import type { Point, Problem } from "./api";
 import { angleOf, arrow, Drawing, isEach, range, unit, where } from "./drawing";
-import { s, say } from "./dom";
-import { inWords, mirrorAxes, nextThatWay, rollerLines } from "./marks";
+import { announce, s } from "./dom";
+import { describeTarget, mirrorAxes, nextInDirection, rollerLines } from "./marks";
 import { directionOf, nodesOf, rowOf, touching, type Region, type Rule, type Task } from "./task";
 
 export type Tool = "supports" | "input" | "output" | "beams" | "hand";
 
-/** How much longer than the stroke its arrow is drawn. */
+/** Length of the arrow of the input, in strokes. */
 export const STRETCH = 4;
 const SHORTEST = 0.7;
 
-export interface Deeds {
+export interface CanvasActions {
   nodes(region: Region, nodes: number[], add: boolean, merge: boolean): void;
   beams(beams: number[], merge: boolean): void;
   aim(region: "input" | "output", direction: Point, amount: number | null, merge: boolean): void;
@@ -35,7 +35,7 @@ export class Canvas extends Drawing {
   private readonly axes = s("path", { class: "axis" });
   private readonly rollers = s("path", { class: "rollers" });
 
-  constructor(private readonly deeds: Deeds) {
+  constructor(private readonly actions: CanvasActions) {
     super("The task: a lattice with supports, input and output");
     this.svg.setAttribute("role", "application");
     this.svg.setAttribute("tabindex", "0");
@@ -55,11 +55,11 @@ export class Canvas extends Drawing {
     this.svg.addEventListener("blur", () => this.point(-1, -1));
   }
 
-  /** Show a task; `bits` are the beams of the design by hand, if one is drawn. */
+  /** Show a task; `bits` are the present beams of the design drawn by hand, if there is one. */
   show(task: Task, problem: Problem, bits: Uint8Array | null, fault: number[] = []): void {
-    const fresh = this.task?.problem.positions !== task.problem.positions || this.task?.problem.beams !== task.problem.beams;
+    const changed = this.task?.problem.positions !== task.problem.positions || this.task?.problem.beams !== task.problem.beams;
     this.task = task;
-    if (fresh) {
+    if (changed) {
       this.setLattice(problem.positions, problem.beams);
       this.cursor = -1;
     }
@@ -89,7 +89,7 @@ export class Canvas extends Drawing {
     this.showFaults(fault);
   }
 
-  /** Show where an answer of the solver puts the design. */
+  /** Show the design in its deformed state. */
   showMoved(displacement: number[] | null, beams: number[]): void {
     const at = this.rest.slice();
     if (displacement) for (let k = 0; k < at.length; k++) at[k]! += displacement[k]!;
@@ -211,7 +211,7 @@ export class Canvas extends Drawing {
         const [x, y] = [this.rest[2 * k]!, this.rest[2 * k + 1]!];
         return x >= x0 && x <= x1 && y >= y0 && y <= y1;
       });
-      if (inside.length) this.deeds.nodes(region, inside, drag.add, false);
+      if (inside.length) this.actions.nodes(region, inside, drag.add, false);
     } else {
       this.toggleNode(this.nearestNode(at), this.rows || event.shiftKey);
     }
@@ -224,7 +224,7 @@ export class Canvas extends Drawing {
 
   private double(event: MouseEvent): void {
     if (this.picksBeams || !this.task) return;
-    // The two clicks before have switched the node twice; now its whole row follows.
+    // The two preceding clicks have toggled the node twice; this toggles its row.
     this.toggleNode(this.nearestNode(this.locate(event)), true);
   }
 
@@ -232,7 +232,7 @@ export class Canvas extends Drawing {
     if (node < 0 || !this.task || this.picksBeams) return;
     const region = this.tool as Region;
     const inside = nodesOf(this.task.problem, region).includes(node);
-    this.deeds.nodes(region, row ? rowOf(this.task.problem, node) : [node], !inside, false);
+    this.actions.nodes(region, row ? rowOf(this.task.problem, node) : [node], !inside, false);
   }
 
   private paint(at: Point): void {
@@ -240,7 +240,7 @@ export class Canvas extends Drawing {
     if (beam < 0 || !this.drag || this.drag.done.has(beam)) return;
     const merge = this.drag.done.size > 0;
     this.drag.done.add(beam);
-    this.deeds.beams([beam], merge);
+    this.actions.beams([beam], merge);
   }
 
   private aim(region: "input" | "output", at: Point, fine: boolean, merge: boolean): void {
@@ -250,7 +250,7 @@ export class Canvas extends Drawing {
     const length = Math.max(SHORTEST, Math.hypot(dx, dy));
     const amount = region === "input" && this.task!.problem.input.drive === "displacement"
       ? Math.round((length / STRETCH) * 200) / 200 : null;
-    this.deeds.aim(region, unit(fine ? angle : Math.round(angle / 15) * 15), amount, merge);
+    this.actions.aim(region, unit(fine ? angle : Math.round(angle / 15) * 15), amount, merge);
   }
 
   private stretch(from: Point, to: Point): void {
@@ -271,22 +271,22 @@ export class Canvas extends Drawing {
   }
 
   private key(event: KeyboardEvent): void {
-    const ways: Record<string, Point> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-    const way = ways[event.key];
+    const keys: Record<string, Point> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+    const direction = keys[event.key];
     if (!this.task || event.ctrlKey || event.metaKey) return;
-    if (way) {
+    if (direction) {
       event.preventDefault();
-      this.step(way);
+      this.step(direction);
     } else if (event.key === " " || event.key === "Enter") {
       event.preventDefault();
       if (this.cursor < 0) this.step([0, 1]);
-      else if (this.picksBeams) this.deeds.beams([this.cursor], false);
+      else if (this.picksBeams) this.actions.beams([this.cursor], false);
       else this.toggleNode(this.cursor, event.shiftKey || this.rows);
     }
   }
 
-  /** Go to the next node or beam that way. */
-  private step([wx, wy]: Point): void {
+  /** Move the cursor to the next node or beam in a direction. */
+  private step(direction: Point): void {
     const beams = this.picksBeams;
     const total = beams ? this.beams.length : this.rest.length / 2;
     const place = (k: number): Point => {
@@ -295,9 +295,9 @@ export class Canvas extends Drawing {
       return [(this.rest[2 * a]! + this.rest[2 * b]!) / 2, (this.rest[2 * a + 1]! + this.rest[2 * b + 1]!) / 2];
     };
     if (this.cursor >= total) this.cursor = -1;
-    const found = nextThatWay(total, place, this.cursor, [this.box.x, -this.box.y - this.box.h], [wx, wy]);
+    const found = nextInDirection(total, place, this.cursor, [this.box.x, -this.box.y - this.box.h], direction);
     this.cursor = found;
     this.point(beams ? -1 : found, beams ? found : -1);
-    if (found >= 0) say(inWords(this.task!, this.tool, this.bits, found));
+    if (found >= 0) announce(describeTarget(this.task!, this.tool, this.bits, found));
   }
 }

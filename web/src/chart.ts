@@ -1,14 +1,14 @@
 // Efficiency against step for every chain, with the temperature shaded.
 
-import type { TracePoint } from "./api";
+import type { Run, TracePoint } from "./api";
 import { figure, s } from "./dom";
 
 const H = 230;
-const USUAL = 820;
+const DEFAULT_WIDTH = 820;
 const PAD = { left: 44, right: 14, top: 14, bottom: 30 };
 
 export class Chart {
-  readonly svg = s("svg", { class: "chart", viewBox: `0 0 ${USUAL} ${H}`, role: "img", "aria-label": "Efficiency against step, one curve for each chain" });
+  readonly svg = s("svg", { class: "chart", viewBox: `0 0 ${DEFAULT_WIDTH} ${H}`, role: "img", "aria-label": "Efficiency against step, one curve for each chain" });
   readonly curves = new Map<number, TracePoint[]>();
   constructor() {
     new ResizeObserver(() => this.draw()).observe(this.svg);
@@ -20,11 +20,12 @@ export class Chart {
   private cold = 0;
   private hot = 0;
 
-  begin(steps: number, method: string, hot = 0, cold = 0): void {
-    this.steps = steps;
-    this.hot = hot;
-    this.cold = cold;
-    this.shaded = method !== "tempering"; // where hot and cold replicas take turns all the time
+  /** Set the range of steps and of temperatures; replicas at several temperatures are not shaded. */
+  configure(settings: Run["settings"]): void {
+    this.steps = settings.steps;
+    this.hot = settings.hot ?? 0;
+    this.cold = settings.cold ?? 0;
+    this.shaded = settings.replicas === undefined;
   }
 
   compare(title: string, value: number | null): void {
@@ -32,7 +33,7 @@ export class Chart {
     this.draw();
   }
 
-  /** The best that any chain has reached. */
+  /** The best efficiency of all chains so far. */
   get best(): number | null {
     const tops = [...this.curves.values()].map((curve) => curve.at(-1)?.[2] ?? null).filter((top) => top !== null);
     return tops.length ? Math.max(...tops) : null;
@@ -49,8 +50,8 @@ export class Chart {
   }
 
   private draw(): void {
-    // As wide as it is shown, so that its letters are as large as others.
-    const W = Math.max(280, Math.round(this.svg.clientWidth) || USUAL);
+    // The width in pixels, so that the text has its normal size.
+    const W = Math.max(280, Math.round(this.svg.clientWidth) || DEFAULT_WIDTH);
     this.svg.setAttribute("viewBox", `0 0 ${W} ${H}`);
     let [low, high] = [0, 0.1];
     let bestChain = -1;
@@ -105,24 +106,24 @@ export class Chart {
     this.svg.replaceChildren(...parts);
   }
 
-  /** Bands behind the curves, the darker the hotter: the mean over the chains. */
+  /** Bands behind the curves, darker at higher temperature: the mean over the chains. */
   private shading(x: (step: number) => number): SVGElement[] {
     const bins = 64;
     const sum = new Float64Array(bins);
-    const seen = new Float64Array(bins);
+    const counts = new Float64Array(bins);
     let hottest = this.hot - this.cold;
     for (const curve of this.curves.values()) {
       for (const [step, , , temperature] of curve) {
         const bin = Math.min(bins - 1, Math.floor((step / this.steps) * bins));
         sum[bin]! += Math.max(0, temperature - this.cold);
-        seen[bin]! += 1;
+        counts[bin]! += 1;
         hottest = Math.max(hottest, temperature - this.cold);
       }
     }
     if (hottest <= 0) return [];
     const bands: SVGElement[] = [];
     for (let bin = 0; bin < bins; bin++) {
-      const share = seen[bin]! ? sum[bin]! / seen[bin]! / hottest : 0;
+      const share = counts[bin]! ? sum[bin]! / counts[bin]! / hottest : 0;
       if (share < 0.05) continue;
       const from = x((bin * this.steps) / bins);
       bands.push(s("rect", { class: "warm", x: from.toFixed(1), y: PAD.top, width: (x(((bin + 1) * this.steps) / bins) - from + 0.3).toFixed(1), height: H - PAD.top - PAD.bottom, "fill-opacity": (0.55 * share).toFixed(2) }));

@@ -1,11 +1,11 @@
-// Small helpers to make elements, write numbers and say things aloud.
+// Functions that create elements, format numbers and announce messages to screen readers.
 
 type Child = Node | string | number | null | undefined | false;
 type Props = Record<string, unknown>;
 
 const SVG = "http://www.w3.org/2000/svg";
 
-function dress(element: Element, props: Props, children: Child[]): void {
+function setProps(element: Element, props: Props, children: Child[]): void {
   for (const [key, value] of Object.entries(props)) {
     if (value === null || value === undefined || value === false) continue;
     if (key.startsWith("on") && typeof value === "function") {
@@ -26,7 +26,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K, props: Props = {}, ...children: Child[]
 ): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
-  dress(element, props, children);
+  setProps(element, props, children);
   return element;
 }
 
@@ -34,27 +34,27 @@ export function s<K extends keyof SVGElementTagNameMap>(
   tag: K, props: Props = {}, ...children: Child[]
 ): SVGElementTagNameMap[K] {
   const element = document.createElementNS(SVG, tag);
-  dress(element, props, children);
+  setProps(element, props, children);
   return element;
 }
 
 export function clear(element: Element, ...children: Child[]): void {
   element.replaceChildren();
-  dress(element, {}, children);
+  setProps(element, {}, children);
 }
 
-let spoken: HTMLElement | null = null;
+let liveRegion: HTMLElement | null = null;
 
-/** Say something to who listens instead of looking. */
-export function say(text: string): void {
-  if (!spoken) {
-    spoken = h("div", { class: "unseen", role: "status", "aria-live": "polite" });
-    document.body.append(spoken);
+/** Announce a message to screen readers. */
+export function announce(text: string): void {
+  if (!liveRegion) {
+    liveRegion = h("div", { class: "visually-hidden", role: "status", "aria-live": "polite" });
+    document.body.append(liveRegion);
   }
-  spoken.textContent = text;
+  liveRegion.textContent = text;
 }
 
-/** A number as short as it can be read. */
+/** Format a number with a fixed number of digits; a dash without a value. */
 export function figure(value: number | null | undefined, digits = 2): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   return value.toFixed(digits).replace("-", "−");
@@ -79,7 +79,7 @@ export function ago(seconds: number): string {
   return new Date(seconds * 1000).toLocaleDateString("en", { day: "numeric", month: "short", year: "numeric" });
 }
 
-/** A choice of a few, as radio buttons that look like one control. */
+/** A choice of few options: radio buttons displayed as one control. */
 export function choice<T extends string>(
   label: string, options: [T, string][], value: T, pick: (value: T) => void, name = label,
 ): HTMLElement {
@@ -153,7 +153,7 @@ export function icon(name: keyof typeof paths): SVGElement {
   s("path", { d: paths[name] }));
 }
 
-/** A button with a picture alone; who cannot see it hears what it says. */
+/** A button with an icon; its title is announced by screen readers. */
 export function iconButton(name: keyof typeof paths, title: string, press: () => void): HTMLButtonElement {
   return h("button", { type: "button", class: "quiet icon", title, "aria-label": title.replace(/ \(.*/, ""), onclick: press }, icon(name));
 }

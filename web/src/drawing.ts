@@ -1,4 +1,4 @@
-// A lattice as SVG: few paths of many beams, so that it can be drawn anew sixty times a second.
+// A lattice as SVG: few paths of many beams, which can be redrawn sixty times a second.
 
 import type { Point, Problem } from "./api";
 import { s } from "./dom";
@@ -9,7 +9,7 @@ export interface Box { x: number; y: number; w: number; h: number }
 
 export const BINS = 12;
 
-/** x and y of all nodes in turn. */
+/** Flatten positions to x and y of each node in turn. */
 export function flatten(positions: Point[]): Float64Array {
   const flat = new Float64Array(2 * positions.length);
   positions.forEach(([x, y], k) => { flat[2 * k] = x; flat[2 * k + 1] = y; });
@@ -27,7 +27,7 @@ export class Drawing {
   rest: Float64Array = new Float64Array(0);
   at: Float64Array = new Float64Array(0);
   beams: [number, number][] = [];
-  /** Of the lattice at rest, with a margin; `view` is what is seen. */
+  /** Bounds of the lattice at rest, with a margin; `view` is the visible region. */
   box: Box = { x: 0, y: 0, w: 10, h: 10 };
   private view: Box = this.box;
 
@@ -50,10 +50,10 @@ export class Drawing {
       y0 = Math.min(y0, y); y1 = Math.max(y1, y);
     }
     this.box = { x: x0 - margin, y: -y1 - margin, w: x1 - x0 + 2 * margin, h: y1 - y0 + 2 * margin };
-    this.look(this.box);
+    this.setView(this.box);
   }
 
-  /** Put the nodes elsewhere; `null` puts them back. */
+  /** Displace the nodes; `null` returns them to rest. */
   move(displacement: ArrayLike<number> | null, times = 1): void {
     if (!displacement) {
       this.at = this.rest;
@@ -64,7 +64,7 @@ export class Drawing {
     this.at = at;
   }
 
-  /** Enlarge the picture, if need be, so that beams stay inside when they have moved. */
+  /** Enlarge the view, if necessary, so that displaced beams are inside. */
   makeRoom(beams: ArrayLike<number>, displacement: ArrayLike<number>, margin = 0.6): void {
     const { x, y, w, h } = this.view;
     let [x0, y0, x1, y1] = [x, y, x + w, y + h];
@@ -73,10 +73,10 @@ export class Drawing {
       const py = -(this.rest[2 * node + 1]! + displacement[2 * node + 1]!);
       x0 = Math.min(x0, px - margin); x1 = Math.max(x1, px + margin); y0 = Math.min(y0, py - margin); y1 = Math.max(y1, py + margin);
     }
-    this.look({ x: x0, y: y0, w: x1 - x0, h: y1 - y0 });
+    this.setView({ x: x0, y: y0, w: x1 - x0, h: y1 - y0 });
   }
 
-  private look(view: Box): void {
+  private setView(view: Box): void {
     this.view = view;
     this.svg.setAttribute("viewBox", `${view.x} ${view.y} ${view.w} ${view.h}`);
     thicken(this.svg, view.w);
@@ -93,7 +93,7 @@ export class Drawing {
     return d;
   }
 
-  /** Draw groups of beams where the nodes are; groups that are not named vanish. */
+  /** Draw groups of beams at the current positions; other groups are cleared. */
   draw(groups: Group[]): void {
     const named = new Set<string>();
     for (const { name, beams } of groups) {
@@ -105,7 +105,7 @@ export class Drawing {
     }
   }
 
-  /** Draw beams at rest underneath everything. */
+  /** Draw beams at rest below all other elements. */
   ghost(name: string, beams: ArrayLike<number>): void {
     const key = `under-${name}`;
     let path = this.paths.get(key);
@@ -127,7 +127,7 @@ export class Drawing {
     return path;
   }
 
-  /** Mark nodes with dots of a kind. */
+  /** Mark nodes with dots of one class. */
   mark(name: string, nodes: ArrayLike<number>, at: Float64Array = this.at): void {
     let path = this.marks.get(name);
     if (!path) {
@@ -149,7 +149,7 @@ export class Drawing {
     this.mark("output", problem.output.nodes);
   }
 
-  /** Where the pointer is, in lattice units. */
+  /** Position of the pointer in lattice units. */
   locate(event: { clientX: number; clientY: number }): Point {
     const matrix = this.svg.getScreenCTM();
     if (!matrix) return [0, 0];
@@ -181,7 +181,7 @@ export class Drawing {
   }
 }
 
-/** Keep lines visible in a picture of a large lattice; `width` is what it shows, in beams. */
+/** Make lines thicker in a picture of a large lattice; `width` is the visible width in beam lengths. */
 export function thicken(svg: SVGElement, width: number, usual = 32): void {
   svg.style.setProperty("--thick", Math.min(2, Math.max(1, width / usual)).toFixed(2));
 }
@@ -196,7 +196,7 @@ export function where(bits: ArrayLike<number>, value = 1): number[] {
   return found;
 }
 
-/** Sort beams into as many groups as there are colours, by a share from 0 to 1 each. */
+/** Group beams by colour according to a fraction from 0 to 1 of each. */
 export function binned(beams: number[], share: ArrayLike<number>, prefix = "heat"): Group[] {
   const groups: number[][] = Array.from({ length: BINS }, () => []);
   for (const beam of beams) {
@@ -220,7 +220,7 @@ const NAMES: [number, string][] = [
   [180, "left"], [225, "down and left"], [270, "down"], [315, "down and right"],
 ];
 
-export function wayOf(direction: Point): string {
+export function directionName(direction: Point): string {
   const angle = angleOf(direction);
   return NAMES.find(([at]) => at === angle)?.[1] ?? `towards ${angle}°`;
 }

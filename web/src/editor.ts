@@ -1,40 +1,40 @@
-// The page on which a task is drawn, and a design by hand.
+// The page on which a task is defined, and a design is drawn by hand.
 
-import { post, Refusal, session, Solver, bitsOf, hexOf, type Part, type Point, type Problem, type Response } from "./api";
-import { KEY } from "./begin";
+import { bitsOf, fetchRegistries, hexOf, post, ServerError, session, Solver, type Part, type Point, type Problem, type Registries, type Response } from "./api";
+import { TASK_KEY } from "./begin";
 import { Canvas, type Tool } from "./canvas";
 import { where } from "./drawing";
-import { choice, clear, download, figure, h, iconButton, say } from "./dom";
+import { announce, choice, clear, download, figure, h, iconButton } from "./dom";
+import type { Brush, Fault, Settings, TaskEditor } from "./editing";
 import { Panels } from "./panels";
 import {
   assign, goalsOf, History, images, nodesOf, problemOf, taskOf, toLink, type Hold, type Region, type Task,
 } from "./task";
-import { fileName, sentence, suffixOf, undoing } from "./words";
+import { fileName, sentence, suffixOf, undoKeys } from "./text";
 
 const TOOLS: [Tool, string, string][] = [
-  ["supports", "Hold", "Click nodes that are held; drag a box for many, double-click for a row."],
-  ["input", "Push", "Click nodes that are pushed; drag the orange arrow to aim, longer for a longer stroke."],
-  ["output", "Move", "Click nodes that should move; drag the blue arrow to say which way."],
-  ["beams", "Beams", "Paint beams that must stay or must never be there."],
-  ["hand", "By hand", "Click beams away and back; what the real solver says is drawn in at once."],
+  ["supports", "Supports", "Click nodes to support them; drag a box to select several, double-click to select a row."],
+  ["input", "Input", "Click the input nodes; drag the orange arrow to set direction and stroke."],
+  ["output", "Output", "Click the output nodes; drag the blue arrow to set the direction in which they should move."],
+  ["beams", "Beams", "Mark beams that must be present or absent."],
+  ["hand", "By hand", "Click beams to remove or add them; the computed response is shown at once."],
 ];
 
 const MISSING: [Region, string][] = [
-  ["supports", "Nothing is held yet: choose Hold and click nodes."],
-  ["input", "Nothing is pushed yet: choose Push and click nodes."],
-  ["output", "Nothing is to move yet: choose Move and click nodes."],
+  ["supports", "No supports: choose Supports and click nodes."],
+  ["input", "No input: choose Input and click nodes."],
+  ["output", "No output: choose Output and click nodes."],
 ];
-const WELCOME = "To begin with: held below, pushed down on the right, it should move left. Change what you like, or just press Design it.";
+const WELCOME = "This example is supported at the bottom and pushed down at the right; its output should move left. Change it, or press Design it.";
 
-export interface Settings { method: string; steps: number; chains: number; seed: number; real: boolean; width: number; material: string }
-
-export class Editor {
+export class Editor implements TaskEditor {
   readonly element = h("div", { class: "page draw" });
   tool: Tool = "supports";
   hold: Hold = "fixed";
-  brush: "keep" | "never" | "auto" = "keep";
-  settings: Settings = { method: "basin-hopping", steps: 20000, chains: 4, seed: 0, real: true, width: 2, material: "ninjaflex" };
-  fault: { key: string; message: string } | null = null;
+  brush: Brush = "keep";
+  settings: Settings = { method: "", steps: 20000, chains: 4, seed: 0, forPart: true, width: 2, material: "" };
+  fault: Fault | null = null;
+  registries: Registries | null = null;
   response: Response | null = null;
   private history: History<Task>;
   private readonly canvas: Canvas;
@@ -42,7 +42,7 @@ export class Editor {
   private readonly solver: Solver;
   private stiffness: Problem["stiffness"] | null = null;
   private readonly hint = h("p", { class: "hint" });
-  private readonly complaint = h("p", { class: "complaint", role: "alert" });
+  private readonly errorLine = h("p", { class: "error", role: "alert" });
   private readonly readout = h("div", { class: "readout", "aria-live": "polite" });
   private readonly tools = h("div", { class: "tools" });
   private readonly undoButton = iconButton("undo", "Undo (Ctrl+Z)", () => this.step("undo"));
@@ -50,40 +50,47 @@ export class Editor {
   private checking: AbortController | null = null;
   private timer = 0;
   private checked = "";
-  private readonly leaving = (): void => this.keep();
-  private readonly keys = undoing((way) => this.step(way));
+  private readonly onLeave = (): void => this.store();
+  private readonly keys = undoKeys((action) => this.step(action));
 
-  constructor(task: Task, private readonly fresh = false) {
+  constructor(task: Task, private readonly isFirstVisit = false) {
     this.history = new History(task);
     this.canvas = new Canvas({
       nodes: (region, nodes, add, merge) => this.set(assign(this.task, region, nodes, add, this.hold), merge),
       beams: (beams, merge) => this.paint(beams, merge),
       aim: (region, direction, amount, merge) => this.aim(region, direction, amount, merge),
     });
-    this.solver = new Solver((answer, latency) => this.answered(answer, latency, answer.error));
+    this.solver = new Solver((result, latency) => this.showResponse(result, latency, result.error));
     this.panels = new Panels(this);
     this.build();
     this.choose("supports");
     document.addEventListener("keydown", this.keys);
-    addEventListener("pagehide", this.leaving);
+    addEventListener("pagehide", this.onLeave);
     this.changed();
+    void fetchRegistries().then((found) => {
+      this.registries = found;
+      this.settings = { ...this.settings, method: this.settings.method || found.searches[0]!.name, material: this.settings.material || found.materials[0]!.name };
+      this.panels.show();
+      void this.check();
+    }, (error: ServerError) => { this.errorLine.textContent = sentence(error.message); });
   }
 
   get task(): Task { return this.history.value; }
   get problem(): Problem { return problemOf(this.task); }
 
-  /** The problem with the stiffness of the part that it is for, as the server says it is. */
-  private get meant(): Problem { return this.settings.real && this.stiffness ? { ...this.problem, stiffness: this.stiffness } : this.problem; }
+  /** The problem with the stiffness of the part, as computed by the server. */
+  private get partProblem(): Problem { return this.settings.forPart && this.stiffness ? { ...this.problem, stiffness: this.stiffness } : this.problem; }
 
-  private get part(): Part {
-    return { width: this.settings.width, thickness: 5, scale: this.task.scale, material: this.settings.material };
+  /** The part to be designed; null without one, or before its material is known. */
+  private get part(): Part | null {
+    const { forPart, width, material } = this.settings;
+    return forPart && material ? { width, thickness: 5, scale: this.task.scale, material } : null;
   }
 
-  /** Take up another stiffness. */
-  restiffen(): void {
-    void this.check().then(() => this.ask());
+  updateStiffness(): void {
+    void this.check().then(() => this.evaluate());
   }
-  /** What has to be drawn before anything can be searched. */
+
   get missing(): { region: Region; message: string } | null {
     const { problem } = this.task;
     const empty = MISSING.find(([region]) => !nodesOf(problem, region).length);
@@ -91,7 +98,7 @@ export class Editor {
   }
 
   close(): void {
-    removeEventListener("pagehide", this.leaving);
+    removeEventListener("pagehide", this.onLeave);
     document.removeEventListener("keydown", this.keys);
     clearTimeout(this.timer);
     this.checking?.abort();
@@ -103,12 +110,12 @@ export class Editor {
       h("div", { class: "bar" }, this.tools,
         h("span", { class: "spring" }), this.undoButton, this.redoButton),
       h("div", { class: "paper" }, this.readout, this.canvas.svg),
-      h("div", { class: "below" }, this.hint, this.complaint));
+      h("div", { class: "below" }, this.hint, this.errorLine));
     this.element.append(
       h("div", { class: "intro" },
-        h("h1", {}, "What should move, when you push where?"),
-        h("p", {}, "Draw what is held, what is pushed and what should move; bellcrank finds which beams to leave out so that one piece of material does it."),
-        this.fresh && h("p", { class: "welcome" }, WELCOME)),
+        h("h1", {}, "Design a compliant mechanism"),
+        h("p", {}, "Define supports, input and output. The search determines which beams to remove, so that one piece of material produces the motion."),
+        this.isFirstVisit && h("p", { class: "welcome" }, WELCOME)),
       stage, this.panels.element);
   }
 
@@ -124,13 +131,11 @@ export class Editor {
     (this.tools.querySelector("input:checked") as HTMLElement | null)?.focus({ preventScroll: true });
   }
 
-  /** Take in a task that was changed. */
   set(task: Task, merge = false): void {
     this.history.set(task, merge);
     this.changed();
   }
 
-  /** Take in another task from elsewhere. */
   open(task: Task): void {
     this.set(task);
     this.choose("supports");
@@ -151,7 +156,7 @@ export class Editor {
       const to = bits[beams[0]!] ? 0 : 1;
       for (const beam of all) bits[beam] = to;
       this.set({ ...this.task, hand: hexOf(bits) }, merge);
-      say(`${to ? "added" : "removed"} beam ${beams[0]}`);
+      announce(`${to ? "added" : "removed"} beam ${beams[0]}`);
       return;
     }
     const rules = [...this.task.rules];
@@ -160,46 +165,46 @@ export class Editor {
     this.set({ ...this.task, rules, hand: null }, merge);
   }
 
-  pickRows(yes: boolean): void { this.canvas.rows = yes; }
+  selectRows(rows: boolean): void { this.canvas.rows = rows; }
 
   clearRegion(region: "supports" | "input" | "output"): void {
     this.set(assign(this.task, region, nodesOf(this.task.problem, region), false));
   }
 
-  turn(region: "input" | "output", direction: Point): void { this.change(region, { direction }); }
+  setDirection(region: "input" | "output", direction: Point): void { this.change(region, { direction }); }
 
   change(region: "input" | "output", changes: Record<string, unknown>): void {
     const { problem } = this.task;
     this.set({ ...this.task, problem: { ...problem, [region]: { ...problem[region], ...changes } } });
   }
 
-  private step(way: "undo" | "redo"): void {
-    this.history[way]();
+  private step(action: "undo" | "redo"): void {
+    this.history[action]();
     this.changed();
-    say(way === "undo" ? "undone" : "done again");
+    announce(action === "undo" ? "undone" : "redone");
   }
 
   private changed(): void {
     if (this.tool === "hand" && !this.task.hand) this.history.set({ ...this.task, hand: this.problem.initial }, true);
     clearTimeout(this.timer);
     if (this.tool === "hand") {
-      // The question goes out before anything is drawn, and what can wait waits.
-      this.ask();
+      // The request is sent before the drawing is updated; the rest is delayed.
+      this.evaluate();
       this.showDrawing();
-      this.timer = window.setTimeout(() => { this.keep(); this.show(); void this.check(); }, 150);
+      this.timer = window.setTimeout(() => { this.store(); this.show(); void this.check(); }, 150);
       return;
     }
-    this.keep();
+    this.store();
     this.show();
     this.timer = window.setTimeout(() => void this.check(), 120);
   }
 
-  private keep(): void {
-    try { localStorage.setItem(KEY, JSON.stringify(this.task)); } catch { /* storage is full: nothing is kept */ }
+  private store(): void {
+    try { localStorage.setItem(TASK_KEY, JSON.stringify(this.task)); } catch { /* the storage is full: not stored */ }
   }
 
-  private ask(): void {
-    if (this.task.hand && !this.missing) this.solver.ask(this.meant, this.task.hand);
+  private evaluate(): void {
+    if (this.task.hand && !this.missing) this.solver.evaluate(this.partProblem, this.task.hand);
   }
 
   private show(): void {
@@ -207,7 +212,7 @@ export class Editor {
     const byHand = this.tool === "hand" && this.task.hand;
     this.undoButton.disabled = !this.history.canUndo;
     this.redoButton.disabled = !this.history.canRedo;
-    this.complaint.textContent = this.missing ? "" : (this.fault?.message ?? "");
+    this.errorLine.textContent = this.missing ? "" : (this.fault?.message ?? "");
     if (!byHand) clear(this.readout);
     this.panels.show();
   }
@@ -221,7 +226,7 @@ export class Editor {
     this.element.classList.toggle("by-hand", !!byHand);
   }
 
-  /** Ask the server what it thinks of the task. */
+  /** Validate the task on the server, and evaluate the full lattice. */
   private async check(): Promise<void> {
     this.checking?.abort();
     if (this.missing) {
@@ -229,62 +234,62 @@ export class Editor {
       this.show();
       return;
     }
-    const body = { problem: this.problem, goals: goalsOf(this.task), part: this.settings.real ? this.part : null };
+    const body = { problem: this.problem, goals: goalsOf(this.task), part: this.part };
     const text = JSON.stringify(body);
     if (text === this.checked) return;
-    const asked = new AbortController();
-    this.checking = asked;
+    const requested = new AbortController();
+    this.checking = requested;
     try {
-      const found = await post<{ response: Response | null; stiffness: Problem["stiffness"] | null }>("/tasks/check", body, asked.signal);
+      const found = await post<{ response: Response | null; stiffness: Problem["stiffness"] | null }>("/tasks/check", body, requested.signal);
       this.checked = found.response ? text : "";
       this.fault = null;
       this.response = found.response;
       if (found.stiffness && JSON.stringify(found.stiffness) !== JSON.stringify(this.stiffness)) {
         this.stiffness = found.stiffness;
-        this.ask();
+        this.evaluate();
       }
     } catch (error) {
       if (error instanceof DOMException) return;
-      const refused = error as Refusal;
+      const refused = error as ServerError;
       this.checked = "";
-      this.fault = { key: refused.key, message: inPlainWords(refused.message) };
+      this.fault = { key: refused.key, message: errorText(refused.message) };
     }
-    if (!asked.signal.aborted) this.show();
+    if (!requested.signal.aborted) this.show();
   }
 
-  private answered(answer: Response, latency: number, error?: { message: string }): void {
+  private showResponse(response: Response, latency: number, error?: { message: string }): void {
     if (this.tool !== "hand" || !this.task.hand) return;
     const bits = bitsOf(this.task.hand, this.problem.beams.length);
-    this.canvas.showMoved(error ? null : answer.displacement, where(bits));
-    const whole = this.response?.efficiency;
-    const good = !error && answer.status === "converged";
+    this.canvas.showMoved(error ? null : response.displacement, where(bits));
+    const full = this.response?.efficiency;
+    const converged = !error && response.status === "converged";
     clear(this.readout,
-      h("strong", {}, error ? "–" : figure(answer.efficiency, 3)),
-      h("span", {}, error ? sentence(error.message) : good ? "output motion over input motion" : sentence(answer.message)),
-      good && whole !== null && whole !== undefined && h("span", {}, `all beams: ${figure(whole, 3)}`),
+      h("strong", {}, error ? "–" : figure(response.efficiency, 3)),
+      h("span", {}, error ? sentence(error.message) : converged ? "spring model: output / input displacement" : sentence(response.message)),
+      converged && full !== null && full !== undefined && h("span", {}, `full lattice: ${figure(full, 3)}`),
       h("span", { class: "latency" }, `${latency.toFixed(0)} ms, ${where(bits).length} beams`));
     this.readout.dataset.latency = latency.toFixed(1);
     document.dispatchEvent(new CustomEvent("bellcrank-response", { detail: latency }));
   }
 
-  /** Begin the search, and go to where it can be watched. */
-  async begin(): Promise<void> {
+  /** Start the search and open its page. */
+  async startSearch(): Promise<void> {
     const { settings, task } = this;
     const body = {
       title: task.problem.name, session: session(), problem: this.problem, goals: goalsOf(task),
       method: settings.method, steps: settings.steps, chains: settings.chains, seed: settings.seed,
-      part: settings.real ? this.part : null,
+      part: this.part,
       reference: task.hand && task.hand !== this.problem.initial ? task.hand : null,
     };
     const { id } = await post<{ id: string }>("/runs", body);
     location.hash = `#/run/${id}`;
   }
 
-  async keepHand(title: string): Promise<void> {
-    const kept = await post<{ source: string; key: string }>("/gallery", {
-      problem: this.meant, mask: this.task.hand, title, provenance: { kind: "drawn", ...(this.settings.real ? { part: this.part } : {}) },
+  async saveHandDesign(title: string): Promise<void> {
+    const saved = await post<{ source: string; key: string }>("/gallery", {
+      problem: this.partProblem, mask: this.task.hand, title, provenance: { kind: "drawn", ...(this.part ? { part: this.part } : {}) },
     });
-    location.hash = `#/design/${kept.source}/${kept.key}`;
+    location.hash = `#/design/${saved.source}/${saved.key}`;
   }
 
   async save(suffix: ".toml" | ".json"): Promise<void> {
@@ -292,15 +297,14 @@ export class Editor {
     download(new Blob([text], { type: "text/plain" }), `${fileName(this.task.problem.name)}${suffix}`);
   }
 
-  /** Put the task into a link, and say where that is: a browser copies only on a page it trusts. */
   async link(): Promise<string> {
     const address = `${location.origin}/#/draw/${await toLink(this.task)}`;
     try {
       await navigator.clipboard.writeText(address);
       return "Copied";
-    } catch {
+    } catch { // browsers allow copying on secure pages only
       history.replaceState(null, "", address);
-      return "See the address";
+      return "See address bar";
     }
   }
 
@@ -311,8 +315,8 @@ export class Editor {
   }
 }
 
-/** Say what is wrong with a mirror as the page calls it; other sentences stay as they are. */
-function inPlainWords(message: string): string {
-  const lonely = /^goal 'mirror .*: (\d+ of \d+) designable beams/.exec(message);
-  return lonely ? `The task is not symmetric: ${lonely[1]} beams have no mirror image. Choose mirrored nodes, or drop the mirror.` : sentence(message);
+/** Replace the message of a mirror constraint by the terms of the page; other messages are unchanged. */
+function errorText(message: string): string {
+  const unmatched = /^goal 'mirror .*: (\d+ of \d+) designable beams/.exec(message);
+  return unmatched ? `The task is not symmetric: ${unmatched[1]} beams have no mirror image. Select symmetric nodes, or switch the mirror symmetry off.` : sentence(message);
 }

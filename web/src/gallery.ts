@@ -1,18 +1,18 @@
-// Designs and searches to open.
+// The gallery of designs and the list of searches.
 
-import { get, type Run, type Shelf } from "./api";
+import { get, type Run, type Collection } from "./api";
 import { ago, count, figure, h } from "./dom";
-import { shelfView, tile } from "./shelves";
+import { collectionView, tile } from "./collections";
 
-/** Designs of a shelf before one asks for all: three rows. */
+/** Number of designs of a collection shown at first: three rows. */
 const SHOWN = 15;
 
 export async function galleryPage(): Promise<HTMLElement> {
-  const shelves = await get<Shelf[]>("/gallery");
+  const collections = await get<Collection[]>("/gallery");
   return h("div", { class: "page wide" },
-    h("div", { class: "intro" }, h("h1", {}, "Gallery"), h("p", {}, "Open a design to see it move, to take it, or to go on from it.")),
-    ...shelves.filter(({ entries }) => entries.length).map((shelf) => shelfView(shelf, (small) =>
-      tile(small, small.source === "runs" ? `#/run/${small.key}` : `#/design/${small.source}/${small.key}`), SHOWN)));
+    h("div", { class: "intro" }, h("h1", {}, "Gallery"), h("p", {}, "Open a design to see its motion, to download it, or to use it as a starting point.")),
+    ...collections.filter(({ entries }) => entries.length).map((collection) => collectionView(collection, (entry) =>
+      tile(entry, entry.source === "runs" ? `#/run/${entry.key}` : `#/design/${entry.source}/${entry.key}`), SHOWN)));
 }
 
 export class RunsPage {
@@ -22,7 +22,7 @@ export class RunsPage {
 
   constructor() {
     this.element.append(h("div", { class: "intro" }, h("h1", {}, "Searches"),
-      h("p", {}, "They go on when this page is closed, and are here when you come back.")), this.list);
+      h("p", {}, "Searches continue on the server when this page is closed.")), this.list);
     void this.refresh();
     this.timer = window.setInterval(() => void this.refresh(), 1000);
   }
@@ -36,7 +36,7 @@ export class RunsPage {
     } catch { return; }
     const focused = document.activeElement?.getAttribute("href");
     if (!runs.length) {
-      this.list.replaceChildren(h("li", { class: "empty" }, "None yet. ", h("a", { href: "#/draw" }, "Draw a task"), " and press Design it."));
+      this.list.replaceChildren(h("li", { class: "empty" }, "No searches. ", h("a", { href: "#/draw" }, "Define a task"), " and press Design it."));
       return;
     }
     this.list.replaceChildren(...runs.map((run) => {
@@ -44,10 +44,10 @@ export class RunsPage {
       const active = run.status === "running" || run.status === "queued" || run.status === "paused";
       return h("li", {}, h("a", { class: "line", href: `#/run/${run.id}` },
         h("span", { class: "title" }, run.title),
-        h("span", { class: `status ${run.status}` }, run.status === "queued" && run.place ? `${count(run.place, "search", "searches")} before it` : run.status),
+        h("span", { class: `status ${run.status}` }, run.status === "queued" && run.place ? `queued, ${count(run.place, "search", "searches")} ahead` : run.status),
         h("span", { class: "value" }, figure(run.efficiency)),
         h("span", { class: "more" }, `${run.method} · ${ago(run.created)}`),
-        active && h("progress", { max: 1, value: share, "aria-label": `${run.title}: part that is done` })));
+        active && h("progress", { max: 1, value: share, "aria-label": `${run.title}: progress` })));
     }));
     if (focused) this.list.querySelector<HTMLElement>(`[href="${focused}"]`)?.focus({ preventScroll: true });
   }

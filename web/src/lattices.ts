@@ -1,8 +1,8 @@
-// Lattices as tables, and what becomes of a task when its lattice is another.
+// Tables of lattices, and the transfer of regions from one lattice to another.
 
 import type { Point, Problem } from "./api";
 
-/** The rows of a lattice like the crane of the paper: a broad base, a body, and arms that reach out. */
+/** Return a lattice like the crane of the paper: a wide base, a body, and projecting arms. */
 export function craneRows(across: number, up: number): Record<string, unknown> {
   const counts = [across, across + 1, across];
   const first_x = [0.5, 0, 0.5];
@@ -19,7 +19,7 @@ export function craneRows(across: number, up: number): Record<string, unknown> {
 }
 
 const SIDES: [0 | 1, 1 | -1][] = [[1, -1], [1, 1], [0, -1], [0, 1]];
-/** Less than the height of a row, more than what disorder moves a node by. */
+/** Less than the height of a row, more than the displacement of nodes in a disordered lattice. */
 const EDGE = 0.7;
 
 /** Nodes along one side: lowest or highest in x or y. */
@@ -28,8 +28,8 @@ function along(positions: Point[], [axis, sign]: [0 | 1, 1 | -1]): number[] {
   return positions.flatMap((point, k) => (extreme - sign * point[axis] < EDGE ? [k] : []));
 }
 
-/** Find the nodes of a new lattice that lie where some of the old one lay, by their share of the box. */
-export function moved(before: Problem, made: Pick<Problem, "positions">, nodes: number[]): number[] {
+/** Find the nodes of a new lattice at the relative positions of nodes of the old one. */
+export function transferNodes(before: Problem, made: Pick<Problem, "positions">, nodes: number[]): number[] {
   const box = (positions: Point[]): [number, number, number, number] => {
     const xs = positions.map((p) => p[0]);
     const ys = positions.map((p) => p[1]);
@@ -43,11 +43,11 @@ export function moved(before: Problem, made: Pick<Problem, "positions">, nodes: 
     positions.forEach(([, y], k) => { const key = Math.round(10 * y); rows.set(key, [...(rows.get(key) ?? []), k]); });
     return rows;
   };
-  // A whole row stays a whole row, however many nodes it has now.
+  // Complete rows are mapped to complete rows.
   const [old, fresh] = [height(before.positions), height(made.positions)];
   const rows = [...fresh.keys()];
   const left = new Set(nodes);
-  // A whole edge stays a whole edge, also where nodes lie in no rows.
+  // Complete edges are mapped to complete edges, also without rows.
   for (const side of SIDES) {
     const edge = along(before.positions, side);
     if (edge.length < 3 || !edge.every((node) => left.has(node))) continue;
@@ -63,7 +63,7 @@ export function moved(before: Problem, made: Pick<Problem, "positions">, nodes: 
   }
   for (const node of left) {
     const [x, y] = before.positions[node]!;
-    // Near an edge the distance from that edge counts, so that corners stay corners.
+    // Near an edge, the distance from that edge is kept, so that corners are mapped to corners.
     const fit = (v: number, o: number, w: number, n: number, m: number): number =>
       v - o < 0.3 * w ? n + (v - o) : o + w - v < 0.3 * w ? n + m - (o + w - v) : n + ((v - o) / w) * m;
     const [tx, ty] = [fit(x, ox, ow, nx, nw), fit(y, oy, oh, ny, nh)];

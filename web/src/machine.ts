@@ -1,50 +1,50 @@
-// Parts that are placed, turned and linked, and built as one design.
+// The page on which parts are placed, rotated and linked, and assembled to one design.
 
-import { bitsOf, get, post, type Point, type Problem, type Refusal, type Shelf, type Small } from "./api";
+import { bitsOf, get, post, type Point, type Problem, type ServerError, type Collection, type GalleryEntry } from "./api";
 import { arrow, Drawing, isEach, where } from "./drawing";
-import { button, choice, clear, field, figure, h, iconButton, number, s, say, select } from "./dom";
-import { emptyPlan, isPlan, MOST, portsOf, readPlan, spoken, withoutPart, withPart, writePlan, type Plan, type PlanEnd, type PlanPart, type Port, type WrittenPlan } from "./plan";
-import { shelfView, thumbnail } from "./shelves";
+import { announce, button, choice, clear, field, figure, h, iconButton, number, s, select } from "./dom";
+import { emptyPlan, isPlan, MOST, portLabel, portsOf, readPlan, withoutPart, withPart, writePlan, type Plan, type PlanEnd, type PlanPart, type Port, type WrittenPlan } from "./plan";
+import { collectionView, thumbnail } from "./collections";
 import { History } from "./task";
-import { sentence, undoing } from "./words";
+import { sentence, undoKeys } from "./text";
 
 interface Built { problem: Problem; mask: string; efficiency: number | null; status: string; message: string; provenance: Record<string, unknown>; parts: Record<string, number[]> }
 
 const KEY = "bellcrank-machine";
 const NEAR = 2.1;
-/** Designs of a shelf before one asks for all. */
+/** Number of designs of a collection shown at first. */
 const SHOWN = 12;
-/** In the order of their use; what is on other shelves fits no machine. */
-const SHELVES = ["machines", "library", "struts", "kept", "runs"];
+/** Collections whose designs have ports, in the order of display. */
+const COLLECTIONS = ["machines", "library", "struts", "kept", "runs"];
 
 export class MachinePage {
   readonly element = h("div", { class: "page machine" });
   private readonly drawing = new Drawing("The machine");
   private readonly panel = h("aside", { class: "panel", "aria-label": "Parts" });
-  private readonly shelf = h("div", { class: "shelves" }, h("p", { class: "note" }, "Fetching the designs …"));
-  private readonly fault = h("p", { class: "complaint", role: "alert" });
+  private readonly collection = h("div", { class: "collections" }, h("p", { class: "note" }, "Loading designs …"));
+  private readonly fault = h("p", { class: "error", role: "alert" });
   private readonly readout = h("div", { class: "readout", "aria-live": "polite" });
   private readonly blank = h("div", { class: "blank" },
-    h("h2", {}, "Nothing here yet"),
-    h("p", {}, "Open one of the machines below to see how it is done, or add actuators one by one: the first is pushed, and each moves the next."));
+    h("h2", {}, "No parts"),
+    h("p", {}, "Open one of the bundled machines below as an example, or add actuators one by one. The first one receives the input, and each drives the next."));
   private readonly undoButton = iconButton("undo", "Undo (Ctrl+Z)", () => this.step("undo"));
   private readonly redoButton = iconButton("redo", "Redo (Ctrl+Shift+Z)", () => this.step("redo"));
   private readonly history: History<Plan>;
-  private readonly keys = undoing((way) => this.step(way));
+  private readonly keys = undoKeys((action) => this.step(action));
   private built: Built | null = null;
-  private smalls = new Map<string, Small>();
-  private asked = 0;
+  private known = new Map<string, GalleryEntry>();
+  private requested = 0;
 
   constructor(given: WrittenPlan | null) {
-    this.history = new History(given ? readPlan(given) : keptPlan());
+    this.history = new History(given ? readPlan(given) : storedPlan());
     this.element.append(
-      h("div", { class: "intro" }, h("h1", {}, "A machine of several parts"),
-        h("p", {}, given?.about ? sentence(`${given.name}: ${given.about}`) : "Pick designs, say what pushes what, and build them as one piece.")),
+      h("div", { class: "intro" }, h("h1", {}, "Assemble a machine"),
+        h("p", {}, given?.about ? sentence(`${given.name}: ${given.about}`) : "Add designs, connect their ports, and assemble them to one piece.")),
       h("div", { class: "main" },
         h("section", { class: "stage", "aria-label": "Machine" },
           h("div", { class: "bar" }, button("New machine", () => this.set(emptyPlan()), "quiet"), h("span", { class: "spring" }), this.undoButton, this.redoButton),
           h("div", { class: "paper" }, this.readout, this.drawing.svg, this.blank), h("div", { class: "below" }, this.fault)),
-        h("section", { class: "card", "aria-label": "Designs to add" }, this.shelf)),
+        h("section", { class: "card", "aria-label": "Designs to add" }, this.collection)),
       this.panel);
     document.addEventListener("keydown", this.keys);
     void this.changed();
@@ -54,29 +54,29 @@ export class MachinePage {
   private get plan(): Plan { return this.history.value; }
 
   close(): void {
-    this.asked = -1;
+    this.requested = -1;
     document.removeEventListener("keydown", this.keys);
   }
 
   private async load(): Promise<void> {
-    let shelves: Shelf[];
+    let collections: Collection[];
     try {
-      shelves = await get<Shelf[]>("/gallery");
+      collections = await get<Collection[]>("/gallery");
     } catch (error) {
-      clear(this.shelf, h("p", { class: "fault", role: "alert" }, sentence((error as Refusal).message)));
+      clear(this.collection, h("p", { class: "fault", role: "alert" }, sentence((error as ServerError).message)));
       return;
     }
-    for (const small of shelves.flatMap(({ entries }) => entries)) this.smalls.set(`${small.source}/${small.key}`, small);
-    const wanted = SHELVES.map((source) => shelves.find((shelf) => shelf.source === source)).filter((shelf) => shelf?.entries.length) as Shelf[];
-    clear(this.shelf, ...wanted.map((shelf) => shelf.source === "machines"
-      ? shelfView({ ...shelf, title: "Start from a machine" }, (small) => this.tile(small, () => void this.start(small.key)))
-      : shelfView({ ...shelf, title: `Add: ${shelf.title.toLowerCase()}` }, (small) => this.tile(small, () => this.add(small)), SHOWN)));
+    for (const entry of collections.flatMap(({ entries }) => entries)) this.known.set(`${entry.source}/${entry.key}`, entry);
+    const wanted = COLLECTIONS.map((source) => collections.find((collection) => collection.source === source)).filter((collection) => collection?.entries.length) as Collection[];
+    clear(this.collection, ...wanted.map((collection) => collection.source === "machines"
+      ? collectionView({ ...collection, title: "Bundled machines" }, (entry) => this.tile(entry, () => void this.start(entry.key)))
+      : collectionView({ ...collection, title: `Add: ${collection.title.toLowerCase()}` }, (entry) => this.tile(entry, () => this.add(entry)), SHOWN)));
     this.show();
   }
 
-  private tile(small: Small, press: () => void): HTMLElement {
-    return h("button", { type: "button", class: "tile", "data-entry": `${small.source}/${small.key}`, onclick: press },
-      thumbnail(small), h("span", { class: "title" }, small.title), h("span", { class: "note" }, small.note));
+  private tile(entry: GalleryEntry, press: () => void): HTMLElement {
+    return h("button", { type: "button", class: "tile", "data-entry": `${entry.source}/${entry.key}`, onclick: press },
+      thumbnail(entry), h("span", { class: "title" }, entry.title), h("span", { class: "note" }, entry.note));
   }
 
   private async start(key: string): Promise<void> {
@@ -84,14 +84,14 @@ export class MachinePage {
       this.set(readPlan(await get<WrittenPlan>(`/machines/${key}`)));
       this.element.scrollIntoView({ block: "start" });
     } catch (error) {
-      this.fault.textContent = sentence((error as Refusal).message);
+      this.fault.textContent = sentence((error as ServerError).message);
     }
   }
 
-  private add(small: Small): void {
-    if (this.plan.parts.length >= MOST) { this.fault.textContent = `A machine has at most ${MOST} parts here.`; return; }
-    this.set(withPart(this.plan, `${small.source}/${small.key}`));
-    say(`${small.title} added`);
+  private add(entry: GalleryEntry): void {
+    if (this.plan.parts.length >= MOST) { this.fault.textContent = `A machine has at most ${MOST} parts on this page.`; return; }
+    this.set(withPart(this.plan, `${entry.source}/${entry.key}`));
+    announce(`${entry.title} added`);
   }
 
   private set(plan: Plan): void {
@@ -99,20 +99,20 @@ export class MachinePage {
     void this.changed();
   }
 
-  private step(way: "undo" | "redo"): void {
-    this.history[way]();
-    say(way === "undo" ? "undone" : "done again");
+  private step(action: "undo" | "redo"): void {
+    this.history[action]();
+    announce(action === "undo" ? "undone" : "redone");
     void this.changed();
   }
 
-  /** Change one part; the others stay as they are. */
+  /** Change one part. */
   private change(name: string, changes: Partial<PlanPart>): void {
     this.set({ ...this.plan, parts: this.plan.parts.map((part) => (part.name === name ? { ...part, ...changes } : part)) });
   }
 
   private async changed(): Promise<void> {
-    const asked = ++this.asked;
-    try { localStorage.setItem(KEY, JSON.stringify(this.plan)); } catch { /* storage is full: nothing is kept */ }
+    const requested = ++this.requested;
+    try { localStorage.setItem(KEY, JSON.stringify(this.plan)); } catch { /* the storage is full: not stored */ }
     this.fault.textContent = "";
     if (!this.plan.parts.length) this.built = null;
     this.drawing.svg.classList.toggle("stale", this.built !== null);
@@ -121,14 +121,14 @@ export class MachinePage {
     if (!this.plan.parts.length) return;
     try {
       const built = await post<Built>("/machines", { plan: writePlan(this.plan) });
-      if (asked !== this.asked) return;
+      if (requested !== this.requested) return;
       this.built = built;
       this.fault.textContent = built.efficiency === null ? sentence(built.message) : "";
       this.drawing.svg.classList.remove("stale");
     } catch (error) {
-      if (asked !== this.asked) return;
+      if (requested !== this.requested) return;
       this.built = null;
-      this.fault.textContent = sentence((error as Refusal).message);
+      this.fault.textContent = sentence((error as ServerError).message);
     }
     this.draw();
     this.show();
@@ -160,9 +160,9 @@ export class MachinePage {
     drawing.draw([...painted, { name: "bridge", beams: where(bits).filter((beam) => !owned.has(beam)) }]);
     drawing.markRegions(problem);
     drawing.overlay.replaceChildren(...(["input", "output"] as const).flatMap((region) => arrows(problem, region)));
-    const against = built.efficiency !== null && built.efficiency < 0;
+    const reversed = built.efficiency !== null && built.efficiency < 0;
     clear(this.readout, h("strong", {}, figure(built.efficiency, 3)),
-      h("span", { class: against ? "alarm" : "" }, against ? "It moves against its arrow: what drives it should be made to push a load." : "output motion over input motion"),
+      h("span", { class: reversed ? "alarm" : "" }, reversed ? "The output moves against its direction: drive it by an actuator made for a loaded output." : "spring model: output / input displacement"),
       h("span", {}, `${problem.positions.length} nodes, ${where(bits).length} beams`));
   }
 
@@ -175,15 +175,15 @@ export class MachinePage {
       parts.length > 0 && this.machineBox(),
       ...parts.map((part, k) => this.partBox(part, k)),
       !parts.length && h("section", { class: "step open" }, h("h2", { class: "plain" }, "Parts"),
-        h("div", { class: "content" }, h("p", {}, "None yet. Any elementary actuator can push any other: their ends have the same shape."),
-          h("p", { class: "note" }, "To make one of your own, draw from one of the tasks “elementary-…” and search it."))));
+        h("div", { class: "content" }, h("p", {}, "No parts. Elementary actuators have ports of the same shape, so that each can drive any other."),
+          h("p", { class: "note" }, "To design an actuator of your own, start from one of the tasks “elementary-…”."))));
     if (focused) this.panel.querySelector<HTMLElement>(`[data-key="${focused}"]`)?.focus({ preventScroll: true });
   }
 
   private partBox(part: PlanPart, k: number): HTMLElement {
     const key = (what: string): Record<string, string> => ({ "data-key": `${part.name}-${what}` });
     const others = portsOf(this.plan).filter((port) => !port.startsWith(`${part.name}.`));
-    const joins: [string, string][] = [...(k === 0 && !part.join ? [] : others.map((port): [string, string] => [port, `on ${spoken(port)}`])), ["", k === 0 ? "here" : "at a place"]];
+    const joins: [string, string][] = [...(k === 0 && !part.join ? [] : others.map((port): [string, string] => [port, portLabel(port)])), ["", k === 0 ? "origin" : "coordinates"]];
     const turns: [string, string][] = [0, 60, 120, 180, 240, 300].map((angle) => [String(angle), `${angle}°`]);
     const tick = (what: "mirror" | "supports", text: string): HTMLElement => h("label", { class: "tick" },
       h("input", { type: "checkbox", checked: part[what], ...key(what), onchange: () => this.change(part.name, { [what]: !part[what] }) }), text);
@@ -191,60 +191,60 @@ export class MachinePage {
       this.change(part.name, { at: axis ? [part.at[0], value] : [value, part.at[1]] })), key(`at-${axis}`)));
     return h("section", { class: "step open" },
       h("h2", { class: "plain" }, h("span", { class: `swatch part-${k % 4}` }),
-        h("span", {}, `${part.name}: ${this.smalls.get(part.entry)?.title ?? part.entry.split("/")[1]}`),
+        h("span", {}, `${part.name}: ${this.known.get(part.entry)?.title ?? part.entry.split("/")[1]}`),
         button("Remove", () => this.set(withoutPart(this.plan, part.name)), "quiet small", { "aria-label": `Remove ${part.name}` })),
       h("div", { class: "content" },
         h("div", { class: "row" },
-          field("Goes", keyed(select(joins, part.join, (join) => this.change(part.name, { join })), key("join"))),
-          field("Turned", keyed(select(turns, String(part.rotate), (angle) => this.change(part.name, { rotate: Number(angle) })), key("rotate")))),
-        part.join !== "" && choice<Port>("With its", [["input", "With its input"], ["output", "With its output"]], part.by, (by) => this.change(part.name, { by })),
-        k > 0 && part.join === "" && h("div", { class: "row" }, place(0, "x of its input"), place(1, "y of its input")),
-        h("div", { class: "row" }, tick("mirror", "Mirrored"), tick("supports", "Held"))));
+          field("Attached to", keyed(select(joins, part.join, (join) => this.change(part.name, { join })), key("join"))),
+          field("Rotation", keyed(select(turns, String(part.rotate), (angle) => this.change(part.name, { rotate: Number(angle) })), key("rotate")))),
+        part.join !== "" && choice<Port>("Attached by", [["input", "By its input"], ["output", "By its output"]], part.by, (by) => this.change(part.name, { by })),
+        k > 0 && part.join === "" && h("div", { class: "row" }, place(0, "x of input"), place(1, "y of input")),
+        h("div", { class: "row" }, tick("mirror", "Mirrored"), tick("supports", "Supported"))));
   }
 
   private machineBox(): HTMLElement {
     const { plan } = this;
     const ports = portsOf(plan);
-    const options = ports.map((port): [string, string] => [port, spoken(port)]);
+    const options = ports.map((port): [string, string] => [port, portLabel(port)]);
     const name = h("input", { type: "text", value: plan.name, maxlength: 100, "data-key": "name" });
     name.addEventListener("change", () => this.set({ ...plan, name: name.value.trim() || "my machine" }));
     const relink = (k: number, changes: Partial<Plan["links"][number]>): void =>
       this.set({ ...plan, links: plan.links.map((link, n) => (n === k ? { ...link, ...changes } : link)) });
     const linkRows = plan.links.map((link, k) => h("div", { class: "row three" },
       field("Link", select(options, link.from, (from) => relink(k, { from }))),
-      field("with", select(options, link.to, (to) => relink(k, { to }))),
-      field("by", select([["weld", "weld"], ["bridge", "bridge"]], link.kind, (kind) => relink(k, { kind }))),
-      button("Remove the link", () => this.set({ ...plan, links: plan.links.filter((_, n) => n !== k) }), "quiet small")));
-    return h("section", { class: "step open" }, h("h2", { class: "plain" }, "Together"),
+      field("to", select(options, link.to, (to) => relink(k, { to }))),
+      field("type", select([["weld", "weld"], ["bridge", "bridge"]], link.kind, (kind) => relink(k, { kind }))),
+      button("Remove link", () => this.set({ ...plan, links: plan.links.filter((_, n) => n !== k) }), "quiet small")));
+    return h("section", { class: "step open" }, h("h2", { class: "plain" }, "Machine"),
       h("div", { class: "content" },
         field("Name", name),
-        h("div", { class: "row" }, this.endBox("Pushed at", "input"), this.endBox("Moves at", "output")),
+        h("div", { class: "row" }, this.endBox("Input", "input"), this.endBox("Output", "output")),
         ...linkRows,
-        ports.length > 2 && button("Add a link", () => this.set({ ...plan, links: [...plan.links, { from: ports[1]!, to: ports[2]!, kind: "bridge" }] })),
-        h("button", { type: "button", class: "primary", disabled: !this.built, "data-key": "build", onclick: () => void this.build() }, "Build it"),
+        ports.length > 2 && button("Add link", () => this.set({ ...plan, links: [...plan.links, { from: ports[1]!, to: ports[2]!, kind: "bridge" }] })),
+        h("button", { type: "button", class: "primary", disabled: !this.built, "data-key": "build", onclick: () => void this.build() }, "Assemble"),
         !this.built && this.fault.textContent && h("p", { class: "fault" }, this.fault.textContent)));
   }
 
-  /** Where the machine is pushed, or moves: one port as a rule, several of a machine that has them. */
+  /** Select the input or output port of the machine; a bundled machine may have several. */
   private endBox(label: string, end: "input" | "output"): HTMLElement {
     const { plan } = this;
     const { ports } = plan[end];
     const several = ports.length > 1;
-    const options: [string, string][] = portsOf(plan).map((port) => [port, spoken(port)]);
+    const options: [string, string][] = portsOf(plan).map((port) => [port, portLabel(port)]);
     if (several) options.unshift(["", `${ports.length} ports`]);
     const pick = (port: string): void => { if (port) this.set({ ...plan, [end]: { ports: [port] } satisfies PlanEnd }); };
     return field(label, keyed(select(options, several ? "" : (ports[0] ?? ""), pick), { "data-key": end }),
-      "", several ? ports.map(spoken).join(", ") : "");
+      "", several ? ports.map(portLabel).join(", ") : "");
   }
 
   private async build(): Promise<void> {
     if (!this.built) return;
     try {
       const { problem, mask, provenance } = this.built;
-      const kept = await post<{ source: string; key: string }>("/gallery", { problem, mask, provenance, title: this.plan.name });
-      location.hash = `#/design/${kept.source}/${kept.key}`;
+      const saved = await post<{ source: string; key: string }>("/gallery", { problem, mask, provenance, title: this.plan.name });
+      location.hash = `#/design/${saved.source}/${saved.key}`;
     } catch (error) {
-      this.fault.textContent = sentence((error as Refusal).message);
+      this.fault.textContent = sentence((error as ServerError).message);
     }
   }
 }
@@ -254,27 +254,27 @@ function keyed<E extends HTMLElement>(element: E, key: Record<string, string>): 
   return element;
 }
 
-function keptPlan(): Plan {
+function storedPlan(): Plan {
   try {
-    const kept = JSON.parse(localStorage.getItem(KEY) ?? "null") as unknown;
-    if (isPlan(kept)) return kept;
-  } catch { /* what was kept is no plan */ }
+    const stored = JSON.parse(localStorage.getItem(KEY) ?? "null") as unknown;
+    if (isPlan(stored)) return stored;
+  } catch { /* the stored text is no plan: ignored */ }
   return emptyPlan();
 }
 
-/** Which way the machine is pushed, or moves: an arrow for each port. */
+/** Arrows of the input or output directions, one for each port. */
 function arrows(problem: Problem, region: "input" | "output"): SVGElement[] {
   const { nodes, direction } = problem[region];
   const place = (node: number): Point => problem.positions[node]!;
-  const ports: { nodes: number[]; way: Point }[] = [];
+  const ports: { nodes: number[]; along: Point }[] = [];
   nodes.forEach((node, k) => {
     const [x, y] = place(node);
     // Nodes of a port are neighbours; ports are further apart.
     const port = ports.find((each) => each.nodes.some((other) => Math.hypot(place(other)[0] - x, place(other)[1] - y) < NEAR));
     if (port) port.nodes.push(node);
-    else ports.push({ nodes: [node], way: isEach(direction) ? direction[k]! : direction });
+    else ports.push({ nodes: [node], along: isEach(direction) ? direction[k]! : direction });
   });
-  return ports.map(({ nodes: group, way: [dx, dy] }) => {
+  return ports.map(({ nodes: group, along: [dx, dy] }) => {
     const x = group.reduce((sum, node) => sum + place(node)[0] / group.length, 0);
     const y = group.reduce((sum, node) => sum + place(node)[1] / group.length, 0);
     return s("g", { class: `arrow ${region}` }, s("path", { class: "shaft", d: arrow([x, y], [2.4 * dx, 2.4 * dy], 0.5) }));

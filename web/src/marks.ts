@@ -1,10 +1,10 @@
-// What is drawn around a lattice, and how one goes from node to node with the arrow keys.
+// Marks of rollers and mirror axes, and navigation from node to node with the arrow keys.
 
 import type { Point } from "./api";
 import type { Box } from "./drawing";
 import { nodesOf, type Task } from "./task";
 
-/** The ways along which nodes may slide, as a path. */
+/** Directions in which nodes may slide, as a path. */
 export function rollerLines(rest: Float64Array, along_y: number[], along_x: number[]): string {
   let d = "";
   for (const [nodes, dx, dy] of [[along_y, 0, 0.34], [along_x, 0.34, 0]] as [number[], number, number][]) {
@@ -16,7 +16,7 @@ export function rollerLines(rest: Float64Array, along_y: number[], along_x: numb
   return d;
 }
 
-/** The lines in which a design is mirrored: through the middle of the beams that may change. */
+/** Mirror axes, through the middle of the designable beams. */
 export function mirrorAxes(
   rest: Float64Array, beams: [number, number][], box: Box, mirror: { x: boolean; y: boolean },
 ): string {
@@ -28,8 +28,8 @@ export function mirrorAxes(
   return (mirror.x ? `M${(x0 + x1) / 2} ${box.y}V${box.y + box.h}` : "") + (mirror.y ? `M${box.x} ${(y0 + y1) / 2}H${box.x + box.w}` : "");
 }
 
-/** Find what comes next that way: near, and not far to the side. From a corner if nothing is at hand. */
-export function nextThatWay(total: number, place: (k: number) => Point, at: number, corner: Point, [wx, wy]: Point): number {
+/** Find the nearest node or beam in a direction, starting from a corner if `at` is negative. */
+export function nextInDirection(total: number, place: (k: number) => Point, at: number, corner: Point, [wx, wy]: Point): number {
   const from = at >= 0 ? place(at) : corner;
   let best = Infinity;
   let found = at;
@@ -44,12 +44,12 @@ export function nextThatWay(total: number, place: (k: number) => Point, at: numb
   return found;
 }
 
-/** A node or beam as it is said to who listens. */
-export function inWords({ problem, rules }: Task, tool: string, bits: Uint8Array, k: number): string {
+/** Describe a node or beam for screen readers. */
+export function describeTarget({ problem, rules }: Task, tool: string, bits: Uint8Array, k: number): string {
   if (tool === "hand") return `beam ${k}, ${bits[k] ? "present" : "absent"}`;
-  if (tool === "beams") return `beam ${k}, ${{ auto: "left to the search", keep: "always there", never: "never there", free: "left to the search" }[rules[k]!]}`;
+  if (tool === "beams") return `beam ${k}, ${{ auto: "designable", keep: "always present", never: "always absent", free: "designable" }[rules[k]!]}`;
   const [x, y] = problem.positions[k]!;
   const part = (["supports", "input", "output"] as const).find((region) => nodesOf(problem, region).includes(k));
-  const name = part ? { supports: "held", input: "pushed", output: "to move" }[part] : "free";
+  const name = part ? { supports: "support", input: "input", output: "output" }[part] : "free";
   return `node ${k} at ${x.toFixed(1)}, ${y.toFixed(1)}: ${name}`;
 }

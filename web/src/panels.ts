@@ -1,26 +1,26 @@
-// What stands beside the drawing: the same task in words and numbers.
+// The panels beside the drawing: the properties of the task in text and numbers.
 
-import { get, post, type Point, type Problem, type Refusal } from "./api";
-import { bare, builtInTask, exampleTask } from "./begin";
-import { angleOf, isEach, unit, wayOf } from "./drawing";
+import { get, post, type Point, type Problem, type ServerError } from "./api";
+import { builtInTask, emptyTask, exampleTask } from "./begin";
+import { angleOf, isEach, unit, directionName } from "./drawing";
 import { button, choice, clear, count, field, figure, h, number, select } from "./dom";
-import type { Editor } from "./editor";
-import { craneRows, moved } from "./lattices";
+import type { Brush, TaskEditor } from "./editing";
+import { craneRows, transferNodes } from "./lattices";
 import { SearchBox } from "./searchbox";
 import { directionOf, nodesOf, type Hold, type Rule } from "./task";
-import { sentence } from "./words";
+import { sentence } from "./text";
 
-interface Named { name: string; group: string; about: string }
+interface BundledProblem { name: string; group: string; about: string }
 
 export class Panels {
   readonly element = h("aside", { class: "panel", "aria-label": "Task" });
-  private problems: Named[] = [];
+  private problems: BundledProblem[] = [];
   private local: Record<string, string> = {};
   private readonly searchBox: SearchBox;
 
-  constructor(private readonly editor: Editor) {
+  constructor(private readonly editor: TaskEditor) {
     this.searchBox = new SearchBox(editor, () => this.show());
-    void get<Named[]>("/problems").then((found) => { this.problems = found; this.show(); });
+    void get<BundledProblem[]>("/problems").then((found) => { this.problems = found; this.show(); });
   }
 
   show(): void {
@@ -28,9 +28,9 @@ export class Panels {
     const label = focused instanceof HTMLElement && this.element.contains(focused) ? focused.dataset.key ?? "" : "";
     clear(this.element,
       this.section("lattice", "Lattice", this.latticeSummary(), this.lattice()),
-      this.section("supports", "Held", this.regionSummary("supports"), this.supports()),
-      this.section("input", "Pushed", this.regionSummary("input"), this.input()),
-      this.section("output", "Moves", this.regionSummary("output"), this.output()),
+      this.section("supports", "Supports", this.regionSummary("supports"), this.supports()),
+      this.section("input", "Input", this.regionSummary("input"), this.input()),
+      this.section("output", "Output", this.regionSummary("output"), this.output()),
       this.section("beams", "Beams", this.beamSummary(), this.beams()),
       this.searchBox.make());
     if (label) this.element.querySelector<HTMLElement>(`[data-key="${label}"]`)?.focus({ preventScroll: true });
@@ -56,10 +56,10 @@ export class Panels {
     if (this.local[`fault-${key}`]) return this.local[`fault-${key}`]!;
     if (missing) return missing.region === key ? missing.message : "";
     if (!fault) return "";
-    const heads: Record<string, string[]> = {
+    const keys: Record<string, string[]> = {
       lattice: ["lattice", "positions", "beams"], supports: ["supports"], input: ["input"], output: ["output"], beams: ["designable", "initial", "problem"],
     };
-    const owner = Object.entries(heads).find(([, names]) => names.some((name) => fault.key.startsWith(name)));
+    const owner = Object.entries(keys).find(([, names]) => names.some((name) => fault.key.startsWith(name)));
     return (owner ? owner[0] === key : key === "beams") ? fault.message : "";
   }
 
@@ -68,14 +68,14 @@ export class Panels {
     try {
       await work();
     } catch (error) {
-      this.local[`fault-${key}`] = sentence((error as Refusal).message);
+      this.local[`fault-${key}`] = sentence((error as ServerError).message);
     }
     this.show();
   }
 
   private latticeSummary(): string {
     const { problem, scale } = this.editor.task;
-    return `${count(problem.positions.length, "node")}, ${count(problem.beams.length, "beam")}, ${scale} mm apart`;
+    return `${count(problem.positions.length, "node")}, ${count(problem.beams.length, "beam")}, beam length ${scale} mm`;
   }
 
   private lattice(): HTMLElement {
@@ -99,7 +99,7 @@ export class Panels {
       if (value > 0) editor.set({ ...editor.task, scale: value });
     });
     scale.dataset.key = "scale";
-    const file = h("input", { type: "file", accept: ".toml,.json", class: "unseen", tabindex: -1, "aria-label": "File to open" });
+    const file = h("input", { type: "file", accept: ".toml,.json", class: "visually-hidden", tabindex: -1, "aria-label": "File to open" });
     file.addEventListener("change", () => {
       const picked = file.files?.[0];
       if (picked) void this.attempt("lattice", () => this.editor.load(picked));
@@ -111,10 +111,10 @@ export class Panels {
           : picked === "triangular-rows" ? craneRows(11, 6)
           : { kind: picked, columns: Number(table?.columns ?? 8), rows: Number(table?.rows ?? 9), ...(picked === "displaced-delaunay" ? { displacement: 0.2, seed: 1 } : {}) })),
       (kind === "triangular-rectangle" || kind === "displaced-delaunay") && h("div", { class: "row" },
-        whole("columns", "Across", 2, 60), whole("rows", "Up", 2, 60)),
+        whole("columns", "Columns", 2, 60), whole("rows", "Rows", 2, 60)),
       kind === "triangular-rows" && Array.isArray(table?.counts) && table.counts.length > 6 && h("div", { class: "row" },
-        this.size("Across", Number(table.counts[0]), 5, 40, (value) => craneRows(value, (table.counts as number[]).length - 6)),
-        this.size("Rows between", table.counts.length - 6, 1, 40, (value) => craneRows(Number((table.counts as number[])[0]), value))),
+        this.size("Columns", Number(table.counts[0]), 5, 40, (value) => craneRows(value, (table.counts as number[]).length - 6)),
+        this.size("Rows of the body", table.counts.length - 6, 1, 40, (value) => craneRows(Number((table.counts as number[])[0]), value))),
       kind === "jammed-discs" && h("div", { class: "row" }, whole("discs", "Discs", 20, 1000), whole("seed", "Seed", 0, 100000)),
       kind === "displaced-delaunay" && h("div", { class: "row" }, whole("seed", "Seed", 0, 100000)),
       h("div", { class: "row" }, field("Beam length", scale, "mm"),
@@ -148,11 +148,11 @@ export class Panels {
     await this.attempt("lattice", async () => {
       const made = await post<Pick<Problem, "positions" | "beams">>("/lattices", { lattice: table });
       const before = this.editor.task;
-      let next = bare(made, table, before);
-      // Regions are found again where they lay, as far as there still are nodes.
-      for (const region of ["input", "output"] as const) next = { ...next, problem: { ...next.problem, [region]: { ...next.problem[region], nodes: moved(before.problem, made, before.problem[region].nodes) } } };
+      let next = emptyTask(made, table, before);
+      // Regions are transferred to the nearest nodes of the new lattice.
+      for (const region of ["input", "output"] as const) next = { ...next, problem: { ...next.problem, [region]: { ...next.problem[region], nodes: transferNodes(before.problem, made, before.problem[region].nodes) } } };
       const taken = new Set([...next.problem.input.nodes, ...next.problem.output.nodes]);
-      const held = moved(before.problem, made, before.problem.supports.fixed).filter((node) => !taken.has(node));
+      const held = transferNodes(before.problem, made, before.problem.supports.fixed).filter((node) => !taken.has(node));
       next.problem.supports = { fixed: held, fixed_x: [], fixed_y: [] };
       const output = next.problem.output.nodes.filter((node) => !next.problem.input.nodes.includes(node));
       next.problem.output = { ...next.problem.output, nodes: output };
@@ -163,29 +163,29 @@ export class Panels {
   private regionSummary(region: "supports" | "input" | "output"): string {
     const { problem, scale } = this.editor.task;
     const nodes = nodesOf(problem, region).length;
-    if (!nodes) return "nothing yet";
+    if (!nodes) return "none";
     if (region === "supports") return count(nodes, "node");
     const at = problem[region];
-    const way = isEach(at.direction) ? "each its own way" : wayOf(at.direction);
-    if (region === "output") return `${count(nodes, "node")}, ${way}`;
+    const direction = isEach(at.direction) ? "several directions" : directionName(at.direction);
+    if (region === "output") return `${count(nodes, "node")}, ${direction}`;
     const { drive, amount } = problem.input;
-    return `${count(nodes, "node")}, ${drive === "displacement" ? `${figure(amount * scale, 1)} mm` : `force ${figure(amount, 2)}`} ${way}`;
+    return `${count(nodes, "node")}, ${drive === "displacement" ? `${figure(amount * scale, 1)} mm` : `force ${figure(amount, 2)}`} ${direction}`;
   }
 
   private picking(region: "supports" | "input" | "output"): HTMLElement {
     const { editor } = this;
     const all = nodesOf(editor.task.problem, region);
     const rows = h("input", { type: "checkbox", "data-key": "rows", checked: this.local.rows === "yes" });
-    rows.addEventListener("change", () => { this.local.rows = rows.checked ? "yes" : ""; editor.pickRows(rows.checked); });
+    rows.addEventListener("change", () => { this.local.rows = rows.checked ? "yes" : ""; editor.selectRows(rows.checked); });
     return h("div", { class: "row between" },
       h("label", { class: "tick" }, rows, "Whole rows"),
       button("Clear", () => editor.clearRegion(region), "quiet", { disabled: !all.length, "data-key": "clear" }));
   }
 
   private supports(): HTMLElement {
-    const options: [Hold, string][] = [["fixed", "Fixed"], ["fixed_y", "Slides ↔"], ["fixed_x", "Slides ↕"]];
+    const options: [Hold, string][] = [["fixed", "Fixed"], ["fixed_y", "Roller ↔"], ["fixed_x", "Roller ↕"]];
     return h("div", { class: "content" },
-      choice("How they are held", options, this.editor.hold, (picked) => { this.editor.hold = picked; }),
+      choice("Kind of support", options, this.editor.hold, (picked) => { this.editor.hold = picked; }),
       this.picking("supports"));
   }
 
@@ -193,15 +193,15 @@ export class Panels {
     const { editor } = this;
     const at = editor.task.problem[region];
     if (isEach(at.direction)) {
-      return h("p", {}, "Each node has a direction of its own. ",
-        button("Give all the same", () => editor.turn(region, directionOf(at)), "quiet", { "data-key": "same" }));
+      return h("p", {}, "The nodes have different directions. ",
+        button("Use one direction", () => editor.setDirection(region, directionOf(at)), "quiet", { "data-key": "same" }));
     }
-    const angle = number(angleOf(at.direction), { min: 0, max: 360, step: 5 }, (value) => editor.turn(region, unit(value)));
+    const angle = number(angleOf(at.direction), { min: 0, max: 360, step: 5 }, (value) => editor.setDirection(region, unit(value)));
     angle.dataset.key = `${region}-angle`;
-    const ways: [string, string, Point][] = [["↑", "up", [0, 1]], ["→", "right", [1, 0]], ["↓", "down", [0, -1]], ["←", "left", [-1, 0]]];
+    const directions: [string, string, Point][] = [["↑", "up", [0, 1]], ["→", "right", [1, 0]], ["↓", "down", [0, -1]], ["←", "left", [-1, 0]]];
     return h("div", { class: "row" }, field("Direction", angle, "°"),
-      h("div", { class: "ways", role: "group", "aria-label": "Usual ways" }, ...ways.map(([sign, name, way]) =>
-        button(sign, () => editor.turn(region, way), "quiet", { "aria-label": name, title: name, "data-key": `${region}-${name}` }))));
+      h("div", { class: "directions", role: "group", "aria-label": "Common directions" }, ...directions.map(([sign, name, direction]) =>
+        button(sign, () => editor.setDirection(region, direction), "quiet", { "aria-label": name, title: name, "data-key": `${region}-${name}` }))));
   }
 
   private input(): HTMLElement {
@@ -216,7 +216,7 @@ export class Panels {
     return h("div", { class: "content" },
       this.direction("input"),
       h("div", { class: "row" }, field(moves ? "Stroke" : "Force on each node", size, moves ? "mm" : ""),
-        field("Driven by", select([["displacement", "a motion"], ["force", "a force"]], drive, (picked) =>
+        field("Prescribed", select([["displacement", "displacement"], ["force", "force"]], drive, (picked) =>
           editor.change("input", { drive: picked as Problem["input"]["drive"], amount: picked === "force" ? 0.02 : 0.3 })))),
       this.picking("input"));
   }
@@ -228,15 +228,15 @@ export class Panels {
       editor.change("output", value > 0 ? { spring: value, spring_kind: "directional" } : { spring: null, spring_kind: null }));
     stiff.dataset.key = "spring";
     return h("div", { class: "content" }, this.direction("output"),
-      field("Works against a spring", stiff, "", "0 for none; a beam has a stiffness of 10"),
+      field("Output spring stiffness", stiff, "", "0 for none; for comparison, a beam has a stiffness of 10"),
       this.picking("output"));
   }
 
   private beamSummary(): string {
     const { editor } = this;
     const rules = editor.task.rules.filter((rule) => rule === "keep" || rule === "never").length;
-    const mirrored = editor.task.mirror.x || editor.task.mirror.y ? ", mirrored" : "";
-    return `${count(editor.problem.designable.length, "beam")} to search${rules ? `, ${rules} painted` : ""}${mirrored}`;
+    const mirrored = editor.task.mirror.x || editor.task.mirror.y ? ", symmetric" : "";
+    return `${editor.problem.designable.length.toLocaleString("en")} designable${rules ? `, ${rules} fixed` : ""}${mirrored}`;
   }
 
   private beams(): HTMLElement {
@@ -249,17 +249,17 @@ export class Panels {
     };
     if (editor.tool === "hand") {
       return h("div", { class: "content" },
-        h("p", {}, "Your design is compared with what the search finds."),
+        h("p", {}, "The search result is compared with this design."),
         h("div", { class: "buttons" },
-          button("Keep this design", () => void this.attempt("beams", () => editor.keepHand(editor.task.problem.name)), "", { "data-key": "keep" }),
-          button("All beams again", () => editor.set({ ...editor.task, hand: editor.problem.initial }), "", { "data-key": "all" })),
-        h("div", { class: "row ticks" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")));
+          button("Save this design", () => void this.attempt("beams", () => editor.saveHandDesign(editor.task.problem.name)), "", { "data-key": "save" }),
+          button("Restore all beams", () => editor.set({ ...editor.task, hand: editor.problem.initial }), "", { "data-key": "all" })),
+        h("div", { class: "row ticks" }, tick("x", "Mirror symmetry left/right"), tick("y", "Mirror symmetry up/down")));
     }
-    const brushes: [Rule, string][] = [["keep", "Must stay"], ["never", "Never"], ["auto", "Free"]];
+    const brushes: [Rule, string][] = [["keep", "Present"], ["never", "Absent"], ["auto", "Designable"]];
     return h("div", { class: "content" },
-      choice("Paint", brushes, editor.brush as Rule, (picked) => { editor.brush = picked as "keep"; }),
-      h("div", { class: "row ticks" }, tick("x", "Mirror left and right"), tick("y", "Mirror up and down")),
+      choice("Mark as", brushes, editor.brush as Rule, (picked) => { editor.brush = picked as Brush; }),
+      h("div", { class: "row ticks" }, tick("x", "Mirror symmetry left/right"), tick("y", "Mirror symmetry up/down")),
       h("div", { class: "buttons" },
-        button("Free all beams", () => editor.set({ ...editor.task, rules: editor.task.rules.map(() => "auto") }), "", { "data-key": "free" })));
+        button("Make all designable", () => editor.set({ ...editor.task, rules: editor.task.rules.map(() => "auto") }), "", { "data-key": "free" })));
   }
 }

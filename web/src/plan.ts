@@ -1,11 +1,11 @@
-// A machine as it is put together: plain data, to and from what the server reads.
+// The plan of a machine as plain data, and its conversion to and from the form of the server.
 
 export type Port = "input" | "output";
 
 export interface PlanPart {
   name: string;
   entry: string;
-  /** A port such as `first.output`; empty where it is put `at` a place. */
+  /** A port such as `first.output`; empty if the part is placed at `at`. */
   join: string;
   by: Port;
   mirror: boolean;
@@ -25,7 +25,7 @@ export interface Plan {
   output: PlanEnd;
 }
 
-/** As in the files of `bellcrank machine`. */
+/** Form of the files of `bellcrank machine`. */
 export interface WrittenPlan {
   name: string;
   about?: string;
@@ -66,10 +66,13 @@ export function portsOf(plan: Plan): string[] {
   return plan.parts.flatMap(({ name }) => [`${name}.input`, `${name}.output`]);
 }
 
-/** A port in words. */
-export function spoken(port: string): string { return port.replace(".", "’s "); }
+/** Display text of a port, such as "output of first". */
+export function portLabel(port: string): string {
+  const [part, end] = port.split(".");
+  return `${end} of ${part}`;
+}
 
-/** Add a design: the first is pushed, each next goes on the output of the one before. */
+/** Add a design: the first receives the input, each further one is attached to the output of the previous one. */
 export function withPart(plan: Plan, entry: string): Plan {
   const name = NAMES.find((each) => !plan.parts.some((part) => part.name === each)) ?? `part ${plan.parts.length + 1}`;
   const last = plan.parts.at(-1);
@@ -81,21 +84,21 @@ export function withPart(plan: Plan, entry: string): Plan {
 }
 
 export function withoutPart(plan: Plan, name: string): Plan {
-  const stays = (port: string): boolean => !port.startsWith(`${name}.`);
-  const parts = plan.parts.filter((part) => part.name !== name).map((part) => (stays(part.join) ? part : { ...part, join: "" }));
+  const remains = (port: string): boolean => !port.startsWith(`${name}.`);
+  const parts = plan.parts.filter((part) => part.name !== name).map((part) => (remains(part.join) ? part : { ...part, join: "" }));
   const end = (before: PlanEnd, fallback: string): PlanEnd => {
-    const ports = before.ports.filter(stays);
+    const ports = before.ports.filter(remains);
     if (ports.length === before.ports.length) return before;
     return { ports: ports.length || !fallback ? ports : [fallback] };
   };
   const [first, last] = [parts[0], parts.at(-1)];
   return {
-    ...plan, parts, links: plan.links.filter((link) => stays(link.from) && stays(link.to)),
+    ...plan, parts, links: plan.links.filter((link) => remains(link.from) && remains(link.to)),
     input: end(plan.input, first ? `${first.name}.input` : ""), output: end(plan.output, last ? `${last.name}.output` : ""),
   };
 }
 
-/** What was kept in this browser, if it is a plan. */
+/** Whether a stored value is a plan. */
 export function isPlan(value: unknown): value is Plan {
   const plan = value as Plan | null;
   return !!plan && typeof plan === "object" && typeof plan.name === "string" && Array.isArray(plan.parts)

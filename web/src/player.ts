@@ -1,12 +1,12 @@
-// A design that moves along its true path: played, scrubbed, amplified, coloured.
+// Animation of a design along its computed path, with amplification and colours.
 
 import { post, type Motion, type Problem } from "./api";
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, where } from "./drawing";
 import { choice, clear, field, figure, h, icon, s } from "./dom";
-import { sentence } from "./words";
+import { sentence } from "./text";
 
-export type Colour = "plain" | "energy" | "stress" | "beams";
+export type Colour = "plain" | "energy" | "stress" | "sensitivity";
 
 export interface Picture { points: number[]; cells: number[]; corners: number; stress: number[] }
 export interface Sensitivity { efficiency: number; beams: number[]; change: (number | null)[] }
@@ -19,7 +19,7 @@ export class Player {
   readonly readout = h("div", { class: "readout" });
   private readonly controls = h("div", { class: "transport" });
   private readonly legend = h("p", { class: "legend" });
-  private readonly slider = h("input", { type: "range", min: 0, max: 1000, value: "1000", "aria-label": "Part of the stroke" });
+  private readonly slider = h("input", { type: "range", min: 0, max: 1000, value: "1000", "aria-label": "Fraction of the stroke" });
   private readonly playButton = h("button", { type: "button", class: "round", onclick: () => this.toggle() });
   private readonly stress = s("g", { class: "stress" });
   private motion: Motion | null = null;
@@ -29,13 +29,13 @@ export class Player {
   private colour: Colour = "energy";
   private frame = 0;
   private began = 0;
-  private told = 0;
+  private updated = 0;
   private sensitivity: Sensitivity | null = null;
   private picture: Picture | null = null;
   private shares = new Float64Array(0);
-  /** Asked when a colour is picked that needs something computed first. */
-  want: (colour: Colour) => void = () => {};
-  note: (text: string) => void = () => {};
+  /** Called when the stress is selected before it is computed. */
+  onStressRequested: () => void = () => {};
+  onError: (message: string) => void = () => {};
 
   constructor(private readonly problem: Problem, private readonly mask: string, private readonly scale: number) {
     this.drawing.setLattice(problem.positions, problem.beams);
@@ -44,7 +44,7 @@ export class Player {
     this.beams = where(bits);
     this.drawing.ghost("rest", this.beams);
     this.slider.addEventListener("input", () => { this.stop(); this.part = Number(this.slider.value) / 1000; this.show(); });
-    const times = h("input", { type: "range", min: 1, max: 8, step: 0.5, value: "1", "aria-label": "How many times the motion is drawn" });
+    const times = h("input", { type: "range", min: 1, max: 8, step: 0.5, value: "1", "aria-label": "Amplification of the motion" });
     const size = h("output", {}, "× 1");
     times.addEventListener("input", () => { this.times = Number(times.value); size.textContent = `× ${this.times}`; this.show(); });
     this.controls.append(this.playButton, this.slider,
@@ -62,14 +62,14 @@ export class Player {
   close(): void { this.stop(); }
 
   private colours(): HTMLElement {
-    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["beams", "Beam worth"], ["stress", "Stress"]] as [Colour, string][],
+    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["sensitivity", "Sensitivity"], ["stress", "Stress"]] as [Colour, string][],
       this.colour, (picked) => this.paint(picked));
   }
 
   paint(colour: Colour): void {
     this.colour = colour;
-    if (colour === "stress" && !this.picture) this.want("stress");
-    if (colour === "beams" && !this.sensitivity) void this.loadSensitivity();
+    if (colour === "stress" && !this.picture) this.onStressRequested();
+    if (colour === "sensitivity" && !this.sensitivity) void this.loadSensitivity();
     if (colour === "stress") { this.stop(); this.part = 1; }
     const input = this.element.querySelector<HTMLInputElement>(`.colour input[value="${colour}"]`);
     if (input) input.checked = true;
@@ -89,7 +89,7 @@ export class Player {
       this.element.dataset.ready = "yes";
       if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
     } catch (error) {
-      this.note(sentence((error as Error).message));
+      this.onError(sentence((error as Error).message));
     }
   }
 
@@ -98,7 +98,7 @@ export class Player {
       this.sensitivity = await post<Sensitivity>("/sensitivity", { problem: this.problem, mask: this.mask });
       this.show();
     } catch (error) {
-      this.note(sentence((error as Error).message));
+      this.onError(sentence((error as Error).message));
     }
   }
 
@@ -130,10 +130,10 @@ export class Player {
 
   private show(): void {
     const { drawing, motion } = this;
-    // Numbers that change sixty times a second cannot be read, and cost a layout each.
+    // Text that changes sixty times a second is not readable, and each change costs a layout.
     const now = performance.now();
-    const calm = this.playing && now - this.told < 100;
-    if (!calm) this.told = now;
+    const calm = this.playing && now - this.updated < 100;
+    if (!calm) this.updated = now;
     let energy: ArrayLike<number> | null = null;
     if (motion) {
       const place = this.part * (motion.part.length - 1);
@@ -150,27 +150,27 @@ export class Player {
       energy = this.shares;
       const value = Math.round(1000 * this.part);
       if (!calm && this.slider.valueAsNumber !== value) this.slider.value = String(value);
-      if (!calm) this.tell(motion, k, t);
+      if (!calm) this.showReadout(motion, k, t);
     }
     const stressed = this.colour === "stress" && this.picture !== null;
     if (stressed) this.drawStress(this.picture!);
     else if (this.stress.childNodes.length) this.stress.replaceChildren();
     if (stressed) drawing.draw([]);
-    else if (this.colour === "beams" && this.sensitivity) drawing.draw(this.worth(this.sensitivity));
+    else if (this.colour === "sensitivity" && this.sensitivity) drawing.draw(this.effects(this.sensitivity));
     else if (this.colour === "energy" && energy) drawing.draw(binned(this.beams, energy));
     else drawing.draw([{ name: "plain", beams: this.beams }]);
     if (stressed) for (const name of ["support", "input", "output"]) drawing.mark(name, []);
     else drawing.markRegions(this.problem);
-    if (!calm) this.explain();
+    if (!calm) this.showLegend();
   }
 
-  private tell(motion: Motion, k: number, t: number): void {
+  private showReadout(motion: Motion, k: number, t: number): void {
     const near = t > 0.5 ? k + 1 : k;
     const { input } = this.problem;
     const stroke = input.drive === "displacement" ? `${figure(this.part * input.amount * this.scale, 2)} mm in` : `${figure(100 * this.part, 0)} % of the force`;
     const efficiency = motion.efficiency[near] ?? null;
     const out = efficiency === null || input.drive !== "displacement" ? "" : `${figure(this.part * input.amount * this.scale * efficiency, 2)} mm out`;
-    const lines = [figure(efficiency, 3), stroke, out, motion.snapped[near] ? "has snapped here" : ""];
+    const lines = [figure(efficiency, 3), stroke, out, motion.snapped[near] ? "after a snap-through" : ""];
     if (this.readout.childElementCount !== 4) {
       clear(this.readout, h("strong"), h("span"), h("span"), h("span", { class: "alarm" }));
     }
@@ -180,40 +180,40 @@ export class Player {
     });
   }
 
-  private worth(found: Sensitivity): { name: string; beams: number[] }[] {
+  private effects(found: Sensitivity): { name: string; beams: number[] }[] {
     const change = new Map(found.beams.map((beam, k) => [beam, found.change[k] ?? null]));
     const present = new Set(this.beams);
     const scale = Math.abs(found.efficiency) || 1;
-    const groups: Record<string, number[]> = { "worth-none": [], "worth-1": [], "worth-2": [], "worth-3": [], "worth-broken": [], "worth-harm": [], "worth-add": [], "worth-given": [] };
+    const groups: Record<string, number[]> = { "effect-none": [], "effect-1": [], "effect-2": [], "effect-3": [], "effect-broken": [], "effect-harm": [], "effect-add": [], "effect-given": [] };
     for (const beam of this.beams) {
-      if (!change.has(beam)) { groups["worth-given"]!.push(beam); continue; }
+      if (!change.has(beam)) { groups["effect-given"]!.push(beam); continue; }
       const value = change.get(beam)!;
       const loss = value === null ? null : -value / scale;
-      const name = loss === null ? "worth-broken" : loss > 0.5 ? "worth-3" : loss > 0.1 ? "worth-2" : loss > 0.005 ? "worth-1" : loss < -0.005 ? "worth-harm" : "worth-none";
+      const name = loss === null ? "effect-broken" : loss > 0.5 ? "effect-3" : loss > 0.1 ? "effect-2" : loss > 0.005 ? "effect-1" : loss < -0.005 ? "effect-harm" : "effect-none";
       groups[name]!.push(beam);
     }
-    for (const [beam, value] of change) if (!present.has(beam) && value !== null && value / scale > 0.005) groups["worth-add"]!.push(beam);
+    for (const [beam, value] of change) if (!present.has(beam) && value !== null && value / scale > 0.005) groups["effect-add"]!.push(beam);
     return Object.entries(groups).map(([name, beams]) => ({ name, beams }));
   }
 
   private point(event: PointerEvent): void {
-    if (this.colour !== "beams" || !this.sensitivity) return;
+    if (this.colour !== "sensitivity" || !this.sensitivity) return;
     const beam = this.drawing.nearestBeam(this.drawing.locate(event), 0.4);
     const k = this.sensitivity.beams.indexOf(beam);
-    if (beam < 0 || k < 0) { this.legend.dataset.beam = ""; this.explain(); return; }
+    if (beam < 0 || k < 0) { this.legend.dataset.beam = ""; this.showLegend(); return; }
     const change = this.sensitivity.change[k] ?? null;
     const there = this.beams.includes(beam);
-    const after = change === null ? "it would snap or fall apart" : figure(this.sensitivity.efficiency + change, 3);
+    const after = change === null ? "no admissible design" : figure(this.sensitivity.efficiency + change, 3);
     this.legend.dataset.beam = `${there ? "Without" : "With"} beam ${beam}: ${figure(this.sensitivity.efficiency, 3)} → ${after}`;
-    this.explain();
+    this.showLegend();
   }
 
-  private explain(): void {
+  private showLegend(): void {
     const texts: Record<Colour, string> = {
-      plain: "Grey: at rest. Orange: pushed. Blue: what should move.",
-      energy: "From pale to red: what each beam bears of the energy.",
-      beams: this.sensitivity ? (this.legend.dataset.beam || "Dark: all depends on it. Dashed: would help. Point at a beam.") : "Taking each beam away in turn …",
-      stress: this.picture ? `Von Mises stress, up to ${figure(Math.max(...sample(this.picture.stress)), 2)} MPa.` : "Ask for finite elements under Figures.",
+      plain: "Grey: at rest. Orange: input. Blue: output.",
+      energy: "Strain energy of each beam, increasing from pale to red.",
+      sensitivity: this.sensitivity ? (this.legend.dataset.beam || "Dark: removal lowers the efficiency most. Dashed: addition raises it. Point at a beam for its values.") : "Evaluating the removal of each beam …",
+      stress: this.picture ? `Von Mises stress, up to ${figure(Math.max(...sample(this.picture.stress)), 2)} MPa.` : "Check with finite elements to compute the stress.",
     };
     if (this.legend.textContent !== texts[this.colour]) this.legend.textContent = texts[this.colour];
   }
@@ -239,7 +239,7 @@ export class Player {
   }
 }
 
-/** At most some thousand of many values, since a call cannot take more. */
+/** Reduce many values to block maxima, since a call has a limited number of arguments. */
 function sample(values: number[]): number[] {
   if (values.length < 5000) return values;
   return Array.from({ length: Math.ceil(values.length / 5000) }, (_, k) =>

@@ -1,12 +1,12 @@
-// What stands beside a design: figures, the part it becomes, its files, and where to go from here.
+// The panel beside a design: efficiency, part, files and next steps.
 
-import { fetchBlob, fetchFile, get, post, type Comparison, type Part, type Problem, type Refusal } from "./api";
+import { fetchBlob, fetchFile, fetchRegistries, get, post, type Comparison, type Part, type Problem, type Registries, type ServerError } from "./api";
 import { bitsOf, hexOf } from "./api";
-import { KEY } from "./begin";
+import { TASK_KEY } from "./begin";
 import { button, clear, download, field, figure, h, number, select } from "./dom";
 import { Player, type Picture } from "./player";
 import { taskOf } from "./task";
-import { fileName, REMEDIES, sentence } from "./words";
+import { fileName, REMEDIES, sentence } from "./text";
 
 export interface Subject {
   title: string;
@@ -18,100 +18,112 @@ export interface Subject {
   comparison: Comparison | null;
   part: Part | null;
   history: string | null;
-  /** Of the machine that it is, if it comes along. */
+  /** Name of the plan, if it is a bundled machine. */
   plan: string | null;
 }
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null }
 interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[] }
 
-const FILES: [string, string, string][] = [
-  ["stl", "STL", "to print"], ["3mf", "3MF", "with units"], ["svg", "SVG", "to cut or draw"], ["dxf", "DXF", "to cut"],
-  ["mp4", "MP4", "the motion"], ["gif", "GIF", "the motion"], ["pdf", "Card", "all on a page"], ["json", "design.json", "for bellcrank"],
-];
-const LEVELS: [string, string, string][] = [["frame", "Frame", "seconds"], ["plane", "Printed outline", "up to a minute"], ["solid", "Solid", "minutes"]];
-
 export class Result {
   readonly player: Player;
   readonly element = h("aside", { class: "panel", "aria-label": "Result" });
+  private readonly headline = h("p", { class: "headline" });
+  private readonly warnings = h("ul", { class: "warnings", role: "alert" });
   private readonly table = h("table", { class: "figures" });
   private readonly trouble = h("p", { class: "fault", role: "alert" });
   private readonly partBox = h("div", { class: "content" });
   private readonly filesBox = h("div", { class: "content" });
   private part: Part;
-  private fems: Record<string, Fem | "asked" | string> = {};
+  private fems: Record<string, Fem | "running" | string> = {};
+  private registries: Registries | null = null;
   private remarks: Remarks | null = null;
-  private making = "";
+  private writing = "";
 
   constructor(private readonly subject: Subject) {
-    this.part = { width: 2, thickness: 5, scale: 10, material: "ninjaflex", ...given(subject) };
+    this.part = { width: 2, thickness: 5, scale: 10, material: "ninjaflex", ...partOf(subject) };
     this.player = new Player(subject.problem, subject.mask, this.part.scale);
-    this.player.note = (text) => { this.trouble.textContent = text; };
-    this.player.want = (colour) => { if (colour === "stress") void this.validate("frame"); };
+    this.player.onError = (text) => { this.trouble.textContent = text; };
+    this.player.onStressRequested = () => void this.validate("frame");
     this.element.append(
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Efficiency"), this.headline(), this.verdict(), this.table, this.trouble),
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "The part"), this.partBox),
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Take it"), this.filesBox),
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Go on"), this.onward()));
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Efficiency"), this.headline, this.warnings, this.verdict(), this.table, this.trouble),
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Part"), this.partBox),
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Download"), this.filesBox),
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Next steps"), this.nextSteps()));
     this.showTable();
     this.showPart();
     this.showFiles();
     void this.describe();
-    if (this.meant) void this.validate("frame", false);
+    if (this.isPart) void this.validate("frame", false);
+    void fetchRegistries().then((found) => {
+      this.registries = found;
+      this.showTable();
+      this.showPart();
+      this.showFiles();
+    }, (error: ServerError) => { this.trouble.textContent = sentence(error.message); });
   }
 
-  /** Whether the design was searched for a part, so that frames have chosen it already. */
-  private get meant(): boolean { return Boolean(this.subject.part ?? this.subject.provenance["part"]); }
+  /** Whether the design was selected by frame analysis of its part. */
+  private get isPart(): boolean { return Boolean(this.subject.part ?? this.subject.provenance["part"]); }
 
   close(): void { this.player.close(); }
 
-  private headline(): HTMLElement {
-    const { efficiency, problem } = this.subject;
-    const words = problem.input.drive === "displacement"
-      ? "The output moves this many times as far as the input is pushed."
-      : "What comes out for what is put in.";
-    return h("p", { class: "headline" }, h("strong", {}, figure(efficiency, 2)), h("span", {}, words));
+  /** Show the efficiency of the most detailed model that has been computed, with its name and the warnings. */
+  private showHeadline(): void {
+    const { problem } = this.subject;
+    const known = this.fems["frame"];
+    const frame = typeof known === "object" ? known : null;
+    const useFrame = frame !== null && frame.efficiency !== null;
+    const quantity = problem.input.drive === "displacement" && (problem.objective ?? "displacement") === "displacement" ? "Output displacement / input displacement"
+      : `Objective: ${problem.objective ?? "output / input"}`;
+    clear(this.headline, h("strong", {}, figure(useFrame ? frame.efficiency : this.subject.efficiency, 2)),
+      h("span", {}, h("b", { class: "model" }, useFrame ? `frame of ${this.part.width} mm struts` : "spring model"), h("br"), quantity));
+    const warnings = frame ? [...frame.warnings, ...frame.doubts] : [];
+    clear(this.warnings, ...warnings.map((text) => h("li", {}, sentence(text))));
   }
 
-  /** What is to be said about a design that is not what was asked for, and what to try. */
+  /** Suggestions for a design that does not move as required. */
   private verdict(): HTMLElement | null {
     const { efficiency, comparison } = this.subject;
     if (efficiency === null) return null;
     const better = comparison?.efficiency ?? null;
-    const said = efficiency <= 0 ? "It moves against its arrow, or not at all."
-      : better !== null && better > efficiency ? "The design drawn by hand moves further." : "";
-    return said ? h("div", { class: "advice" }, h("p", {}, said), h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text)))) : null;
+    const defect = efficiency <= 0 ? "The output does not move in its direction."
+      : better !== null && better > efficiency ? "The design drawn by hand has a higher efficiency." : "";
+    return defect ? h("div", { class: "advice" }, h("p", {}, defect), h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text)))) : null;
   }
 
   private showTable(): void {
+    this.showHeadline();
     const { efficiency, comparison, mask } = this.subject;
     const beams = bitsOf(mask, this.subject.problem.beams.length).reduce((a, b) => a + b, 0);
     const rows: (HTMLElement | null)[] = [
-      h("tr", {}, h("th", { scope: "row" }, "Discrete model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, `${beams} beams`)),
-      comparison && h("tr", {}, h("th", { scope: "row" }, comparison.title === "yours" ? "Your own design" : "Drawn by hand"), h("td", {}, figure(comparison.efficiency, 3)),
-        h("td", { class: "more" }, comparison.efficiency && efficiency && comparison.efficiency > 0 && efficiency > comparison.efficiency ? `${figure(efficiency / comparison.efficiency, 1)} times less` : "")),
-      ...LEVELS.map(([level, name, time]) => this.femRow(level, name, time)),
+      h("tr", {}, h("th", { scope: "row" }, "Spring model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, `${beams} beams`)),
+      comparison && h("tr", {}, h("th", { scope: "row" }, comparison.title === "yours" ? "Your design" : "Drawn by hand"), h("td", {}, figure(comparison.efficiency, 3)),
+        h("td", { class: "more" }, comparison.efficiency && efficiency && comparison.efficiency > 0 && efficiency > comparison.efficiency ? `${figure(comparison.efficiency / efficiency, 2)} of the result` : "")),
+      ...(this.registries?.levels ?? []).map((level) => this.femRow(level)),
     ];
-    clear(this.table, h("caption", {}, "Efficiency by level of detail"), h("tbody", {}, ...rows));
+    clear(this.table, h("caption", {}, "Efficiency by model"), h("tbody", {}, ...rows));
   }
 
-  private femRow(level: string, name: string, time: string): HTMLElement {
-    const known = this.fems[level];
-    const heading = h("th", { scope: "row" }, name);
+  private femRow({ name, title, duration, missing }: Registries["levels"][number]): HTMLElement {
+    const known = this.fems[name];
+    const heading = h("th", { scope: "row" }, title);
+    if (missing) return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, "not installed on the server"));
     if (known === undefined) {
-      return h("tr", {}, heading, h("td", { colspan: 2 }, button("Ask finite elements", () => void this.validate(level), "quiet small", { "aria-label": `Ask finite elements: ${name}` }), h("span", { class: "more" }, ` ${time}`)));
+      return h("tr", {}, heading, h("td", { colspan: 2 }, button("Check with finite elements", () => void this.validate(name), "quiet small", { "aria-label": `Check with finite elements: ${title}` }), h("span", { class: "more" }, ` ${duration}`)));
     }
-    if (known === "asked") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), "computing …"));
+    if (known === "running") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), "computing …"));
     if (typeof known === "string") return h("tr", {}, heading, h("td", { colspan: 2, class: "fault" }, known));
     const stress = known.von_mises_MPa === null ? "" : `${figure(known.von_mises_MPa, 2)} MPa, ${figure(100 * (known.principal_strain ?? 0), 0)} % strain`;
-    const warning = known.warnings[0];
-    const said = known.efficiency === null ? sentence(warning ?? known.status) : warning ? `${stress}. ${sentence(warning)}` : stress;
-    return h("tr", {}, heading, h("td", {}, figure(known.efficiency, 3)), h("td", { class: "more" }, said,
+    // Warnings of the frame are shown below the headline.
+    const details = known.efficiency === null ? sentence(known.status) : stress;
+    const text = [details, ...(name === "frame" ? [] : known.warnings.map(sentence))].filter(Boolean).join(" ");
+    return h("tr", {}, heading, h("td", {}, figure(known.efficiency, 3)), h("td", { class: "more" }, text,
       known.picture && h("span", {}, " ", button("Show stress", () => this.player.showStress(known.picture), "quiet small"))));
   }
 
   private async validate(level: string, show = true): Promise<void> {
-    this.fems[level] = "asked";
+    this.fems[level] = "running";
     this.showTable();
     try {
       const { problem, mask } = this.subject;
@@ -119,7 +131,7 @@ export class Result {
       this.fems[level] = found;
       if (show && found.picture) this.player.showStress(found.picture);
     } catch (error) {
-      this.fems[level] = sentence((error as Refusal).message);
+      this.fems[level] = sentence((error as ServerError).message);
     }
     this.showTable();
   }
@@ -133,7 +145,7 @@ export class Result {
     };
     const size = (key: "width" | "thickness" | "scale", label: string): HTMLElement =>
       field(label, number(this.part[key], { min: 0.1, step: "any" }, (value) => change({ [key]: value })), "mm");
-    const material = select([["ninjaflex", "NinjaFlex"], ["tpu-95a", "TPU 95A"], ["pla", "PLA"], ["petg", "PETG"]], this.part.material, (picked) => change({ material: picked }));
+    const material = select((this.registries?.materials ?? []).map(({ name, title }): [string, string] => [name, title]), this.part.material, (picked) => change({ material: picked }));
     const { remarks } = this;
     clear(this.partBox,
       h("div", { class: "row" }, size("width", "Strut width"), size("thickness", "Thickness")),
@@ -142,7 +154,7 @@ export class Result {
       remarks && h("p", { class: "more" }, `${remarks.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ")} mm`,
         remarks.mass === null ? "" : `, ${figure(remarks.mass, 1)} g`, remarks.stroke === null ? "" : `, stroke ${figure(remarks.stroke, 2)} mm`),
       remarks && remarks.remarks.length > 0 && h("details", { class: "remarks" },
-        h("summary", {}, `${remarks.remarks.length} ${remarks.remarks.length === 1 ? "remark" : "remarks"} before you print`),
+        h("summary", {}, `${remarks.remarks.length} ${remarks.remarks.length === 1 ? "remark" : "remarks"} on printing`),
         h("ul", {}, ...remarks.remarks.map((text) => h("li", {}, sentence(text))))));
   }
 
@@ -153,69 +165,69 @@ export class Result {
       this.showPart();
     } catch (error) {
       this.remarks = null;
-      this.showPart(sentence((error as Refusal).message));
+      this.showPart(sentence((error as ServerError).message));
     }
   }
 
   private showFiles(fault = ""): void {
     clear(this.filesBox,
       h("div", { class: "files" },
-        ...FILES.map(([suffix, name, use]) => h("button", {
-          type: "button", class: this.making === suffix ? "file busy" : "file", disabled: this.making !== "", "data-file": suffix,
-          onclick: () => void this.take(suffix),
-        }, h("strong", {}, name), h("span", {}, this.making === suffix ? "making …" : use))),
-        this.subject.history && h("button", { type: "button", class: "file", "data-file": "history", disabled: this.making !== "", onclick: () => void this.takeHistory() },
-          h("strong", {}, "History"), h("span", {}, "every proposal"))),
+        ...(this.registries?.files ?? []).map(({ name: suffix, title, purpose }) => h("button", {
+          type: "button", class: this.writing === suffix ? "file busy" : "file", disabled: this.writing !== "", "data-file": suffix,
+          onclick: () => void this.downloadFile(suffix),
+        }, h("strong", {}, title), h("span", {}, this.writing === suffix ? "writing …" : purpose))),
+        this.subject.history && h("button", { type: "button", class: "file", "data-file": "history", disabled: this.writing !== "", onclick: () => void this.downloadHistory() },
+          h("strong", {}, "History"), h("span", {}, "all proposals"))),
       fault && h("p", { class: "fault", role: "alert" }, fault));
   }
 
-  private async take(suffix: string): Promise<void> {
+  private async downloadFile(suffix: string): Promise<void> {
     const { problem, mask, efficiency, provenance, title } = this.subject;
-    this.making = suffix;
+    this.writing = suffix;
     this.showFiles();
     try {
       const content = await fetchFile(suffix, { problem, mask, part: this.part, efficiency, provenance });
       download(content, suffix === "json" ? "design.json" : suffix === "pdf" ? `${fileName(title)}-card.pdf` : `${fileName(title)}.${suffix}`);
-      this.making = "";
+      this.writing = "";
       this.showFiles();
     } catch (error) {
-      this.making = "";
-      this.showFiles(sentence((error as Refusal).message));
+      this.writing = "";
+      this.showFiles(sentence((error as ServerError).message));
     }
   }
 
-  private async takeHistory(): Promise<void> {
+  private async downloadHistory(): Promise<void> {
     try {
       download(await fetchBlob(`/runs/${this.subject.history}/history.parquet`), "history.parquet");
     } catch (error) {
-      this.showFiles(sentence((error as Refusal).message));
+      this.showFiles(sentence((error as ServerError).message));
     }
   }
 
-  private onward(): HTMLElement {
+  private nextSteps(): HTMLElement {
     const { problem, mask } = this.subject;
     const open = (byHand: boolean): void => {
       const task = taskOf(problem, null, this.part.scale);
       const whole = hexOf(new Uint8Array(problem.beams.length).fill(1));
       const from = byHand ? { ...task, hand: mask } : { ...task, problem: { ...problem, initial: problem.initial || whole } };
-      localStorage.setItem(KEY, JSON.stringify(from));
+      localStorage.setItem(TASK_KEY, JSON.stringify(from));
       if (byHand) sessionStorage.setItem("bellcrank-tool", "hand");
       location.hash = "#/draw";
     };
     const { plan } = this.subject;
     return h("div", { class: "content buttons" },
-      plan && button("Open its parts", () => { location.hash = `#/machine/${plan}`; }, "strong"),
+      plan && button("Open its plan", () => { location.hash = `#/machine/${plan}`; }, "strong"),
       button("Open as a new task", () => open(false)),
-      button("Change it by hand", () => open(true)));
+      button("Change by hand", () => open(true)));
   }
 }
 
-function given(subject: Subject): Partial<Part> {
-  const kept = (subject.part ?? subject.provenance["part"] ?? {}) as Partial<Part>;
-  return Object.fromEntries(Object.entries(kept).filter(([key, value]) => ["width", "thickness", "scale", "material"].includes(key) && (typeof value === "number" || typeof value === "string")));
+function partOf(subject: Subject): Partial<Part> {
+  const stored = (subject.part ?? subject.provenance["part"] ?? {}) as Partial<Part>;
+  return Object.fromEntries(Object.entries(stored).filter(([key, value]) => ["width", "thickness", "scale", "material"].includes(key) && (typeof value === "number" || typeof value === "string")));
 }
 
-/** A design from the gallery. */
+/** Load a design of the gallery. */
 export async function designSubject(source: string, key: string): Promise<Subject> {
   const whole = await get<{ title: string; problem: Problem; note: string; mask: string; efficiency: number | null; provenance: Record<string, unknown> }>(`/gallery/${source}/${key}`);
   return { ...whole, comparison: null, part: null, history: null, plan: source === "machines" ? key : null };

@@ -1,20 +1,16 @@
-// A search that is watched, and its result when it ends.
+// The progress of a search, and its result.
 
-import { follow, get, post, remove, type News, type Refusal, type Run, type WholeRun } from "./api";
+import { fetchRegistries, follow, get, post, remove, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
 import { bitsOf } from "./api";
 import { Chart } from "./chart";
 import { Drawing, where } from "./drawing";
-import { button, choice, clear, count, duration, figure, h, say } from "./dom";
+import { announce, button, choice, clear, count, duration, figure, h } from "./dom";
 import { Result } from "./result";
-import { plainly, REMEDIES, sentence } from "./words";
-
-const WORDS: Record<Run["status"], string> = {
-  queued: "waiting for its turn", running: "searching", paused: "resting", stopped: "stopped early", finished: "finished", failed: "failed",
-};
+import { runMessage, REMEDIES, sentence } from "./text";
 
 export class RunPage {
   readonly element = h("div", { class: "page run" });
-  private readonly drawing = new Drawing("The best design so far, moved");
+  private readonly drawing = new Drawing("The best design so far, deformed");
   private readonly chart = new Chart();
   private readonly head = h("div", { class: "intro" });
   private readonly live = h("div", { class: "live" });
@@ -28,20 +24,22 @@ export class RunPage {
   private readonly switcher = h("div", { class: "bar" });
   private result: Result | null = null;
   private shown = "";
-  private news: News | null = null;
+  private update: RunUpdate | null = null;
   private chain = "best";
   private readonly leave: () => void;
   private showing: "live" | "human" = "live";
-  private statusSaid = "";
+  private shownStatus = "";
+  private method: Registries["searches"][number] | null = null;
+  private readonly curveNote = h("p", { class: "note" });
 
-  constructor(private run: WholeRun) {
+  constructor(private run: RunDetails) {
     this.drawing.setLattice(run.problem.positions, run.problem.beams);
-    this.chart.begin(run.settings.steps, run.method, run.settings.hot, run.settings.cold);
+    this.chart.configure(run.settings);
     if (run.comparison) this.chart.compare(run.comparison.title, run.comparison.efficiency);
     this.stage.append(this.switcher, this.paper);
     const card = h("section", { class: "card", "aria-label": "Efficiency along the search" },
       h("h2", {}, "Efficiency along the search"), this.chart.svg,
-      h("p", { class: "note" }, this.shadingNote()));
+      this.curveNote);
     this.watch = h("aside", { class: "panel", "aria-label": "Search" },
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.controls, this.trouble));
     this.side.append(this.watch);
@@ -49,8 +47,9 @@ export class RunPage {
     this.show(run);
     this.draw(run.problem.initial, null);
     if (run.mask) void this.open();
-    this.leave = follow(`/runs/${run.id}/live`, (news) => this.hear(news), (lost) => {
-      this.trouble.textContent = lost ? "The server does not answer; the search goes on with it, and so does this page." : "";
+    void fetchRegistries().then(({ searches }) => this.describeMethod(searches.find(({ name }) => name === run.method)), () => undefined);
+    this.leave = follow(`/runs/${run.id}/live`, (update) => this.receive(update), (lost) => {
+      this.trouble.textContent = lost ? "The server cannot be reached. The search continues when it is restarted." : "";
     });
   }
 
@@ -59,20 +58,21 @@ export class RunPage {
     this.result?.close();
   }
 
-  private shadingNote(): string {
-    return {
-      paper: "Shaded: the annealing, darker where it is hot.",
-      "basin-hopping": "The best design of each chain. Shaded: where a chain wanders instead of climbing.",
-      tempering: "The coldest replica of each chain.",
-    }[this.run.method] ?? "";
+  /** Describe the curves and the method, which the registry of searches defines. */
+  private describeMethod(search: Registries["searches"][number] | undefined): void {
+    if (!search) return;
+    this.method = search;
+    const curve = search.running_best ? "Best efficiency of each chain so far." : "Efficiency of the current design of each chain.";
+    this.curveNote.textContent = `${curve}${this.run.settings.replicas === undefined ? " Shaded: phases of higher temperature." : ""}`;
+    this.show(this.run);
   }
 
-  private hear(news: News): void {
-    if (news.error) { this.trouble.textContent = sentence(news.error.message); return; }
+  private receive(update: RunUpdate): void {
+    if (update.error) { this.trouble.textContent = sentence(update.error.message); return; }
     const before = this.run.status;
-    this.news = news;
-    this.run = { ...this.run, ...news.run };
-    if (Object.keys(news.points).length || news.reset) this.chart.add(news.points, news.reset);
+    this.update = update;
+    this.run = { ...this.run, ...update.run };
+    if (Object.keys(update.points).length || update.reset) this.chart.add(update.points, update.reset);
     this.show(this.run);
     if (!this.result) this.drawLive();
     const done = (status: string): boolean => status === "finished" || status === "stopped";
@@ -80,14 +80,14 @@ export class RunPage {
   }
 
   private drawLive(): void {
-    const { news } = this;
+    const { update } = this;
     if (this.showing === "human" && this.run.comparison) {
       this.draw(this.run.comparison.mask, null);
       return;
     }
-    const chain = this.chain === "best" ? null : news?.chains[this.chain];
+    const chain = this.chain === "best" ? null : update?.chains[this.chain];
     if (chain) this.draw(chain.mask, null);
-    else if (news?.moved) this.draw(news.moved.mask, news.moved.displacement);
+    else if (update?.moved) this.draw(update.moved.mask, update.moved.displacement);
   }
 
   private draw(mask: string, displacement: number[] | null): void {
@@ -112,7 +112,7 @@ export class RunPage {
   }
 
   private async open(): Promise<void> {
-    const whole = await get<WholeRun>(`/runs/${this.run.id}`);
+    const whole = await get<RunDetails>(`/runs/${this.run.id}`);
     this.run = whole;
     if (whole.comparison) this.chart.compare(whole.comparison.title, whole.comparison.efficiency);
     if (!whole.mask) return;
@@ -130,85 +130,85 @@ export class RunPage {
 
   private show(run: Run): void {
     const settings = run.settings;
-    if (this.statusSaid !== `${run.status}${run.title}`) {
-      this.statusSaid = `${run.status}${run.title}`;
-      clear(this.head, h("h1", {}, run.title), h("p", {}, h("span", { class: `status ${run.status}` }, WORDS[run.status]),
-        run.status === "queued" && run.place > 0 ? `, ${count(run.place, "search", "searches")} before it` : ""));
-      say(`${run.title}: ${WORDS[run.status]}`);
+    if (this.shownStatus !== `${run.status}${run.title}`) {
+      this.shownStatus = `${run.status}${run.title}`;
+      clear(this.head, h("h1", {}, run.title), h("p", {}, h("span", { class: `status ${run.status}` }, run.status),
+        run.status === "queued" && run.place > 0 ? `, ${count(run.place, "search", "searches")} ahead` : ""));
+      announce(`${run.title}: ${run.status}`);
       this.showControls(run);
       this.showSwitcher();
     }
-    const made = Object.values(this.news?.chains ?? {}).reduce((sum, chain) => sum + chain.step, 0);
+    const made = Object.values(this.update?.chains ?? {}).reduce((sum, chain) => sum + chain.step, 0);
     const done = run.status === "finished" ? run.total : Math.max(run.done, made);
     const share = Math.min(1, done / run.total);
     const running = run.status === "running";
-    const tried = this.news?.tried;
-    const last: [string, string] = tried ? ["trying as parts", `${tried[0]} of ${tried[1]}`] : ["time left", duration(this.news?.left)];
+    const tried = this.update?.tried;
+    const last: [string, string] = tried ? ["candidates analysed", `${tried[0]} of ${tried[1]}`] : ["time left", duration(this.update?.left)];
     const rows: [string, string][] = [
       ["best so far", figure(run.efficiency ?? this.chart.best, 3)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
-      ...(running ? [["speed", this.news?.speed ? `${Math.round(this.news.speed).toLocaleString("en")} steps/s` : "starting …"], last] as [string, string][] : []),
-      ["method", `${run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
-      ...(settings.goals.length ? [["keeps", settings.goals.join(", ")]] as [string, string][] : []),
+      ...(running ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], last] as [string, string][] : []),
+      ["method", `${this.method?.title ?? run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
+      ...(settings.goals.length ? [["constraints", settings.goals.join(", ")]] as [string, string][] : []),
     ];
     let bar = this.live.querySelector("progress");
     if (!bar) {
-      bar = h("progress", { max: 1, "aria-label": "Part of the search that is done" });
+      bar = h("progress", { max: 1, "aria-label": "Progress of the search" });
       this.live.append(bar, h("dl", { class: "facts" }));
     }
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
-    if (run.message && run.status !== "running") this.explain(run);
+    if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {
-      const moved = this.news?.moved;
+      const moved = this.update?.moved;
       const value = moved?.efficiency ?? run.efficiency ?? this.chart.best;
-      clear(this.readout, value !== null && h("strong", {}, figure(value, 3)), h("span", {}, this.stateInWords(run, value !== null, done)));
+      clear(this.readout, value !== null && h("strong", {}, figure(value, 3)), h("span", {}, this.stateText(run, value !== null, done)));
     }
   }
 
-  /** Say why a search has no design to show, and what to try. */
-  private explain(run: Run): void {
+  /** Show why a search has no design, and suggestions. */
+  private showMessage(run: Run): void {
     const none = /accepted|found/.test(run.message);
-    clear(this.trouble, plainly(run.message), none && h("span", { class: "advice" }, " What may help: ",
-      ...REMEDIES.flatMap((text) => [h("br"), text]), h("br"), h("a", { href: "#/draw" }, "Back to the drawing")));
+    clear(this.trouble, runMessage(run.message), none && h("span", { class: "advice" }, " Suggestions: ",
+      ...REMEDIES.flatMap((text) => [h("br"), text]), h("br"), h("a", { href: "#/draw" }, "Back to the task")));
   }
 
   private showSwitcher(): void {
-    const chains = [["best", this.run.method === "basin-hopping" ? "Best" : "Leading"], ...Array.from({ length: Math.min(6, this.run.settings.chains) }, (_, k) => [String(k), `Chain ${k + 1}`])] as [string, string][];
+    const chains = [["best", "Best"], ...Array.from({ length: Math.min(6, this.run.settings.chains) }, (_, k) => [String(k), `Chain ${k + 1}`])] as [string, string][];
     if (this.run.comparison) chains.push(["human", this.run.comparison.title === "yours" ? "Yours" : "By hand"]);
-    clear(this.switcher, choice("Which design is shown", chains, this.showing === "human" ? "human" : this.chain, (picked) => {
+    clear(this.switcher, choice("Displayed design", chains, this.showing === "human" ? "human" : this.chain, (picked) => {
       this.showing = picked === "human" ? "human" : "live";
       this.chain = picked === "human" ? "best" : picked;
       this.drawLive();
     }));
   }
 
-  private stateInWords(run: Run, known: boolean, done: number): string {
-    if (run.status !== "running") return WORDS[run.status];
-    if (known) return run.method === "basin-hopping" ? "best design so far, moved" : "the design at hand, moved";
-    return done ? "No design that holds together and moves has been found yet." : "The search is starting …";
+  private stateText(run: Run, known: boolean, done: number): string {
+    if (run.status !== "running") return run.status;
+    if (known) return "best design so far, spring model";
+    return done ? "No admissible design yet." : "Starting …";
   }
 
   private showControls(run: Run): void {
-    const act = (deed: string) => async (): Promise<void> => {
+    const act = (action: string) => async (): Promise<void> => {
       try {
         this.trouble.textContent = "";
-        await post(`/runs/${run.id}/${deed}`);
+        await post(`/runs/${run.id}/${action}`);
       } catch (error) {
-        this.trouble.textContent = sentence((error as Refusal).message);
+        this.trouble.textContent = sentence((error as ServerError).message);
       }
     };
     const erase = async (): Promise<void> => {
-      if (!confirm("Delete this search with everything it has found?")) return;
+      if (!confirm("Delete this search and all its results?")) return;
       await remove(`/runs/${run.id}`);
       location.hash = "#/runs";
     };
     const { status } = run;
     clear(this.controls,
       (status === "running" || status === "queued") && button("Pause", () => void act("pause")()),
-      status === "running" && button("Stop and take the best", () => void act("stop")(), "strong"),
-      (status === "paused" || status === "stopped" || status === "failed") && button(status === "failed" ? "Try again" : "Go on searching", () => void act("resume")(), "strong"),
-      status === "paused" && button("Take the best", () => void act("stop")()),
+      status === "running" && button("Stop and choose the best", () => void act("stop")(), "strong"),
+      (status === "paused" || status === "stopped" || status === "failed") && button(status === "failed" ? "Retry" : "Continue", () => void act("resume")(), "strong"),
+      status === "paused" && button("Choose the best", () => void act("stop")()),
       status !== "running" && button("Delete", () => void erase(), "quiet"));
   }
 }

@@ -1,75 +1,71 @@
-// How a design is searched, and the button that begins.
+// Settings of a search, and the button that starts it.
 
-import type { Refusal } from "./api";
+import type { ServerError } from "./api";
 import { choice, field, h, number, select } from "./dom";
-import type { Editor } from "./editor";
-import { sentence } from "./words";
+import type { Settings, TaskEditor } from "./editing";
+import { sentence } from "./text";
 
-const METHODS: [string, string, string][] = [
-  ["basin-hopping", "Basin hopping", "Climbs, disturbs a part, climbs again. The best in most cases."],
-  ["tempering", "Tempering", "Chains at several temperatures that exchange designs."],
-  ["paper", "The paper", "Single random flips, as Bonfanti et al. (2020) published it."],
-];
 const EFFORTS: [string, string, number, number, string][] = [
-  ["quick", "Quick", 4000, 2, "Seconds on a small lattice: to see what can be had."],
-  ["usual", "Usual", 20000, 4, "About a minute. Good in most cases."],
-  ["long", "Thorough", 100000, 4, "Minutes: for what you mean to build."],
+  ["quick", "Quick", 4000, 2, "Seconds on a small lattice, for a first impression."],
+  ["usual", "Standard", 20000, 4, "About a minute. Sufficient in most cases."],
+  ["long", "Thorough", 100000, 4, "Minutes, for a part to be built."],
 ];
 
 export class SearchBox {
   private fault = "";
   private busy = false;
-  private more = false;
+  private expanded = false;
 
-  constructor(private readonly editor: Editor, private readonly refresh: () => void) {}
+  constructor(private readonly editor: TaskEditor, private readonly refresh: () => void) {}
 
-  /** Return it as it is now. */
+  /** Return the panel in its current state. */
   make(): HTMLElement {
     const { editor } = this;
     const { settings } = editor;
-    const update = (changes: Partial<typeof settings>): void => { editor.settings = { ...editor.settings, ...changes }; this.refresh(); };
+    const methods = editor.registries?.searches ?? [];
+    const update = (changes: Partial<Settings>): void => { editor.settings = { ...editor.settings, ...changes }; this.refresh(); };
     const whole = (key: "steps" | "chains" | "seed", label: string, least: number, most: number): HTMLElement => {
       const input = number(settings[key], { min: least, max: most, step: 1 }, (value) => update({ [key]: Math.min(most, Math.max(least, Math.round(value))) }));
       input.dataset.key = key;
       return field(label, input);
     };
     const effort = EFFORTS.find(([, , steps, chains]) => steps === settings.steps && chains === settings.chains)?.[0] ?? "";
-    const real = h("input", { type: "checkbox", checked: settings.real, "data-key": "real" });
-    real.addEventListener("change", () => { update({ real: real.checked }); editor.restiffen(); });
-    const method = select(METHODS.map(([key, name]) => [key, name]), settings.method, (picked) => update({ method: picked }));
+    const forPart = h("input", { type: "checkbox", checked: settings.forPart, "data-key": "for-part" });
+    forPart.addEventListener("change", () => { update({ forPart: forPart.checked }); editor.updateStiffness(); });
+    const method = select(methods.map(({ name, title }) => [name, title]), settings.method, (picked) => update({ method: picked }));
     method.dataset.key = "method";
-    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => { update({ width: value }); editor.restiffen(); });
+    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => { update({ width: value }); editor.updateStiffness(); });
     width.dataset.key = "width";
     const { missing } = editor;
     return h("section", { class: "step search open" },
       h("h2", { class: "plain" }, "Search"),
       h("div", { class: "content" },
-        choice("How long", EFFORTS.map(([key, name]) => [key, name]), effort as never, (picked) => {
+        choice("Effort", EFFORTS.map(([key, name]) => [key, name]), effort as never, (picked) => {
           const found = EFFORTS.find(([key]) => key === picked)!;
           update({ steps: found[2], chains: found[3] });
         }),
-        h("p", { class: "note" }, EFFORTS.find(([key]) => key === effort)?.[4] ?? `${settings.steps.toLocaleString("en")} steps of ${settings.chains} chains.`),
-        h("details", { ...(this.more ? { open: true } : {}), ontoggle: (event: Event) => { this.more = (event.target as HTMLDetailsElement).open; } },
+        h("p", { class: "note" }, EFFORTS.find(([key]) => key === effort)?.[4] ?? `${settings.chains} chains of ${settings.steps.toLocaleString("en")} steps.`),
+        h("details", { ...(this.expanded ? { open: true } : {}), ontoggle: (event: Event) => { this.expanded = (event.target as HTMLDetailsElement).open; } },
           h("summary", { "data-key": "more" }, "Method, seed, strut width"),
-          field("Method", method, "", METHODS.find(([key]) => key === settings.method)![2]),
+          field("Method", method, "", methods.find(({ name }) => name === settings.method)?.summary ?? ""),
           h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000), whole("chains", "Chains", 1, 64), whole("seed", "Seed", 0, 2 ** 31)),
-          h("label", { class: "tick" }, real, "For a part with struts this wide"),
-          settings.real ? field("Strut width", width, "mm", "The best designs are tried as such a part, and the best part is taken.")
-            : h("p", { class: "note" }, "The springs have the stiffness of the task, the paper's by default.")),
-        h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !!missing || !!editor.fault || this.busy,
-          onclick: () => void this.begin() }, "Design it"),
+          h("label", { class: "tick" }, forPart, "Design a part with struts of this width"),
+          settings.forPart ? field("Strut width", width, "mm", "The best candidates are ranked by nonlinear frame analysis.")
+            : h("p", { class: "note" }, "The spring model uses the stiffness of the task, by default that of the paper.")),
+        h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !!missing || !!editor.fault || !settings.method || this.busy,
+          onclick: () => void this.start() }, "Design it"),
         missing && h("p", { class: "note" }, missing.message),
         this.fault && h("p", { class: "fault", role: "alert" }, this.fault)));
   }
 
-  private async begin(): Promise<void> {
+  private async start(): Promise<void> {
     this.busy = true;
     this.fault = "";
     this.refresh();
     try {
-      await this.editor.begin();
+      await this.editor.startSearch();
     } catch (error) {
-      this.fault = sentence((error as Refusal).message);
+      this.fault = sentence((error as ServerError).message);
     }
     this.busy = false;
     this.refresh();

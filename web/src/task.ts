@@ -1,4 +1,4 @@
-// A task as it is drawn: plain data, with undo, and to and from what the server reads.
+// The task as plain data, with undo, and its conversion to and from the form of the server.
 
 import { bitsOf, hexOf, type Point, type Problem } from "./api";
 import { isEach } from "./drawing";
@@ -9,12 +9,12 @@ export type Hold = "fixed" | "fixed_x" | "fixed_y";
 
 export interface Task {
   problem: Problem;
-  /** Of the lattice, if it was made from a table. */
+  /** Table of the lattice, if it was made from one. */
   lattice: Record<string, unknown> | null;
-  /** What a person says of each beam; `auto` leaves it to the region that it touches. */
+  /** Rule of each beam; `auto` makes it designable unless it touches a region. */
   rules: Rule[];
   mirror: { x: boolean; y: boolean };
-  /** Millimetres of a lattice unit. */
+  /** Length of a lattice unit, mm. */
   scale: number;
   /** A design drawn by hand, as a mask. */
   hand: string | null;
@@ -28,7 +28,7 @@ export function touching(problem: Problem): Uint8Array {
   return Uint8Array.from(problem.beams, ([a, b]) => (taken.has(a) || taken.has(b) ? 1 : 0));
 }
 
-/** Read a problem as something to be drawn on. */
+/** Convert a problem to a task. */
 export function taskOf(problem: Problem, lattice: Record<string, unknown> | null = null, scale = 10): Task {
   const touches = touching(problem);
   const designable = new Uint8Array(problem.beams.length);
@@ -41,7 +41,7 @@ export function taskOf(problem: Problem, lattice: Record<string, unknown> | null
   return { problem, lattice, rules, mirror: { x: false, y: false }, scale, hand: null };
 }
 
-/** What can be searched of a task: beams that may change, and those present at first. */
+/** Convert a task to a problem with its designable beams and initial design. */
 export function problemOf(task: Task): Problem {
   const { problem, rules } = task;
   const touches = touching(problem);
@@ -65,7 +65,7 @@ export function nodesOf(problem: Problem, region: Region): number[] {
   return [...fixed, ...fixed_x, ...fixed_y];
 }
 
-/** Put nodes into a region, or take them out; a node belongs to one region only. */
+/** Add nodes to a region or remove them; a node belongs to one region only. */
 export function assign(task: Task, region: Region, nodes: number[], add: boolean, hold: Hold = "fixed"): Task {
   const gone = new Set(nodes);
   const without = (list: number[]): number[] => list.filter((node) => !gone.has(node));
@@ -84,7 +84,7 @@ export function assign(task: Task, region: Region, nodes: number[], add: boolean
   return { ...task, problem: { ...task.problem, ...next }, hand: null };
 }
 
-/** Change the nodes of a region; directions of single nodes go with them. */
+/** Change the nodes of a region and keep the directions of single nodes. */
 function withNodes<R extends Problem["input"] | Problem["output"]>(region: R, nodes: number[]): R {
   if (!isEach(region.direction)) return { ...region, nodes };
   const each = new Map(region.nodes.map((node, k) => [node, (region.direction as Point[])[k]!]));
@@ -106,7 +106,7 @@ export function rowOf(problem: Problem, node: number): number[] {
     .map(([k]) => k);
 }
 
-/** The mirror images of a beam that can be found, itself included. */
+/** Return a beam and its mirror images. */
 export function images(problem: Problem, beam: number, mirror: { x: boolean; y: boolean }): number[] {
   if (!mirror.x && !mirror.y) return [beam];
   const { positions, beams, designable } = problem;
@@ -133,7 +133,7 @@ export function images(problem: Problem, beam: number, mirror: { x: boolean; y: 
   return [...found];
 }
 
-/** Keeps what was, so that it can come back. */
+/** A value with undo and redo. */
 export class History<T> {
   private past: string[] = [];
   private future: string[] = [];
@@ -144,7 +144,7 @@ export class History<T> {
   get canUndo(): boolean { return this.past.length > 0; }
   get canRedo(): boolean { return this.future.length > 0; }
 
-  /** Take in what is now; `merge` makes it part of the last step, as for a drag. */
+  /** Set the value; `merge` makes the change part of the last step, as during a drag. */
   set(value: T, merge = false): void {
     if (!merge) {
       this.past.push(JSON.stringify(this.now));
@@ -169,7 +169,7 @@ async function squeeze(stream: ReadableStream<Uint8Array>): Promise<Uint8Array> 
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** A task as letters for an address, of which nothing is sent to any server. */
+/** Encode a task for the fragment of an address, which is not sent to a server. */
 export async function toLink(task: Task): Promise<string> {
   const stream = new Blob([JSON.stringify(task)]).stream().pipeThrough(new CompressionStream("deflate-raw"));
   const bytes = await squeeze(stream as ReadableStream<Uint8Array>);

@@ -65,11 +65,15 @@ class Level:
         Function that raises an error for a part and settings that cannot be analysed.
     missing
         Function that returns which optional library is missing and how to install it, or None.
+    title, duration
+        Display name, and the usual duration of an analysis in words.
     """
 
     analyse: Callable[..., Analysis]
     check: Callable[[Part, FemSettings], None]
     missing: Callable[[], str | None] = lambda: None
+    title: str = ""
+    duration: str = ""
 
     def __call__(
         self,

@@ -75,6 +75,8 @@ class Search:
     plot_running_best
         Whether plots show the best efficiency so far in place of the current one, which varies
         too much to be read.
+    title, summary
+        Display name, and a description in one sentence.
     """
 
     settings: type[SearchSettings]
@@ -84,6 +86,8 @@ class Search:
     is_done: Callable[[Any, Any], bool]
     candidate_rule: CandidateRule = plateau_ends
     plot_running_best: bool = False
+    title: str = ""
+    summary: str = ""
 
 
 searches: Registry[Search] = Registry("search")

@@ -17,13 +17,13 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from bellcrank import __version__
 from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName, first_line
-from bellcrank.part import materials
 from bellcrank.search import default_workers
 from bellcrank.web import design_routes, run_routes, task_routes
 from bellcrank.web.gallery import BundledDesigns, Gallery, RunDesigns, SavedDesigns
 from bellcrank.web.jobs import Jobs
 from bellcrank.web.machine_gallery import Actuators, Machines, Struts
 from bellcrank.web.pools import Busy, TimeLimitExceeded, make_pools, plain_error
+from bellcrank.web.registries import registered
 from bellcrank.web.requests import ErrorResponse
 from bellcrank.web.scheduler import Scheduler
 from bellcrank.web.security import AccessControl
@@ -94,16 +94,17 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
         return {
             "version": __version__,
             "ready": state.ready,
-            "trouble": state.trouble,
+            "error": state.error,
             "processors": default_workers(),
             "searches": state.scheduler.slots,
             "running": len(state.scheduler.running),
             "queued": len(state.scheduler.queue),
-            "materials": {
-                name: {"young": each.young, "poisson": each.poisson}
-                for name, each in materials.items()
-            },
         }
+
+    @app.get("/api/registries", tags=["server"])
+    def registries() -> dict[str, list[dict[str, Any]]]:
+        """Return the names and descriptions of searches, materials, file formats and levels."""
+        return registered()
 
     return app
 
@@ -113,7 +114,7 @@ async def _prepare(state: AppState) -> None:
     try:
         await asyncio.gather(state.pools.prepare(), run_in_threadpool(state.gallery.listing))
     except BellcrankError as error:
-        state.trouble = first_line(error)
+        state.error = first_line(error)
     else:
         state.ready = True
 
@@ -152,10 +153,9 @@ def _add_error_handlers(app: FastAPI) -> None:
         first = error.errors()[0]
         path = [str(part) for part in first["loc"] if part not in {"body", "path", "query"}]
         key = ".".join(path)
-        expected = str(first["msg"]).removeprefix("Input should be ")
-        message = (
-            f"{key}: expected {expected}" if expected != first["msg"] else f"{key}: {expected}"
-        )
+        reason = str(first["msg"]).removeprefix("Value error, ")
+        expected = reason.removeprefix("Input should be ")
+        message = f"{key}: expected {expected}" if expected != reason else f"{key}: {reason}"
         return JSONResponse({"message": message.removeprefix(": "), "key": key}, 422)
 
     async def http_error(_request: Request, error: Exception) -> JSONResponse:

@@ -14,10 +14,9 @@ from bellcrank.model import Design, unpack_mask
 from bellcrank.web import quick_calls, slow_calls
 from bellcrank.web.gallery import design_data, entry_named
 from bellcrank.web.limits import MESSAGE
+from bellcrank.web.page_files import page_files
 from bellcrank.web.pools import plain_error
 from bellcrank.web.requests import (
-    MEDIA,
-    QUICK_FILES,
     DesignBody,
     FemBody,
     FileBody,
@@ -67,11 +66,11 @@ async def make_file(suffix: FileSuffix, body: FileBody, state: State) -> Respons
     """Return a file of a design for printing, cutting, viewing or simulation."""
     about = {"efficiency": body.efficiency, "provenance": body.provenance}
     text = json.dumps(body.problem)
-    pool = state.pools.thorough if suffix in QUICK_FILES else state.pools.slow
+    pool = state.pools.thorough if page_files[suffix].quick else state.pools.slow
     content = await pool.call(
         slow_calls.design_file, text, body.mask, f".{suffix}", body.part, about
     )
-    return Response(content, media_type=MEDIA[suffix])
+    return Response(content, media_type=page_files[suffix].media_type)
 
 
 @router.get("/gallery")

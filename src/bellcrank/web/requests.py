@@ -2,33 +2,44 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from bellcrank.errors import UnknownName, first_line
+from bellcrank.fem import levels
+from bellcrank.search import DEFAULT_SEARCH, searches
 from bellcrank.web.limits import CHAINS, STEPS
+from bellcrank.web.page_files import page_files
 
-Method = Literal["basin-hopping", "tempering", "paper"]
-FileSuffix = Literal["stl", "3mf", "svg", "dxf", "step", "mp4", "gif", "pdf", "json"]
-Level = Literal["frame", "plane", "solid"]
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def _name_in(registry: Mapping[str, Any]) -> AfterValidator:
+    """Return a validator that refuses names that are not in a registry."""
+
+    def check(name: str) -> str:
+        try:
+            registry[name]
+        except UnknownName as error:
+            raise ValueError(first_line(error)) from None
+        return name
+
+    return AfterValidator(check)
+
+
+def _names(registry: Mapping[str, Any]) -> Any:
+    """Return a field whose schema lists the names of a registry."""
+    return Field(max_length=100, json_schema_extra={"enum": list(registry)})
+
+
+Method = Annotated[str, _names(searches), _name_in(searches)]
+FileSuffix = Annotated[str, _names(page_files), _name_in(page_files)]
+Level = Annotated[str, _names(levels), _name_in(levels)]
 Mask = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=4000)]
 Session = Annotated[str, Field(pattern=r"^[a-z0-9-]{1,64}$")]
 Goals = Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=12)]
-
-MEDIA = {
-    "stl": "model/stl",
-    "3mf": "model/3mf",
-    "svg": "image/svg+xml",
-    "dxf": "image/vnd.dxf",
-    "step": "model/step",
-    "mp4": "video/mp4",
-    "gif": "image/gif",
-    "pdf": "application/pdf",
-    "json": "application/json",
-}
-
-QUICK_FILES = ("stl", "3mf", "svg", "dxf", "json")
-"""Files that are written quickly and do not wait behind movies and finite elements."""
 
 
 class Body(BaseModel):
@@ -112,7 +123,7 @@ class RunBody(Body):
     title: str = Field(min_length=1, max_length=120)
     session: Session
     problem: dict[str, Any]
-    method: Method = "basin-hopping"
+    method: Method = DEFAULT_SEARCH
     steps: int = Field(default=20_000, ge=1, le=STEPS)
     chains: int = Field(default=4, ge=1, le=CHAINS)
     seed: int = Field(default=0, ge=0, lt=2**53)

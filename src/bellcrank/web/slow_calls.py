@@ -36,7 +36,7 @@ def design_file(
     Parameters
     ----------
     suffix
-        One of `bellcrank.web.requests.FileSuffix`, with a dot.
+        A name in `bellcrank.web.page_files.page_files`, with a dot.
     part
         Dimensions and material, as `PartSpec.from_dict` reads them.
     about

@@ -24,7 +24,7 @@ class AppState:
     ----------
     ready
         Whether the kernels are compiled and loaded.
-    trouble
+    error
         Why they cannot be loaded; empty if they can.
     """
 
@@ -35,7 +35,7 @@ class AppState:
     saved: SavedDesigns
     machines: Machines
     ready: bool = False
-    trouble: str = ""
+    error: str = ""
 
 
 def _state(connection: HTTPConnection) -> AppState:

@@ -66,8 +66,12 @@ def analyse_solid(part: Part, settings: FemSettings, report: Callable[[float], N
     return _analyse(part, settings, report, "solid", solve_solid)
 
 
-levels.register("plane")(Level(analyse_plane, check_outline, missing_ngsolve))
-levels.register("solid")(Level(analyse_solid, check_outline, missing_ngsolve))
+levels.register("plane")(
+    Level(analyse_plane, check_outline, missing_ngsolve, "2D solid", "up to a minute")
+)
+levels.register("solid")(
+    Level(analyse_solid, check_outline, missing_ngsolve, "3D solid", "minutes")
+)
 
 
 def _analyse(

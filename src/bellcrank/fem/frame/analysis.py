@@ -91,7 +91,7 @@ def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], N
     )
 
 
-levels.register("frame")(Level(analyse_frame, check_frame))
+levels.register("frame")(Level(analyse_frame, check_frame, title="Frame", duration="seconds"))
 
 
 def point_of(part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool) -> StrokePoint:

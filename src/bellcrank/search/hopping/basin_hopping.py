@@ -347,6 +347,14 @@ def advance(
 
 searches.register("basin-hopping")(
     Search(
-        HoppingSettings, HoppingState, start, advance, is_done, confirmed, plot_running_best=True
+        HoppingSettings,
+        HoppingState,
+        start,
+        advance,
+        is_done,
+        confirmed,
+        plot_running_best=True,
+        title="Basin hopping",
+        summary="Local search with restarts from perturbed designs. The best in most cases.",
     )
 )

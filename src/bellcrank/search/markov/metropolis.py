@@ -245,4 +245,14 @@ def advance_in_python(
     return state, rows.proposals(evaluator.problem)
 
 
-searches.register("paper")(Search(MetropolisSettings, ChainState, start, advance, is_done))
+searches.register("paper")(
+    Search(
+        MetropolisSettings,
+        ChainState,
+        start,
+        advance,
+        is_done,
+        title="Metropolis (paper)",
+        summary="Single random flips with annealing, as published by Bonfanti et al. (2020).",
+    )
+)

@@ -214,6 +214,14 @@ def _with(values: tuple[T, ...], index: int, value: T) -> tuple[T, ...]:
 
 searches.register("tempering")(
     Search(
-        TemperingSettings, TemperingState, start, advance, is_done, peaks, plot_running_best=True
+        TemperingSettings,
+        TemperingState,
+        start,
+        advance,
+        is_done,
+        peaks,
+        plot_running_best=True,
+        title="Parallel tempering",
+        summary="Metropolis chains at several temperatures that exchange their designs.",
     )
 )

@@ -1,10 +1,10 @@
-// Designs with small pictures, on shelves that can be looked through.
+// Collections of designs with thumbnails and filters.
 
-import type { Shelf, Small } from "./api";
+import type { Collection, GalleryEntry } from "./api";
 import { thicken } from "./drawing";
 import { button, count, field, figure, h, s, select } from "./dom";
 
-export function thumbnail({ picture }: Small): SVGElement {
+export function thumbnail({ picture }: GalleryEntry): SVGElement {
   const [x0, y0, x1, y1] = picture.box as [number, number, number, number];
   const margin = 0.7;
   let d = "";
@@ -25,30 +25,30 @@ export function thumbnail({ picture }: Small): SVGElement {
   return svg;
 }
 
-export function tile(small: Small, href: string): HTMLElement {
-  return h("a", { class: "tile", href }, thumbnail(small),
-    h("span", { class: "title" }, small.title),
-    h("span", { class: "note" }, small.efficiency === null ? small.note : `${figure(small.efficiency)} · ${small.note}`));
+export function tile(entry: GalleryEntry, href: string): HTMLElement {
+  return h("a", { class: "tile", href }, thumbnail(entry),
+    h("span", { class: "title" }, entry.title),
+    h("span", { class: "note" }, entry.efficiency === null ? entry.note : `${figure(entry.efficiency)} · ${entry.note}`));
 }
 
-/** Designs side by side; where there are many, with choices of what they do, and only some at first. */
-export function shelfView(shelf: Shelf, make: (small: Small) => HTMLElement, most = Infinity): HTMLElement {
+/** Show a collection as tiles, with filters for its facets, and at most `most` entries until all are requested. */
+export function collectionView(collection: Collection, make: (entry: GalleryEntry) => HTMLElement, most = Infinity): HTMLElement {
   const picked: Record<string, string> = {};
   const tiles = h("div", { class: "tiles" });
-  const told = h("p", { class: "note", role: "status" });
+  const counter = h("p", { class: "note", role: "status" });
   let all = false;
   const more = button("", () => { all = true; show(); });
   const show = (): void => {
-    const fitting = shelf.entries.filter(({ facets }) => Object.entries(picked).every(([name, value]) => !value || facets[name] === value));
+    const fitting = collection.entries.filter(({ facets }) => Object.entries(picked).every(([name, value]) => !value || facets[name] === value));
     const shown = all ? fitting : fitting.slice(0, most);
     tiles.replaceChildren(...shown.map(make));
     more.hidden = shown.length === fitting.length;
     more.textContent = `Show all ${fitting.length}`;
-    told.textContent = count(fitting.length, "design");
+    counter.textContent = count(fitting.length, "design");
   };
-  const names = [...new Set(shelf.entries.flatMap(({ facets }) => Object.keys(facets)))];
+  const names = [...new Set(collection.entries.flatMap(({ facets }) => Object.keys(facets)))];
   const choices = names.map((name) => {
-    const values = [...new Set(shelf.entries.map(({ facets }) => facets[name] ?? ""))].filter(Boolean)
+    const values = [...new Set(collection.entries.map(({ facets }) => facets[name] ?? ""))].filter(Boolean)
       .sort((a, b) => a.localeCompare(b, "en", { numeric: true }));
     return field(name, select([["", "any"], ...values.map((value): [string, string] => [value, value])], "", (value) => {
       picked[name] = value;
@@ -56,6 +56,6 @@ export function shelfView(shelf: Shelf, make: (small: Small) => HTMLElement, mos
     }));
   });
   show();
-  return h("section", { class: "shelf", "aria-label": shelf.title, "data-source": shelf.source },
-    h("div", { class: "shelf-head" }, h("h2", {}, shelf.title), choices.length > 0 && h("div", { class: "facets" }, ...choices, told)), tiles, more);
+  return h("section", { class: "collection", "aria-label": collection.title, "data-source": collection.source },
+    h("div", { class: "collection-head" }, h("h2", {}, collection.title), choices.length > 0 && h("div", { class: "facets" }, ...choices, counter)), tiles, more);
 }

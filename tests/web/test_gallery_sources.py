@@ -1,4 +1,4 @@
-"""Designs that come along: elementary actuators, struts, and machines made of them."""
+"""Bundled designs of the gallery: elementary actuators, struts, and machines."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture(scope="module")
-def shelves(client: TestClient) -> dict[str, list[dict[str, Any]]]:
-    """Return the entries of each shelf of the gallery."""
-    return {shelf["source"]: shelf["entries"] for shelf in client.get("/api/gallery").json()}
+def collections(client: TestClient) -> dict[str, list[dict[str, Any]]]:
+    """Return the entries of each source of the gallery."""
+    return {each["source"]: each["entries"] for each in client.get("/api/gallery").json()}
 
 
-def test_every_actuator_of_the_library_is_on_its_shelf(shelves: dict[str, Any]) -> None:
+def test_every_actuator_of_the_library_is_listed(collections: dict[str, Any]) -> None:
     known = {summary.name: summary for summary in library().summaries}
-    assert {entry["key"] for entry in shelves["library"]} == set(known)
-    for entry in shelves["library"]:
+    assert {entry["key"] for entry in collections["library"]} == set(known)
+    for entry in collections["library"]:
         summary = known[entry["key"]]
         assert entry["facets"]["Moves"] == summary.direction
         assert entry["facets"]["Size"] == (f"{summary.columns} wide" if summary.columns else "")
@@ -36,13 +36,13 @@ def test_every_actuator_of_the_library_is_on_its_shelf(shelves: dict[str, Any]) 
         assert entry["efficiency"] is not None
 
 
-def test_every_kind_of_actuator_is_called_something_a_person_understands() -> None:
+def test_every_kind_of_actuator_has_a_display_name() -> None:
     assert set(LOADS) == set(kinds)
 
 
-def test_machines_say_what_they_do(shelves: dict[str, Any]) -> None:
-    assert [entry["key"] for entry in shelves["machines"]] == bundled_machines()
-    notes = {entry["key"]: entry["note"] for entry in shelves["machines"]}
+def test_machines_have_a_description_and_their_contact(collections: dict[str, Any]) -> None:
+    assert [entry["key"] for entry in collections["machines"]] == bundled_machines()
+    notes = {entry["key"]: entry["note"] for entry in collections["machines"]}
     assert all(len(note) > 20 for note in notes.values())
     assert "struts touch from" in notes["reverser"]
     assert "no contact" in notes["sorter-left"]
@@ -61,10 +61,10 @@ def test_the_plan_of_a_machine_builds_that_machine(client: TestClient, name: str
     assert found["mask"] == built["mask"]
 
 
-def test_an_actuator_is_opened_as_the_library_keeps_it(
-    client: TestClient, shelves: dict[str, Any]
+def test_an_actuator_of_the_gallery_is_that_of_the_library(
+    client: TestClient, collections: dict[str, Any]
 ) -> None:
-    key = shelves["library"][0]["key"]
+    key = collections["library"][0]["key"]
     found = client.get(f"/api/gallery/library/{key}").json()
     assert found["mask"] == library().find(key).design.mask_hex
 
@@ -77,11 +77,11 @@ def test_an_actuator_is_opened_as_the_library_keeps_it(
         "machines/..%2Fgripper", "machines/gripper.toml",
     ],
 )  # fmt: skip
-def test_names_that_nothing_has_are_not_found(client: TestClient, address: str) -> None:
+def test_unknown_names_are_not_found(client: TestClient, address: str) -> None:
     assert client.get(f"/api/{address}").status_code == 404
 
 
-def test_struts_have_the_length_that_their_name_says() -> None:
+def test_struts_have_the_length_of_their_name() -> None:
     for entry in Struts().entries():
         problem = entry.design.problem
         ends = [
@@ -96,8 +96,8 @@ def _count(source: Any) -> int:
     return len(list(source.entries()))
 
 
-def test_who_looks_at_the_same_time_sees_all_of_a_shelf() -> None:
+def test_simultaneous_requests_list_all_entries_of_a_source() -> None:
     for source in (BundledDesigns(), Actuators(), Machines()):
-        with ThreadPoolExecutor(8) as visitors:
-            looks = [visitors.submit(_count, source) for _ in range(16)]
-        assert {look.result() for look in looks} == {_count(source)}
+        with ThreadPoolExecutor(8) as pool:
+            results = [pool.submit(_count, source) for _ in range(16)]
+        assert {each.result() for each in results} == {_count(source)}

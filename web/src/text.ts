@@ -1,4 +1,4 @@
-// Sentences, names of files, and the keys for undo.
+// Sentences, file names, and the keys for undo.
 
 export function fileName(title: string): string {
   return title.trim().toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, "") || "bellcrank";
@@ -15,20 +15,20 @@ export function sentence(text: string): string {
   return trimmed.charAt(0).toUpperCase() + trimmed.slice(1) + (/[.!?]$/.test(trimmed) ? "" : ".");
 }
 
-/** What to try where a search has found nothing good. */
+/** Suggestions for a search that has found no good design. */
 export const REMEDIES = [
   "Search longer: Thorough, or more chains.",
-  "Leave more beams to the search: fewer held nodes, fewer painted beams, no mirror.",
-  "Ask for less: a shorter stroke, or an output nearer to the input.",
+  "Make more beams designable: fewer supports, fewer fixed beams, no mirror symmetry.",
+  "Reduce the requirement: a shorter stroke, or an output closer to the input.",
 ];
 
-/** What a search says of itself, without the words of the command line. */
-export function plainly(message: string): string {
+/** Message of a search without the options of the command line. */
+export function runMessage(message: string): string {
   return sentence(message.replace(/^problem '[^']*': /, "").replaceAll(/ \(--[a-z-]+\)/g, ""));
 }
 
-/** Hear Ctrl+Z and Ctrl+Shift+Z, except where somebody writes. */
-export function undoing(step: (way: "undo" | "redo") => void): (event: KeyboardEvent) => void {
+/** Return a handler of Ctrl+Z and Ctrl+Shift+Z, except in text fields. */
+export function undoKeys(step: (action: "undo" | "redo") => void): (event: KeyboardEvent) => void {
   return (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
     const { target } = event;

@@ -1,0 +1,57 @@
+"""Names and descriptions of registered entries, from which the page builds its choices."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from bellcrank.fem import levels
+from bellcrank.part import materials
+from bellcrank.search import DEFAULT_SEARCH, searches
+from bellcrank.web.page_files import page_files
+
+MATERIAL_TITLES = {"ninjaflex": "NinjaFlex"}
+"""Display names of materials that are no abbreviations."""
+
+
+@cache
+def registered() -> dict[str, list[dict[str, Any]]]:
+    """Return searches, materials, file formats and finite-element levels as plain data.
+
+    The default search comes first; the other entries are in the order of registration. Each entry
+    has ``name`` and ``title``.
+    """
+    methods = sorted(searches, key=lambda name: name != DEFAULT_SEARCH)
+    return {
+        "searches": [
+            {
+                "name": name,
+                "title": searches[name].title or name,
+                "summary": searches[name].summary,
+                "running_best": searches[name].plot_running_best,
+            }
+            for name in methods
+        ],
+        "materials": [
+            {
+                "name": name,
+                "title": MATERIAL_TITLES.get(name, name.replace("-", " ").upper()),
+                "young": material.young,
+                "poisson": material.poisson,
+            }
+            for name, material in materials.items()
+        ],
+        "files": [
+            {"name": name, "title": entry.title, "purpose": entry.purpose}
+            for name, entry in page_files.items()
+        ],
+        "levels": [
+            {
+                "name": name,
+                "title": level.title or name,
+                "duration": level.duration,
+                "missing": level.missing() or "",
+            }
+            for name, level in levels.items()
+        ],
+    }
