@@ -17,13 +17,33 @@ export class Panels {
   private problems: BundledProblem[] = [];
   private local: Record<string, string> = {};
   private readonly searchBox: SearchBox;
+  private pressed = false;
+  private stale = false;
 
   constructor(private readonly editor: TaskEditor) {
     this.searchBox = new SearchBox(editor, () => this.show());
+    this.element.addEventListener("pointerdown", () => this.press());
     void get<BundledProblem[]>("/problems").then((found) => { this.problems = found; this.show(); });
   }
 
+  /** Postpone updates until the pointer is released: a replaced element would receive no click. */
+  private press(): void {
+    this.pressed = true;
+    const release = (): void => {
+      removeEventListener("pointerup", release);
+      removeEventListener("pointercancel", release);
+      setTimeout(() => { // after the click
+        this.pressed = false;
+        if (this.stale) this.show();
+      });
+    };
+    addEventListener("pointerup", release);
+    addEventListener("pointercancel", release);
+  }
+
   show(): void {
+    this.stale = this.pressed;
+    if (this.pressed) return;
     const focused = document.activeElement;
     const label = focused instanceof HTMLElement && this.element.contains(focused) ? focused.dataset.key ?? "" : "";
     clear(this.element,
@@ -75,7 +95,7 @@ export class Panels {
 
   private latticeSummary(): string {
     const { problem, scale } = this.editor.task;
-    return `${count(problem.positions.length, "node")}, ${count(problem.beams.length, "beam")}, beam length ${scale} mm`;
+    return `${count(problem.positions.length, "node")}, ${count(problem.beams.length, "beam")} of ${scale} mm`;
   }
 
   private lattice(): HTMLElement {
