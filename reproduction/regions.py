@@ -7,7 +7,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.model import Design, find_problem
-from reproduction.formatting import number, percent
+from reproduction.formatting import number
 from reproduction.predictions import one_thread
 from reproduction.registry import Claim, Figures, Study, register
 from reproduction.searching import design_of, run_chain
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from reproduction.networks.attribution import Attribution
     from reproduction.result_store import ResultStore
 
-MEASURES = ("low_rank", "network", "occlusion", "white", "black")
+MEASURES = ("white", "black", "network", "low_rank")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,20 +62,14 @@ def run(settings: Settings, store: ResultStore) -> Figures:
             )
         )
         store.progress("designs", chain + 1, settings.chains)
-    names = [name for name in MEASURES if name in rows[0]["agreement"]]
     return {
         "problem": settings.problem,
         "steps": settings.steps,
         "stride": settings.stride,
         "designs": rows,
         "mean": {
-            name: {
-                kind: _mean([row["agreement"][name][kind] for row in rows])
-                for kind in ("pearson", "spearman", "recall")
-            }
-            for name in names
+            name: _mean([row["rank_correlations"][name] for row in rows]) for name in MEASURES
         },
-        "vital_shared": _mean([row["vital_shared"] for row in rows]),
     }
 
 
@@ -88,29 +82,21 @@ def _mean(values: list[float | None]) -> float | None:
 def attribution_of(name: str, mask: str, stride: int) -> Attribution:
     """Return the attribution of the bundled network and the exact sensitivities of a design."""
     from bellcrank.surrogate.predictor import load_model
-    from reproduction.networks.attribution import Block, attribute
+    from reproduction.networks.attribution import attribute
 
     design: Design = design_of(find_problem(name), mask)
     with one_thread():
-        return attribute(load_model(design.problem), design, Block(stride=stride))
+        return attribute(load_model(design.problem), design, stride=stride)
 
 
 def _agreement(name: str, mask: str, stride: int) -> dict[str, Any]:
     """Return the agreement of an attribution with the exact sensitivities."""
     found = attribution_of(name, mask, stride).to_dict()
-    subset = {"white": "present", "black": "absent"}
     return {
         "mask": mask,
         "efficiency": found["efficiency"],
         "predicted": found["predicted"],
-        "agreement": {
-            measure: {
-                kind: values[subset.get(measure, "all")][kind]
-                for kind in ("pearson", "spearman", "recall")
-            }
-            for measure, values in found["correlations"].items()
-        },
-        "vital_shared": found["regions"]["overlap"].get("vital"),
+        "rank_correlations": found["correlations"],
     }
 
 
@@ -127,13 +113,12 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
     """Compare with the paper."""
     means = figures["mean"]
     ranks = ", ".join(
-        f"{label} {number(means[name]['spearman'])}"
+        f"{label} {number(means[name])}"
         for name, label in (
             ("white", "white block"), ("black", "black block"),
             ("network", "flips predicted by the network"),
             ("low_rank", "flips predicted by low-rank updates"),
         )
-        if name in means
     )  # fmt: skip
     return [
         Claim(
@@ -142,13 +127,6 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
             f"rank correlation with the exact change of efficiency by flips: {ranks}",
             f"means over {len(figures['designs'])} designs; white blocks are compared for present "
             "beams, black blocks for absent beams",
-        ),
-        Claim(
-            "agreement on vital beams",
-            "",
-            f"{percent(figures['vital_shared'])} of the beams that are vital for the network or "
-            "for the mechanics are vital for both",
-            "Jaccard index, mean over the designs",
         ),
     ]
 

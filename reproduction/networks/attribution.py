@@ -1,35 +1,35 @@
-"""Attribution: which beams of a design matter, to a network and to the mechanics.
+"""Occlusion maps of a network, compared with the exact effect of each beam.
 
-A block that covers a part of the picture changes the network's prediction (occlusion); so does
-the flip of a beam. Both are compared with the exact change of efficiency by each flip, and with
-its prediction by a low-rank update of the stiffness.
+A block that covers a part of the picture changes the prediction of a network. A white block
+covers beams as if they were absent, a black block as if all were present. The maps of these
+changes are compared with the exact change of the efficiency by the flip of each beam, as are two
+other predictions: the network's for the flipped designs, and that of a low-rank update of the
+stiffness.
 
 References
 ----------
-M. D. Zeiler, R. Fergus, "Visualizing and understanding convolutional networks", ECCV 2014, for
-occlusion maps.
+M. D. Zeiler, R. Fergus, "Visualizing and understanding convolutional networks", ECCV 2014.
 
 Examples
 --------
 >>> from bellcrank.model import human_design
 >>> from bellcrank.surrogate.predictor import load_model
 >>> crane = human_design("crane")
->>> found = attribute(load_model(crane.problem), crane, Block(stride=32), device="cpu")
->>> found.correlations()["low_rank"]["all"].pearson > 0.9
+>>> found = attribute(load_model(crane.problem), crane, stride=32, device="cpu")
+>>> found.correlations()["low_rank"] > 0.9
 True
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
-from enum import IntEnum
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import SpringEvaluator, Status
+from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Design
 from bellcrank.surrogate.backend import find_device
 from bellcrank.surrogate.evaluator import NetworkEvaluator
@@ -47,127 +47,13 @@ if TYPE_CHECKING:
 
 WHITE, BLACK = 0, 255
 """Ink of a block."""
-SUBSETS = ("all", "present", "absent")
-"""Flips over which correlations are computed: all, removals, additions."""
-TOP = 30
-"""Number of best flips in `Agreement.recall`."""
-ENOUGH = 4 * TOP
-"""Smallest number of flips for a recall; a random ranking finds a quarter of the best then."""
-VITAL, NEUTRAL = 0.5, 0.05
-"""Limits of regions, as fractions of the efficiency of the design."""
-LEAST_EFFICIENCY = 0.05
-"""Smallest efficiency in these fractions."""
-
-
-class Region(IntEnum):
-    """Effect of the flip of a beam on the function of a design."""
-
-    VITAL = 0
-    USEFUL = 1
-    NEUTRAL = 2
-    ADVERSE = 3
-    UNSTABLE = 4
-
-    @property
-    def label(self) -> str:
-        """Name in files."""
-        return self.name.lower()
-
-
-@dataclass(frozen=True, slots=True)
-class Block:
-    """A square that slides over a picture.
-
-    Parameters
-    ----------
-    size
-        Side in pixels.
-    stride
-        Distance of neighbouring positions in pixels.
-
-    Raises
-    ------
-    InvalidSettings
-    """
-
-    size: int = 12
-    stride: int = 4
-
-    def __post_init__(self) -> None:
-        for name in ("size", "stride"):
-            value = getattr(self, name)
-            if value < 1:
-                raise InvalidSettings(f"block {name}: expected at least 1 pixel, got {value}")
-
-    def centres(self, extent: int) -> NDArray[np.float64]:
-        """Return the positions of the centre along one side of a picture, in pixels.
-
-        Examples
-        --------
-        >>> Block(size=12, stride=4).centres(12)
-        array([ 2.,  6., 10.])
-        """
-        return np.asarray((np.arange(-(-extent // self.stride)) + 0.5) * self.stride, np.float64)
-
-    def span(self, centre: float, extent: int) -> slice:
-        """Return the pixels that the block covers around a centre."""
-        first = int(np.floor(centre - 0.5 * self.size + 0.5))
-        return slice(max(first, 0), min(max(first + self.size, 0), extent))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Occlusion:
-    """Change of the prediction by blocks that cover parts of the picture.
-
-    Parameters
-    ----------
-    block
-        Size and stride.
-    white, black : (rows, columns) float64
-        Change of the predicted efficiency by a block of that colour, the uppermost row first.
-    low, high : (2,) float64
-        Lower left and upper right corner of the maps in lattice units.
-    white_at, black_at : (n,) float64
-        The maps at the middle of each designable beam.
-    """
-
-    block: Block
-    white: NDArray[np.float64]
-    black: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    white_at: NDArray[np.float64]
-    black_at: NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """Agreement of predicted with exact changes of efficiency.
-
-    Parameters
-    ----------
-    pearson, spearman
-        Correlation of the values and of their ranks; nan where one side is constant.
-    recall
-        Share of the `TOP` best flips among the `TOP` flips with the best prediction; nan for
-        fewer than `ENOUGH` flips.
-    count
-        Number of flips.
-    """
-
-    pearson: float
-    spearman: float
-    recall: float
-    count: int
-
-    def to_dict(self) -> dict[str, float | int | None]:
-        """Return the measures as plain data; nan becomes None."""
-        return {name: finite(value) for name, value in asdict(self).items()}
+BLOCK, STRIDE = 12, 4
+"""Side of the block, and usual distance of its neighbouring positions, in pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Attribution:
-    """Effect of each flip of a design by mechanics and by a network.
+    """Effect of the beams of a design by mechanics and by a network.
 
     Parameters
     ----------
@@ -181,15 +67,17 @@ class Attribution:
         Designable beams.
     present : (n,) bool
         Whether the design has each of them.
-    exact, status : (n,)
+    exact : (n,) float64
         Change of the efficiency by each flip by mechanics; nan where the flipped design has no
-        unique response, with the `bellcrank.mechanics.Status` that says why.
-    low_rank : (n,) float64
-        The same change predicted by a low-rank update.
-    network : (n,) float64
-        Change of the network's prediction by each flip.
-    occlusion
-        None for networks whose input is not a picture.
+        unique response.
+    low_rank, network : (n,) float64
+        The same change predicted by a low-rank update and by the network.
+    white, black : (rows, columns) float64
+        Change of the predicted efficiency by a block of that colour, the uppermost row first.
+    white_at, black_at : (n,) float64
+        The maps at the middle of each designable beam.
+    low, high : (2,) float64
+        Lower left and upper right corner of the maps in lattice units.
     """
 
     design: Design
@@ -199,46 +87,35 @@ class Attribution:
     beams: NDArray[np.int64]
     present: NDArray[np.bool_]
     exact: NDArray[np.float64]
-    status: NDArray[np.int64]
     low_rank: NDArray[np.float64]
     network: NDArray[np.float64]
-    occlusion: Occlusion | None
+    white: NDArray[np.float64]
+    black: NDArray[np.float64]
+    white_at: NDArray[np.float64]
+    black_at: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
-    def measures(self) -> dict[str, NDArray[np.float64]]:
-        """Return the changes (n,) to compare with `exact`, by name.
+    def correlations(self) -> dict[str, float]:
+        """Return the rank correlation of each prediction with `exact`.
 
-        ``occlusion`` is the white block at present beams and the black block at absent ones.
+        White blocks are compared for present beams, black blocks for absent beams.
         """
-        found = {"low_rank": self.low_rank, "network": self.network}
-        if self.occlusion is not None:
-            white, black = self.occlusion.white_at, self.occlusion.black_at
-            both = np.where(self.present, white, black)
-            found |= {"occlusion": both, "white": white, "black": black}
-        return found
-
-    def correlations(self) -> dict[str, dict[str, Agreement]]:
-        """Return the agreement of each measure with `exact` over each of `SUBSETS`."""
-        chosen = {
-            "all": np.ones(len(self.beams), np.bool_),
-            "present": self.present,
-            "absent": ~self.present,
+        everywhere = np.ones(len(self.beams), np.bool_)
+        compared = {
+            "white": (self.white_at, self.present),
+            "black": (self.black_at, ~self.present),
+            "network": (self.network, everywhere),
+            "low_rank": (self.low_rank, everywhere),
         }
         return {
-            name: {
-                subset: agreement(values[chosen[subset]], self.exact[chosen[subset]])
-                for subset in SUBSETS
-            }
-            for name, values in self.measures().items()
+            name: rank_correlation(values[chosen], self.exact[chosen])
+            for name, (values, chosen) in compared.items()
         }
-
-    def regions(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the `Region` of each beam (n,) by mechanics and by the network."""
-        return regions_of(self.exact, self.efficiency), regions_of(self.network, self.predicted)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all as plain data; nan becomes None."""
-        exact, network = self.regions()
-        seen = self.occlusion
+        columns = ("exact", "low_rank", "network", "white_at", "black_at")
         return {
             "problem": self.design.problem.name,
             "mask": self.design.mask_hex,
@@ -247,47 +124,26 @@ class Attribution:
             "predicted": self.predicted,
             "beams": self.beams.tolist(),
             "present": self.present.tolist(),
-            "status": [Status(each).label for each in self.status],
-            "exact": [finite(value) for value in self.exact.tolist()],
-            "measures": {
-                name: [finite(value) for value in values.tolist()]
-                for name, values in self.measures().items()
-            },
-            "regions": {
-                "exact": [Region(each).label for each in exact],
-                "network": [Region(each).label for each in network],
-                "overlap": overlap_of_regions(exact, network),
-            },
-            "correlations": {
-                name: {subset: found.to_dict() for subset, found in rows.items()}
-                for name, rows in self.correlations().items()
-            },
-            "occlusion": None
-            if seen is None
-            else {
-                "block": seen.block.size,
-                "stride": seen.block.stride,
-                **{
-                    name: getattr(seen, name).tolist() for name in ("low", "high", "white", "black")
-                },
-            },
+            **{name: list(map(finite, getattr(self, name).tolist())) for name in columns},
+            **{name: getattr(self, name).tolist() for name in ("white", "black", "low", "high")},
+            "correlations": {name: finite(rho) for name, rho in self.correlations().items()},
         }
 
 
 def attribute(
-    model: TrainedModel, design: Design, block: Block | None = None, *, device: str = "auto"
+    model: TrainedModel, design: Design, *, stride: int = STRIDE, device: str = "auto"
 ) -> Attribution:
-    """Compute the effect of each flip of a design by mechanics and by a network.
+    """Compute the occlusion maps of a network and the exact effect of each flip.
 
     Parameters
     ----------
     model
-        Network trained on the design's problem, in any numbering. The design is evaluated with
-        the stiffness of that problem.
+        Network on pictures, trained on the design's problem in any numbering. The design is
+        evaluated with the stiffness of that problem.
     design
         Design with a unique, stable response.
-    block
-        Block for occlusion maps; by default the usual one if the network's input is a picture.
+    stride
+        Distance of neighbouring positions of the block in pixels.
     device
         Device of the network.
 
@@ -296,45 +152,59 @@ def attribute(
     InvalidModel
         If the network was trained on another problem.
     InvalidSettings
-        If the design has no unique response or no designable beam, or a block is given although
-        the input of the network is not a picture.
+        If the design has no unique response or no designable beam, the stride is less than one
+        pixel, or the input of the network is not a picture or smaller than the block.
     """
+    if stride < 1:
+        raise InvalidSettings(f"stride: expected at least 1 pixel, got {stride}")
     design = Design(replace(design.problem, stiffness=model.problem.stiffness), design.mask)
-    problem = design.problem
-    if block is not None:
-        picture_view(model)
+    problem, mask = design.problem, design.mask
+    number = beams_between(model.problem, problem)
     if not len(problem.designable):
         raise InvalidSettings(f"problem {problem.name!r} has no designable beam to flip")
-    efficiency, exact, status, low_rank = flip_effects(problem, design.mask)
+    view = _picture_view(model)
     predictor = Predictor(problem, model, device=device)
-    flips = NetworkEvaluator(predictor).predict_flips(design.mask)
-    seen = None
-    if isinstance(model.view, PictureView):
-        seen = _occlusion(model, design, block or Block(), device)
+    flips = NetworkEvaluator(predictor).predict_flips(mask)
+    packed = np.packbits(renumbered(mask[None], number)[0])
+    white = occlude(model, packed, stride, ink=WHITE, device=device)
+    black = occlude(model, packed, stride, ink=BLACK, device=device)
+    efficiency, exact, low_rank = flip_effects(problem, mask)
+    known, canvas = model.problem.lattice, view.renderer.canvas
+    drawn = canvas.pixels_of(known.positions)
+    middles = drawn[known.beams].mean(axis=1)[number[problem.designable]]
+    # Pictures are to scale: the size of a pixel follows from the extents.
+    unit = float(np.ptp(known.positions, axis=0).max() / np.ptp(drawn, axis=0).max())
+    size = stride * np.array(white.shape[::-1], np.float64)
+    corner = np.array([0.0, canvas.height - size[1]])
+    low = problem.lattice.positions.min(axis=0) + (corner - drawn.min(axis=0)) * unit
     return Attribution(
         design=design,
         architecture=model.architecture,
         efficiency=efficiency,
-        predicted=float(predictor.predict(design.mask[None])[0]),
+        predicted=float(predictor.predict(mask[None])[0]),
         beams=flips.beams,
-        present=design.mask[flips.beams],
+        present=mask[flips.beams],
         exact=exact,
-        status=status,
         low_rank=low_rank,
         network=flips.change,
-        occlusion=seen,
+        white=white,
+        black=black,
+        white_at=sample_map(white, stride, middles, canvas.height),
+        black_at=sample_map(black, stride, middles, canvas.height),
+        low=low,
+        high=low + size * unit,
     )
 
 
 def flip_effects(
     problem: Problem, mask: NDArray[np.bool_]
-) -> tuple[float, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
     """Evaluate a design and all its flips of designable beams with the mechanics.
 
     Returns
     -------
     efficiency : float
-    exact, status, low_rank : (n,)
+    exact, low_rank : (n,)
         As in `Attribution`.
 
     Raises
@@ -350,101 +220,46 @@ def flip_effects(
             f"{response.status.message}"
         )
     beams = np.asarray(problem.designable, np.int64)
-    low_rank = np.full(len(beams), np.nan)
     prediction = evaluator.predict_flips(mask, beams)
-    if prediction is not None:
-        low_rank[:] = prediction.change
+    low_rank = np.full(len(beams), np.nan) if prediction is None else prediction.change
     evaluator.set_reference()
-    exact, status = np.full(len(beams), np.nan), np.empty(len(beams), np.int64)
+    exact = np.full(len(beams), np.nan)
     for number, beam in enumerate(beams):
         flipped = mask.copy()
         flipped[beam] = not flipped[beam]
         found = evaluator.evaluate(flipped, warm_start=True)
-        status[number] = found.status
         if found.is_admissible:
             exact[number] = found.efficiency - response.efficiency
-    return response.efficiency, exact, status, low_rank
+    return response.efficiency, exact, low_rank
 
 
-def agreement(predicted: NDArray[np.float64], exact: NDArray[np.float64]) -> Agreement:
-    """Compare predicted with exact changes (n,); entries that are not finite are left out.
+def rank_correlation(predicted: NDArray[np.float64], exact: NDArray[np.float64]) -> float:
+    """Return Spearman's correlation of values (n,); entries that are not finite are left out.
 
     Examples
     --------
-    >>> found = agreement(np.array([1.0, 2.0, 3.0, 9.0]), np.array([2.0, 4.0, 6.0, np.nan]))
-    >>> found.pearson, found.count
-    (1.0, 3)
+    >>> rank_correlation(np.array([1.0, 2.0, 3.0, 9.0]), np.array([2.0, 4.0, 9.0, np.nan]))
+    1.0
     """
     from scipy.stats import rankdata
 
     known = np.isfinite(predicted) & np.isfinite(exact)
-    guess, truth = np.asarray(predicted)[known], np.asarray(exact)[known]
-    if len(truth) < 2:
-        return Agreement(math.nan, math.nan, math.nan, len(truth))
-    recall = math.nan
-    if len(truth) >= ENOUGH:
-        best, named = (np.argsort(-values, kind="stable")[:TOP] for values in (truth, guess))
-        recall = len(np.intersect1d(best, named)) / TOP
-    ranks = correlation(rankdata(guess), rankdata(truth))
-    return Agreement(correlation(guess, truth), ranks, recall, len(truth))
+    if known.sum() < 2:
+        return math.nan
+    return correlation(rankdata(predicted[known]), rankdata(exact[known]))
 
 
-def regions_of(change: NDArray[np.float64], efficiency: float) -> NDArray[np.int64]:
-    """Return the `Region` of each beam.
-
-    Where the efficiency is negative, a flip that increases it harms the function of the design.
-
-    Parameters
-    ----------
-    change : (n,)
-        Change of the efficiency by each flip; nan for a flipped design without a unique response.
-    efficiency
-        Efficiency of the design.
-
-    Examples
-    --------
-    >>> regions_of(np.array([-0.9, -0.2, 0.001, 0.3, np.nan]), efficiency=1.0).tolist()
-    [0, 1, 2, 3, 4]
-    """
-    part = change / float(np.copysign(max(abs(efficiency), LEAST_EFFICIENCY), efficiency))
-    region = np.full(len(change), Region.NEUTRAL, np.int64)
-    region[part >= NEUTRAL] = Region.ADVERSE
-    region[part <= -NEUTRAL] = Region.USEFUL
-    region[part <= -VITAL] = Region.VITAL
-    region[~np.isfinite(change)] = Region.UNSTABLE
-    return region
-
-
-def overlap_of_regions(
-    first: NDArray[np.int64], second: NDArray[np.int64]
-) -> dict[str, float | None]:
-    """Return Jaccard's index of each region; None where it is empty in both.
-
-    Examples
-    --------
-    >>> overlap_of_regions(np.array([0, 0, 2]), np.array([0, 2, 2]))["vital"]
-    0.5
-    """
-    found: dict[str, float | None] = {}
-    for region in Region:
-        here, there = first == region, second == region
-        either = int((here | there).sum())
-        found[region.label] = int((here & there).sum()) / either if either else None
-    return found
-
-
-def picture_view(model: TrainedModel) -> PictureView:
-    """Return the view of a network whose input is a picture.
-
-    Raises
-    ------
-    InvalidSettings
-        If its input is not a picture.
-    """
+def _picture_view(model: TrainedModel) -> PictureView:
+    """Return the view of a network whose input is a picture that contains the block."""
     if not isinstance(model.view, PictureView):
         raise InvalidSettings(
-            f"block: expected a network whose input is a picture, got {model.architecture!r}; "
-            f"leave out the block, or use another network"
+            f"occlusion maps: expected a network whose input is a picture, got "
+            f"{model.architecture!r}; use another network"
+        )
+    _, height, width = model.view.shape
+    if min(height, width) < BLOCK:
+        raise InvalidSettings(
+            f"occlusion maps: expected pictures of at least {BLOCK} pixels, got {width} x {height}"
         )
     return model.view
 
@@ -452,7 +267,7 @@ def picture_view(model: TrainedModel) -> PictureView:
 def occlude(
     model: TrainedModel,
     packed: NDArray[np.uint8],
-    block: Block,
+    stride: int = STRIDE,
     *,
     ink: int = WHITE,
     device: str = "auto",
@@ -465,10 +280,10 @@ def occlude(
         Network whose input is a picture.
     packed : (bytes,) uint8
         Design over the beams of the model's problem.
-    block
-        Size and stride.
+    stride
+        Distance of neighbouring positions in pixels.
     ink
-        `WHITE` covers beams as if they were absent, `BLACK` as if all were present.
+        `WHITE` or `BLACK`.
 
     Returns
     -------
@@ -478,36 +293,40 @@ def occlude(
     Raises
     ------
     InvalidSettings
-        If the input of the network is not a picture, or the block is larger than it.
+        If the input of the network is not a picture or is smaller than the block.
     """
-    view = picture_view(model)
-    _, height, width = view.shape
-    if block.size > min(height, width):
-        raise InvalidSettings(
-            f"block size: expected at most {min(height, width)} pixels for pictures of "
-            f"{width} x {height}, got {block.size}"
-        )
+    view = _picture_view(model)
     picture = view.arrays(packed[None])[0]
-    rows, columns = block.centres(height), block.centres(width)
-    spots = [
-        (block.span(row, height), block.span(column, width)) for row in rows for column in columns
-    ]
+    _, height, width = view.shape
+    rows, columns = spans(height, stride), spans(width, stride)
+    spots = [(row, column) for row in rows for column in columns]
     # A block over pixels of its own colour changes nothing.
     covering = [number for number, spot in enumerate(spots) if (picture[0][spot] != ink).any()]
     pictures = np.repeat(picture[None], len(covering) + 1, axis=0)
     for one, number in zip(pictures[1:], covering, strict=True):
         one[0][spots[number]] = ink
-    where = find_device(device)
-    output = run_network(
-        model.network.to(where), lambda part: part, pictures, view.scale, "float32"
-    )
+    network = model.network.to(find_device(device))
+    output = run_network(network, lambda part: part, pictures, view.scale, "float32")
     change = np.zeros(len(spots))
     change[covering] = output[1:] - output[0]
     return model.deviation * change.reshape(len(rows), len(columns))
 
 
+def spans(extent: int, stride: int) -> list[slice]:
+    """Return the pixels that the block covers along one side of a picture, for each position.
+
+    Examples
+    --------
+    >>> [(span.start, span.stop) for span in spans(12, 4)]
+    [(0, 8), (0, 12), (4, 12)]
+    """
+    centres = [(number + 0.5) * stride for number in range(-(-extent // stride))]
+    first = [math.floor(centre - 0.5 * BLOCK + 0.5) for centre in centres]
+    return [slice(max(start, 0), min(start + BLOCK, extent)) for start in first]
+
+
 def sample_map(
-    values: NDArray[np.float64], block: Block, places: NDArray[np.float64], height: int
+    values: NDArray[np.float64], stride: int, points: NDArray[np.float64], height: int
 ) -> NDArray[np.float64]:
     """Interpolate a map linearly between the positions of the block.
 
@@ -515,7 +334,7 @@ def sample_map(
     ----------
     values : (rows, columns)
         Result of `occlude`.
-    places : (n, 2)
+    points : (n, 2)
         Pixel coordinates from the lower left corner.
     height
         Height of the picture in pixels.
@@ -526,29 +345,6 @@ def sample_map(
     """
     from scipy.ndimage import map_coordinates
 
-    column = places[:, 0] / block.stride - 0.5
-    row = (height - places[:, 1]) / block.stride - 0.5
+    column = points[:, 0] / stride - 0.5
+    row = (height - points[:, 1]) / stride - 0.5
     return np.asarray(map_coordinates(values, [row, column], order=1, mode="nearest"))
-
-
-def _occlusion(model: TrainedModel, design: Design, block: Block, device: str) -> Occlusion:
-    """Compute both maps and their values at the beams, in the numbering of the design."""
-    problem, known = design.problem, model.problem.lattice
-    beams = beams_between(model.problem, problem)
-    canvas = picture_view(model).renderer.canvas
-    packed = np.packbits(renumbered(design.mask[None], beams)[0])
-    white = occlude(model, packed, block, ink=WHITE, device=device)
-    black = occlude(model, packed, block, ink=BLACK, device=device)
-    drawn = canvas.pixels_of(known.positions)
-    middles = drawn[known.beams].mean(axis=1)[beams[problem.designable]]
-    # Pictures are to scale: the size of a pixel follows from the extents.
-    unit = float(np.ptp(known.positions, axis=0).max() / np.ptp(drawn, axis=0).max())
-    rows, columns = white.shape
-    size = block.stride * np.array([columns, rows], np.float64)
-    corner = np.array([0.0, canvas.height - size[1]])
-    low = problem.lattice.positions.min(axis=0) + (corner - drawn.min(axis=0)) * unit
-    return Occlusion(
-        block, white, black, low, low + size * unit,
-        sample_map(white, block, middles, canvas.height),
-        sample_map(black, block, middles, canvas.height),
-    )  # fmt: skip

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.box import SIMPLE
-from rich.table import Table
 
-from bellcrank.cli.app import INTERRUPTED, app
-from bellcrank.cli.arguments import settings_of
+from bellcrank.cli.app import app
 from bellcrank.cli.checkout import require_reproduction
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.cli.live import Live
 from bellcrank.cli.predict import Device, ModelFile
 
-if TYPE_CHECKING:
-    from reproduction.networks.surrogate_search import (
-        SurrogateSearchProgress,
-        SurrogateSearchResult,
-    )
-
-UNITS = {"searching": "chains", "verifying": "chains", "comparing": "chains"}
+COLUMNS = {
+    "network": "with the network",
+    "predicted": "predicted",
+    "mechanics": "with the mechanics",
+    "distance": "beams from the dataset",
+}
 
 
 @app.command()
@@ -45,10 +40,6 @@ def surrogate_search(
     compare: Annotated[
         bool, typer.Option("--compare/--no-compare", help="Run as many chains with the mechanics.")
     ] = True,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="KEY=VALUE: cost, schedule, hot, cold or annealing."),
-    ] = None,
     device: Device = "auto",
     out: Annotated[
         Path | None, typer.Option(help="Result folder. \\[NAME-surrogate-search]")
@@ -57,89 +48,50 @@ def surrogate_search(
 ) -> None:
     """Search with a network in place of the mechanics, and verify the designs by the mechanics."""
     require_reproduction()
-    from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import find_problem
     from bellcrank.storage import require_new_folder
     from bellcrank.surrogate.dataset import read_dataset
     from bellcrank.surrogate.predictor import load_predictor
-    from reproduction.networks.surrogate_search import SurrogateSearchSettings, run_surrogate_search
+    from reproduction.networks import surrogate_search as search
     from reproduction.networks.surrogate_search_files import write_surrogate_search
 
     task = find_problem(problem)
-    chosen = SurrogateSearchSettings(
-        chains=chains, steps=steps, seed=seed, verified=verified, compare=compare,
-        search=settings_of("--set", settings),
-    )  # fmt: skip
+    settings = search.SurrogateSearchSettings(
+        chains=chains, steps=steps, seed=seed, verified=verified, compare=compare
+    )
     folder = out or Path(f"{task.name}-surrogate-search")
     require_new_folder(folder)
     predictor = load_predictor(task, model, device=device)
     training = None if dataset is None else read_dataset(dataset)
     announce_compilation()
-    with stopping_on_interrupt() as stop, SurrogateSearchLive() as live:
-        result = run_surrogate_search(
-            task, predictor, chosen, training=training, report=live, stop=stop
+    with SurrogateSearchLive("searching", None) as live:
+        record = search.run_surrogate_search(
+            task, predictor, settings, training=training, report=live
         )
-    write_surrogate_search(result, folder)
+    write_surrogate_search(record, task, folder)
     if as_json:
-        print_json(json.dumps(result.to_dict(), indent=1))
-    else:
-        _print_result(result)
-        results.print(f"results: {plain(folder)}/")
-    if result.stopped:
-        notes.print(
-            f"Stopped after {len(result.offered('final'))} of {chains} chains; the designs found "
-            f"so far are verified and written to {plain(folder)}/."
-        )
-        sys.exit(INTERRUPTED)
+        print_json(json.dumps(record, indent=1))
+        return
+    for rule, label in search.OFFERS.items():
+        medians = record["medians"][rule]
+        figures = [
+            f"{title} {medians[key]:.4g}"
+            for key, title in COLUMNS.items()
+            if medians[key] is not None
+        ]
+        results.print(f"{label}, medians: {', '.join(figures) or 'none'}")
+        if failed := medians["network_failed"]:
+            notes.print(f"{failed} of these designs of the network have no unique response.")
+    best = search.best_design(task, record)
+    if best is not None:
+        results.print(f"best: efficiency [bold]{best.efficiency:.4f}[/] by mechanics")
+    results.print(f"results: {plain(folder)}/")
 
 
 class SurrogateSearchLive(Live):
     """Progress line of a search with a network."""
 
-    def __init__(self) -> None:
-        super().__init__("searching", None)
-
-    def __call__(self, progress: SurrogateSearchProgress) -> None:
-        """Show the stage and the number of chains that are done."""
-        line = f"{progress.stage}  {progress.done} / {progress.total} {UNITS[progress.stage]}"
-        self._show(progress.done, progress.total, line, line)
-
-
-def _print_result(result: SurrogateSearchResult) -> None:
-    """Print the medians of the offered designs, the effort and the best design."""
-    from reproduction.networks.surrogate_search import OFFERS
-
-    medians = result.medians()
-    columns = {"predicted": "predicted", "network": "with network"}
-    if result.by_mechanics:
-        columns["mechanics"] = "with mechanics"
-    if any(row["distance"] is not None for row in medians.values()):
-        columns["distance"] = "beams from the dataset"
-    table = Table("median efficiency", box=SIMPLE)
-    for title in columns.values():
-        table.add_column(title, justify="right")
-    for offer, words in OFFERS.items():
-        table.add_row(words, *(_figure(name, medians[offer][name]) for name in columns))
-    results.print(table)
-    for name, share in result.acceptance.items():
-        results.print(
-            f"with {name}: {share:.1%} of the proposals accepted (median), "
-            f"{result.seconds[name]:.1f} s"
-        )
-        if failed := medians["verified"][f"{name}_failed"]:
-            notes.print(f"{failed} chains with {name} offer no design with a unique response.")
-    if result.best is None:
-        notes.print(
-            "[bold yellow]warning:[/] no design found with the network has a unique response."
-        )
-    else:
-        results.print(
-            f"best: efficiency [bold]{result.best.efficiency:.4f}[/] by mechanics, predicted "
-            f"{result.best.predicted:.4f}"
-        )
-
-
-def _figure(name: str, value: Any) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.0f}" if name == "distance" else f"{value:.4f}"
+    def __call__(self, evaluator: str, done: int, total: int) -> None:
+        """Show the number of chains that are done."""
+        line = f"with the {evaluator}: {done} / {total} chains"
+        self._show(done, total, line, line)
