@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 
 from bellcrank.model import pack_mask, write_problem
+from bellcrank.storage.description import read_description, write_description
 from bellcrank.surrogate.trained_model import read_model
+from bellcrank.surrogate.training_setup import DESCRIPTION, TRAINING_SCHEMA
 from tests.surrogate.helpers import same_weights
 from tests.surrogate.tiny import tiny_dataset, tiny_problem
 
@@ -64,10 +66,10 @@ def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_training_writes_model_log_and_record(trained: Path, data: Path) -> None:
+def test_a_training_writes_model_and_record(trained: Path, data: Path) -> None:
     model = read_model(trained / "model.safetensors")
     assert model.record["recipe"]["model"] == "mlp"
-    assert len((trained / "log.csv").read_text().splitlines()) == 3
+    assert len(model.record["epochs"]) == 2
     again = call("train", data, "--resume", trained, "--device", "cpu", "--json")
     assert again.data["results"][0]["held_out"] == model.record["held_out"]
     assert same_weights(read_model(trained / "model.safetensors"), model)
@@ -134,11 +136,13 @@ def test_a_killed_training_resumes(data: Path, tmp_path: Path) -> None:
     finally:
         process.send_signal(signal.SIGKILL)
         process.wait()
-    description = folder / "training.json"
-    content = json.loads(description.read_text())
-    assert content["recipe"]["epochs"] == 4000
-    content["recipe"]["epochs"] = 1  # so that the rest is short
-    description.write_text(json.dumps(content))
+    path = folder / DESCRIPTION
+    description = read_description(
+        path, TRAINING_SCHEMA, "training", ("recipe", "precision", "data")
+    )
+    assert description.content["recipe"]["epochs"] == 4000
+    description.content["recipe"]["epochs"] = 1  # so that the rest is short
+    write_description(path, TRAINING_SCHEMA, description, overwrite=True)
     (folder / "checkpoint.safetensors").unlink()
     outcome = call("train", data, "--resume", folder)
     assert outcome.code == 0, outcome.err

@@ -21,8 +21,8 @@ from bellcrank.cli.predict import Device
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from bellcrank.surrogate.progress import Progress
     from bellcrank.surrogate.trained_model import TrainedModel
+    from bellcrank.surrogate.training import Progress
 
 
 @app.command()

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     import torch
 
+CHECKPOINT = "checkpoint.safetensors"
+"""Name of the file in the folder of a training."""
 METADATA_KEY = "bellcrank"
 
 

@@ -203,42 +203,42 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    place = Path(path)
-    if place.is_dir() and (place / DATASET_FILE).exists():
-        place /= DATASET_FILE
-    if place.is_dir():
+    source = Path(path)
+    if source.is_dir() and (source / DATASET_FILE).exists():
+        source /= DATASET_FILE
+    if source.is_dir():
         raise InvalidFile(f"{path}: no {DATASET_FILE} in this folder")
-    if not place.is_file():
+    if not source.is_file():
         raise InvalidFile(f"{path}: no such file; build a dataset with: bellcrank dataset build")
     try:
-        named = pq.read_schema(place).names
+        named = pq.read_schema(source).names
     except (OSError, pa.ArrowException, ValueError) as error:
         raise InvalidFile(
-            f"{place}: not a Parquet file, or damaged ({first_line(error)})"
+            f"{source}: not a Parquet file, or damaged ({first_line(error)})"
         ) from None
     if missing := [name for name in COLUMNS if name not in named]:
         raise InvalidFile(
-            f"{place}: not a dataset: it has no column {missing[0]!r}; build one with: bellcrank "
+            f"{source}: not a dataset: it has no column {missing[0]!r}; build one with: bellcrank "
             f"dataset build"
         )
-    with parquet_file(place, REMEDY) as (file, header):
+    with parquet_file(source, REMEDY) as (file, header):
         if header.get("schema") != DATASET_SCHEMA:
             raise CorruptRun(
-                f"{place}: expected schema {DATASET_SCHEMA!r}, got {header.get('schema')!r}"
+                f"{source}: expected schema {DATASET_SCHEMA!r}, got {header.get('schema')!r}"
             )
         columns = arrays_of(file.read(columns=list(COLUMNS)), COLUMNS)
         data, origin = header["problem"], dict(header["origin"])
-    problem = problem_from_dict(data, str(place))
+    problem = problem_from_dict(data, str(source))
     try:
         found = Dataset(
             problem, columns["mask"], columns["efficiency"], columns["run"], columns["step"],
             columns["accepted"], origin,
         )  # fmt: skip
     except InvalidDataset as error:
-        raise InvalidDataset(f"{place}: {error}") from None
+        raise InvalidDataset(f"{source}: {error}") from None
     # Parquet has checksums of its pages, but not of its footer, which lists the rows.
     if header.get("digest") not in (None, _digest(found)):
-        raise CorruptRun(f"{place}: damaged (the checksum of its rows is wrong)")
+        raise CorruptRun(f"{source}: damaged (the checksum of its rows is wrong)")
     return found
 
 

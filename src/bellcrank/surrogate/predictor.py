@@ -22,8 +22,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidModel, InvalidProblem
 from bellcrank.surrogate.matching import beams_between, renumbered
-from bellcrank.surrogate.trained_model import TrainedModel, read_model
-from bellcrank.surrogate.training_folder import MODEL
+from bellcrank.surrogate.trained_model import MODEL, TrainedModel, read_model
 
 if TYPE_CHECKING:
     import os
@@ -32,8 +31,8 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Problem
 
-BUNDLED = ("crane",)
-"""Problems for which the package contains a trained network."""
+BUNDLED = "pretrained/crane.safetensors"
+"""The trained network that the package contains."""
 
 
 class Predictor:
@@ -138,8 +137,8 @@ def load_predictor(
         If PyTorch is not installed.
     """
     model = load_model(problem, path, any_stiffness=any_stiffness)
-    known = _with_stiffness_of(model.problem, problem) if any_stiffness else problem
-    return Predictor(known, model, device=device, precision=precision)
+    given = replace(problem, stiffness=model.problem.stiffness) if any_stiffness else problem
+    return Predictor(given, model, device=device, precision=precision)
 
 
 def load_model(
@@ -149,25 +148,19 @@ def load_model(
 
     Parameters and errors are those of `load_predictor`.
     """
-    if path is not None:
-        model = read_model(model_file(path))
-        _require_match(model, problem, any_stiffness=any_stiffness)
-        return model
-    refusals = []
-    for name in BUNDLED:
-        source = resources.files("bellcrank.surrogate") / "pretrained" / f"{name}.safetensors"
-        with resources.as_file(source) as file:
-            model = read_model(file)
-        try:
-            _require_match(model, problem, any_stiffness=any_stiffness)
-        except InvalidModel as error:
-            refusals.append(str(error))
-        else:
-            return model
-    raise InvalidModel(
-        f"no bundled network for {problem.name!r} ({refusals[0]}); train one (bellcrank dataset "
-        f"build, bellcrank train) and give its file or folder"
-    )
+    with resources.as_file(resources.files("bellcrank.surrogate") / BUNDLED) as bundled:
+        model = read_model(bundled if path is None else model_file(path))
+    given = replace(problem, stiffness=model.problem.stiffness) if any_stiffness else problem
+    try:
+        beams_between(model.problem, given)
+    except InvalidModel as error:
+        if path is not None:
+            raise
+        raise InvalidModel(
+            f"no bundled network for {problem.name!r} ({error}); train one (bellcrank dataset "
+            f"build, bellcrank train) and give its file or folder"
+        ) from None
+    return model
 
 
 def model_file(path: str | os.PathLike[str]) -> Path:
@@ -178,20 +171,9 @@ def model_file(path: str | os.PathLike[str]) -> Path:
     InvalidFile
         If a folder contains none.
     """
-    place = Path(path)
-    if not place.is_dir():
-        return place
-    if not (place / MODEL).exists():
-        raise InvalidFile(f"{place}: no trained model in this folder; expected {MODEL}")
-    return place / MODEL
-
-
-def _require_match(model: TrainedModel, problem: Problem, *, any_stiffness: bool) -> None:
-    """Raise InvalidModel if a network was trained on another problem."""
-    beams_between(
-        model.problem, _with_stiffness_of(model.problem, problem) if any_stiffness else problem
-    )
-
-
-def _with_stiffness_of(known: Problem, given: Problem) -> Problem:
-    return replace(given, stiffness=known.stiffness)
+    file = Path(path)
+    if not file.is_dir():
+        return file
+    if not (file / MODEL).exists():
+        raise InvalidFile(f"{file}: no trained model in this folder; expected {MODEL}")
+    return file / MODEL

@@ -23,7 +23,7 @@ RANGES = {
     "held_out": ("above 0 and below 1", math.ulp(0.0), 1.0),
     "averaging": ("at least 0 and below 1", 0.0, 1.0),
 }
-"""Range of each real number, in words and as a half-open interval."""
+"""Range of each real number, in text and as a half-open interval."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,11 +101,11 @@ class Recipe:
             _check_whole("tested_last", self.tested_last, LEAST["tested"])
         if self.epoch_size is not None:
             _check_whole("epoch_size", self.epoch_size, self.batch)
-        for name, (words, low, high) in RANGES.items():
+        for name, (label, low, high) in RANGES.items():
             value = getattr(self, name)
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if not number or not low <= value < high:
-                raise InvalidSettings(f"{name}: expected a number {words}, got {value!r}")
+                raise InvalidSettings(f"{name}: expected a number {label}, got {value!r}")
         for name, known in CHOICES.items():
             if (value := getattr(self, name)) not in known:
                 raise InvalidSettings(f"{name}: expected one of {', '.join(known)}, got {value!r}")

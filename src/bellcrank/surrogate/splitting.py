@@ -166,8 +166,8 @@ class Overlap:
 
 def overlap(data: Dataset, split: Split) -> Overlap:
     """Count repeated designs, and those on both sides of a split."""
-    words = np.ascontiguousarray(data.packed).view([("", np.uint8, data.packed.shape[1])]).ravel()
-    _, name = np.unique(words, return_inverse=True)
+    packed = np.ascontiguousarray(data.packed).view([("", np.uint8, data.packed.shape[1])]).ravel()
+    _, name = np.unique(packed, return_inverse=True)
     known = np.zeros(int(name.max()) + 1, np.bool_)
     known[name[split.training]] = True
     repeated = int(known[name[split.held_out]].sum())

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from bellcrank.surrogate.models import Architecture
     from bellcrank.surrogate.views import View
 
+MODEL = "model.safetensors"
+"""Name of the file in the folder of a training."""
 MODEL_SCHEMA = "bellcrank/model/1"
 METADATA_KEY = "bellcrank"
 DIGITS = 6
@@ -140,9 +142,12 @@ class TrainedModel:
         """Return the efficiencies (n,) for outputs (n,) of the network."""
         return self.mean + self.deviation * output
 
-    def describe(self) -> dict[str, Any]:
-        """Return the metadata of the file as plain data."""
-        return {
+    def to_bytes(self) -> bytes:
+        """Return the content of a file: weights as safetensors with metadata."""
+        import_torch()
+        from safetensors.torch import save
+
+        metadata = {
             "schema": MODEL_SCHEMA,
             "architecture": self.architecture,
             "lattice": lattice_hash(self.problem.lattice),
@@ -153,17 +158,11 @@ class TrainedModel:
             "record": self.record,
             "problem": problem_to_dict(self.problem),
         }
-
-    def to_bytes(self) -> bytes:
-        """Return the content of a file: weights as safetensors with metadata."""
-        import_torch()
-        from safetensors.torch import save
-
         tensors = {
             name: value.detach().cpu().contiguous()
             for name, value in self.network.state_dict().items()
         }
-        return save(tensors, {METADATA_KEY: json.dumps(self.describe())})
+        return save(tensors, {METADATA_KEY: json.dumps(metadata)})
 
     def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the file, whole or not at all.
@@ -173,11 +172,6 @@ class TrainedModel:
         OutputExists, StorageError
         """
         write_bytes(path, self.to_bytes(), overwrite=overwrite)
-
-
-def batch_of(device: torch.device) -> int:
-    """Return the number of designs in one evaluation on a device."""
-    return BATCH.get(device.type, BATCH["cpu"])
 
 
 def inputs_of(arrays: NDArray[np.uint8], scale: float, device: torch.device) -> torch.Tensor:
@@ -221,7 +215,7 @@ def run_network(
 
     device = next(network.parameters()).device
     parts = []
-    batch = batch_of(device)
+    batch = BATCH.get(device.type, BATCH["cpu"])
     was_training = network.training
     network.eval()
     try:
@@ -255,9 +249,8 @@ def read_model(path: str | os.PathLike[str]) -> TrainedModel:
     from safetensors import SafetensorError
     from safetensors.torch import load
 
-    place = Path(path)
     try:
-        content = place.read_bytes()
+        content = Path(path).read_bytes()
     except OSError as error:
         raise InvalidFile(f"{path}: cannot be read ({error.strerror})") from None
     try:

@@ -12,20 +12,20 @@ import time
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.model.storage import write_bytes, write_text
+from bellcrank.errors import RunFailed
+from bellcrank.model.storage import write_bytes
 from bellcrank.provenance import provenance
 from bellcrank.surrogate.backend import autocast, import_torch, name_of
 from bellcrank.surrogate.checkpoints import (
+    CHECKPOINT,
     TrainingTensors,
     checkpoint_bytes,
     damaged_checkpoint,
     load_checkpoint,
 )
-from bellcrank.surrogate.metrics import accuracy
-from bellcrank.surrogate.progress import EpochRecord, LossMeter, Progress, log_text
+from bellcrank.surrogate.metrics import accuracy, finite
 from bellcrank.surrogate.splitting import overlap, rows_of_epoch
-from bellcrank.surrogate.trained_model import inputs_of, run_network
-from bellcrank.surrogate.training_folder import CHECKPOINT, LOG, MODEL
+from bellcrank.surrogate.trained_model import MODEL, inputs_of, run_network
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -43,8 +43,57 @@ CHECKPOINT_SECONDS = 60.0
 """Interval between checkpoints: the largest loss by a kill."""
 REPORT_SECONDS = 0.5
 """Interval between reports of progress."""
-STEPS_AT_ONCE = 50
-"""Steps on a GPU between evaluations of the loss, which wait for the device."""
+
+
+@dataclass(frozen=True, slots=True)
+class EpochRecord:
+    """State of a training after an epoch.
+
+    Parameters
+    ----------
+    epoch
+        From 1.
+    designs
+        Training designs so far, in all epochs.
+    seconds
+        Duration of the training so far, in all sessions.
+    loss
+        Mean squared error over the batches of the epoch, each before its step, in units of the
+        variance.
+    r_squared, determination, rms_error
+        Accuracy on held-out runs; see `bellcrank.surrogate.metrics.Accuracy`.
+    """
+
+    epoch: int
+    designs: int
+    seconds: float
+    loss: float
+    r_squared: float
+    determination: float
+    rms_error: float
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Progress of a training.
+
+    Parameters
+    ----------
+    done, total
+        Training designs so far, and in all epochs.
+    loss
+        Mean squared error over the epoch so far in units of the variance; nan at the start.
+    epoch
+        Record of the epoch that has just ended, or None.
+    testing
+        In the final test: held-out designs tested so far, and their number.
+    """
+
+    done: int
+    total: int
+    loss: float
+    epoch: EpochRecord | None = None
+    testing: tuple[int, int] | None = None
 
 
 @dataclass(slots=True, eq=False)
@@ -65,8 +114,10 @@ class Training:
         Network, optimiser and moving average.
     step, seconds
         Steps of the optimiser so far, and their duration.
-    losses, log
-        Losses of the current epoch, and records of finished epochs.
+    loss_sum, loss_count
+        Sum of the losses of the batches of the current epoch, and their number.
+    log
+        Records of finished epochs.
     """
 
     data: Dataset
@@ -79,7 +130,8 @@ class Training:
     tensors: TrainingTensors
     step: int = 0
     seconds: float = 0.0
-    losses: LossMeter = field(default_factory=LossMeter)
+    loss_sum: float = 0.0
+    loss_count: int = 0
     log: list[EpochRecord] = field(default_factory=list)
 
     @property
@@ -101,7 +153,7 @@ class Training:
     def run(self, stop: Callable[[], bool] = lambda: False) -> Iterator[Progress]:
         """Train to the end, or until `stop` returns true, and yield the progress.
 
-        The folder then contains a checkpoint and the log.
+        The folder then contains a checkpoint.
         """
         saved = reported = time.monotonic()
         while not self.is_done:
@@ -117,7 +169,6 @@ class Training:
                     if stop():
                         self.save()
                         return
-            self.losses.settle()
             self.log.append(self._end_epoch())
             self.save()
             saved = time.monotonic()
@@ -138,24 +189,22 @@ class Training:
         record = self._record(self._test(self.recipe.tested_last, tested))
         model = replace(self.model, network=self._result, record=record)
         if self.folder is not None:
-            self._write_log(self.folder)  # a kill may have come between checkpoint and log
             model.write(self.folder / MODEL, overwrite=True)
         return model
 
     def save(self) -> None:
-        """Write a checkpoint and the log to the folder."""
+        """Write a checkpoint to the folder."""
         if self.folder is None:
             return
-        self.losses.settle()
         data = {
             "step": self.step,
             "seconds": self.seconds,
-            **self.losses.to_dict(),
+            "loss_sum": self.loss_sum,
+            "loss_count": self.loss_count,
             "log": [asdict(epoch) for epoch in self.log],
         }
         content = checkpoint_bytes(self.tensors, data)
         write_bytes(self.folder / CHECKPOINT, content, overwrite=True)
-        self._write_log(self.folder)
 
     def restore(self, path: Path) -> None:
         """Continue from a checkpoint.
@@ -168,7 +217,7 @@ class Training:
         data = load_checkpoint(self.tensors, path)
         try:
             self.step, self.seconds = int(data["step"]), float(data["seconds"])
-            self.losses = LossMeter.from_dict(data)
+            self.loss_sum, self.loss_count = float(data["loss_sum"]), int(data["loss_count"])
             self.log = [EpochRecord(**epoch) for epoch in data["log"]]
         except (KeyError, TypeError, ValueError) as error:
             raise damaged_checkpoint(path, error) from None
@@ -189,17 +238,21 @@ class Training:
             "seconds": round(self.seconds, 1),
             "data": {**asdict(overlap(self.data, self.split)), "runs": self.data.run_count},
             "held_out": found.to_dict(),
-            "epochs": [epoch.to_dict() for epoch in self.log],
+            "epochs": [
+                {name: finite(value) for name, value in asdict(epoch).items()} for epoch in self.log
+            ],
             "provenance": provenance(torch=import_torch().__version__),
         }
 
     def _progress(self, epoch: EpochRecord | None = None) -> Progress:
         batch = self.recipe.batch
-        self.losses.settle()
-        return Progress(self.step * batch, self.total_steps * batch, self.losses.smoothed, epoch)
+        loss = math.nan if epoch is None else epoch.loss
+        if self.loss_count:
+            loss = self.loss_sum / self.loss_count
+        return Progress(self.step * batch, self.total_steps * batch, loss, epoch)
 
     def _steps_of_epoch(self) -> Iterator[None]:
-        """Make the remaining steps of the current epoch; yield between groups of steps."""
+        """Make the remaining steps of the current epoch, and yield after each."""
         import torch
 
         epoch, first = divmod(self.step, self.steps_per_epoch)
@@ -208,7 +261,6 @@ class Training:
         rows = rows_of_epoch(self.recipe, epoch, training, efficiency, count)
         network, optimiser = self.model.network.train(), self.tensors.optimiser
         labels = ((self.data.efficiency - self.model.mean) / self.model.deviation).astype("f4")
-        group_size = 1 if self.device.type == "cpu" else STEPS_AT_ONCE
         for number in range(first, self.steps_per_epoch):
             start = time.monotonic()
             chosen = rows[number * self.recipe.batch : (number + 1) * self.recipe.batch]
@@ -227,12 +279,16 @@ class Training:
             if self.tensors.average is not None:
                 decay = self.recipe.averaging
                 update_average(self.tensors.average, network, decay, self.step)
-            self.losses.add(loss)
-            if self.step % group_size == 0:
-                self.losses.settle()
+            value = loss.item()
+            if not math.isfinite(value):
+                raise RunFailed(
+                    f"the training diverged: its loss is {value}; train again with a lower "
+                    f"learning_rate"
+                )
+            self.loss_sum += value
+            self.loss_count += 1
             self.seconds += time.monotonic() - start
-            if self.step % group_size == 0:
-                yield
+            yield
 
     def _test(
         self, most: int | None, report: Callable[[int, int], None] = lambda _done, _total: None
@@ -247,14 +303,12 @@ class Training:
 
     def _end_epoch(self) -> EpochRecord:
         """Test the network and return the record of the current epoch."""
-        found = self._test(self.recipe.tested)
+        found, loss = self._test(self.recipe.tested), self.loss_sum / self.loss_count
+        self.loss_sum, self.loss_count = 0.0, 0
         return EpochRecord(
-            len(self.log) + 1, self.step * self.recipe.batch, round(self.seconds, 2),
-            self.losses.end_epoch(), found.r_squared, found.determination, found.rms_error,
+            len(self.log) + 1, self.step * self.recipe.batch, round(self.seconds, 2), loss,
+            found.r_squared, found.determination, found.rms_error,
         )  # fmt: skip
-
-    def _write_log(self, folder: Path) -> None:
-        write_text(folder / LOG, log_text(self.log), overwrite=True)
 
 
 def learning_rate(recipe: Recipe, step: int, total: int) -> float:

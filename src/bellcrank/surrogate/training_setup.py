@@ -11,24 +11,23 @@ Examples
 from __future__ import annotations
 
 import copy
+import hashlib
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bellcrank.errors import InvalidSettings
+import numpy as np
+
+from bellcrank.errors import InvalidSettings, OutputExists
+from bellcrank.provenance import provenance
+from bellcrank.storage.description import Description, read_description, write_description
+from bellcrank.storage.files import make_folder, remove_temporaries
 from bellcrank.surrogate.backend import find_device, find_precision
-from bellcrank.surrogate.checkpoints import TrainingTensors
+from bellcrank.surrogate.checkpoints import CHECKPOINT, TrainingTensors
+from bellcrank.surrogate.recipes import Recipe
 from bellcrank.surrogate.splitting import split_by_run
-from bellcrank.surrogate.trained_model import TrainedModel, architecture_of
+from bellcrank.surrogate.trained_model import MODEL, TrainedModel, architecture_of
 from bellcrank.surrogate.training import Training
-from bellcrank.surrogate.training_folder import (
-    CHECKPOINT,
-    Description,
-    check_new,
-    data_hash,
-    read_description,
-    remove_leftovers,
-    write_description,
-)
 from bellcrank.surrogate.views import views
 
 if TYPE_CHECKING:
@@ -37,7 +36,10 @@ if TYPE_CHECKING:
     import torch
 
     from bellcrank.surrogate.dataset import Dataset
-    from bellcrank.surrogate.recipes import Recipe
+
+TRAINING_SCHEMA = "bellcrank/training/3"
+DESCRIPTION = "training.json"
+_FILES = re.compile("|".join(map(re.escape, (DESCRIPTION, CHECKPOINT, MODEL))))
 
 
 def begin(
@@ -67,13 +69,26 @@ def begin(
         If the folder contains files of a training.
     """
     if folder is not None:
-        check_new(folder)
+        for name in (DESCRIPTION, CHECKPOINT, MODEL):
+            if (Path(folder) / name).exists():
+                raise OutputExists(
+                    f"{Path(folder) / name}: this folder contains a training; resume it "
+                    f"(--resume), or choose another folder (--out)"
+                )
     where = find_device(device)
     training = _build(data, recipe, where, find_precision(recipe.precision, where))
     if folder is not None:
         training.folder = Path(folder)
-        remove_leftovers(training.folder)
-        write_description(training.folder, Description(recipe, training.precision, data_hash(data)))
+        make_folder(training.folder)
+        remove_temporaries(training.folder, _FILES)
+        content = {
+            "recipe": recipe.to_dict(),
+            "precision": training.precision,
+            "data": data_hash(data),
+        }
+        write_description(
+            training.folder / DESCRIPTION, TRAINING_SCHEMA, Description(content, provenance())
+        )
     return training
 
 
@@ -83,22 +98,34 @@ def resume(folder: str | os.PathLike[str], data: Dataset, *, device: str = "auto
     Raises
     ------
     InvalidFile
-        If there is none, or its description is damaged.
+        If there is none.
+    CorruptRun
+        If its description is damaged.
     InvalidSettings
         If it was started with other data.
     InvalidModel
         If its checkpoint is damaged.
     """
-    place = Path(folder)
-    description = read_description(place)
-    if description.data != data_hash(data):
+    path = Path(folder)
+    keys = ("recipe", "precision", "data")
+    content = read_description(path / DESCRIPTION, TRAINING_SCHEMA, "training", keys).content
+    if content["data"] != data_hash(data):
         raise InvalidSettings(f"{folder}: the training there was started with other data")
-    training = _build(data, description.recipe, find_device(device), description.precision)
-    training.folder = place
-    remove_leftovers(place)
-    if (place / CHECKPOINT).exists():
-        training.restore(place / CHECKPOINT)
+    recipe = Recipe.from_dict(content["recipe"])
+    training = _build(data, recipe, find_device(device), content["precision"])
+    training.folder = path
+    remove_temporaries(path, _FILES)
+    if (path / CHECKPOINT).exists():
+        training.restore(path / CHECKPOINT)
     return training
+
+
+def data_hash(data: Dataset) -> str:
+    """Return a hash of the masks, efficiencies and runs of a dataset."""
+    digest = hashlib.sha256()
+    for column in (data.packed, data.efficiency, data.run):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.hexdigest()[:16]
 
 
 def _build(data: Dataset, recipe: Recipe, device: torch.device, precision: str) -> Training:
