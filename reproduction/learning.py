@@ -14,7 +14,7 @@ from reproduction import published
 from reproduction.formatting import count, number, percent
 from reproduction.pictures.charts import Chart, Density, Level, Series
 from reproduction.pictures.sheets import Sheet, draw_sheet
-from reproduction.predictions import BINS, Settings, bundled, trained
+from reproduction.predictions import Settings, bundled, trained
 from reproduction.registry import Claim, Figures, Study, register
 
 if TYPE_CHECKING:
@@ -95,7 +95,9 @@ def _costs(record: Mapping[str, Any]) -> dict[str, Any]:
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
     """Draw accuracy during training, predictions, and designs of searches with the network."""
-    charts = [_training_chart(figures), _density_chart(figures), _designs_chart(figures)]
+    charts = [_training_chart(figures), _density_chart(figures)]
+    if "surrogate-search" in figures["records"]:
+        charts.append(_designs_chart(figures["records"]["surrogate-search"]))
     sheet = Sheet(
         title=f"{figures['problem']}: accuracy of a network and designs found with it",
         note=f"{_network(figures)}, {figures['looks']:,.0f} training samples; tested on "
@@ -144,19 +146,9 @@ def _density_chart(figures: Mapping[str, Any]) -> Chart:
     )  # fmt: skip
 
 
-def _designs_chart(figures: Mapping[str, Any]) -> Chart:
-    """Chart the designs found with the network or, without a record, all predictions."""
+def _designs_chart(made: Mapping[str, Any]) -> Chart:
+    """Chart the designs found with the network and with the mechanics."""
     groups = [("mechanics", style.INPUT), ("network", style.BEST)]
-    made = figures["records"].get("surrogate-search")
-    if made is None:
-        ends = np.linspace(figures["ends"][0], figures["ends"][1], BINS + 1)
-        total = sum(figures["spread"]["mechanics"])
-        spread = [
-            Series(ends[:-1], 100.0 / total * np.array(figures["spread"][name]), kind="steps",
-                   name=f"by {name}", colour=colour)
-            for name, colour in groups
-        ]  # fmt: skip
-        return Chart("Distribution", "efficiency", "designs, %", spread, legend="upper left")
     known = {
         name: np.array([value for value in made[name] if value is not None]) for name, _ in groups
     }

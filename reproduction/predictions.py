@@ -79,7 +79,6 @@ def bundled(settings: Settings) -> dict[str, Any]:
     before = model.record.get("before", {}).get("designs", 0)
     return {
         **_network(model, before),
-        "held_out_by_its_record": model.record["held_out"],
         **_comparison(predicted, data.efficiency),
     }
 
@@ -135,11 +134,9 @@ def _comparison(predicted: np.ndarray, actual: np.ndarray) -> dict[str, Any]:
     ends = (low - room, high + room)
     grid, _, _ = np.histogram2d(predicted, actual, bins=BINS, range=(ends, ends))
     slope, offset = np.polyfit(actual, predicted, 1)
-    both = [np.histogram(values, bins=BINS, range=ends)[0] for values in (actual, predicted)]
     return {
         "accuracy": accuracy(predicted, actual).to_dict(),
         "fit": [float(slope), float(offset)],
         "ends": ends,
         "grid": grid.astype(int).tolist(),
-        "spread": {"mechanics": both[0].tolist(), "network": both[1].tolist()},
     }

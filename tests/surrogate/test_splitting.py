@@ -65,9 +65,9 @@ def test_repeated_designs_are_counted_as_by_brute_force(
     masks = [row.tobytes() for row in mixed.packed]
     known = {masks[row] for row in split.training}
     found = overlap(mixed, split)
-    assert found.repeated == sum(masks[row] in known for row in split.held_out) > 0
-    assert found.distinct == len(set(masks)) < 60
-    assert (found.designs, found.held_out) == (200, len(split.held_out))
+    assert found["repeated"] == sum(masks[row] in known for row in split.held_out) > 0
+    assert found["distinct"] == len(set(masks)) < 60
+    assert (found["designs"], found["held_out"]) == (200, len(split.held_out))
 
 
 def peaked(rng: np.random.Generator) -> NDArray[np.float64]:

@@ -108,10 +108,7 @@ def summary_of(data: Dataset) -> dict[str, Any]:
         ),
     }
     if data.run_count > 1:
-        found = overlap(data, split_by_run(data, recipe.held_out, recipe.split_seed))
-        summary |= {
-            "distinct": found.distinct, "held_out": found.held_out, "repeated": found.repeated,
-        }  # fmt: skip
+        summary |= overlap(data, split_by_run(data, recipe.held_out, recipe.split_seed))
     return summary
 
 

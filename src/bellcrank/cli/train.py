@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.progress import TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from bellcrank.cli.app import INTERRUPTED, app
 from bellcrank.cli.arguments import settings_of
@@ -21,8 +19,9 @@ from bellcrank.cli.predict import Device
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from bellcrank.surrogate.trained_model import TrainedModel
     from bellcrank.surrogate.training import Progress
+
+FIGURES = {"R²": "r_squared", "determination": "determination", "rms error": "rms_error"}
 
 
 @app.command()
@@ -79,7 +78,13 @@ def train(
     if as_json:
         print_json(json.dumps({"results": [trained.record]}, indent=1))
         return
-    results.print(_table(trained))
+    record = trained.record
+    results.print(
+        f"{trained.architecture}: {record['designs']} training designs in {record['seconds']:.0f} s"
+    )
+    for label, key in FIGURES.items():
+        value = record["held_out"][key]
+        results.print(f"held out {label}: {'-' if value is None else format(value, '.4f')}")
     results.print(f"written to {plain(folder)}/")
 
 
@@ -88,8 +93,6 @@ class TrainingLive(Live):
 
     def __init__(self) -> None:
         super().__init__("training", None, TextColumn("left"), TimeRemainingColumn())
-        self._start = time.monotonic()
-        self._first: int | None = None
 
     def __call__(self, progress: Progress) -> None:
         """Show the progress."""
@@ -98,13 +101,7 @@ class TrainingLive(Live):
             line = f"testing  {tested} / {held_out} held-out designs"
             self._show(progress.done, progress.total, line, line)
             return
-        if self._first is None:
-            self._first = progress.done
-        passed = time.monotonic() - self._start
-        trained = progress.done - self._first
-        speed = f"  {trained / passed:.0f} designs/s" if trained else ""
-        figures = f"loss {progress.loss:.4f}{speed}"
-        share = 100.0 * progress.done / progress.total
+        share, figures = 100.0 * progress.done / progress.total, f"loss {progress.loss:.4f}"
         self._show(progress.done, progress.total, figures, f"training {share:3.0f} %  {figures}")
         if (epoch := progress.epoch) is not None:
             notes.print(
@@ -112,22 +109,3 @@ class TrainingLive(Live):
                 f"{epoch.r_squared:.4f}, determination {epoch.determination:.4f}, error "
                 f"{epoch.rms_error:.3f}"
             )
-
-
-def _table(trained: TrainedModel) -> Table:
-    from bellcrank.surrogate.metrics import Accuracy
-
-    found = Accuracy.from_dict(trained.record["held_out"])
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    table.add_column("model")
-    for name in ("designs", "seconds", "R²", "determination", "rms error"):
-        table.add_column(name, justify="right")
-    table.add_row(
-        trained.architecture,
-        f"{trained.record['designs']}",
-        f"{trained.record['seconds']:.0f}",
-        f"{found.r_squared:.4f}",
-        f"{found.determination:.4f}",
-        f"{found.rms_error:.4f}",
-    )
-    return table

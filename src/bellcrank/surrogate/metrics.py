@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,14 +39,6 @@ class Accuracy:
     def to_dict(self) -> dict[str, Any]:
         """Return the measures as plain data; nan becomes None."""
         return {name: finite(value) for name, value in asdict(self).items()}
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Rebuild the measures from `to_dict`."""
-        numbers: dict[str, Any] = {
-            name: math.nan if each is None else each for name, each in data.items()
-        }
-        return cls(**numbers)
 
 
 def accuracy(predicted: NDArray[np.floating[Any]], actual: NDArray[np.floating[Any]]) -> Accuracy:

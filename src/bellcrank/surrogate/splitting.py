@@ -142,33 +142,23 @@ def uniform_weights(efficiency: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(weight / weight.sum())
 
 
-@dataclass(frozen=True, slots=True)
-class Overlap:
-    """Number of held-out designs that also occur in the training set.
+def overlap(data: Dataset, split: Split) -> dict[str, int]:
+    """Count repeated designs, and those on both sides of a split.
 
-    Parameters
-    ----------
-    designs
-        Rows of the dataset.
-    distinct
-        Different designs among them.
-    held_out
-        Held-out rows.
-    repeated
-        Held-out rows whose design is also a training row.
+    Returns
+    -------
+    dict
+        ``designs`` (rows), ``distinct`` (different designs), ``held_out`` (held-out rows) and
+        ``repeated`` (held-out rows whose design is also a training row).
     """
-
-    designs: int
-    distinct: int
-    held_out: int
-    repeated: int
-
-
-def overlap(data: Dataset, split: Split) -> Overlap:
-    """Count repeated designs, and those on both sides of a split."""
     packed = np.ascontiguousarray(data.packed).view([("", np.uint8, data.packed.shape[1])]).ravel()
     _, name = np.unique(packed, return_inverse=True)
     known = np.zeros(int(name.max()) + 1, np.bool_)
     known[name[split.training]] = True
     repeated = int(known[name[split.held_out]].sum())
-    return Overlap(len(data), len(known), len(split.held_out), repeated)
+    return {
+        "designs": len(data),
+        "distinct": len(known),
+        "held_out": len(split.held_out),
+        "repeated": repeated,
+    }

@@ -142,12 +142,9 @@ class TrainedModel:
         """Return the efficiencies (n,) for outputs (n,) of the network."""
         return self.mean + self.deviation * output
 
-    def to_bytes(self) -> bytes:
-        """Return the content of a file: weights as safetensors with metadata."""
-        import_torch()
-        from safetensors.torch import save
-
-        metadata = {
+    def describe(self) -> dict[str, Any]:
+        """Return the metadata of the file as plain data."""
+        return {
             "schema": MODEL_SCHEMA,
             "architecture": self.architecture,
             "lattice": lattice_hash(self.problem.lattice),
@@ -158,11 +155,17 @@ class TrainedModel:
             "record": self.record,
             "problem": problem_to_dict(self.problem),
         }
+
+    def to_bytes(self) -> bytes:
+        """Return the content of a file: weights as safetensors with metadata."""
+        import_torch()
+        from safetensors.torch import save
+
         tensors = {
             name: value.detach().cpu().contiguous()
             for name, value in self.network.state_dict().items()
         }
-        return save(tensors, {METADATA_KEY: json.dumps(metadata)})
+        return save(tensors, {METADATA_KEY: json.dumps(self.describe())})
 
     def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the file, whole or not at all.

@@ -236,7 +236,7 @@ class Training:
             "device": name_of(self.device),
             "designs": self.step * self.recipe.batch,
             "seconds": round(self.seconds, 1),
-            "data": {**asdict(overlap(self.data, self.split)), "runs": self.data.run_count},
+            "data": {**overlap(self.data, self.split), "runs": self.data.run_count},
             "held_out": found.to_dict(),
             "epochs": [
                 {name: finite(value) for name, value in asdict(epoch).items()} for epoch in self.log
