@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
     from bellcrank.surrogate.trained_model import TrainedModel
 
-WHITE, BLACK = 0, 255
-"""Ink of a block."""
+INKS = {"white": 0, "black": 255}
+"""Ink of each block."""
 BLOCK, STRIDE = 12, 4
 """Side of the block, and usual distance of its neighbouring positions, in pixels."""
 
@@ -67,15 +67,13 @@ class Attribution:
         Designable beams.
     present : (n,) bool
         Whether the design has each of them.
-    exact : (n,) float64
-        Change of the efficiency by each flip by mechanics; nan where the flipped design has no
-        unique response.
-    low_rank, network : (n,) float64
-        The same change predicted by a low-rank update and by the network.
-    white, black : (rows, columns) float64
-        Change of the predicted efficiency by a block of that colour, the uppermost row first.
-    white_at, black_at : (n,) float64
-        The maps at the middle of each designable beam.
+    changes : {name: (n,) float64}
+        Change of the efficiency by each flip: ``exact`` (by mechanics; nan where the flipped
+        design has no unique response), predicted by ``low_rank`` updates and by the ``network``;
+        ``white`` and ``black``: the maps at the middle of each beam.
+    maps : {name: (rows, columns) float64}
+        Change of the predicted efficiency by a ``white`` and a ``black`` block, the uppermost row
+        first.
     low, high : (2,) float64
         Lower left and upper right corner of the maps in lattice units.
     """
@@ -86,36 +84,28 @@ class Attribution:
     predicted: float
     beams: NDArray[np.int64]
     present: NDArray[np.bool_]
-    exact: NDArray[np.float64]
-    low_rank: NDArray[np.float64]
-    network: NDArray[np.float64]
-    white: NDArray[np.float64]
-    black: NDArray[np.float64]
-    white_at: NDArray[np.float64]
-    black_at: NDArray[np.float64]
+    changes: dict[str, NDArray[np.float64]]
+    maps: dict[str, NDArray[np.float64]]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
     def correlations(self) -> dict[str, float]:
-        """Return the rank correlation of each prediction with `exact`.
+        """Return the rank correlation of each change with ``exact``.
 
         White blocks are compared for present beams, black blocks for absent beams.
         """
-        everywhere = np.ones(len(self.beams), np.bool_)
-        compared = {
-            "white": (self.white_at, self.present),
-            "black": (self.black_at, ~self.present),
-            "network": (self.network, everywhere),
-            "low_rank": (self.low_rank, everywhere),
-        }
+        chosen = {"white": self.present, "black": ~self.present}
+        exact, everywhere = self.changes["exact"], slice(None)
         return {
-            name: rank_correlation(values[chosen], self.exact[chosen])
-            for name, (values, chosen) in compared.items()
+            name: rank_correlation(
+                self.changes[name][chosen.get(name, everywhere)],
+                exact[chosen.get(name, everywhere)],
+            )
+            for name in ("white", "black", "network", "low_rank")
         }
 
     def to_dict(self) -> dict[str, Any]:
         """Return all as plain data; nan becomes None."""
-        columns = ("exact", "low_rank", "network", "white_at", "black_at")
         return {
             "problem": self.design.problem.name,
             "mask": self.design.mask_hex,
@@ -124,8 +114,13 @@ class Attribution:
             "predicted": self.predicted,
             "beams": self.beams.tolist(),
             "present": self.present.tolist(),
-            **{name: list(map(finite, getattr(self, name).tolist())) for name in columns},
-            **{name: getattr(self, name).tolist() for name in ("white", "black", "low", "high")},
+            "changes": {
+                name: [finite(value) for value in values.tolist()]
+                for name, values in self.changes.items()
+            },
+            "maps": {name: values.tolist() for name, values in self.maps.items()},
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
             "correlations": {name: finite(rho) for name, rho in self.correlations().items()},
         }
 
@@ -166,15 +161,19 @@ def attribute(
     predictor = Predictor(problem, model, device=device)
     flips = NetworkEvaluator(predictor).predict_flips(mask)
     packed = np.packbits(renumbered(mask[None], number)[0])
-    white = occlude(model, packed, stride, ink=WHITE, device=device)
-    black = occlude(model, packed, stride, ink=BLACK, device=device)
-    efficiency, exact, low_rank = flip_effects(problem, mask)
+    maps = {
+        name: occlude(model, packed, stride, ink=ink, device=device) for name, ink in INKS.items()
+    }
+    efficiency, changes = flip_effects(problem, mask)
+    changes["network"] = flips.change
     known, canvas = model.problem.lattice, view.renderer.canvas
     drawn = canvas.pixels_of(known.positions)
     middles = drawn[known.beams].mean(axis=1)[number[problem.designable]]
+    for name, values in maps.items():
+        changes[name] = sample_map(values, stride, middles, canvas.height)
     # Pictures are to scale: the size of a pixel follows from the extents.
     unit = float(np.ptp(known.positions, axis=0).max() / np.ptp(drawn, axis=0).max())
-    size = stride * np.array(white.shape[::-1], np.float64)
+    size = stride * np.array(maps["white"].shape[::-1], np.float64)
     corner = np.array([0.0, canvas.height - size[1]])
     low = problem.lattice.positions.min(axis=0) + (corner - drawn.min(axis=0)) * unit
     return Attribution(
@@ -184,13 +183,8 @@ def attribute(
         predicted=float(predictor.predict(mask[None])[0]),
         beams=flips.beams,
         present=mask[flips.beams],
-        exact=exact,
-        low_rank=low_rank,
-        network=flips.change,
-        white=white,
-        black=black,
-        white_at=sample_map(white, stride, middles, canvas.height),
-        black_at=sample_map(black, stride, middles, canvas.height),
+        changes=changes,
+        maps=maps,
         low=low,
         high=low + size * unit,
     )
@@ -198,14 +192,8 @@ def attribute(
 
 def flip_effects(
     problem: Problem, mask: NDArray[np.bool_]
-) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """Evaluate a design and all its flips of designable beams with the mechanics.
-
-    Returns
-    -------
-    efficiency : float
-    exact, low_rank : (n,)
-        As in `Attribution`.
+) -> tuple[float, dict[str, NDArray[np.float64]]]:
+    """Return the efficiency of a design, and ``exact`` and ``low_rank`` changes by its flips.
 
     Raises
     ------
@@ -230,7 +218,7 @@ def flip_effects(
         found = evaluator.evaluate(flipped, warm_start=True)
         if found.is_admissible:
             exact[number] = found.efficiency - response.efficiency
-    return response.efficiency, exact, low_rank
+    return response.efficiency, {"exact": exact, "low_rank": low_rank}
 
 
 def rank_correlation(predicted: NDArray[np.float64], exact: NDArray[np.float64]) -> float:
@@ -269,7 +257,7 @@ def occlude(
     packed: NDArray[np.uint8],
     stride: int = STRIDE,
     *,
-    ink: int = WHITE,
+    ink: int = INKS["white"],
     device: str = "auto",
 ) -> NDArray[np.float64]:
     """Return the change of the prediction by a block at each of its positions.
@@ -283,7 +271,7 @@ def occlude(
     stride
         Distance of neighbouring positions in pixels.
     ink
-        `WHITE` or `BLACK`.
+        One of `INKS`.
 
     Returns
     -------

@@ -60,7 +60,8 @@ def draw_attribution(
 def _figure(found: Attribution) -> Figure:
     """Lay out the three panels in a row above the colour bar."""
     problem, rho = found.design.problem, found.correlations()
-    drawn = [found.exact[np.isfinite(found.exact)], found.white, found.black]
+    exact = found.changes["exact"]
+    drawn = [exact[np.isfinite(exact)], *found.maps.values()]
     largest = max((float(np.quantile(np.abs(x), 0.998)) for x in drawn if x.size), default=0.0)
     largest = largest or 1.0
     norm = AsinhNorm(linear_width=LINEAR * largest, vmin=-largest, vmax=largest)
@@ -80,7 +81,9 @@ def _figure(found: Attribution) -> Figure:
         ("White block", f"covers beams, rank correlation {rho['white']:.2f}"),
         ("Black block", f"covers gaps, rank correlation {rho['black']:.2f}"),
     )
-    for (heading, caption), values in zip(headings, (None, found.white, found.black), strict=True):
+    for (heading, caption), values in zip(
+        headings, (None, found.maps["white"], found.maps["black"]), strict=True
+    ):
         style.add_heading(figure, heading, caption, left, total - below - height - TITLE + 0.02)
         panel = add_panel(figure, problem, (left, below), float(scale), low, high)
         add_arrows(panel, input_arrows(problem), style.INPUT, bold=True)
@@ -101,9 +104,10 @@ def _add_change(panel: Panel, found: Attribution, norm: AsinhNorm) -> None:
     lattice, fixed = panel.problem.lattice, found.design.mask.copy()
     fixed[found.beams] = False
     add_struts(panel, lattice.positions, np.flatnonzero(fixed), style.REST, width=0.6, level=1.0)
-    paint = CHANGE(norm(np.nan_to_num(found.exact)))
-    paint[~np.isfinite(found.exact)] = to_rgba(UNSTABLE)
-    order = np.argsort(np.abs(np.nan_to_num(found.exact, nan=np.inf)), kind="stable")
+    exact = found.changes["exact"]
+    paint = CHANGE(norm(np.nan_to_num(exact)))
+    paint[~np.isfinite(exact)] = to_rgba(UNSTABLE)
+    order = np.argsort(np.abs(np.nan_to_num(exact, nan=np.inf)), kind="stable")
     for present, width, level in ((False, 0.42, 2.0), (True, 1.35, 3.0)):
         chosen = order[found.present[order] == present]
         lines = list(lattice.positions[lattice.beams[found.beams[chosen]]])

@@ -72,10 +72,9 @@ def test_json_is_all_that_is_printed_and_draws_nothing(here: Path, pictures: Pat
     design = human_design("crane")
     assert found["mask"] == design.mask_hex
     assert found["beams"] == design.problem.designable.tolist()
-    for name in ("present", "exact", "network", "white_at"):
-        assert len(found[name]) == 203
+    assert len(found["present"]) == len(found["changes"]["exact"]) == 203
     assert found["correlations"]["low_rank"] > 0.95
-    assert len(found["white"]) == 5
+    assert len(found["maps"]["white"]) == 5
 
 
 def test_a_design_for_a_part_is_explained_and_predicted_with_the_stiffness_of_the_training(

@@ -17,8 +17,7 @@ from bellcrank.surrogate.models import models
 from bellcrank.surrogate.trained_model import TrainedModel
 from bellcrank.surrogate.views import views
 from reproduction.networks.attribution import (
-    BLACK,
-    WHITE,
+    INKS,
     attribute,
     occlude,
     rank_correlation,
@@ -76,7 +75,7 @@ def test_a_white_block_on_white_paper_changes_nothing(by_kind, crane):
     model = by_kind["resnet18-w16"]
     mask = crane.initial.copy()
     mask[crane.designable] = False
-    found = occlude(model, np.packbits(mask), 6, ink=WHITE, device="cpu")
+    found = occlude(model, np.packbits(mask), 6, ink=INKS["white"], device="cpu")
     picture = model.view.arrays(np.packbits(mask)[None])[0, 0]
     empty = np.array(
         [[not picture[row, column].any() for column in spans(72, 6)] for row in spans(48, 6)]
@@ -87,7 +86,7 @@ def test_a_white_block_on_white_paper_changes_nothing(by_kind, crane):
     assert (np.abs(found[~empty]) > 0.0).all()
 
 
-@pytest.mark.parametrize("ink", [WHITE, BLACK])
+@pytest.mark.parametrize("ink", INKS.values())
 def test_a_map_is_the_change_of_the_prediction_for_each_altered_picture(by_kind, human, ink):
     model = by_kind["resnet18-w16"]
     packed = np.packbits(human.mask)
@@ -118,7 +117,7 @@ def test_maps_lie_where_the_lattice_is(explained, crane):
     assert (explained.low < positions.min(axis=0)).all()
     assert (explained.high > positions.max(axis=0)).all()
     # The canvas is centred: as much paper on the left as on the right, up to a stride.
-    unit = (explained.high - explained.low)[0] / (4 * explained.white.shape[1])
+    unit = (explained.high - explained.low)[0] / (4 * explained.maps["white"].shape[1])
     assert np.allclose(
         positions.min(axis=0) - explained.low, explained.high - positions.max(axis=0), atol=1e-6
     )
@@ -150,11 +149,11 @@ def test_exact_effects_are_those_of_the_evaluator(explained, human):
         response = evaluator.evaluate(flipped)
         if response.is_admissible:
             change = response.efficiency - explained.efficiency
-            assert explained.exact[index] == pytest.approx(change, abs=1e-7)
+            assert explained.changes["exact"][index] == pytest.approx(change, abs=1e-7)
         else:
-            assert np.isnan(explained.exact[index])
+            assert np.isnan(explained.changes["exact"][index])
     evaluator.evaluate(human.mask)
-    assert np.array_equal(explained.low_rank, evaluator.predict_flips(human.mask).change)
+    assert np.array_equal(explained.changes["low_rank"], evaluator.predict_flips(human.mask).change)
 
 
 def test_predicted_effects_of_flips_are_differences_of_predictions(explained, by_kind, human):
@@ -163,22 +162,22 @@ def test_predicted_effects_of_flips_are_differences_of_predictions(explained, by
     flipped[explained.beams[7]] ^= True
     predicted = model.predict(np.packbits([human.mask, flipped], axis=1), device="cpu")
     assert explained.predicted == pytest.approx(predicted[0], abs=1e-5)
-    assert explained.network[7] == pytest.approx(predicted[1] - predicted[0], abs=1e-5)
+    assert explained.changes["network"][7] == pytest.approx(predicted[1] - predicted[0], abs=1e-5)
 
 
 def test_correlations_agree_with_scipy(explained):
     found = explained.correlations()
     present, everywhere = explained.present, np.ones(len(explained.beams), bool)
     compared = {
-        "white": (explained.white_at, present),
-        "black": (explained.black_at, ~present),
-        "network": (explained.network, everywhere),
-        "low_rank": (explained.low_rank, everywhere),
+        "white": (explained.changes["white"], present),
+        "black": (explained.changes["black"], ~present),
+        "network": (explained.changes["network"], everywhere),
+        "low_rank": (explained.changes["low_rank"], everywhere),
     }
     assert set(found) == set(compared)
     for name, (values, chosen) in compared.items():
-        known = chosen & np.isfinite(values) & np.isfinite(explained.exact)
-        expected = spearmanr(values[known], explained.exact[known])[0]
+        known = chosen & np.isfinite(values) & np.isfinite(explained.changes["exact"])
+        expected = spearmanr(values[known], explained.changes["exact"][known])[0]
         assert found[name] == pytest.approx(expected)
     assert np.isnan(rank_correlation(np.ones(1), np.ones(1)))
 
@@ -186,8 +185,8 @@ def test_correlations_agree_with_scipy(explained):
 def test_an_attribution_is_plain_data(explained, human):
     found = json.loads(json.dumps(explained.to_dict(), allow_nan=False))
     assert found["mask"] == human.mask_hex
-    assert len(found["exact"]) == len(found["network"]) == len(found["beams"]) == 203
-    assert len(found["white"]) == len(found["black"]) == 12
+    assert {len(values) for values in found["changes"].values()} == {len(found["beams"])} == {203}
+    assert {name: len(rows) for name, rows in found["maps"].items()} == {"white": 12, "black": 12}
     assert set(found["correlations"]) == {"white", "black", "network", "low_rank"}
 
 
@@ -204,9 +203,9 @@ def test_numbering_and_position_of_the_lattice_do_not_matter(explained, by_kind,
     )
     found = attribute(by_kind["resnet18-w16"], Design(other, human.mask[order]), device="cpu")
     there = np.searchsorted(explained.beams, order[found.beams])
-    assert np.allclose(found.exact, explained.exact[there], atol=1e-7)
-    assert np.allclose(found.network, explained.network[there], atol=1e-5)
-    assert np.allclose(found.black_at, explained.black_at[there], atol=1e-5)
+    assert np.allclose(found.changes["exact"], explained.changes["exact"][there], atol=1e-7)
+    assert np.allclose(found.changes["network"], explained.changes["network"][there], atol=1e-5)
+    assert np.allclose(found.changes["black"], explained.changes["black"][there], atol=1e-5)
     assert np.allclose(found.low, explained.low + SHIFT)
 
 
@@ -229,8 +228,11 @@ def test_another_problem_is_refused(by_kind):
 
 def test_changes_of_zero_can_be_drawn_and_nothing_is_cut_off(explained, tmp_path):
     draw_attribution(explained, tmp_path / "all.png")
-    flat, empty = np.zeros(len(explained.beams)), np.zeros_like(explained.white)
-    still = replace(explained, exact=flat, white=empty, black=empty)
+    still = replace(
+        explained,
+        changes={name: np.zeros_like(each) for name, each in explained.changes.items()},
+        maps={name: np.zeros_like(each) for name, each in explained.maps.items()},
+    )
     draw_attribution(still, tmp_path / "flat.svg")
     assert (tmp_path / "flat.svg").read_bytes().startswith(b"<?xml")
     picture = imread(tmp_path / "all.png")[..., :3]
