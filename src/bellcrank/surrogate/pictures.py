@@ -135,17 +135,13 @@ class Renderer:
         draw_beams(self.strokes, packed, passed)
         self.background = Background(packed, passed)
 
-    def render(
-        self, packed: NDArray[np.uint8], out: NDArray[np.uint8] | None = None
-    ) -> NDArray[np.uint8]:
+    def render(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Draw designs.
 
         Parameters
         ----------
         packed : (n, bytes) uint8
             Packed masks over the beams of the lattice.
-        out : (n, height, width) uint8
-            Array for the result; new by default.
 
         Returns
         -------
@@ -156,20 +152,12 @@ class Renderer:
         ------
         InvalidDataset
             If the masks have the wrong number of bits.
-        InvalidSettings
-            If `out` has another shape or type, or is not contiguous.
         """
         from bellcrank.surrogate.kernels.rendering import draw
 
         # The kernel does not check bounds.
         masks = np.ascontiguousarray(check_masks(packed, len(self.strokes.start) - 1))
-        shape = (len(masks), self.canvas.height, self.canvas.width)
-        ink = np.empty(shape, np.uint8) if out is None else out
-        if ink.shape != shape or ink.dtype != np.uint8 or not ink.flags.c_contiguous:
-            raise InvalidSettings(
-                f"out: expected a contiguous array of bytes of shape {shape}, got "
-                f"{ink.dtype} of shape {ink.shape}"
-            )
+        ink = np.empty((len(masks), self.canvas.height, self.canvas.width), np.uint8)
         picture = np.empty_like(self.background.passed)
         draw(self.strokes, self.background, masks, picture, ink.reshape(len(masks), picture.size))
         return ink

@@ -47,8 +47,8 @@ class Predictor:
         Its masks are the argument of `predict`.
     model
         The trained network.
-    device, precision
-        Where and in which arithmetic the network is evaluated; see `bellcrank.surrogate.backend`.
+    device
+        Device of the network; see `bellcrank.surrogate.backend`.
 
     Raises
     ------
@@ -56,18 +56,10 @@ class Predictor:
         If the network was trained on another problem.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        model: TrainedModel,
-        *,
-        device: str = "auto",
-        precision: str = "float32",
-    ) -> None:
+    def __init__(self, problem: Problem, model: TrainedModel, *, device: str = "auto") -> None:
         self.problem = problem
         self.model = model
         self.device = device
-        self.precision = precision
         self._beams = beams_between(model.problem, problem)
 
     def predict(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -87,7 +79,7 @@ class Predictor:
         InvalidProblem
             If the masks have another shape or type.
         InvalidSettings
-            If the device or the precision is not available.
+            If the device is not available.
         InvalidModel
             If a prediction is not a finite number.
         """
@@ -99,7 +91,7 @@ class Predictor:
                 f"{self.problem.name!r}, got {given.dtype} of shape {given.shape}"
             )
         packed = np.packbits(renumbered(given, self._beams), axis=1)
-        predicted = self.model.predict(packed, device=self.device, precision=self.precision)
+        predicted = self.model.predict(packed, device=self.device)
         wrong = np.flatnonzero(~np.isfinite(predicted))
         if len(wrong):
             raise InvalidModel(
@@ -114,7 +106,6 @@ def load_predictor(
     path: str | os.PathLike[str] | None = None,
     *,
     device: str = "auto",
-    precision: str = "float32",
     any_stiffness: bool = False,
 ) -> Predictor:
     """Load a trained network for a problem.
@@ -138,7 +129,7 @@ def load_predictor(
     """
     model = load_model(problem, path, any_stiffness=any_stiffness)
     given = replace(problem, stiffness=model.problem.stiffness) if any_stiffness else problem
-    return Predictor(given, model, device=device, precision=precision)
+    return Predictor(given, model, device=device)
 
 
 def load_model(
@@ -149,7 +140,12 @@ def load_model(
     Parameters and errors are those of `load_predictor`.
     """
     with resources.as_file(resources.files("bellcrank.surrogate") / BUNDLED) as bundled:
-        model = read_model(bundled if path is None else model_file(path))
+        file = bundled if path is None else Path(path)
+        if file.is_dir():
+            file /= MODEL
+            if not file.exists():
+                raise InvalidFile(f"{path}: no trained model in this folder; expected {MODEL}")
+        model = read_model(file)
     given = replace(problem, stiffness=model.problem.stiffness) if any_stiffness else problem
     try:
         beams_between(model.problem, given)
@@ -161,19 +157,3 @@ def load_model(
             f"build, bellcrank train) and give its file or folder"
         ) from None
     return model
-
-
-def model_file(path: str | os.PathLike[str]) -> Path:
-    """Return a model file: the path itself, or the model in the folder of a training.
-
-    Raises
-    ------
-    InvalidFile
-        If a folder contains none.
-    """
-    file = Path(path)
-    if not file.is_dir():
-        return file
-    if not (file / MODEL).exists():
-        raise InvalidFile(f"{file}: no trained model in this folder; expected {MODEL}")
-    return file / MODEL
