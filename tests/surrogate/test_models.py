@@ -44,7 +44,6 @@ def test_a_network_maps_a_batch_to_as_many_numbers_and_learns_from_them(
         assert torch.isfinite(parameter.grad).all(), parameter_name
     moved = sum(float(each.grad.abs().sum()) > 0.0 for each in network.parameters())  # type: ignore[union-attr]
     assert moved > 0.9 * len(list(network.parameters())) - 1
-    assert architecture.about
 
 
 def test_weights_loaded_into_another_instance_predict_the_same(name: str, problem: Problem) -> None:

@@ -38,17 +38,20 @@ class TrainingTensors:
     optimiser: torch.optim.Optimizer
     average: torch.nn.Module | None
 
-    def state(self) -> dict[str, torch.Tensor]:
-        """Return all tensors by name."""
+    def to_bytes(self, data: dict[str, Any]) -> bytes:
+        """Return the content of a checkpoint file with all tensors and plain data."""
+        from safetensors.torch import save
+
         tensors = {f"network.{k}": v for k, v in self.network.state_dict().items()}
         if self.average is not None:
             tensors |= {f"average.{k}": v for k, v in self.average.state_dict().items()}
         for index, state in self.optimiser.state_dict()["state"].items():
             tensors |= {f"optimiser.{index}.{key}": value for key, value in state.items()}
-        return tensors
+        on_host = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
+        return save(on_host, {METADATA_KEY: json.dumps(data)})
 
     def load(self, tensors: dict[str, Any]) -> None:
-        """Restore the state that `state` returned."""
+        """Restore the tensors of a checkpoint."""
 
         def under(prefix: str) -> dict[str, Any]:
             cut = len(prefix)
@@ -63,14 +66,6 @@ class TrainingTensors:
             states.setdefault(int(index), {})[key] = value
         whole = self.optimiser.state_dict()
         self.optimiser.load_state_dict({**whole, "state": states})
-
-
-def checkpoint_bytes(tensors: TrainingTensors, data: dict[str, Any]) -> bytes:
-    """Return the content of a checkpoint file with tensors and plain data."""
-    from safetensors.torch import save
-
-    on_host = {name: value.detach().cpu().contiguous() for name, value in tensors.state().items()}
-    return save(on_host, {METADATA_KEY: json.dumps(data)})
 
 
 def load_checkpoint(tensors: TrainingTensors, path: Path) -> dict[str, Any]:

@@ -42,13 +42,10 @@ class Architecture:
     build
         Function from the shape of one input, without the batch, to a network with initial
         weights.
-    about
-        Short description.
     """
 
     view: str
     build: Callable[[tuple[int, ...]], nn.Module]
-    about: str
 
 
 models: Registry[Architecture] = Registry("model")
@@ -193,10 +190,6 @@ def _initialise_as_keras(module: nn.Module) -> None:
             nn.init.zeros_(module.bias)
 
 
-models.register("mlp")(Architecture("bits", Perceptron, "perceptron on the bits of a mask"))
-models.register("resnet18-w16")(
-    Architecture("picture", SlimResNet, "slim residual network, 0.7 M parameters")
-)
-models.register("resnet50")(
-    Architecture("picture", ResNet50, "the paper's network, 23.6 M parameters")
-)
+models.register("mlp")(Architecture("bits", Perceptron))
+models.register("resnet18-w16")(Architecture("picture", SlimResNet))
+models.register("resnet50")(Architecture("picture", ResNet50))

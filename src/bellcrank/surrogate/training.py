@@ -19,7 +19,6 @@ from bellcrank.surrogate.backend import autocast, import_torch, name_of
 from bellcrank.surrogate.checkpoints import (
     CHECKPOINT,
     TrainingTensors,
-    checkpoint_bytes,
     damaged_checkpoint,
     load_checkpoint,
 )
@@ -203,7 +202,7 @@ class Training:
             "loss_count": self.loss_count,
             "log": [asdict(epoch) for epoch in self.log],
         }
-        content = checkpoint_bytes(self.tensors, data)
+        content = self.tensors.to_bytes(data)
         write_bytes(self.folder / CHECKPOINT, content, overwrite=True)
 
     def restore(self, path: Path) -> None:
