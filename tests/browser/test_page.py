@@ -228,7 +228,7 @@ def test_a_bundled_machine_is_opened_and_changed(page: Any, server: Server) -> N
     library.get_by_label("Moves").select_option("up")
     library.get_by_label("Size").select_option("9 wide")
     assert library.locator(".note[role=status]").inner_text() == "3 designs"
-    library.locator("button.tile", has_text="easy to drive").click()
+    library.locator("button.tile", has_text="low input force").click()
     page.locator(".panel h2", has_text="second: Up, 9 wide").wait_for()
     page.goto(f"{server.address}/#/design/machines/gripper")
     page.get_by_role("button", name="Open its plan").click()

@@ -170,9 +170,9 @@ export class Player {
     const stroke = input.drive === "displacement" ? `${figure(this.part * input.amount * this.scale, 2)} mm in` : `${figure(100 * this.part, 0)} % of the force`;
     const efficiency = motion.efficiency[near] ?? null;
     const out = efficiency === null || input.drive !== "displacement" ? "" : `${figure(this.part * input.amount * this.scale * efficiency, 2)} mm out`;
-    const lines = [figure(efficiency, 3), stroke, out, motion.snapped[near] ? "after a snap-through" : ""];
-    if (this.readout.childElementCount !== 4) {
-      clear(this.readout, h("strong"), h("span"), h("span"), h("span", { class: "alarm" }));
+    const lines = [figure(efficiency, 3), "spring model", stroke, out, motion.snapped[near] ? "after a snap-through" : ""];
+    if (this.readout.childElementCount !== 5) {
+      clear(this.readout, h("strong"), h("span"), h("span"), h("span"), h("span", { class: "alarm" }));
     }
     lines.forEach((text, n) => {
       const line = this.readout.children[n]!;
