@@ -170,7 +170,7 @@ STUDY = register(
         deviations=(
             (
                 "Equilibria are computed by Newton's method instead of conjugate gradients. The "
-                "responses are the same; all are computed from rest."
+                "responses are the same; all are those reached from rest."
             ),
             "Designs that snap along the stroke are rejected: their efficiency is not unique.",
         ),

@@ -110,7 +110,7 @@ def test_foreign_files_are_named_and_never_touched(segments: Store, place: str) 
     named = path.parent if place.endswith("/y") else path
     with pytest.raises(CorruptRun) as raised:
         complete(segments, "serial")
-    assert str(raised.value).startswith(f"{named}: does not belong to this campaign")
+    assert str(raised.value).startswith(f"{named}: does not belong to this run or campaign")
     found = verify(segments)
     assert found.damage[0].startswith(f"{named}: does not belong")
     repair(segments, found)

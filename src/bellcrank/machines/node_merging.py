@@ -1,7 +1,7 @@
 """Merging of coincident nodes of the parts of a machine.
 
-Coincident nodes of welded ports become one node, and so do coincident supports. All other nodes of
-different parts must keep a minimum distance.
+Coincident nodes of welded ports become one node, and so do coincident supports of parts whose
+supports hold the machine. All other nodes of different parts must be at least `MIN_DISTANCE` apart.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     from bellcrank.machines.plan import Link, Plan, PortName
 
 COINCIDENT = 1e-6
-"""Distance, in lattice spacings, below which two nodes coincide."""
+"""Distance below which two nodes coincide, as a fraction of the spacing: the smallest median beam
+length of the parts."""
 MIN_DISTANCE = 0.5
-"""Smallest distance, in lattice spacings, of nodes of different parts that are not merged."""
+"""Smallest distance of nodes of different parts that are not merged, as a fraction of the same
+spacing."""
 
 
 def merge_nodes(
@@ -35,12 +37,14 @@ def merge_nodes(
     -------
     nodes
         For each part, the machine's number of each of its nodes.
-    positions : (N, 2) float64
+    positions : (N, 2) float64, lattice units of the machine
+        Position of each node; of merged nodes, that of the first.
 
     Raises
     ------
     InvalidFile
-        If welded ports do not meet or lie on supports, or parts overlap.
+        If the ports of a weld do not meet, a welded port lies on supports of the other part, or
+        nodes of different parts are too close.
     """
     merger = _NodeMerger(plan, parts)
     for link in plan.links:
@@ -57,7 +61,7 @@ def merge_nodes(
 def unique_rows(
     values: NDArray[np.integer[Any]],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return numbers of the distinct rows of an array, in the order of first occurrence.
+    """Assign numbers to the distinct rows of an array, in the order of first occurrence.
 
     Returns
     -------
@@ -78,7 +82,10 @@ def unique_rows(
 
 
 class _NodeMerger:
-    """Concatenated nodes of all parts, and the pairs of nearby nodes that are to be merged."""
+    """Concatenated nodes of all parts, and the pairs of near nodes with a mark on those to merge.
+
+    The pairs are those of nodes of different parts nearer than `MIN_DISTANCE`.
+    """
 
     def __init__(self, plan: Plan, parts: dict[str, Part]) -> None:
         self.plan, self.parts = plan, parts
@@ -131,7 +138,7 @@ class _NodeMerger:
         x, y = self.positions[node]
         raise InvalidFile(
             f"{self.plan.source}: parts {names[self.owner[node]]} and {names[self.owner[other]]} "
-            f"overlap near ({x:.4g}, {y:.4g}); only linked ports and supports may coincide"
+            f"overlap near ({x:.4g}, {y:.4g}); only welded ports and supports may coincide"
         )
 
     def result(self) -> tuple[dict[str, NDArray[np.int64]], NDArray[np.float64]]:

@@ -2,10 +2,13 @@
 
 The footer of a segment names its store, run and steps, and holds the state from which the chain
 continues. Rows and state thus become valid at the same instant, when the file gets its name, and
-the listing of a folder is all there is to know about a chain. A table merges many segments into
-one file and keeps their footers in its own. Runs and campaigns store their proposals this way::
+the files in its folder, with their footers, are the complete record of a chain. A table merges
+many segments into one file and keeps the footers of the segments in its own footer. Runs and
+campaigns store their proposals this way::
 
-    segments/003/00004000.parquet   proposals of run 003 from step 4000 on
+    segments/003/00004000.parquet   proposals of chain 003 from step 4000 on
+
+The name of a folder is called `run` here: a run of a campaign, or a chain of a run folder.
 """
 
 from __future__ import annotations
@@ -40,9 +43,9 @@ class Segment:
     Parameters
     ----------
     run
-        Name of the run that it belongs to.
+        Name of the folder that it belongs to: a run of a campaign, or a chain of a run folder.
     first_step, last_step
-        Steps of its first and last row.
+        Steps of its first and last row, from 0; both are included.
     state
         State of the chain after its last row.
     best
@@ -137,7 +140,7 @@ def segment_table(schema: Any, keys: Mapping[str, Any], first_step: int, rows: P
 
 @dataclass(frozen=True, slots=True)
 class SegmentFiles:
-    """The segments of a store, in one folder for each run.
+    """The segments of a store, in one folder for each run or chain.
 
     Parameters
     ----------
@@ -146,7 +149,8 @@ class SegmentFiles:
     store
         Hash that identifies the store; every segment carries it.
     advice
-        How to recover from a damaged segment; ends the messages of errors.
+        How to recover from a damaged or missing segment; ends those messages. Errors of files
+        that do not belong to the store have a text of their own.
     exclusive
         Whether other files in these folders are errors; otherwise they are ignored.
     """
@@ -189,11 +193,14 @@ class SegmentFiles:
         return [path.name for path in found if path.is_dir()]
 
     def header_of(self, segment: Segment) -> dict[str, Any]:
-        """Return what goes into the footer of a segment."""
+        """Return the header: the plain data stored in the Parquet footer of a segment."""
         return {"schema": SEGMENT_SCHEMA, "store": self.store, **segment.to_dict()}
 
     def read(self, run: str, path: Path, *, thorough: bool) -> Segment:
-        """Read the footer of a segment and check that it is in its place.
+        """Read the footer of a segment and check it.
+
+        It must belong to the store and to this folder and file name, and the file must have as
+        many rows as steps.
 
         Parameters
         ----------
@@ -247,7 +254,9 @@ class SegmentFiles:
         return self.read(run, files[-1][1], thorough=False) if files else None
 
     def tables(self, segments: Iterable[Segment]) -> Iterator[Any]:
-        """Yield the rows of segments as Arrow tables of about `ROW_GROUP` rows.
+        """Yield the rows of segments as Arrow tables.
+
+        Each has at least `ROW_GROUP` rows, the last possibly fewer.
 
         Raises
         ------
@@ -278,7 +287,7 @@ class SegmentFiles:
         remove_temporaries(self.folder_of(run), SEGMENT_NAME)
 
     def delete(self, runs: Iterable[str]) -> None:
-        """Delete all segments of some runs, and the folders that are empty then.
+        """Delete all segments of some runs, complete or not, and the folders that are then empty.
 
         Raises
         ------
@@ -334,6 +343,6 @@ def our_files(folder: Path, ours: re.Pattern[str], *, exclusive: bool) -> list[P
 def foreign(path: Path) -> CorruptRun:
     """Return the error for a file that does not belong to a store."""
     return CorruptRun(
-        f"{path}: does not belong to this campaign; move it elsewhere, or programs that read the "
-        f"folder take it for data"
+        f"{path}: does not belong to this run or campaign; move it elsewhere, since programs that "
+        f"read the folder would treat it as data"
     )

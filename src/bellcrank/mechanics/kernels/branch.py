@@ -27,18 +27,18 @@ from bellcrank.mechanics.kernels.tangents import (
 )
 
 UNCHANGED = 1e-6
-"""Movement below which a flip has changed unloaded beams only; so do a quarter to a third of the
-flips in a long chain on the crane."""
+"""Largest change of a displacement component, in lattice units, up to which a flip has changed
+unloaded beams only; so do a quarter to a third of the flips in a long chain on the crane."""
 JUMP = 0.1
 LONG_JUMP = 0.3
 DETOUR_AFTER_JUMP = 0.13
 NONLINEARITY_AFTER_LONG_JUMP = 0.5
-"""Limits of a response, besides those of `is_nearly_linear`, where a flip moves some node farther
-than a jump. In 14,800 proposals of eight chains `is_nearly_linear` alone accepted two wrong
-branches, both after jumps."""
+"""Limits in addition to those of `is_nearly_linear`, for flips that change a displacement component
+by more than `JUMP` or `LONG_JUMP` (lattice units). In 14,800 proposals of eight chains
+`is_nearly_linear` alone accepted two wrong branches, both after such flips."""
 STIFF = 0.8
-"""Lowest stiffness on a path, as a part of that at its ends, above which the path need not be
-followed in small increments."""
+"""Ratio of the lowest stiffness at a point of the path to the smaller value at rest and at full
+load. Below this ratio the path is followed in small increments."""
 
 
 @kernel
@@ -47,11 +47,12 @@ def is_reached_from_rest(
 ) -> bool:
     """Whether an equilibrium at full load is certainly the one reached from rest.
 
-    It is if it equals `guess`, the equilibrium of the reference: the flipped beam carries no
-    load. It is if it is close to the prediction of the tangents at rest and at full load, with
-    tighter limits if it is far from the guess. Otherwise it is if equilibria that keep their
-    stiffness connect it to rest; this is not used far from the guess, where a strongly nonlinear
-    response can be connected past a bifurcation between the points. The current factor must be
+    `guess` is the displacement at which the warm start began. True if `u` equals it: the flipped
+    beam carries no load. True if `u` is close to what the tangents at rest and at full load
+    predict; the limits are tighter if `u` is far from `guess`. Otherwise true if equilibria that
+    keep their stiffness connect `u` to rest. This last test is not used if the response is both
+    far from the guess and strongly nonlinear: the connection could then pass a bifurcation
+    between two points. Displacements are (N, 2), in lattice units. The current factor must be
     that of `u`.
     """
     jump = largest_difference(u, guess)
@@ -80,7 +81,11 @@ def is_reached_from_rest(
 def interpolate(
     start: Floats, end: Floats, first: Floats, last: Floats, increment: float, middle: Floats
 ) -> None:
-    """Interpolate half way between two points of the path, by a cubic with their tangents."""
+    """Fill `middle` with the displacement half way between two points of the path.
+
+    It is that of the cubic with their tangents; `increment` is the fraction of the full load
+    between the two points.
+    """
     for node in range(len(middle)):
         for axis in range(2):
             middle[node, axis] = 0.5 * (start[node, axis] + end[node, axis]) + 0.125 * increment * (
@@ -90,10 +95,13 @@ def interpolate(
 
 @inlined
 def is_joined_to_rest(system: System, structure: Structure, u: Floats, scratch: Scratch) -> bool:
-    """Connect `u` to rest by equilibria, halving the load between two until they are connected.
+    """Connect `u` to rest by equilibria between; intervals are halved until their ends connect.
 
-    The points between are interpolated, which costs less than following the path. False if the
-    stiffness has a minimum between, or a point is not found: the path must then be followed.
+    Newton steps to the equilibria between start from interpolated displacements, which costs
+    less than following the path. False if the lowest stiffness at a point between is below
+    `STIFF` times the smaller of those at rest and at full load, if no equilibrium is found at a
+    point, or if `MAX_KNOTS` points do not suffice: the path must then be followed. On entry the
+    factor is that at rest, and `scratch.vectors` holds rest and the tangents at rest and at `u`.
     """
     vectors = scratch.vectors
     left, left_tangent, mode = vectors.previous, vectors.tangent, vectors.mode

@@ -1,10 +1,13 @@
-"""Largest strut width and fillet radius at which no hole closes and no struts join.
+"""Largest strut width and fillet radius at which the topology of the outline is kept.
 
-When the width of all struts increases, the topology of the outline changes only at critical points
-of the distance to the nearest centre line. Its maxima are the centres of holes, which close there.
-At its saddle points two surfaces meet, midway between a node and the node or strut opposite to it,
-with no other strut between them: a hole splits or a new one is enclosed. Below these widths fillets
-of different corners do not touch either, since touching fillets would enclose a new hole.
+No hole closes or splits, and no struts without a common node join.
+
+Consider the distance of a point to the nearest centre line. When the width of all struts increases,
+the topology of the outline changes only at half-widths equal to the values of this distance at its
+maxima and saddle points. At a maximum a hole closes. At a saddle point, midway between a node and
+the node or strut opposite to it and with no strut nearer, two surfaces meet: a hole splits, or a
+new one is enclosed. Below these widths fillets of different corners do not touch either, since
+touching fillets would enclose a new hole.
 """
 
 from __future__ import annotations
@@ -24,8 +27,8 @@ if TYPE_CHECKING:
 
     from bellcrank.part.outline.struts import Struts
 
-# Width of struts, relative to the size of the part, at which all holes are open. Surfaces closer
-# than this touch.
+# Half-width, relative to the size of the part, so small that all holes are open. Struts whose
+# surfaces meet below it count as touching.
 _HAIR = 1e-5
 
 # Relative margin to the critical radius, at which holes would be too small to draw.
@@ -41,7 +44,8 @@ class Limits:
     depths : (H,) float64, mm
         Radius of the largest circle in each hole.
     bottlenecks : (B,) float64, mm
-        Half-widths at which surfaces without a common node meet, ascending.
+        Half-widths at which surfaces of struts without a common node meet, ascending; not all of
+        them, see `find_limits`.
     points : (B, 2) float64, mm
         Points at which they meet.
     """
@@ -71,7 +75,8 @@ def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> flo
     Returns
     -------
     float, mm
-        Accurate to 0.1 % and never too large; inf if there is no limit.
+        Never too large; too small by at most 0.1 % of half the width plus this radius; inf if
+        there is no limit.
 
     Raises
     ------
@@ -103,7 +108,7 @@ def check_sizes(width: float, fillet: float) -> None:
 
 
 def check_room(limits: Limits, width: float, fillet: float) -> None:
-    """Check that no hole closes, splits or is added.
+    """Check that width and fillet radius stay below `limits`: no hole closes, splits or is added.
 
     Parameters
     ----------
@@ -115,7 +120,7 @@ def check_room(limits: Limits, width: float, fillet: float) -> None:
     Raises
     ------
     InvalidSettings
-        If one does; names the largest width or radius.
+        If the width or radius is too large; the message gives the largest possible one.
     """
     half, most = 0.5 * width, _allowed(limits.least)
     if half >= most:
@@ -134,7 +139,8 @@ def check_room(limits: Limits, width: float, fillet: float) -> None:
 def find_limits(struts: Struts, reach: float = math.inf) -> Limits:
     """Return the half-widths at which holes close and surfaces meet.
 
-    Only the first meeting surfaces are listed, up to the smallest hole and `reach`.
+    All holes are listed; of the surfaces, at least those that meet first, if this is before the
+    smallest hole closes and before `reach`.
 
     Parameters
     ----------
@@ -147,7 +153,8 @@ def find_limits(struts: Struts, reach: float = math.inf) -> Limits:
 
     depths = _depths(struts)
     most = min(1.001 * reach, float(depths.min(initial=struts.extent)))
-    # The distance is increased step by step: pairs of distant nodes are many and seldom first.
+    # The distance is increased step by step: there are many pairs of distant nodes, and they are
+    # seldom those that meet first.
     limit = min(most, float(shapely.length(struts.tree.geometries).mean()))
     values, points = _bottlenecks(struts, limit)
     while not len(values) and limit < most:
@@ -157,7 +164,10 @@ def find_limits(struts: Struts, reach: float = math.inf) -> Limits:
 
 
 def find_joins(struts: Struts, half: float, reach: float) -> Limits:
-    """Return the points at which surfaces meet between two half-widths, without holes."""
+    """Return all half-widths from `half` to `reach` at which surfaces meet, and their points.
+
+    `depths` is empty: holes are not considered.
+    """
     values, points = _bottlenecks(struts, 1.001 * reach)
     later = values > half
     return Limits(np.empty(0), values[later], points[later])
@@ -210,7 +220,7 @@ def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDA
     _, distance = struts.tree.query_nearest(
         shapely.points(middle), all_matches=False, return_distance=True
     )
-    # Closer points coincide, up to rounding.
+    # Points nearer than this are the same point, except for rounding errors.
     apart = (half > _HAIR * struts.extent) & (half <= limit)
     found = np.flatnonzero(apart & (distance > (1.0 - 1e-9) * half))
     found = found[np.argsort(half[found], kind="stable")]

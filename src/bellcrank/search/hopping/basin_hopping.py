@@ -1,13 +1,15 @@
 """Basin hopping: local search, perturbation, local search again; the better design is kept.
 
-A local search ends at a design that no flip of a beam improves. From there the beams of a disc
-are redrawn at random, and another local search follows; its result replaces the design if it is
-at least as efficient (Wales and Doye, J. Phys. Chem. A 101, 5111, 1997; iterated local search,
-Lourenco et al. 2003).
+A local search ends when several flips in succession fail, or when no flip left is predicted to
+help. Then the beams of a disc are redrawn at random, and another local search follows; its result
+replaces the design if its score is at least as high and its response is stable when loaded in
+small increments (Wales and Doye, J. Phys. Chem. A 101, 5111, 1997; iterated local search, Lourenco
+et al. 2003).
 
 On some lattices the next improvement needs many flips that each change the efficiency little.
-When progress stalls, most steps therefore go to low-temperature Metropolis phases, which start
-from the best design; each phase ends with a local search from the design it has reached.
+When progress stalls, most steps therefore go to low-temperature Metropolis phases. The first one
+starts from the best design, and each later one where the phase before ended, until there is
+progress. A local search from the design that the phase has reached follows each phase.
 """
 
 from __future__ import annotations
@@ -53,7 +55,8 @@ class HoppingSettings(SearchSettings):
     radius
         Mean radius of a perturbation, in mean beam lengths.
     min_density
-        Smallest mean fraction of the beams that is present in the disc after a perturbation.
+        Least value of the probability, drawn anew for each perturbation, with which a beam in the
+        disc is present.
     max_failures
         Consecutive failed flips that end a local search.
     max_predicted_loss
@@ -63,7 +66,8 @@ class HoppingSettings(SearchSettings):
     temperature_factor
         Temperature of a Metropolis phase, as a fraction of the best efficiency.
     phase_share
-        Fraction of the steps that go to Metropolis phases while progress stalls.
+        Largest fraction of the steps that go to Metropolis phases while progress stalls; a phase
+        begins between two local searches.
     min_stall, stall
         Steps without progress after which Metropolis phases begin: at least this number, and at
         least this fraction of all steps so far.
@@ -106,8 +110,8 @@ class HoppingState:
     step
         Proposals made so far.
     mask
-        The best verified design, in hexadecimal; the initial design before the end of the first
-        local search.
+        The best verified design, in hexadecimal; the initial design until the result of a local
+        search has been verified.
     best
         Its score: the efficiency less the penalty for violated goals.
     progress_step
@@ -170,7 +174,11 @@ def is_done(state: HoppingState, settings: HoppingSettings) -> bool:
 def perturb(
     problem: Problem, mask: NDArray[np.bool_], settings: HoppingSettings, rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """Redraw the designable beams of a disc around the midpoint of a random one."""
+    """Redraw the designable beams of a disc at random, until the design differs.
+
+    The disc is centred at the midpoint of a random designable beam, and the midpoints of the
+    beams lie in it. Its radius is between a half and one and a half times the mean radius.
+    """
     lattice = problem.lattice
     middle = lattice.positions[lattice.beams[problem.designable]].mean(axis=1)
     length = float(np.mean(lattice.rest_length))
@@ -230,7 +238,10 @@ class BasinHopping:
                 self._record(mask, response, accepted)
 
     def leave(self) -> None:
-        """Perturb the best design, or begin a Metropolis phase; the first time, do neither."""
+        """Begin a Metropolis phase if one is due; otherwise start a local search.
+
+        It starts from a perturbation of the best design, the first time from the initial design.
+        """
         state = self.state
         if phase_is_due(state, self.settings):
             self.state = replace(
@@ -252,7 +263,10 @@ class BasinHopping:
             )  # fmt: skip
 
     def finish_local_search(self, local: LocalSearch) -> None:
-        """Keep the result if it is no worse and stable when followed in small increments."""
+        """Keep the result if it is no worse and stable when followed in small increments.
+
+        The last step of a run records the design reached.
+        """
         if local.efficiency >= self.state.best:
             response = self.evaluator.evaluate(local.mask, VERIFICATION_INCREMENT)
             verified = response.is_admissible and response.score >= self.state.best
@@ -265,7 +279,9 @@ class BasinHopping:
         self.state = replace(self.state, local_searches=self.state.local_searches + 1)
 
     def run_phase(self) -> None:
-        """Run a Metropolis phase to its end or that of the block; then start a local search.
+        """Run a Metropolis phase to its end or to that of the block.
+
+        At the end of the phase, start a local search.
 
         A design may have a stable response from its neighbour but none from rest. The phase then
         ends, and the next one starts from the best design.

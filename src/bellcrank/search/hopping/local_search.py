@@ -1,8 +1,8 @@
-"""Local search by predicted flips: from a design to one that no flip of a beam improves.
+"""Local search by predicted flips: flips that improve a design, until several in succession fail.
 
 One Newton step predicts the effect of every flip (`SpringEvaluator.predict_flips`). Flips are
 evaluated in the order of their predicted gain; the first that improves the design is accepted,
-and all flips are predicted again.
+and all flips are predicted again. The search also ends when no flip left is predicted to help.
 """
 
 from __future__ import annotations
