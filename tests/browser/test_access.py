@@ -13,6 +13,8 @@ from .driving import start_search, task, tool  # noqa: E402
 if TYPE_CHECKING:
     from .conftest import Server
 
+pytestmark = pytest.mark.slow
+
 
 def findings(page: Any) -> list[str]:
     """Return the serious findings of axe."""

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from .conftest import Server
 
+pytestmark = pytest.mark.slow
+
 HEIGHT = math.sqrt(3.0) / 2.0
 
 

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import pytest
@@ -36,7 +37,7 @@ def three(value: float) -> str:
 
 
 def competition() -> Rows:
-    for path in (DOCS / "competition").glob("*.json"):
+    for path in (DOCS / "competition").glob("*-*.json"):
         told = json.loads(path.read_text(encoding="utf-8"))
         unit = " responses" if told["problem"] == "crane" else ""
         for kind, budget in (
@@ -49,6 +50,19 @@ def competition() -> Rows:
                 told["problem"], budget, f"{found['plain median']:.3f}", f"{found['median']:.3f}",
                 f"{found['ratio']:.2f}", f"{found['tenth percentile']:.3f}", f"{base}e{int(power)}",
             )  # fmt: skip
+
+
+def tournament() -> Rows:
+    results = read("competition/tournament")["results"]
+    for moves, words in (
+        ("flip", "`flip`"),
+        ("flip, node", "`flip`, `node`"),
+        ("balanced", "`balanced`"),
+        ("balanced, node", "`balanced`, `node` (default)"),
+    ):
+        best = results[f"tempering: {moves}"]
+        medians = (median(best[problem]) for problem in ("crane", "anti-parallel", "discs"))
+        yield row(f"tempering: {words}", *(f"{value:.2f}" for value in medians))
 
 
 def goals() -> Rows:
@@ -107,7 +121,7 @@ def searched() -> Rows:
         for kind, words in (
             ("paper", "the paper's stiffness"),
             ("calibrated", "that of the struts"),
-            ("chosen", "that of the struts, frames choose"),
+            ("chosen", "that of the struts, ranked by frames"),
         ):
             told = read("validation/search")[f"{name}, {kind}"]
             yield row(
@@ -222,7 +236,7 @@ def elsewhere() -> Rows:
 
 
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
-    "searches": (competition,),
+    "searches": (competition, tournament),
     "goals": (goals,),
     "validation": (levels, meshes, widths, correlation, searched),
     "machines": (bundled, contact, lengths, two_ports),
@@ -241,6 +255,7 @@ NUMBER = re.compile(r"\| [-+]?\d[\d.,]*( (%|s|ms|mm|MB|kB))?(?= \|)")
 """A cell that is a figure."""
 NOT_MEASURED = {
     "| status | code | means |",
+    "| setting | default | meaning |",
     "| machine | parts | what it does |",
     "| name | E, MPa | Poisson's ratio | density, g/cm³ | strain limit | sources |",
 }

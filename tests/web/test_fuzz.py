@@ -17,6 +17,8 @@ from bellcrank.web.app import make_app  # noqa: E402
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
 
+pytestmark = pytest.mark.slow
+
 
 def described() -> dict[str, Any]:
     """Return what a server says of itself."""

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from bellcrank.web.jobs import Job
 
+pytestmark = pytest.mark.slow
+
 
 class Still(Scheduler):
     """A scheduler that starts nothing, and says what it would start."""

@@ -21,6 +21,8 @@ from .conftest import wait_for  # noqa: E402
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+pytestmark = pytest.mark.slow
+
 
 MARK = "BELLCRANK_TEST_MARK"
 
