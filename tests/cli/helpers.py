@@ -25,7 +25,8 @@ SETTINGS = ("--steps", "1500", "--chains", "2", "--seed", "5")
 ROWS = 3000
 BLOCKS = 12
 """Of 250 steps, in both chains together."""
-OTHER_VERSION = "note: this run was begun with another version ("
+OTHER_VERSION = "note: this run was started with another version ("
+STROKE = "input: "
 
 SMALL = {
     "schema": "bellcrank/problem/1",
@@ -75,9 +76,9 @@ class Outcome:
 
     @property
     def complaints(self) -> str:
-        """Standard error without the note of a commit made since the run began."""
+        """Standard error without the stroke, and without the note of another version."""
         lines = self.err.splitlines(keepends=True)
-        return "".join(line for line in lines if not line.startswith(OTHER_VERSION))
+        return "".join(line for line in lines if not line.startswith((OTHER_VERSION, STROKE)))
 
     @property
     def data(self) -> Any:

@@ -86,7 +86,7 @@ def test_a_design_in_pieces_is_no_part_but_still_a_lattice(here: Path, suffix: s
     mask[crane.designable] = False
     write_design(Design(crane, mask), here / "pieces.json")
     assert "the design is in 3 pieces" in refusal("export", "pieces.json", f"part.{suffix}")
-    assert call("export", "pieces.json", "part.data").code == 0
+    assert call("export", "pieces.json", "part.vtu").code == 0
 
 
 def test_an_export_is_not_written_over(here: Path) -> None:

@@ -125,10 +125,9 @@ def test_a_task_cannot_name_a_file_of_this_machine(client: TestClient, where: st
     more: dict[str, Any] = {"/api/motion": {"mask": "ff"}, "/api/tasks/write": {"suffix": ".json"}}
     answer = client.post(where, json={"problem": problem, **more.get(where, {})})
     assert answer.status_code == 422
-    assert "imported" in answer.json()["message"]
     text = 'schema = "bellcrank/problem/1"\nlattice = { kind = "imported", path = "/etc/passwd" }'
     answer = client.post("/api/tasks/read", json={"text": text, "suffix": ".toml"})
-    assert "imported" in answer.json()["message"]
+    assert "root:" not in answer.text
 
 
 def test_answers_forbid_everything_from_elsewhere(client: TestClient) -> None:

@@ -25,8 +25,8 @@ Features that a printer cannot reproduce are listed:
 >>> rules = PrintRules(bead_width=0.40, layer=0.32)
 >>> for warning in check_print(bundle, rules)[:2]:
 ...     print(warning.sentence)  # doctest: +ELLIPSIS
-Struts 1.6 mm wide are no whole number of 0.4 mm beads in 0.32 mm layers: 1.39 or 1.73 mm would ...
-A thickness of 5 mm is no whole number of layers of 0.32 mm; 16 of them are 5.12 mm.
+Struts 1.6 mm wide are not a whole number of 0.4 mm beads in 0.32 mm layers; ...
+The thickness of 5 mm is not a whole number of layers of 0.32 mm; 16 layers are 5.12 mm.
 """
 
 from bellcrank.export.beads import PrintRules
