@@ -19,11 +19,16 @@ PACKAGES = {
     ],
     "hatchling": ["tests/release"],
     "ngsolve": ["tests/fem/calculix.py", "tests/fem/nodes.py"],
+    "pymoto": ["tests/reproduction/test_rivals.py"],
     "skfem": ["tests/fem/skfem_check.py"],
     "torch": [
-        "src/bellcrank/surrogate/models.py",
+        "reproduction/networks",
+        "src/bellcrank/surrogate",
         "tests/cli/test_explain.py",
+        "tests/cli/test_surrogate_search.py",
+        "tests/cli/test_train.py",
         "tests/reproduction/test_attribution.py",
+        "tests/reproduction/test_surrogate_search.py",
         "tests/surrogate",
     ],
 }

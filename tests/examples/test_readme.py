@@ -113,6 +113,7 @@ def test_an_actuator_is_characterised(
 def test_a_network_predicts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    pytest.importorskip("torch")
     monkeypatch.chdir(tmp_path)
     human = human_design("crane")
     assert human is not None
