@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import av
@@ -11,12 +10,8 @@ import pytest
 from PIL import Image
 
 from bellcrank.cli import live
-from bellcrank.plots.movies import movie_settings
-from bellcrank.search import read_settings
-from bellcrank.storage import RunFolder
-from bellcrank.workflows.animate_search import read_history, search_movie
 
-from .helpers import PROBLEM, call, design_of, files, refusal, write
+from .helpers import PROBLEM, call, files, refusal, write
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -82,48 +77,6 @@ def test_a_larger_motion_is_another_movie(here: Path, small: str) -> None:
     assert plain.read_bytes() != larger.read_bytes()
 
 
-def test_a_search_is_filmed(here: Path, whole: Path) -> None:
-    frames = frames_of(filmed(here, whole, "search.mp4", "--search"))
-    assert len(frames) == 8
-    assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 0.5
-
-
-def test_a_search_that_is_not_finished_is_filmed_and_left_alone(here: Path, half: Path) -> None:
-    before = files(half)
-    filmed(here, half, "search.gif", "--search")
-    assert files(half) == before
-
-
-def test_the_story_of_a_search_leads_from_the_full_lattice_to_the_chosen_design(
-    whole: Path,
-) -> None:
-    folder = RunFolder.open(whole)
-    history = read_history(folder, read_settings(folder.settings))
-    chosen = json.loads((whole / "design.json").read_text())["provenance"]
-    assert (history.chain, history.step[-1]) == (chosen["chain"], chosen["step"] + 1)
-    assert history.mask[0].all()
-    assert history.step[0] == 0
-    assert (np.diff(history.step) > 0).all()
-    assert (np.diff(history.efficiency) > 0.0).all()
-    assert history.efficiency[-1] == pytest.approx(design_of(whole)["efficiency"], rel=0.1)
-
-
-def test_the_movie_of_a_search_ends_with_its_best_design_and_no_news(whole: Path) -> None:
-    folder = RunFolder.open(whole)
-    told: list[tuple[str, int, int]] = []
-    movie = search_movie(
-        folder, movie_settings("a.mp4", 4.0), progress=lambda *news: told.append(news)
-    )
-    (sequence,) = movie.sequences
-    efficiency = movie.graphs[0].lines[0]
-    assert np.array_equal(sequence.present[-1], sequence.present[-2])
-    assert sequence.present[0].all()
-    assert efficiency.at[-1] == len(efficiency.y) - 1
-    assert told[-1] == ("loading", len(sequence.notes), len(sequence.notes))
-    assert set(movie.order) == set(range(len(sequence.notes)))
-    assert np.isfinite(sequence.displacement).all()
-
-
 def test_a_movie_is_replaced_on_request_only(here: Path, small: str) -> None:
     write(here / "m.gif", "precious")
     line = refusal("animate", small, "m.gif", *QUICK)
@@ -132,7 +85,7 @@ def test_a_movie_is_replaced_on_request_only(here: Path, small: str) -> None:
     assert (here / "m.gif").read_bytes().startswith(b"GIF89a")
 
 
-@pytest.mark.parametrize("form", [(), ("--search",), ("--compare", PROBLEM)])
+@pytest.mark.parametrize("form", [(), ("--compare", PROBLEM)])
 @pytest.mark.parametrize("name", ["m.avi", "m", "m.mp4.txt"])
 def test_an_unknown_format_is_refused(small: str, form: tuple[str, ...], name: str) -> None:
     line = refusal("animate", small, name, *form)
@@ -153,19 +106,10 @@ def test_an_unknown_format_is_refused(small: str, form: tuple[str, ...], name: s
         (("--magnify", "0", *QUICK), "magnify: expected a number above 0, got 0.0"),
         (("--objective", "best"), "unknown objective 'best'; known: displacement, "),
         (("--compare", "nowhere"), "unknown problem 'nowhere'; known: "),
-        (("--search", "--compare", PROBLEM), "leave out --compare and --objective"),
-        (("--search", "--objective", "force"), "leave out --compare and --objective"),
-        (("--search",), "no such folder"),
     ],
 )
 def test_what_makes_no_sense_is_refused(small: str, words: tuple[str, ...], complaint: str) -> None:
     assert complaint in refusal("animate", small, "m.mp4", *words)
-
-
-def test_a_search_needs_the_folder_of_a_run(here: Path) -> None:
-    (here / "empty").mkdir()
-    line = refusal("animate", "empty", "m.mp4", "--search")
-    assert line.startswith("error: empty: not the folder of a run: it has no run.json")
 
 
 def test_a_missing_folder_for_the_movie_is_named(small: str) -> None:

@@ -296,7 +296,7 @@ def in_pieces(here: Path) -> str:
     ],
 )
 def test_bad_input_is_refused_in_one_line(words: tuple[str, ...], word: str) -> None:
-    if {"plane", "solid"} & set(words):
+    if {"plane", "solid"} & set(",".join(words).split(",")):
         pytest.importorskip("ngsolve", reason="NGSolve is not installed")
     assert word in refusal("validate", *words)
 

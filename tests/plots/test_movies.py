@@ -14,18 +14,11 @@ from bellcrank.errors import InvalidProblem, InvalidSettings, OutputExists, Stor
 from bellcrank.mechanics import SpringEvaluator, strain_of
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Stiffness, Supports
 from bellcrank.plots.movies import (
-    Graph,
-    Line,
-    Movie,
     MovieFigure,
     MovieSettings,
-    StateSequence,
     check_movie,
-    max_states,
     movie_settings,
     mp4,
-    pick_states,
-    search_schedule,
     stroke_schedule,
     write_movie,
 )
@@ -50,23 +43,6 @@ def written(movie, tmp_path_factory):
     for kind in FORMATS:
         write_movie(movie, folder / f"crane.{kind}", SETTINGS)
     return folder
-
-
-@pytest.fixture(scope="module")
-def changing():
-    """A movie of eight designs with fewer and fewer beams."""
-    design = find_design("scaling-8")
-    present = np.repeat(design.mask[None], 8, axis=0)
-    for k in range(8):
-        present[k, design.problem.designable[: 5 * k]] = False
-    evaluator = SpringEvaluator(design.problem)
-    moved = np.array([evaluator.evaluate(mask).displacement for mask in present])
-    sequence = StateSequence(
-        design.problem, present, present, moved, None, "search", tuple("abcdefgh"), ("",) * 8
-    )
-    line = Line(np.arange(8.0), np.arange(8.0) ** 2, np.arange(8))
-    graph = Graph("steps", "efficiency", (line,), preview=False, logarithmic=True)
-    return Movie((sequence,), (graph,), search_schedule(40, 8))
 
 
 def truss(force: float) -> Design:
@@ -160,32 +136,6 @@ def test_a_motion_is_slow_at_its_ends():
     part, _ = stroke_schedule(150)
     pace = np.diff(part)
     assert max(pace[0], pace[-1]) < 0.05 * pace.max()
-
-
-@pytest.mark.parametrize("frames", [3, 4, 10, 75, 300])
-@pytest.mark.parametrize("fps", [1, 25, 60])
-def test_every_selected_design_of_a_search_is_shown(frames, fps):
-    for states in range(1, max_states(frames, fps) + 1):
-        order = search_schedule(frames, states)
-        assert len(order) == frames
-        assert set(np.diff(order)) <= {0, 1}
-        assert order[-1] == states - 1
-        assert order[0] == 0 or states == 1
-
-
-def test_early_changes_and_improvements_are_both_selected():
-    step = np.arange(10_000)
-    efficiency = np.where(step < 9000, 0.1, 0.1 + (step - 9000) / 1000)
-    chosen = pick_states(efficiency, step, 40)
-    assert len(chosen) <= 42
-    assert (chosen[0], chosen[-1]) == (0, 9999)
-    assert np.count_nonzero(chosen < 100) >= 8
-    assert np.count_nonzero(chosen >= 9000) >= 15
-
-
-@pytest.mark.parametrize("count", [1, 2, 5])
-def test_few_designs_are_all_selected(count):
-    assert pick_states(np.zeros(count), np.arange(count), 5).tolist() == list(range(count))
 
 
 def test_the_first_frame_is_rest_and_the_middle_one_the_full_stroke(movie):
@@ -298,14 +248,13 @@ def test_drawn_and_cached_pictures_make_the_same_file(movie, written, tmp_path, 
     assert (tmp_path / "again.mp4").read_bytes() == (written / "crane.mp4").read_bytes()
 
 
-def test_states_can_be_drawn_in_any_order(movie, changing):
-    for one in (movie, changing):
-        figure = MovieFigure(one, SMALL)
-        states = np.unique(one.order)
-        forth = [figure.draw(int(state)) for state in states]
-        back = [figure.draw(int(state)) for state in states[::-1]][::-1]
-        assert all(np.array_equal(a, b) for a, b in zip(forth, back, strict=True))
-        assert not np.array_equal(forth[0], forth[-1])
+def test_states_can_be_drawn_in_any_order(movie):
+    figure = MovieFigure(movie, SMALL)
+    states = np.unique(movie.order)
+    forth = [figure.draw(int(state)) for state in states]
+    back = [figure.draw(int(state)) for state in states[::-1]][::-1]
+    assert all(np.array_equal(a, b) for a, b in zip(forth, back, strict=True))
+    assert not np.array_equal(forth[0], forth[-1])
 
 
 def test_supports_do_not_move_in_the_picture(movie):
@@ -353,17 +302,6 @@ def test_magnified_motion_is_drawn_larger_and_noted():
     rest = design.problem.lattice.positions
     assert np.allclose(large.moved - rest, 2.5 * large.displacement)
     assert large.notes[-1].startswith("motion drawn × 2.5 · load 100 % · ")
-
-
-def test_added_and_removed_beams_are_marked(changing):
-    figure = MovieFigure(changing, (960, 540))
-    news, none = figure.draw(3), figure.draw(0)
-
-    def reddish(picture):
-        red, green, blue = (picture[:, :, k].astype(int) for k in range(3))
-        return np.count_nonzero((red > 220) & (green < 175) & (green > 120) & (blue > 110))
-
-    assert reddish(news) > reddish(none) + 50
 
 
 @pytest.mark.parametrize("name", ["movie.avi", "movie", "movie.mp4.txt"])

@@ -1,4 +1,4 @@
-"""`bellcrank animate`: movies of designs that move, and of searches."""
+"""`bellcrank animate`: movies of designs that move."""
 
 from __future__ import annotations
 
@@ -15,43 +15,32 @@ from bellcrank.cli.live import Live
 from bellcrank.errors import InvalidSettings
 
 SECONDS = 5.0
-"""Of a motion."""
-SEARCH_SECONDS = 10.0
-"""Of a search."""
+"""Default length."""
 
 
 class MovieProgress(Live):
-    """Shows how far a movie is, in the responses it needs and in its frames."""
+    """Shows the progress of a movie: responses computed, then frames drawn."""
 
     def __init__(self) -> None:
-        super().__init__("filming", None)
+        super().__init__("movie", None)
 
     def __call__(self, what: str, done: int, total: int) -> None:
-        """Take in the news."""
+        """Show the numbers of finished and of all steps of an activity."""
         figures = f"{what} {done} of {total}"
-        self._show(done, total, figures, f"filming: {figures}")
+        self._show(done, total, figures, f"movie: {figures}")
 
 
 @app.command()
 def animate(
     what: Annotated[
         str,
-        typer.Argument(
-            help="A design file or folder, human:NAME, machine:NAME, a problem; with --search "
-            "the folder of a run."
-        ),
+        typer.Argument(help="A design file or folder, human:NAME, machine:NAME, a problem."),
     ],
     out: Annotated[Path, typer.Argument(metavar="FILE", help="Movie to write (mp4, gif).")],
     compare: Annotated[
-        str | None, typer.Option(help="Second design, filmed beside the first.")
+        str | None, typer.Option(help="Second design, shown beside the first.")
     ] = None,
-    search: Annotated[
-        bool, typer.Option("--search", help="How the design of a run came about.")
-    ] = False,
-    seconds: Annotated[
-        float | None,
-        typer.Option(help="Length.", show_default=f"{SECONDS:g}, with --search {SEARCH_SECONDS:g}"),
-    ] = None,
+    seconds: Annotated[float, typer.Option(help="Length.")] = SECONDS,
     fps: Annotated[
         int | None, typer.Option(help="Frames per second.", show_default="30, GIF 25")
     ] = None,
@@ -65,31 +54,18 @@ def animate(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the movie.")] = False,
 ) -> None:
-    """Film a design from rest to its full stroke and back, or the search that found one."""
+    """Make a movie of a design that moves from rest to its full stroke and back."""
     from bellcrank.plots.movies import check_movie, movie_settings
     from bellcrank.workflows.animate import MotionOptions, animate_motion
-    from bellcrank.workflows.animate_search import animate_search
 
-    if search and (compare is not None or objective is not None):
-        raise InvalidSettings(
-            "--search films one run, by its own objective; leave out --compare and --objective"
-        )
-    usual = SEARCH_SECONDS if search else SECONDS
-    settings = movie_settings(
-        out, usual if seconds is None else seconds, fps, None if size is None else _size(size)
-    )
+    settings = movie_settings(out, seconds, fps, None if size is None else _size(size))
     options = MotionOptions(objective, magnify)
     check_movie(out, overwrite=overwrite)
     names = [what] if compare is None else [what, compare]
-    designs = [] if search else [(name, design_named(name)) for name in names]
+    designs = [(name, design_named(name)) for name in names]
     announce_compilation()
     with MovieProgress() as progress:
-        if search:
-            animate_search(
-                Path(what), out, settings, magnify=magnify, overwrite=overwrite, progress=progress
-            )
-        else:
-            animate_motion(designs, out, settings, options, overwrite=overwrite, progress=progress)
+        animate_motion(designs, out, settings, options, overwrite=overwrite, progress=progress)
     notes.print(f"wrote {plain(out)}")
 
 

@@ -36,7 +36,7 @@ from bellcrank.mechanics.objectives import (
     objectives,
 )
 from bellcrank.mechanics.status import Outcome, Status
-from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction
+from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction, increment_at
 from bellcrank.mechanics.superelement import (
     Condensed,
     Coupling,
@@ -71,6 +71,7 @@ __all__ = [
     "evaluators_that_fit",
     "follow",
     "free_nodes",
+    "increment_at",
     "load_bearing_core",
     "loaded_beams",
     "objective_name",

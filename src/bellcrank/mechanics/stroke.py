@@ -32,6 +32,19 @@ def at_fraction(problem: Problem, fraction: float) -> Problem:
     return replace(problem, input=replace(problem.input, amount=fraction * problem.input.amount))
 
 
+def increment_at(fraction: float) -> float:
+    """Return the largest load increment, a fraction of the load, at a fraction of the input.
+
+    It is a power of two, so that the increments add up to the load without a remainder.
+
+    Examples
+    --------
+    >>> increment_at(1.0), increment_at(0.25)
+    (0.03125, 0.125)
+    """
+    return min(1.0, 2.0 ** math.floor(math.log2(VERIFICATION_INCREMENT / fraction)))
+
+
 class StrokeEvaluator:
     """Responses of designs at equal fractions of the full input, each computed from rest.
 
@@ -63,6 +76,4 @@ class StrokeEvaluator:
     def evaluate(self, mask: ArrayLike) -> Iterator[tuple[float, Response]]:
         """Yield the fraction of the full input and the response there, in ascending order."""
         for load, evaluator in self._evaluators:
-            # A power of two, so that the increments add up to the load without a remainder.
-            increment = 2.0 ** math.floor(math.log2(VERIFICATION_INCREMENT / load))
-            yield load, evaluator.evaluate(mask, min(1.0, increment))
+            yield load, evaluator.evaluate(mask, increment_at(load))

@@ -124,7 +124,6 @@ def motion_movie(
 
 def _sequence(name: str, design: Design, response: LoadingPath, magnify: float) -> StateSequence:
     """Return the states of a design along its stroke."""
-    states, beams = response.energy.shape
     word = "stroke" if design.problem.input.drive == "displacement" else "load"
     size = f"{design.beam_count} beams" if magnify == 1.0 else f"motion drawn × {magnify:g}"
     notes = tuple(
@@ -134,8 +133,8 @@ def _sequence(name: str, design: Design, response: LoadingPath, magnify: float) 
     snap = f"snaps at {100.0 * response.fraction[response.snapped.argmax()]:.0f} % of the {word}"
     return StateSequence(
         problem=design.problem,
-        present=np.broadcast_to(design.mask, (states, beams)),
-        load_bearing=np.broadcast_to(load_bearing_core(design), (states, beams)),
+        present=design.mask,
+        load_bearing=load_bearing_core(design),
         displacement=response.displacement,
         energy=response.energy,
         title=name,

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status, strain_of
+from bellcrank.mechanics import SpringEvaluator, Status, at_fraction, increment_at, strain_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -86,12 +85,8 @@ def loading_path(
     snapped = np.zeros(states, dtype=bool)
     for k, fraction in enumerate(fractions.tolist()):
         share = max(fraction, SMALL)
-        amount = share * problem.input.amount
-        scaled = replace(problem, input=replace(problem.input, amount=amount))
-        evaluator = SpringEvaluator(scaled, objective)
-        # A power of two, so that the increments add up to the whole without a remainder.
-        increment = min(1.0, 2.0 ** math.floor(math.log2(VERIFICATION_INCREMENT / share)))
-        response = evaluator.evaluate(design.mask, increment)
+        evaluator = SpringEvaluator(at_fraction(problem, share), objective)
+        response = evaluator.evaluate(design.mask, increment_at(share))
         if response.status not in {Status.CONVERGED, Status.SNAPPED}:
             raise InvalidSettings(f"{problem.name}: no motion to show: {response.status.message}")
         efficiency[k] = response.efficiency

@@ -1,4 +1,4 @@
-"""Movies of lattices that move or change, with curves that are drawn alongside.
+"""Movies of lattices that move, with curves that are drawn alongside.
 
 The drawings are made from plain arrays. The parts of a picture that do not change are drawn
 once; each frame adds the moving parts to a copy.
@@ -6,18 +6,13 @@ once; each frame adds the moving parts to a copy.
 - a `Movie` holds a `StateSequence` for each lattice, `Graph`s of `Line`s, and the state that
   each frame shows;
 - `MovieSettings` holds the length, frame rate and size; `write_movie` writes the file;
-- `stroke_schedule`, `search_schedule` and `pick_states` choose the states of the frames.
+- `stroke_schedule` chooses the states of the frames.
 """
 
 from bellcrank.plots.movies.figure import MovieFigure
 from bellcrank.plots.movies.output import MovieSettings, check_movie, movie_settings, write_movie
 from bellcrank.plots.movies.records import Graph, Line, Movie, StateSequence
-from bellcrank.plots.movies.schedule import (
-    max_states,
-    pick_states,
-    search_schedule,
-    stroke_schedule,
-)
+from bellcrank.plots.movies.schedule import stroke_schedule
 
 __all__ = [
     "Graph",
@@ -27,10 +22,7 @@ __all__ = [
     "MovieSettings",
     "StateSequence",
     "check_movie",
-    "max_states",
     "movie_settings",
-    "pick_states",
-    "search_schedule",
     "stroke_schedule",
     "write_movie",
 ]

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from bellcrank.plots import style
 
@@ -61,8 +61,7 @@ class Curves:
         _style(axes, graph, up)
         self._grown: list[tuple[Line2D, Line2D]] = []
         for line, colour in zip(graph.lines, colours, strict=False):
-            if graph.preview:
-                axes.plot(line.x, line.y, color=colour, linewidth=1.4, alpha=0.28)
+            axes.plot(line.x, line.y, color=colour, linewidth=1.4, alpha=0.28)
             options: dict[str, Any] = {"color": colour, "clip_on": False, "animated": True}
             (grown,) = axes.plot(
                 [], [], linewidth=1.9, solid_capstyle="round", label=line.label, **options
@@ -91,7 +90,8 @@ class Curves:
 
 def _style(axes: Axes, graph: Graph, height: float) -> None:
     """Set limits, labels and ticks."""
-    x_limits, y_limits = _x_limits(graph), _y_limits(graph.lines)
+    x_limits = 0.0, 1.03 * max(float(line.x.max()) for line in graph.lines) or 1.0
+    y_limits = _y_limits(graph.lines)
     for axis, text, limits in (
         (axes.xaxis, graph.x_label, x_limits),
         (axes.yaxis, graph.y_label, y_limits),
@@ -104,12 +104,7 @@ def _style(axes: Axes, graph: Graph, height: float) -> None:
     axes.xaxis.labelpad = 2.0
     axes.set_ylim(*y_limits)
     axes.yaxis.set_major_locator(MaxNLocator(max(2, min(5, int(height / 0.3)))))
-    if graph.logarithmic:
-        axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _position: _number(x)))
-        axes.xaxis.set_minor_locator(NullLocator())
-    else:
-        axes.xaxis.set_major_locator(MaxNLocator(5))
+    axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.set_xlim(*x_limits)
     axes.yaxis.set_label_coords(-0.52 / axes.get_position().width / _figure_width(axes), 0.5)
     style.style_axes(axes)
@@ -150,12 +145,6 @@ def unit_label(unit: float) -> str:
 def _number(x: float) -> str:
     """Format the number of a tick."""
     return f"{x:,.0f}".replace(",", "\u202f") if abs(x) >= 1000.0 else f"{x:.4g}"
-
-
-def _x_limits(graph: Graph) -> tuple[float, float]:
-    """Return the limits of the horizontal axis."""
-    largest = max(float(line.x.max()) for line in graph.lines)
-    return 0.0, (1.1 if graph.logarithmic else 1.03) * largest or 1.0
 
 
 def _y_limits(lines: tuple[Line, ...]) -> tuple[float, float]:

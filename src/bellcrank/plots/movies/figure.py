@@ -22,9 +22,7 @@ from bellcrank.plots.legend import (
 from bellcrank.plots.marks import add_panel
 from bellcrank.plots.movies.curves import Curves, power_of_ten, unit_label
 from bellcrank.plots.movies.lattice_artist import (
-    ADDED,
     ENERGY,
-    REMOVED,
     LatticeArtist,
     energy_scale,
     frame_of,
@@ -108,7 +106,7 @@ class MovieFigure:
         heading = MARGIN + 0.27 + LINE + LINE * self._has_alarms + 0.1
         entries = _legend_entries(movie.sequences)
         rows = math.ceil(len(entries) / LEGEND_COLUMNS)
-        foot = MARGIN + ROW_HEIGHT * rows + 0.1 + (0.0 if scale is None else 0.46)
+        foot = MARGIN + ROW_HEIGHT * rows + 0.56
         frames = aligned_frames(
             [frame_of(sequence) for sequence in movie.sequences],
             [sequence.problem for sequence in movie.sequences],
@@ -120,8 +118,7 @@ class MovieFigure:
         ]
         self._texts: list[tuple[Text, Text | None]] = []
         self._artists = self._add_actors(layout, frames, scale)
-        if scale is not None:
-            _add_colour_bar(self._figure, scale, MARGIN + ROW_HEIGHT * rows + 0.32)
+        _add_colour_bar(self._figure, scale, MARGIN + ROW_HEIGHT * rows + 0.32)
         add_legend(self._figure, entries, MARGIN, columns=math.ceil(len(entries) / rows))
         self._parts: list[LatticeArtist | Curves] = [*self._artists, *self._curves]
         self._canvas.draw()
@@ -132,7 +129,7 @@ class MovieFigure:
         return any(any(sequence.alarms) for sequence in self._sequences)
 
     def _add_actors(
-        self, layout: Layout, frames: list[tuple[Any, Any]], scale: PowerNorm | None
+        self, layout: Layout, frames: list[tuple[Any, Any]], scale: PowerNorm
     ) -> list[LatticeArtist]:
         """Add the lattices side by side, each with a heading."""
         left, bottom, width, height = layout.room
@@ -216,17 +213,12 @@ def _legend_entries(sequences: tuple[StateSequence, ...]) -> list[tuple[str, Any
     """Return legend entries for the elements that the movie contains."""
     problems = [sequence.problem for sequence in sequences]
     entries: list[tuple[str, Any]] = [("at rest", strut_entry(style.IDLE_REST))]
-    changing = not all(sequence.is_one_design for sequence in sequences)
-    if changing:
-        entries += [("removed", strut_entry(REMOVED, 2.2)), ("added", strut_entry(ADDED))]
     if any((sequence.present & ~sequence.load_bearing).any() for sequence in sequences):
         entries.append(("unloaded", strut_entry(style.IDLE, 2.2)))
     entries += support_entries(problems)
     entries.append(("input", arrow_entry(style.INPUT)))
     entries.append(("output, wanted direction", arrow_entry(style.WANTED)))
-    entries.append(
-        ("output, displacement" if changing else "output, path", strut_entry(style.OUTPUT, 1.2))
-    )
+    entries.append(("output, path", strut_entry(style.OUTPUT, 1.2)))
     return entries
 
 

@@ -34,16 +34,11 @@ ENERGY = LinearSegmentedColormap.from_list(
 """Grey for low, dark for high strain energy; monotonic in brightness."""
 TOP_QUANTILE = 0.995
 """Quantile of the energies at the end of the colour scale; beams above it share one colour."""
-REMOVED = "#e8998d"
-ADDED = "#009e73"
 
 
-def energy_scale(sequences: tuple[StateSequence, ...]) -> PowerNorm | None:
-    """Return the colour scale for all states, or None if beams are drawn in black."""
-    known = [sequence.energy for sequence in sequences if sequence.energy is not None]
-    if not known:
-        return None
-    tops = [np.quantile(energy, TOP_QUANTILE, axis=1).max() for energy in known]
+def energy_scale(sequences: tuple[StateSequence, ...]) -> PowerNorm:
+    """Return the colour scale for all states."""
+    tops = [np.quantile(one.energy, TOP_QUANTILE, axis=1).max() for one in sequences]
     return PowerNorm(0.5, 0.0, float(max(tops)) or 1.0, clip=True)
 
 
@@ -51,12 +46,8 @@ def frame_of(sequence: StateSequence) -> tuple[NDArray[np.float64], NDArray[np.f
     """Return the lower left and upper right corner of all states, lattice units."""
     problem = sequence.problem
     positions, step = problem.lattice.positions, spacing(problem)
-    seen = sequence.present.any(axis=0)
-    nodes = np.unique(
-        np.concatenate(
-            [problem.lattice.beams[seen].ravel(), problem.input.nodes, problem.output.nodes]
-        )
-    )
+    beams = problem.lattice.beams[sequence.present]
+    nodes = np.unique(np.concatenate([beams.ravel(), problem.input.nodes, problem.output.nodes]))
     points = [positions, sequence.moved[:, nodes].reshape(-1, 2)]
     if len(problem.supports.nodes):
         points.append(outline_around(positions[problem.supports.nodes], 0.35 * step))
@@ -73,7 +64,7 @@ class LatticeArtist:
     sequence
         States of the lattice.
     scale
-        Colour scale; None for black beams.
+        Colour scale of the energy.
 
     Attributes
     ----------
@@ -81,23 +72,16 @@ class LatticeArtist:
         Matplotlib artists that are redrawn for each state.
     """
 
-    def __init__(self, panel: Panel, sequence: StateSequence, scale: PowerNorm | None) -> None:
+    def __init__(self, panel: Panel, sequence: StateSequence, scale: PowerNorm) -> None:
         self._panel, self._sequence, self._moved = panel, sequence, sequence.moved
         self._beams = sequence.problem.lattice.beams
-        held = np.isin(self._beams, sequence.problem.supports.fixed).all(axis=1)
-        self._held = held
-        self._one_design = sequence.is_one_design
-        self._draw_fixed_parts()
+        ends = np.isin(self._beams, sequence.problem.supports.fixed)
+        held = ends[:, 0] & ends[:, 1]
+        self._draw_fixed_parts(held)
         rest = sequence.problem.lattice.positions
-        coloured: dict[str, Any] = {"colors": style.INK}
-        if scale is not None:
-            coloured = {"cmap": ENERGY, "norm": scale}
-        self._ghost = self._struts(1.0, colors=style.IDLE_REST)
-        self._removed = self._struts(0.55, colors=REMOVED)
-        marks = [] if self._one_design else self._created(self._mark_rest)
+        self._free = sequence.present & ~held
         self._unloaded = self._struts(0.55, colors=style.IDLE)
-        self._loaded = self._struts(1.0, **coloured)
-        self._added = self._struts(1.0, colors=ADDED)
+        self._loaded = self._struts(1.0, cmap=ENERGY, norm=scale)
         self._trail = self._struts(0.22, colors=style.OUTPUT, alpha=0.75)
         problem = sequence.problem
         regions = ((problem.input.nodes, style.INPUT), (problem.output.nodes, style.OUTPUT))
@@ -110,33 +94,23 @@ class LatticeArtist:
             partial(add_arrows, panel, self._input_arrows, style.INPUT, bold=True)
         )
         self.artists: list[Any] = [
-            self._ghost, self._removed, *marks, self._unloaded, self._loaded, self._added,
-            self._trail, *(dot for _, dot in self._dots), *self._arrows,
+            self._unloaded, self._loaded, self._trail, *(dot for _, dot in self._dots),
+            *self._arrows,
         ]  # fmt: skip
         for artist in self.artists:
             artist.set_animated(True)
 
-    def _draw_fixed_parts(self) -> None:
-        """Draw the supports and, for one design, the structure at rest."""
-        panel, sequence = self._panel, self._sequence
-        rest = sequence.problem.lattice.positions
+    def _draw_fixed_parts(self, held: NDArray[np.bool_]) -> None:
+        """Draw the supports, the structure at rest, and the input and output nodes at rest."""
+        panel, problem = self._panel, self._sequence.problem
+        present, rest = self._sequence.present, problem.lattice.positions
         add_supports(panel)
-        ground = np.flatnonzero(sequence.present[0] & self._held)
+        ground, free = np.flatnonzero(present & held), np.flatnonzero(present & ~held)
         add_struts(panel, rest, ground, style.GROUND, width=0.6, level=1.0)
-        if self._one_design:
-            free = np.flatnonzero(sequence.present[0] & ~self._held)
-            add_struts(panel, rest, free, style.IDLE_REST, level=1.5)
-            self._mark_rest()
-        add_arrows(panel, _output_arrows(sequence), style.WANTED, bold=True)
-
-    def _mark_rest(self) -> None:
-        """Mark the rest positions of the input and output nodes."""
-        problem = self._sequence.problem
-        for nodes, colour in (
-            (problem.input.nodes, style.INPUT),
-            (problem.output.nodes, style.OUTPUT),
-        ):
-            add_nodes(self._panel, problem.lattice.positions[nodes], colour, hollow=True)
+        add_struts(panel, rest, free, style.IDLE_REST, level=1.5)
+        add_nodes(panel, rest[problem.input.nodes], style.INPUT, hollow=True)
+        add_nodes(panel, rest[problem.output.nodes], style.OUTPUT, hollow=True)
+        add_arrows(panel, _output_arrows(self._sequence), style.WANTED, bold=True)
 
     def _struts(self, width: float, **options: Any) -> LineCollection:
         """Add an empty collection of lines; `width` is a multiple of the strut width."""
@@ -154,33 +128,20 @@ class LatticeArtist:
     def update(self, state: int) -> None:
         """Update all artists to a state."""
         sequence, moved = self._sequence, self._moved[state]
-        present = sequence.present[state] & ~self._held
-        loaded = np.flatnonzero(present & sequence.load_bearing[state])
-        if sequence.energy is not None:
-            energy = sequence.energy[state]
-            loaded = loaded[np.argsort(energy[loaded], kind="stable")]
-            self._loaded.set_array(energy[loaded])
+        loaded = np.flatnonzero(self._free & sequence.load_bearing)
+        energy = sequence.energy[state]
+        loaded = loaded[np.argsort(energy[loaded], kind="stable")]
+        self._loaded.set_array(energy[loaded])
         self._loaded.set_segments(list(moved[self._beams[loaded]]))
-        unloaded = np.flatnonzero(present & ~sequence.load_bearing[state])
+        unloaded = np.flatnonzero(self._free & ~sequence.load_bearing)
         self._unloaded.set_segments(list(moved[self._beams[unloaded]]))
-        if not self._one_design:
-            self._show_changes(state, present)
         nodes = sequence.problem.output.nodes
-        path = self._moved[: state + 1] if self._one_design else moved[None]
+        path = self._moved[: state + 1]
         rest = sequence.problem.lattice.positions[None]
         self._trail.set_segments(list(np.concatenate([rest, path])[:, nodes].transpose(1, 0, 2)))
         for nodes, dot in self._dots:
             dot.set_data(*moved[nodes].T)
         self._move_input_arrows(moved)
-
-    def _show_changes(self, state: int, present: NDArray[np.bool_]) -> None:
-        """Update the lattice at rest and the beams added and removed since the previous state."""
-        sequence, rest = self._sequence, self._sequence.problem.lattice.positions
-        before = sequence.present[max(state - 1, 0)] & ~self._held
-        removed, added = np.flatnonzero(before & ~present), np.flatnonzero(present & ~before)
-        self._ghost.set_segments(list(rest[self._beams[present]]))
-        self._removed.set_segments(list(rest[self._beams[removed]]))
-        self._added.set_segments(list(self._moved[state][self._beams[added]]))
 
     def _move_input_arrows(self, moved: NDArray[np.float64]) -> None:
         """Move the input arrows with the input nodes."""

@@ -23,15 +23,15 @@ class StateSequence:
     ----------
     problem
         Problem with N nodes and M beams.
-    present : (K, M) bool
-        Beams of the design in each of K states.
-    load_bearing : (K, M) bool
+    present : (M,) bool
+        Beams of the design.
+    load_bearing : (M,) bool
         Beams that carry load.
     displacement : (K, N, 2) float64, lattice units
-        Displacement of each node. Nodes with values that are not finite are drawn at rest.
+        Displacement of each node in each of K states. Nodes with values that are not finite are
+        drawn at rest.
     energy : (K, M) float64
-        Strain energy of each beam, shown as its colour. If None, beams are drawn in black, and
-        beams that were added or removed since the previous state are marked.
+        Strain energy of each beam, shown as its colour.
     title
         Heading of the lattice.
     notes
@@ -53,7 +53,7 @@ class StateSequence:
     present: NDArray[np.bool_]
     load_bearing: NDArray[np.bool_]
     displacement: NDArray[np.float64]
-    energy: NDArray[np.float64] | None
+    energy: NDArray[np.float64]
     title: str
     notes: tuple[str, ...]
     alarms: tuple[str, ...]
@@ -61,17 +61,17 @@ class StateSequence:
 
     def __post_init__(self) -> None:
         lattice, states = self.problem.lattice, len(self.notes)
-        beams = (states, lattice.beam_count)
+        beams = lattice.beam_count
         expected = {
-            "present": beams,
-            "load_bearing": beams,
+            "present": (beams,),
+            "load_bearing": (beams,),
             "displacement": (states, lattice.node_count, 2),
-            "energy": beams,
+            "energy": (states, beams),
             "alarms": (states,),
         }
         for name, shape in expected.items():
             given = getattr(self, name)
-            if given is not None and np.shape(given) != shape:
+            if np.shape(given) != shape:
                 raise InvalidProblem(f"{name}: expected shape {shape}, got {np.shape(given)}")
         if not 0.0 < self.magnify < np.inf:
             raise InvalidSettings(f"magnify: expected a number above 0, got {self.magnify!r}")
@@ -84,15 +84,12 @@ class StateSequence:
         points: NDArray[np.float64] = self.problem.lattice.positions + self.magnify * shift
         return points
 
-    @property
-    def is_one_design(self) -> bool:
-        """Whether all states have the same beams."""
-        return bool((self.present == self.present[0]).all())
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
     """A curve with a marker that moves along it.
+
+    The whole curve is drawn faintly from the first frame on.
 
     Parameters
     ----------
@@ -120,17 +117,11 @@ class Graph:
         Axis labels.
     lines
         At most one line for each state sequence.
-    preview
-        Whether the whole curve is drawn faintly from the first frame on.
-    logarithmic
-        Whether the horizontal axis is logarithmic.
     """
 
     x_label: str
     y_label: str
     lines: tuple[Line, ...]
-    preview: bool = True
-    logarithmic: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
