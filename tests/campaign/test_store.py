@@ -94,6 +94,7 @@ def test_compaction_keeps_every_row_in_order_and_expansion_undoes_it(
     assert everything(segments.path) == everything(finished)
 
 
+@pytest.mark.slow
 def test_a_campaign_killed_before_any_call_to_the_system_ends_the_same(
     tmp_path: Path, spec: Spec, tabled: Path
 ) -> None:

@@ -102,6 +102,7 @@ def test_without_a_slicer_the_way_round_it_is_told() -> None:
     assert "bellcrank export DESIGN part.3mf" in message
 
 
+@pytest.mark.slow
 @SLICER
 def test_the_crane_is_sliced_into_as_much_plastic_as_it_has(here: Path) -> None:
     outcome = call("print", "crane")
@@ -116,6 +117,7 @@ def test_the_crane_is_sliced_into_as_much_plastic_as_it_has(here: Path) -> None:
     assert "whole number of layers" in outcome.err
 
 
+@pytest.mark.slow
 @SLICER
 def test_stl_is_sliced_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slicer, "PERIMETERS", (4,))

@@ -152,13 +152,14 @@ def deviation_of_tempering(exact: Exact, monkeypatch: pytest.MonkeyPatch, replic
     return float(deviations(samples, exact.pruned.efficiency, probability).max())
 
 
-@pytest.mark.parametrize("replica", [0, 1])
+@pytest.mark.parametrize("replica", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_every_replica_keeps_its_distribution(
     exact: Exact, monkeypatch: pytest.MonkeyPatch, replica: int
 ) -> None:
     assert deviation_of_tempering(exact, monkeypatch, replica) < LARGEST_DEVIATION
 
 
+@pytest.mark.slow
 def test_exchanging_whatever_the_cost_is_noticed(
     exact: Exact, monkeypatch: pytest.MonkeyPatch
 ) -> None:
