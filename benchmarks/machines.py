@@ -18,12 +18,12 @@ from pathlib import Path
 from bellcrank.machines import Machine, linear_assembly
 from bellcrank.machines.bundled import bundled_machine, bundled_machines
 from bellcrank.machines.bundled.contact import RECORD as RECORD_NAME
-from bellcrank.machines.bundled.contact import check_contact
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
 from bellcrank.search import HoppingSettings
 from bellcrank.workflows import complete_design, reopen_design, start_design
+from bellcrank.workflows.validation import check_contact
 
 CONTACT = Path(__file__).parents[1] / "src" / "bellcrank" / "machines" / "bundled" / RECORD_NAME
 RECORD = Path(__file__).parents[1] / "docs" / "machines" / "bundled.json"

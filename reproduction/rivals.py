@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.fem.continuum.backend import ngsolve
-from bellcrank.search import read_settings
+from bellcrank.search import read_settings, verification_evaluator
 from bellcrank.workflows.candidate_ranking import CandidateRanking
-from bellcrank.workflows.design import verification_evaluator
 from reproduction.boxes import Box, box_of
 from reproduction.outline_analysis import analyse_outline, contour_of, narrowest, polygon_of
 from reproduction.registry import Figures, Study, register

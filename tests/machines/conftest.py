@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bellcrank.machines import elementary
-from bellcrank.machines.library.measurement import measure
+from bellcrank.workflows.library_measurement import measure
 
 if TYPE_CHECKING:
     from bellcrank.machines.library import Entry

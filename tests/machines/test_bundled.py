@@ -10,9 +10,10 @@ import pytest
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.machines import linear_assembly
 from bellcrank.machines.bundled import bundled_machine, bundled_machines, find_plan
-from bellcrank.machines.bundled.contact import bundled_contact, check_contact
+from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.elementary import strut_named
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
+from bellcrank.workflows.validation import check_contact
 
 if TYPE_CHECKING:
     from pathlib import Path

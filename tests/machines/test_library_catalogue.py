@@ -19,9 +19,9 @@ from bellcrank.machines.library import (
     write_entry,
 )
 from bellcrank.machines.library.catalogue import SORTS, entry_files
-from bellcrank.machines.library.measurement import MIN_INPUT_STIFFNESS, lever_result
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Conditions, SpringEvaluator, Status
 from bellcrank.search.constraints import ConstrainedEvaluator, LoadCase
+from bellcrank.workflows.library_measurement import MIN_INPUT_STIFFNESS, lever_result
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,7 +16,7 @@ from bellcrank.machines.library.catalogue import read_summary
 from bellcrank.machines.library.entry import identity
 from bellcrank.machines.library.files import checksum, entry_from_dict, entry_to_dict
 from bellcrank.machines.library.lever import Shape, lever_of
-from bellcrank.machines.library.measurement import measure
+from bellcrank.workflows.library_measurement import measure
 
 if TYPE_CHECKING:
     from collections.abc import Callable

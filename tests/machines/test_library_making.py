@@ -17,11 +17,11 @@ import pytest
 from bellcrank.errors import InvalidSettings, StorageError, UnknownName
 from bellcrank.machines.library import Library, entry_to_dict
 from bellcrank.machines.library.catalogue import entry_files
-from bellcrank.machines.library.making import SEARCHES, InputStiffnessCheck, make
 from bellcrank.machines.library.tasks import EntryTask, MakeSettings
 from bellcrank.mechanics import SpringEvaluator, Status
 from bellcrank.search import Verdict
 from bellcrank.storage.locking import LOCK, locked
+from bellcrank.workflows.library_making import SEARCHES, InputStiffnessCheck, make
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,7 +35,7 @@ TIMED = ("provenance", "checksum")
 SCRIPT = """
 import sys
 from pathlib import Path
-from bellcrank.machines.library.making import make
+from bellcrank.workflows.library_making import make
 from bellcrank.machines.library.tasks import MakeSettings
 settings = MakeSettings(
     directions=("down",), columns=(5,), kinds=("free", "light"), steps=750, chains=2

@@ -249,8 +249,13 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
     CorruptRun
         If a file that has to be read is damaged.
     """
-    from bellcrank.search import candidates_of, read_settings, searches, select
-    from bellcrank.workflows.design import verification_evaluator
+    from bellcrank.search import (
+        candidates_of,
+        read_settings,
+        searches,
+        select,
+        verification_evaluator,
+    )  # fmt: skip
 
     settings = read_settings(task.settings)
     problem = problem_from_dict(task.problem, f"task {task.name!r}")

@@ -27,6 +27,7 @@ PartFile = Annotated[
     Path | None,
     typer.Option("--part", help="TOML file with width, thickness, scale, material and fillet."),
 ]
+UNLOADED_BEAMS = "Beams that carry no load: keep, prune_dead_ends, or prune_all."
 Width = Annotated[str | None, typer.Option(help="Strut width (for example 2mm). \\[2mm]")]
 Thickness = Annotated[str | None, typer.Option(help="Part thickness. \\[5mm]")]
 Scale = Annotated[str | None, typer.Option(help="Length of a lattice unit. \\[10mm]")]

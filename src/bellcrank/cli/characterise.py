@@ -12,7 +12,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
-from bellcrank.cli.arguments import DesignName, design_named
+from bellcrank.cli.arguments import UNLOADED_BEAMS, DesignName, design_named
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.errors import InvalidSettings
 
@@ -35,7 +35,7 @@ def characterise(
     ] = None,
     unloaded_beams: Annotated[
         str,
-        typer.Option(help="counted (literal model), ignored (dead ends) or stripped (idle parts)."),
+        typer.Option(help=UNLOADED_BEAMS),
     ] = "keep",
     out: Annotated[
         Path | None,

@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 
 from bellcrank.cli.app import NOT_MET, app
-from bellcrank.cli.arguments import design_named, settings_of
+from bellcrank.cli.arguments import UNLOADED_BEAMS, design_named, settings_of
 from bellcrank.cli.console import (
     announce_compilation,
     notes,
@@ -50,9 +50,7 @@ def design(
     ] = "basin-hopping",
     unloaded_beams: Annotated[
         str | None,
-        typer.Option(
-            help="Beams without load: keep (the literal model), prune_dead_ends or prune_all."
-        ),
+        typer.Option(help=UNLOADED_BEAMS),
     ] = None,
     cost: Annotated[
         str | None,

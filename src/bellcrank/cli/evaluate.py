@@ -12,7 +12,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
-from bellcrank.cli.arguments import design_named
+from bellcrank.cli.arguments import UNLOADED_BEAMS, design_named
 from bellcrank.cli.console import announce_compilation, print_json, results
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def evaluate(
     ] = None,
     unloaded_beams: Annotated[
         str,
-        typer.Option(help="keep (the literal model), prune_dead_ends or prune_all."),
+        typer.Option(help=UNLOADED_BEAMS),
     ] = "keep",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:

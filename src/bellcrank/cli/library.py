@@ -127,9 +127,9 @@ def add(
     """Measure a design, and add it to your folder of the library."""
     from bellcrank.machines.library import entry_to_dict, user_folder, write_entry
     from bellcrank.machines.library.entry import name_of
-    from bellcrank.machines.library.measurement import measure
     from bellcrank.model.storage import already_exists
     from bellcrank.storage.files import make_folder
+    from bellcrank.workflows.library_measurement import measure
 
     chosen = design_named(design)
     if points < 1:
@@ -171,8 +171,8 @@ def make(
     """Search for entries and measure them; rerun the same command to resume."""
     from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.machines.library import user_folder
-    from bellcrank.machines.library.making import make as make_entries
     from bellcrank.machines.library.tasks import MakeSettings
+    from bellcrank.workflows.library_making import make as make_entries
 
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")

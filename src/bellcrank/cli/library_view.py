@@ -15,9 +15,9 @@ from bellcrank.cli.live import Live
 
 if TYPE_CHECKING:
     from bellcrank.machines.library import Entry, Library, Summary
-    from bellcrank.machines.library.making import TaskOutcome
     from bellcrank.machines.library.tasks import EntryTask, MakeSettings
     from bellcrank.search import Progress
+    from bellcrank.workflows.library_making import TaskOutcome
 
 
 class MakingProgress(Live):

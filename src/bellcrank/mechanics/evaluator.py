@@ -120,7 +120,7 @@ class SpringEvaluator:
         Name of an objective (see `bellcrank.mechanics.objectives`); that of the problem by
         default.
     unloaded_beams
-        ``"keep"``: the literal model. ``"prune_dead_ends"``: the load-bearing core, without
+        ``"keep"``: all beams. ``"prune_dead_ends"``: the load-bearing core, without
         dead ends, which split angular springs although a part is not affected by them.
         ``"prune_all"``: also without pieces that hang by a single node or rest on supports
         alone, which split them as well.

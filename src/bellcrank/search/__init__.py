@@ -20,7 +20,7 @@ Examples
 
 from bellcrank.search.blocks import BLOCK
 from bellcrank.search.cleaning import clean, pieces
-from bellcrank.search.evaluator import Evaluator, make_evaluator
+from bellcrank.search.evaluator import Evaluator, make_evaluator, verification_evaluator
 from bellcrank.search.hopping import HoppingSettings, HoppingState
 from bellcrank.search.markov import (
     ChainState,
@@ -107,4 +107,5 @@ __all__ = [
     "searches",
     "select",
     "start_chain",
+    "verification_evaluator",
 ]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Protocol
 
 from bellcrank.mechanics import FlipPrediction, Response, SpringEvaluator, check_memory
 from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
@@ -61,3 +62,18 @@ def make_evaluator(problem: Problem, settings: SearchSettings) -> Evaluator:
     if not settings.goals and settings.strokes == (1.0,):
         return SpringEvaluator(problem, *options)
     return ConstrainedEvaluator(at_strokes(problem, settings.strokes), settings.goals, *options)
+
+
+def verification_evaluator(problem: Problem, settings: SearchSettings, **changes: Any) -> Evaluator:
+    """Return the evaluator of finished designs: all beams count, and the goals of the search hold.
+
+    Parameters
+    ----------
+    problem
+        Lattice, supports, input and output.
+    settings
+        Settings of the search.
+    changes
+        Settings that differ from those of the search.
+    """
+    return make_evaluator(problem, replace(settings, **{"unloaded_beams": "keep", **changes}))

@@ -97,7 +97,7 @@ class Selection:
     found
         The candidate before cleaning.
     efficiency_before, efficiency_after
-        Efficiency before and after cleaning, both from rest in the literal model.
+        Efficiency before and after cleaning, both from rest, with all beams kept.
     refused
         Number of rejected candidates of higher efficiency, by reason.
     """
@@ -271,7 +271,7 @@ def select(
     Parameters
     ----------
     evaluator
-        Evaluator with the constraints and strokes of the search, in the literal model; a plain
+        Evaluator with the constraints and strokes of the search, with all beams kept; a plain
         `SpringEvaluator` by default.
     choose
         Selects one of the qualified designs; the most efficient by default.

@@ -33,7 +33,7 @@ class SearchSettings:
     objective
         Name of an objective, or None for the problem's default.
     unloaded_beams
-        Treatment of beams that carry no load: ``"keep"`` (the literal model),
+        Treatment of beams that carry no load: ``"keep"`` (they remain in the model),
         ``"prune_dead_ends"`` or ``"prune_all"``.
     goals
         Constraints on the design, each a text such as ``"mass <= 0.6"``

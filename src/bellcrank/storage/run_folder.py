@@ -24,11 +24,8 @@ from bellcrank.model import problem_from_dict, problem_to_dict
 from bellcrank.model.storage import whole_file
 from bellcrank.provenance import provenance
 from bellcrank.storage.description import Description, plain, read_description, write_description
-from bellcrank.storage.files import (
-    make_folder,
-    remove_temporaries,
-    require_new_folder,
-)
+from bellcrank.storage.files import make_folder, remove_temporaries, require_new_folder
+from bellcrank.storage.history import HISTORY, chain_tables, read_history, write_history
 from bellcrank.storage.locking import LOCK, busy, lock_holder
 from bellcrank.storage.parquet import arrays_of, parquet_file, write_sealed
 from bellcrank.storage.records import COLUMNS, checked_proposals
@@ -39,7 +36,6 @@ from bellcrank.storage.segments import (
     proposal_schema,
     segment_table,
 )
-from bellcrank.storage.tables import TablePart, read_part
 
 if TYPE_CHECKING:
     import os
@@ -48,10 +44,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
+    from bellcrank.storage.tables import TablePart
 
 RUN_SCHEMA = "bellcrank/run/1"
 DESCRIPTION = "run.json"
-HISTORY = "history.parquet"
 STATUSES = ("running", "stopped", "finished")
 TOP_NAME = re.compile(re.escape(DESCRIPTION) + "|" + re.escape(HISTORY))
 CHAIN_NAME = re.compile(r"\d{3,}")
@@ -60,10 +56,6 @@ MAX_CHAINS = np.iinfo(np.int16).max + 1
 SEGMENT_ADVICE = (
     "delete the damaged and all later segments of that folder and resume: their steps are "
     "computed again"
-)
-HISTORY_ADVICE = (
-    "if the folder segments/ still holds the proposals, delete this file and resume; otherwise "
-    "restore it from a copy, or repeat the run with the same seed, which gives the same result"
 )
 
 
@@ -329,23 +321,13 @@ class RunFolder:
         return arrays_of(pa.concat_tables([none, *self._tables(chain, names)]), names)
 
     def _tables(self, chain: int, names: list[str]) -> Iterator[Any]:
-        import pyarrow.compute as pc
-
-        history = self._history()
-        if history is None:
-            for segment in self._files.read_all(_name_of(chain), thorough=False):
-                path = self._files.path_of(segment.run, segment.first_step)
-                with parquet_file(path, SEGMENT_ADVICE) as (file, _):
-                    yield file.read(columns=names, use_threads=False)
+        if history := self._history():
+            yield from chain_tables(history.path, chain, names)
             return
-        with parquet_file(history.path, HISTORY_ADVICE) as (file, _):
-            order = file.schema_arrow.get_field_index("chain")
-            for group in range(file.metadata.num_row_groups):
-                numbers = file.metadata.row_group(group).column(order).statistics
-                if numbers.min <= chain <= numbers.max:
-                    columns = ["chain", *names]
-                    table = file.read_row_group(group, columns=columns, use_threads=False)
-                    yield table.filter(pc.equal(table["chain"], chain)).select(names)
+        for segment in self._files.read_all(_name_of(chain), thorough=False):
+            path = self._files.path_of(segment.run, segment.first_step)
+            with parquet_file(path, SEGMENT_ADVICE) as (file, _):
+                yield file.read(columns=names, use_threads=False)
 
     def finish(self) -> None:
         """Merge all chains into ``history.parquet``, delete the segments, mark as finished.
@@ -361,7 +343,7 @@ class RunFolder:
         """
         remove_temporaries(self.path, TOP_NAME)
         if self._history() is None:
-            self._write_history(self.path)
+            self.copy_history(self.path)
         # First the segments: on a full disk this frees the space that the description needs.
         self._files.delete(self._chain_names())
         self.status = "finished"
@@ -378,20 +360,9 @@ class RunFolder:
         StorageError
             If there is no space for it.
         """
-        self._write_history(folder)
-
-    def _write_history(self, folder: Path) -> None:
-
         names = map(_name_of, self.chains)
         segments = [each for name in names for each in self._files.read_all(name, thorough=True)]
-        part = TablePart(folder / HISTORY, 0, 1, segments)
-        header = {
-            **part.header(self._description.hash),
-            "provenance": self._description.provenance,
-            **self._description.content,
-        }
-        with whole_file(part.path) as file:
-            write_sealed(file, self._files.tables(segments), self._schema(), header)
+        write_history(folder, self._files, segments, self._description, self._schema())
 
     def _schema(self) -> Any:
         import pyarrow as pa
@@ -408,10 +379,7 @@ class RunFolder:
         return (len(self._description.content["problem"]["beams"]) + 7) // 8
 
     def _history(self) -> TablePart | None:
-        path = self.path / HISTORY
-        if not path.exists():
-            return None
-        return read_part(path, self._description.hash, HISTORY_ADVICE, thorough=False)
+        return read_history(self.path, self._description.hash)
 
 
 def _name_of(chain: int) -> str:

@@ -17,6 +17,7 @@ from starlette.concurrency import run_in_threadpool
 
 from bellcrank.errors import BellcrankError, InvalidSettings, UnknownName
 from bellcrank.model import human_counterpart, problem_to_dict
+from bellcrank.storage.history import HISTORY
 from bellcrank.web import curves, quick_calls
 from bellcrank.web.jobs import Record
 from bellcrank.web.pools import plain_error
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from bellcrank.web.jobs import Job
     from bellcrank.web.state import AppState
 
-HISTORY = "history.parquet"
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
 RunName = Annotated[str, Field(pattern=r"^[a-z0-9]{12}$")]

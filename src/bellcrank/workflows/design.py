@@ -14,7 +14,6 @@ from bellcrank.part import PartSpec, calibrated
 from bellcrank.provenance import provenance
 from bellcrank.search import (
     Candidate,
-    Evaluator,
     Progress,
     SearchSettings,
     advance_chain,
@@ -26,6 +25,7 @@ from bellcrank.search import (
     searches,
     select,
     start_chain,
+    verification_evaluator,
 )
 from bellcrank.storage import RunFolder, check_no_run, remove_temporaries
 from bellcrank.storage.locking import LOCK, locked
@@ -182,11 +182,6 @@ def accepted_candidates(
     return candidates, proposals, best
 
 
-def verification_evaluator(problem: Problem, settings: SearchSettings, **changes: Any) -> Evaluator:
-    """Return the evaluator of finished designs: the literal model, with the goals of the search."""
-    return make_evaluator(problem, replace(settings, **{"unloaded_beams": "keep", **changes}))
-
-
 def verify(design: Design, settings: SearchSettings, response: Response) -> dict[str, float]:
     """Return the efficiency of a design from rest, in fine and in adaptive load increments."""
     second = verification_evaluator(design.problem, settings, goals=()).evaluate(design.mask)
@@ -216,17 +211,17 @@ def conclude(
     evaluator = verification_evaluator(problem, settings)
     choose = most_efficient if spec is None else CandidateRanking(spec, settings, ranking)
     selection = select(problem, candidates, settings.objective, evaluator, choose)
-    literal = verification_evaluator(problem, settings, goals=())
+    all_beams = verification_evaluator(problem, settings, goals=())
     human = human_counterpart(problem)
     human_response = None
     if human is not None:
-        human_response = literal.evaluate(human.mask, VERIFICATION_INCREMENT)
+        human_response = all_beams.evaluate(human.mask, VERIFICATION_INCREMENT)
     report = DesignReport(
         folder=folder.path,
         settings=settings,
         selection=selection,
         checks=verify(selection.design, settings, selection.response),
-        initial_efficiency=literal.evaluate(problem.initial, VERIFICATION_INCREMENT).efficiency,
+        initial_efficiency=all_beams.evaluate(problem.initial, VERIFICATION_INCREMENT).efficiency,
         human=human,
         human_response=human_response,
         proposals=proposals,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from importlib import import_module
 from pathlib import Path
 from typing import cast, get_args
 
@@ -90,13 +89,10 @@ def _bundled_design(kind: Kind, name: str) -> Design:
 
 
 def _design_of_machines(name: str) -> Design | None:
-    """Return the strut, library entry or bundled machine of that name, or None.
+    """Return the strut, library entry or bundled machine of that name, or None."""
+    from bellcrank.machines.names import design_from_name
 
-    The library is built with the workflows of this package. Loading it by name when it is needed
-    keeps the import direction, and keeps it out of commands that do not use it.
-    """
-    design: Design | None = import_module("bellcrank.machines.names").design_from_name(name)
-    return design
+    return design_from_name(name)
 
 
 def _is_design(path: Path) -> bool:

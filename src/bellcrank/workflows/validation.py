@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.fem import Analysis
+    from bellcrank.machines.bundled.contact import ContactCheck
     from bellcrank.model import Design
 
     Plan = Sequence[tuple[str, FemSettings]]
@@ -315,3 +316,17 @@ def replace_record(validation: Validation, path: Path) -> None:
 def _key(entry: dict[str, Any]) -> str:
     """Return the identity of an analysis."""
     return json.dumps([entry[key] for key in KEY], sort_keys=True)
+
+
+def check_contact(design: Design) -> ContactCheck:
+    """Return the contact of the default part of a design, by nonlinear frame analysis.
+
+    Raises
+    ------
+    InvalidSettings
+        If the design cannot be built.
+    """
+    from bellcrank.machines.bundled.contact import ContactCheck
+
+    found = validate(design, spec_for(design), [("frame", FemSettings())]).analyses[0].contacts
+    return ContactCheck(len(found.pairs), found.first)

@@ -5,13 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 from bellcrank.errors import UnknownName
 from bellcrank.machines.bundled import bundled_machines
-
-if TYPE_CHECKING:
-    from bellcrank.model import Design
 
 RECORD = "contact.json"
 """Results of `check_contact`, written by ``python -m benchmarks.machines``."""
@@ -64,18 +60,3 @@ def bundled_contact(name: str) -> ContactCheck:
     text = (files("bellcrank.machines.bundled") / RECORD).read_text(encoding="utf-8")
     row = json.loads(text)["machines"][name]
     return ContactCheck(row["pairs"], row["onset"])
-
-
-def check_contact(design: Design) -> ContactCheck:
-    """Return the contact of the default part of a design, by nonlinear frame analysis.
-
-    Raises
-    ------
-    InvalidSettings
-        If the design cannot be built.
-    """
-    from bellcrank.fem import FemSettings
-    from bellcrank.workflows import spec_for, validate
-
-    found = validate(design, spec_for(design), [("frame", FemSettings())]).analyses[0].contacts
-    return ContactCheck(len(found.pairs), found.first)

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.errors import InvalidSettings
 from bellcrank.machines.library.catalogue import entry_files, read_summary
 from bellcrank.machines.library.files import write_entry
-from bellcrank.machines.library.measurement import MIN_INPUT_STIFFNESS, measure
 from bellcrank.mechanics import Response, Status
-from bellcrank.search import Verdict, read_settings, run_chains, select
+from bellcrank.search import Verdict, read_settings, run_chains, select, verification_evaluator
 from bellcrank.storage.files import make_folder
 from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows import reopen_design, start_design
-from bellcrank.workflows.design import accepted_candidates, verification_evaluator
+from bellcrank.workflows.design import accepted_candidates
+from bellcrank.workflows.library_measurement import MIN_INPUT_STIFFNESS, measure
 
 if TYPE_CHECKING:
     import threading
