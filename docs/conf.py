@@ -10,7 +10,7 @@ from pathlib import Path
 from bellcrank import __version__
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE / "extensions"))
+sys.path[:0] = [str(HERE / "extensions"), str(HERE.parent)]  # the latter for `reproduction`
 
 from made_pictures import MadePictures  # noqa: E402
 

@@ -30,7 +30,7 @@ CHAINS = {
     "scaling-8": (1.0, 2000, PAPER, "keep", 1),
     "discs": (1.0, 1500, PAPER, "keep", 1),
     "crane without dead ends": (0.6, 1000, PAPER, "prune_dead_ends", 1),
-    "crane stripped to what bears load": (0.8, 1000, PAPER, "prune_all", 1),
+    "crane without unloaded beams": (0.8, 1000, PAPER, "prune_all", 1),
     "crane from half its beams": (0.5, 1000, PAPER, "keep", 1),
     "scaling-8 wandering": (0.6, 1500, HOT, "keep", 1),
     "pliers on rollers": (1.0, 600, PAPER, "keep", 1),

@@ -99,7 +99,13 @@ def test_a_goal_that_always_holds_changes_no_result(small: Problem, search: str)
         assert np.allclose(one.efficiency, other.efficiency, equal_nan=True, atol=1e-8)
 
 
-@pytest.mark.parametrize("goal", GOALS)
+@pytest.mark.parametrize(
+    "goal",
+    [
+        pytest.param(goal, marks=pytest.mark.slow) if goal.startswith("no-") else goal
+        for goal in GOALS
+    ],
+)
 def test_a_search_with_a_goal_ends_with_designs_that_satisfy_it(small: Problem, goal: str) -> None:
     settings = HoppingSettings(steps=2 * BLOCK, goals=(goal,))
     evaluator = make_evaluator(small, settings)
@@ -127,7 +133,7 @@ def test_a_search_with_a_goal_ends_with_designs_that_satisfy_it(small: Problem, 
     )
 
 
-@pytest.mark.parametrize("move", ["flip", "balanced"])
+@pytest.mark.parametrize("move", [pytest.param("flip", marks=pytest.mark.slow), "balanced"])
 def test_the_violation_never_increases_along_a_chain(crane: Problem, move: str) -> None:
     settings = MetropolisSettings(
         steps=600, goals=("mass <= 0.9",), unloaded_beams="prune_all", moves=(move,),

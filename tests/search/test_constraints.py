@@ -325,7 +325,12 @@ def test_distances_of_segments_match_points_sampled_along_them() -> None:
         assert sampled_distance(a, b) == pytest.approx(d, abs=5e-3)
 
 
-@pytest.mark.parametrize("width", [0.0, 0.3, 0.9])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "width", [pytest.param(0.0, marks=SLOW), 0.3, pytest.param(0.9, marks=SLOW)]
+)
 def test_near_struts_are_those_that_a_search_over_all_pairs_finds(width: float) -> None:
     problem = find_problem("crane")
     rng = np.random.default_rng(4)

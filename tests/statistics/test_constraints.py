@@ -63,13 +63,18 @@ def efficiency(problem: Problem) -> np.ndarray:
     return Enumerated(problem, "prune_dead_ends").efficiency
 
 
+computed: dict[tuple[str, tuple[str, ...]], list[np.ndarray]] = {}
+
+
 def samples_of(problem: Problem, goal: str, *moves: str) -> list[np.ndarray]:
     settings = MetropolisSettings(
         steps=1250, schedule="constant", cold=TEMPERATURE, cost="negative", moves=moves,
         unloaded_beams="prune_dead_ends", goals=(goal,),
     )  # fmt: skip
-    evaluator = make_evaluator(problem, settings)
-    return [visited(evaluator, settings, chain) for chain in range(CHAINS)]
+    if (goal, moves) not in computed:
+        evaluator = make_evaluator(problem, settings)
+        computed[goal, moves] = [visited(evaluator, settings, chain) for chain in range(CHAINS)]
+    return computed[goal, moves]
 
 
 @pytest.mark.parametrize("goal", RULES)
