@@ -1,1 +1,1 @@
-"""Timings: `pytest benchmarks` for the parts, `python -m benchmarks.report` for a table."""
+"""Benchmarks: ``pytest benchmarks`` times single functions, each module a larger task."""

@@ -1,4 +1,4 @@
-"""Metropolis chains, recorded once and evaluated again for timings."""
+"""Metropolis chains whose proposals are recorded and evaluated again for timings."""
 
 from __future__ import annotations
 
@@ -19,17 +19,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """The proposals of a chain, and their total time.
+    """Proposals of a chain, and the time of the run.
 
     Parameters
     ----------
+    name
+        Name of the problem.
     masks : (n, M) bool
-        The proposed designs.
+        Proposed designs.
     accepted : (n,) bool
+        Whether each proposal was accepted.
     efficiency : (n,) float64
         Efficiency of each proposed design.
     seconds
-        Wall time of the whole run: proposals, responses, records.
+        Wall time of the run.
     """
 
     name: str
@@ -43,8 +46,8 @@ class Recording:
         """Mean wall time of one Metropolis step."""
         return 1e6 * self.seconds / len(self.masks)
 
-    def stretch(self, start: int, length: int) -> Recording:
-        """Part of the chain; its first row is the design that is current at `start`."""
+    def section(self, start: int, length: int) -> Recording:
+        """Return the proposals from step `start` on, after a first row with the current design."""
         current = np.flatnonzero(self.accepted[:start])[-1]
         rows = np.concatenate([[current], np.arange(start, start + length)])
         return Recording(
@@ -53,8 +56,8 @@ class Recording:
 
 
 @cache
-def record(name: str, steps: int, seed: int = 0) -> Recording:
-    """Run a chain with the settings of the paper."""
+def record_chain(name: str, steps: int, seed: int = 0) -> Recording:
+    """Run a chain with the settings of the paper and record its proposals."""
     evaluator = SpringEvaluator(find_problem(name))
     settings = MetropolisSettings(steps=steps, seed=seed)
     next(chain_blocks(evaluator, MetropolisSettings(steps=20), 0))  # compiles
@@ -72,18 +75,22 @@ def record(name: str, steps: int, seed: int = 0) -> Recording:
     )
 
 
-def walk(evaluator: SpringEvaluator, stretch: Recording) -> NDArray[np.float64]:
-    """Responses along a stretch, each from the last accepted one; returns the efficiencies."""
-    evaluator.evaluate(stretch.masks[0])
+def evaluate_section(evaluator: SpringEvaluator, section: Recording) -> NDArray[np.float64]:
+    """Evaluate the first design from rest, and `evaluate_proposals`."""
+    evaluator.evaluate(section.masks[0])
     evaluator.set_reference()
-    return walk_on(evaluator, stretch)
+    return evaluate_proposals(evaluator, section)
 
 
-def walk_on(evaluator: SpringEvaluator, stretch: Recording) -> NDArray[np.float64]:
-    """As `walk`, from the reference equilibrium that is already set."""
-    efficiency = np.empty(len(stretch.masks) - 1)
+def evaluate_proposals(evaluator: SpringEvaluator, section: Recording) -> NDArray[np.float64]:
+    """Return the efficiencies of the proposals of a section.
+
+    Each response starts from the equilibrium of the last accepted design; the first one starts
+    from the reference equilibrium of the evaluator.
+    """
+    efficiency = np.empty(len(section.masks) - 1)
     for step, (mask, accepted) in enumerate(
-        zip(stretch.masks[1:], stretch.accepted[1:], strict=True)
+        zip(section.masks[1:], section.accepted[1:], strict=True)
     ):
         efficiency[step] = evaluator.evaluate(mask, warm_start=True).efficiency
         if accepted:

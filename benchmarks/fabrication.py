@@ -1,4 +1,7 @@
-"""Time and size of files, G-code and movies: ``python -m benchmarks.fabrication [--quick]``."""
+"""Time and size of exported files, G-code and a movie.
+
+``python -m benchmarks.fabrication [--quick]`` prints a Markdown table of all export formats.
+"""
 
 from __future__ import annotations
 
@@ -19,35 +22,35 @@ from bellcrank.workflows.animate import MotionOptions, animate_motion
 from bellcrank.workflows.fabricate import print_design
 
 SLOW = ("step",)
-"""Formats that need minutes for thousands of struts."""
+"""Formats whose export takes minutes for thousands of struts."""
 
 
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="the crane only, no movie")
+    parser.add_argument("--quick", action="store_true", help="only the export of the crane")
     quick = parser.parse_args().quick
     designs = {"crane": find_problem("crane").full_design()}
     if not quick:
-        designs["scaling of 40 rows"] = scaling(40).full_design()
-    print("| part | struts | file | seconds | MB |\n|---|---|---|---|---|")
+        designs["scaling, 40 rows"] = scaling(40).full_design()
+    print("| part | struts | format | seconds | MB |\n|---|---|---|---|---|")
     for name, design in designs.items():
         part = PartSpec().of(design)
         for kind, exporter in exporters.items():
             if kind in SLOW and name != "crane":
                 continue
-            began = time.perf_counter()
+            start = time.perf_counter()
             content = exporter.to_bytes(Export(part=part))
-            spent = time.perf_counter() - began
+            elapsed = time.perf_counter() - start
             print(
-                f"| {name} | {design.beam_count} | {kind} | {spent:.2f} "
+                f"| {name} | {design.beam_count} | {kind} | {elapsed:.2f} "
                 f"| {len(content) / 1e6:.2f} |",
                 flush=True,
             )
     if quick:
         return
     with TemporaryDirectory() as folder:
-        began = time.perf_counter()
+        start = time.perf_counter()
         path = Path(folder) / "crane.mp4"
         settings = movie_settings(path, 5.0, None, None)
         animate_motion(
@@ -57,15 +60,15 @@ def main() -> None:
             MotionOptions(),
             overwrite=False,
         )
-        print(f"\nA movie of 5 s in 1080p: {time.perf_counter() - began:.1f} s")
+        print(f"\nMovie of 5 s, 1080p: {time.perf_counter() - start:.1f} s")
         if shutil.which("prusa-slicer"):
-            began = time.perf_counter()
+            start = time.perf_counter()
             bundle = Export(part=PartSpec().of(designs["crane"]))
             job = print_design(bundle, profiles["ninjaflex"], Path(folder) / "crane.gcode")
-            share = job.sliced.deposit.volume / job.volume
+            fraction = job.sliced.deposit.volume / job.volume
             print(
-                f"G-code of the crane: {time.perf_counter() - began:.1f} s, {share:.1%} of the "
-                f"solid in {job.sliced.deposit.layers} layers"
+                f"G-code of the crane: {time.perf_counter() - start:.1f} s, "
+                f"{job.sliced.deposit.layers} layers, deposited volume {fraction:.1%} of the solid"
             )
 
 

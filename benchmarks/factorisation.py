@@ -1,9 +1,10 @@
-"""Cost of machines against their number of beams: ``python -m benchmarks.factorisation``.
+"""Cost of machines as a function of the number of beams: ``python -m benchmarks.factorisation``.
 
-Rows of 1 to 40 actuators with half-hidden cells; at each length the time to assemble, to compile
-the row into arrays, to respond, and for one factorisation of the same stiffness matrix: by the
-block Cholesky of the package, by LAPACK in a band (reverse Cuthill-McKee order), by SuperLU.
-Prints Markdown and writes ``docs/machines/factorisation.json``.
+The machines are series of 1 to 40 actuators. For each number of actuators, measure the times of
+the assembly, of the preparation of arrays, of the response, and of one factorisation of the same
+stiffness matrix by three methods: the block Cholesky factorisation of the package, LAPACK's band
+Cholesky factorisation in reverse Cuthill-McKee order, and SuperLU. A Markdown table is printed,
+and the results are written to ``docs/machines/factorisation.json``.
 """
 
 from __future__ import annotations
@@ -36,29 +37,32 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.kernels.arrays import Scratch, Structure
 
 RECORD = Path(__file__).parents[1] / "docs" / "machines" / "factorisation.json"
-MISSING = 0.25
-"""Part of the designable beams that the actuators of the rows lack."""
+ABSENT_FRACTION = 0.25
+"""Fraction of the designable beams that are absent in each actuator."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What one length of row costs; times in milliseconds.
+    """Results for one number of actuators; times in milliseconds.
 
     Parameters
     ----------
     actuators, beams, unknowns
+        Numbers of actuators, beams and unknowns.
     assembly
-        From the plan to one design.
+        Time to assemble one design from the plan.
     preparation
-        From the design to the arrays that the kernels work on, with the order of elimination.
-    response, careful
-        From rest to the full stroke; in increments of 1/32.
+        Time to compute the arrays of the kernels, including the order of elimination.
+    response, verification
+        Time of the response from rest to the full stroke, in the increments of a search and in
+        increments of 1/32.
     sparse, banded, superlu
-        One factorisation.
+        Time of one factorisation by each method.
     half_bandwidth
-        Of the band.
+        Half bandwidth of the band matrix.
     error
-        Largest difference of a solution by the sparse factor from SuperLU's, relative.
+        Largest difference between the solutions by the sparse factorisation and by SuperLU,
+        divided by the largest component.
     """
 
     actuators: int
@@ -67,7 +71,7 @@ class Row:
     assembly: float
     preparation: float
     response: float
-    careful: float
+    verification: float
     sparse: float
     banded: float
     superlu: float
@@ -77,7 +81,7 @@ class Row:
 
 @entry
 def factorise(structure: Structure, scratch: Scratch) -> bool:
-    """Factorise the stiffness that was assembled last."""
+    """Factorise the last assembled stiffness matrix."""
     return cholesky.factorise(structure, scratch)
 
 
@@ -88,29 +92,29 @@ def solve(structure: Structure, scratch: Scratch) -> None:
 
 
 def actuator(columns: int) -> Design:
-    """Return some actuator: beams are missing anywhere outside its ports."""
+    """Return an actuator in which a random choice of designable beams is absent."""
     task = elementary(columns, "down")
     mask = task.initial.copy()
     rng = np.random.default_rng(0)
-    count = round(MISSING * len(task.designable))
+    count = round(ABSENT_FRACTION * len(task.designable))
     mask[rng.choice(task.designable, count, replace=False)] = False
     return Design(task, mask)
 
 
-def row(part: Design, actuators: int) -> Machine:
-    """Put actuators in a row, each driving the next."""
+def series(part: Design, actuators: int) -> Machine:
+    """Return a machine of actuators in series; the output of each is the input of the next."""
     parts: dict[str, Any] = {"p0": {"entry": "part"}}
     for number in range(1, actuators):
         parts[f"p{number}"] = {"entry": "part", "join": f"p{number - 1}.output"}
-    told = {
-        "name": "row", "parts": parts, "input": {"ports": ["p0.input"]},
+    content = {
+        "name": "series", "parts": parts, "input": {"ports": ["p0.input"]},
         "output": {"ports": [f"p{actuators - 1}.output"]},
     }  # fmt: skip
-    return assemble(plan_of(MachineTable.model_validate(told), "row"), lambda _entry: part)
+    return assemble(plan_of(MachineTable.model_validate(content), "series"), lambda _entry: part)
 
 
 def stiffness_of(evaluator: SpringEvaluator) -> csc_array:
-    """Return the stiffness that was assembled last, as scipy has it."""
+    """Return the last assembled stiffness matrix as a SciPy sparse array."""
     structure, scratch = evaluator.structure, evaluator.scratch
     blocks = int(evaluator.system.block.max()) + 1
     rows, columns, values = [], [], []
@@ -131,28 +135,28 @@ def stiffness_of(evaluator: SpringEvaluator) -> csc_array:
 def band_of(matrix: csc_array) -> np.ndarray:
     """Return the lower band of a symmetric matrix in reverse Cuthill-McKee order."""
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
-    moved = matrix[order][:, order].tocoo()
-    width = int(np.abs(moved.coords[0] - moved.coords[1]).max())
+    permuted = matrix[order][:, order].tocoo()
+    width = int(np.abs(permuted.coords[0] - permuted.coords[1]).max())
     band = np.zeros((width + 1, matrix.shape[0]))
-    below = moved.coords[0] >= moved.coords[1]
-    i, j = moved.coords[0][below], moved.coords[1][below]
-    band[i - j, j] = moved.data[below]
+    lower = permuted.coords[0] >= permuted.coords[1]
+    i, j = permuted.coords[0][lower], permuted.coords[1][lower]
+    band[i - j, j] = permuted.data[lower]
     return band
 
 
-def milliseconds(job: Callable[[], object], repeats: int) -> float:
-    """Return the least time that a job took."""
+def milliseconds(function: Callable[[], object], repeats: int) -> float:
+    """Return the minimum time of a number of calls, in milliseconds."""
     times = []
     for _ in range(repeats):
         start = time.perf_counter()
-        job()
+        function()
         times.append(time.perf_counter() - start)
     return round(1e3 * min(times), 3)
 
 
 def measure(part: Design, actuators: int, repeats: int) -> Row:
-    """Measure one length of row."""
-    machine = row(part, actuators)
+    """Measure a series of a number of actuators."""
+    machine = series(part, actuators)
     problem, mask = machine.design.problem, machine.design.mask
     evaluator = SpringEvaluator(problem)
     evaluator.evaluate(mask)
@@ -165,10 +169,10 @@ def measure(part: Design, actuators: int, repeats: int) -> Row:
         actuators=actuators,
         beams=machine.design.beam_count,
         unknowns=matrix.shape[0],
-        assembly=milliseconds(lambda: row(part, actuators), repeats),
+        assembly=milliseconds(lambda: series(part, actuators), repeats),
         preparation=milliseconds(lambda: SpringEvaluator(problem), repeats),
         response=milliseconds(lambda: evaluator.evaluate(mask), repeats),
-        careful=milliseconds(lambda: evaluator.evaluate(mask, VERIFICATION_INCREMENT), 1),
+        verification=milliseconds(lambda: evaluator.evaluate(mask, VERIFICATION_INCREMENT), 1),
         sparse=milliseconds(lambda: factorise(structure, scratch), repeats),
         banded=milliseconds(lambda: cholesky_banded(band, lower=True), repeats),
         superlu=milliseconds(
@@ -181,35 +185,44 @@ def measure(part: Design, actuators: int, repeats: int) -> Row:
 
 
 def _error(evaluator: SpringEvaluator, matrix: csc_array) -> float:
-    right = np.random.default_rng(1).normal(size=evaluator.scratch.step.shape)
-    evaluator.scratch.step[:] = right
+    """Return the relative difference between the solution of the package and SuperLU's."""
+    load = np.random.default_rng(1).normal(size=evaluator.scratch.step.shape)
+    evaluator.scratch.step[:] = load
     solve(evaluator.structure, evaluator.scratch)
-    expected = splu(matrix).solve(right.ravel()[: matrix.shape[0]])
-    found = evaluator.scratch.step.ravel()[: matrix.shape[0]]
-    return float(np.abs(found - expected).max() / np.abs(expected).max())
+    expected = splu(matrix).solve(load.ravel()[: matrix.shape[0]])
+    solution = evaluator.scratch.step.ravel()[: matrix.shape[0]]
+    return float(np.abs(solution - expected).max() / np.abs(expected).max())
 
 
 def main() -> None:
+    """Measure, print the table and write the record."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--columns", type=int, default=12)
-    parser.add_argument("--actuators", type=int, nargs="+", default=[1, 2, 5, 10, 20, 40])
-    parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--out", type=Path, default=RECORD)
+    parser.add_argument("--columns", type=int, default=12, help="columns of cells of an actuator")
+    parser.add_argument(
+        "--actuators",
+        type=int,
+        nargs="+",
+        default=[1, 2, 5, 10, 20, 40],
+        help="numbers of actuators",
+    )
+    parser.add_argument("--repeats", type=int, default=5, help="calls of each timed function")
+    parser.add_argument("--out", type=Path, default=RECORD, help="JSON file")
     options = parser.parse_args()
     part = actuator(options.columns)
     measure(part, 1, 1)  # compiles
     rows = []
-    print("| actuators | beams | unknowns | assembly, ms | preparation | response | in 1/32 "
-          "| factorised | in a band | SuperLU |")  # fmt: skip
+    print("| actuators | beams | unknowns | assembly | preparation | response "
+          "| response, increments of 1/32 | sparse factorisation "
+          "| band factorisation (half bandwidth) | SuperLU |")  # fmt: skip
     print("|---|---|---|---|---|---|---|---|---|---|")
     for actuators in options.actuators:
-        found = measure(part, actuators, options.repeats)
-        rows.append(asdict(found))
+        row = measure(part, actuators, options.repeats)
+        rows.append(asdict(row))
         print(
-            f"| {found.actuators} | {found.beams} | {found.unknowns} | {found.assembly:.0f} "
-            f"| {found.preparation:.1f} | {found.response:.1f} | {found.careful:.1f} "
-            f"| {found.sparse:.2f} | {found.banded:.2f} ({found.half_bandwidth}) "
-            f"| {found.superlu:.2f} |",
+            f"| {row.actuators} | {row.beams} | {row.unknowns} | {row.assembly:.0f} "
+            f"| {row.preparation:.1f} | {row.response:.1f} | {row.verification:.1f} "
+            f"| {row.sparse:.2f} | {row.banded:.2f} ({row.half_bandwidth}) "
+            f"| {row.superlu:.2f} |",
             flush=True,
         )
     record = {"columns": options.columns, "rows": rows, "provenance": provenance()}

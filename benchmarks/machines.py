@@ -1,10 +1,11 @@
-"""Bundled machines, assembled, simulated and improved: ``python -m benchmarks.machines``.
+"""Assembly, simulation and optimisation of the bundled machines: ``python -m benchmarks.machines``.
 
-For each machine: the time of assembly, of the linear assembly and of the simulation; the
-efficiency for small strokes by the linear assembly and of the whole lattice, and at the full
-stroke; and the efficiency after a search over all beams. Prints Markdown and writes
-``docs/machines/bundled.json``. ``--work`` is the folder of the searches, which can be resumed.
-``--contact`` checks the contact of struts instead, and writes the record of the package.
+For each machine, measure the times of the assembly of the lattice, of the linear assembly and of
+the simulation; the efficiency by the linear assembly, of the lattice for a small stroke and at
+the full stroke; and the efficiency after a search over all beams. A Markdown table is printed, and
+the results are written to ``docs/machines/bundled.json``. ``--work`` is the folder of the
+searches; a search in it is resumed. ``--contact`` checks the contact of struts instead, and writes
+the record that is part of the package.
 """
 
 from __future__ import annotations
@@ -25,34 +26,35 @@ from bellcrank.search import HoppingSettings
 from bellcrank.workflows import complete_design, reopen_design, start_design
 from bellcrank.workflows.validation import check_contact
 
-CONTACT = Path(__file__).parents[1] / "src" / "bellcrank" / "machines" / "bundled" / RECORD_NAME
-RECORD = Path(__file__).parents[1] / "docs" / "machines" / "bundled.json"
-SMALL = 1e-3
-"""Fraction of the stroke in which the response is linear."""
+ROOT = Path(__file__).parents[1]
+CONTACT_RECORD = ROOT / "src" / "bellcrank" / "machines" / "bundled" / RECORD_NAME
+RECORD = ROOT / "docs" / "machines" / "bundled.json"
+SMALL_STROKE = 1e-3
+"""Fraction of the stroke for the efficiency for small displacements."""
 GOALS = {"gripper": ("mirror x",)}
 """Constraints of the searches."""
-LONG = ("wave",)
-"""Machines whose search takes too long for a benchmark."""
+WITHOUT_SEARCH = ("wave",)
+"""Machines that are too large for a search in a benchmark."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Figures of one machine; times in seconds.
+    """Results for one machine; times in seconds.
 
     Parameters
     ----------
     name
         Name of the machine.
     parts, nodes, beams, all_beams
-        Sizes; `all_beams` includes absent beams.
-    building, linear_seconds, simulating
+        Numbers of parts, nodes and beams; `all_beams` includes absent beams.
+    assembly_seconds, linear_assembly_seconds, simulation_seconds
         Times of the assembly of the lattice, of the linear assembly, and of the response at the
         full stroke in increments of 1/32.
-    linear, small, efficiency
+    linear_assembly, small_stroke, full_stroke
         Efficiency by the linear assembly, of the lattice for a small stroke, and of the lattice
         at the full stroke.
-    designed
-        Efficiency after a search that starts from the assembly.
+    after_search
+        Efficiency after a search that starts from the assembled machine; None without a search.
     """
 
     name: str
@@ -60,18 +62,18 @@ class Row:
     nodes: int
     beams: int
     all_beams: int
-    building: float
-    linear_seconds: float
-    simulating: float
-    linear: float
-    small: float
-    efficiency: float
-    designed: float | None
+    assembly_seconds: float
+    linear_assembly_seconds: float
+    simulation_seconds: float
+    linear_assembly: float
+    small_stroke: float
+    full_stroke: float
+    after_search: float | None
 
 
-def designed(machine: Machine, name: str, options: argparse.Namespace) -> float | None:
-    """Return the efficiency after a search from a machine; finished searches are read."""
-    if not options.steps or name in LONG:
+def searched_efficiency(machine: Machine, name: str, options: argparse.Namespace) -> float | None:
+    """Return the efficiency after a search; the result of a finished search is read."""
+    if not options.steps or name in WITHOUT_SEARCH:
         return None
     folder = options.work / f"{name}-{options.steps}-{options.chains}"
     if (summary := folder / "summary.json").exists():
@@ -90,40 +92,42 @@ def designed(machine: Machine, name: str, options: argparse.Namespace) -> float 
 
 def measure(name: str, options: argparse.Namespace) -> Row:
     """Measure one machine."""
-    linear_assembly(bundled_machine(name))  # reads files and loads kernels
+    linear_assembly(bundled_machine(name))  # loads files and kernels before the measurement
     start = time.perf_counter()
     machine = bundled_machine(name)
-    built = time.perf_counter()
+    assembled = time.perf_counter()
     problem, mask = machine.design.problem, machine.design.mask
     response = SpringEvaluator(problem).evaluate(mask, VERIFICATION_INCREMENT)
     simulated = time.perf_counter()
     linear = linear_assembly(machine)
-    assembled = time.perf_counter()
-    small = replace(problem, input=replace(problem.input, amount=SMALL * problem.input.amount))
+    linearized = time.perf_counter()
+    amount = SMALL_STROKE * problem.input.amount
+    small = replace(problem, input=replace(problem.input, amount=amount))
     return Row(
         name=name,
         parts=len(machine.parts),
         nodes=problem.lattice.node_count,
         beams=machine.design.beam_count,
         all_beams=problem.lattice.beam_count,
-        building=built - start,
-        linear_seconds=assembled - simulated,
-        simulating=simulated - built,
-        linear=linear.efficiency,
-        small=SpringEvaluator(small).evaluate(mask).efficiency,
-        efficiency=response.efficiency,
-        designed=designed(machine, name, options),
+        assembly_seconds=assembled - start,
+        linear_assembly_seconds=linearized - simulated,
+        simulation_seconds=simulated - assembled,
+        linear_assembly=linear.efficiency,
+        small_stroke=SpringEvaluator(small).evaluate(mask).efficiency,
+        full_stroke=response.efficiency,
+        after_search=searched_efficiency(machine, name, options),
     )
 
 
 def write_contact(names: list[str]) -> None:
-    """Check the contact of machines, and write the record of the package."""
-    found = {name: asdict(check_contact(bundled_machine(name).design)) for name in names}
-    record = {"machines": found, "provenance": provenance()}
-    write_text(CONTACT, json.dumps(record, indent=1) + "\n", overwrite=True)
+    """Check the contact of struts in machines, and write the record of the package."""
+    results = {name: asdict(check_contact(bundled_machine(name).design)) for name in names}
+    record = {"machines": results, "provenance": provenance()}
+    write_text(CONTACT_RECORD, json.dumps(record, indent=1) + "\n", overwrite=True)
 
 
 def main() -> None:
+    """Measure, print the table and write the record."""
     options = parse()
     if options.contact:
         write_contact(bundled_machines())
@@ -138,9 +142,10 @@ def main() -> None:
         row = measure(name, options)
         rows.append(asdict(row))
         print(
-            f"| {row.name} | {row.parts} | {row.beams} of {row.all_beams} | {row.building:.2f} "
-            f"| {row.simulating:.2f} | {row.linear:.3f} | {row.small:.3f} | {row.efficiency:.3f} "
-            f"| {'-' if row.designed is None else f'{row.designed:.2f}'} |",
+            f"| {row.name} | {row.parts} | {row.beams} of {row.all_beams} "
+            f"| {row.assembly_seconds:.2f} | {row.simulation_seconds:.2f} "
+            f"| {row.linear_assembly:.3f} | {row.small_stroke:.3f} | {row.full_stroke:.3f} "
+            f"| {'-' if row.after_search is None else f'{row.after_search:.2f}'} |",
             flush=True,
         )
     record = {
@@ -151,13 +156,18 @@ def main() -> None:
 
 
 def parse() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--work", type=Path, default=Path("machines"), help="folder of searches")
-    parser.add_argument("--contact", action="store_true", help="check the contact of struts")
-    parser.add_argument("--machines", nargs="+", default=bundled_machines())
-    parser.add_argument("--steps", type=int, default=10_000, help="0: no search")
-    parser.add_argument("--chains", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=RECORD)
+    parser.add_argument("--contact", action="store_true", help="only check the contact of struts")
+    parser.add_argument(
+        "--machines", nargs="+", default=bundled_machines(), help="names of machines"
+    )
+    parser.add_argument(
+        "--steps", type=int, default=10_000, help="steps of each chain; 0 for no search"
+    )
+    parser.add_argument("--chains", type=int, default=2, help="chains of a search")
+    parser.add_argument("--out", type=Path, default=RECORD, help="JSON file")
     return parser.parse_args()
 
 

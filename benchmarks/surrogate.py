@@ -1,8 +1,8 @@
-"""What learned surrogates cost beside the mechanics: ``python -m benchmarks.surrogate [--quick]``.
+"""Cost of surrogates and of the spring model: ``python -m benchmarks.surrogate [--quick]``.
 
-Everything is measured in one run. On one core it is processor time of one thread, so that what
-else the machine does hardly matters; on a GPU it is wall time. A candidate is a packed mask, so
-that figures of networks include making what they look at. Prints Markdown and writes
+All costs are measured in the same run: on one core as the processor time of one thread, on a GPU
+as wall time. The input of all methods is a packed mask, so that the times of networks include the
+preparation of their inputs. Markdown tables are printed, and the results are written to
 ``docs/surrogate/costs.json``.
 """
 
@@ -30,7 +30,7 @@ from bellcrank.surrogate.recipes import Recipe
 from bellcrank.surrogate.trained_model import TrainedModel, architecture_of
 from bellcrank.surrogate.training_setup import begin
 from bellcrank.surrogate.views import PictureView, View, views
-from benchmarks.chains import record
+from benchmarks.chains import record_chain
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,13 +40,29 @@ if TYPE_CHECKING:
     from bellcrank.surrogate.pictures import Canvas
 
 PROBLEM = "crane"
-OUT = Path(__file__).parents[1] / "docs" / "surrogate" / "costs.json"
+RECORD = Path(__file__).parents[1] / "docs" / "surrogate" / "costs.json"
 GPU_BATCHES = (1, 256, 4096)
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much of everything to measure."""
+    """Sizes of the measurements.
+
+    Parameters
+    ----------
+    steps
+        Steps of the chain whose proposals are evaluated.
+    pictures, saved
+        Number of pictures drawn by the renderer, and with `savefig`.
+    responses
+        Number of responses.
+    batches
+        Batch sizes of networks on one core.
+    seconds
+        Least time of the repeated calls of a measurement.
+    training_steps
+        Number of training steps.
+    """
 
     steps: int
     pictures: int
@@ -63,33 +79,33 @@ QUICK = Effort(1000, 2000, 10, 4, (1, 32), 0.3, 2)
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What one candidate costs, by one way of judging it."""
+    """Time per design of one method on one device."""
 
-    what: str
-    where: str
+    method: str
+    device: str
     batch: int
     microseconds: float
 
 
 def seconds_of(
-    work: Callable[[], object], least: float, clock: Callable[[], float] = time.process_time
+    function: Callable[[], object], least: float, clock: Callable[[], float] = time.process_time
 ) -> float:
-    """Mean seconds of a call, over so many seconds of calls, after one to warm up."""
-    work()
+    """Return the mean time of calls that take `least` seconds in total, after a first call."""
+    function()
     count, start = 0, clock()
     while not count or clock() - start < least:
-        work()
+        function()
         count += 1
     return (clock() - start) / count
 
 
 def designs(effort: Effort) -> NDArray[np.bool_]:
-    """Return what a chain proposes, without its beginning."""
-    return record(PROBLEM, effort.steps).masks[effort.steps // 4 :]
+    """Return the proposals of a chain after the first quarter of its steps."""
+    return record_chain(PROBLEM, effort.steps).masks[effort.steps // 4 :]
 
 
 def save_as_matplotlib(lines: NDArray[np.float64], canvas: Canvas) -> bytes:
-    """Make one picture as scripts do: a figure, its lines, savefig."""
+    """Draw one picture with a matplotlib figure and `savefig`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
@@ -106,7 +122,7 @@ def save_as_matplotlib(lines: NDArray[np.float64], canvas: Canvas) -> bytes:
 
 
 def measure_rendering(masks: NDArray[np.bool_], effort: Effort) -> dict[str, float]:
-    """Time pictures on the fly, and by savefig."""
+    """Measure the rate of pictures by the renderer of the package and by `savefig`."""
     problem = find_problem(PROBLEM)
     view = PictureView(problem)
     rows = np.resize(np.arange(len(masks)), effort.pictures)
@@ -116,15 +132,15 @@ def measure_rendering(masks: NDArray[np.bool_], effort: Effort) -> dict[str, flo
         for first in range(0, len(packed), 512):
             view.renderer.render(packed[first : first + 512])
 
-    ours = seconds_of(render, effort.seconds) / len(packed)
+    rendered = seconds_of(render, effort.seconds) / len(packed)
     canvas = view.renderer.canvas
     lines = canvas.pixels_of(problem.lattice.positions)[problem.lattice.beams]
     start = time.process_time()
     for mask in masks[: effort.saved]:
         save_as_matplotlib(lines[mask], canvas)
-    theirs = (time.process_time() - start) / min(effort.saved, len(masks))
-    return {"pictures_per_second": 1.0 / ours, "savefig_per_second": 1.0 / theirs,
-            "ratio": theirs / ours}  # fmt: skip
+    saved = (time.process_time() - start) / min(effort.saved, len(masks))
+    return {"pictures_per_second": 1.0 / rendered, "savefig_per_second": 1.0 / saved,
+            "ratio": saved / rendered}  # fmt: skip
 
 
 class TimedView:
@@ -136,34 +152,34 @@ class TimedView:
         self.seconds = 0.0
 
     def arrays(self, packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Compute the arrays, and add the time."""
+        """Return the arrays of the view, and add the time of the call to `seconds`."""
         start = time.process_time()
-        found = self.view.arrays(packed)
+        arrays = self.view.arrays(packed)
         self.seconds += time.process_time() - start
-        return found
+        return arrays
 
 
-def measure_waiting(masks: NDArray[np.bool_], name: str, effort: Effort) -> float:
-    """Return the fraction of a training's steps that is spent on making its inputs."""
-    some = masks[: 32 * effort.training_steps * 4]
-    packed = np.packbits(some, axis=1)
-    runs = np.arange(len(some)) // max(len(some) // 8, 1)
-    data = Dataset(find_problem(PROBLEM), packed, some.sum(axis=1).astype(float), runs)
+def measure_input_share(masks: NDArray[np.bool_], name: str, effort: Effort) -> float:
+    """Return the fraction of the training time that is the preparation of the inputs."""
+    selected = masks[: 32 * effort.training_steps * 4]
+    packed = np.packbits(selected, axis=1)
+    runs = np.arange(len(selected)) // max(len(selected) // 8, 1)
+    data = Dataset(find_problem(PROBLEM), packed, selected.sum(axis=1).astype(float), runs)
     steps = effort.training_steps if name.startswith("resnet") else 20 * effort.training_steps
     recipe = Recipe(model=name, epochs=1, epoch_size=32 * (steps + 1), tested=2)
     training = begin(data, recipe, device="cpu")
     timed = TimedView(training.model.view)
     training.model = replace(training.model, view=timed)
-    story = training._steps_of_epoch()  # noqa: SLF001
-    next(story)
+    epoch = training._steps_of_epoch()  # noqa: SLF001
+    next(epoch)
     timed.seconds, start = 0.0, time.process_time()
     for _ in range(steps - 1):
-        next(story)
+        next(epoch)
     return timed.seconds / (time.process_time() - start)
 
 
 def measure_mechanics(masks: NDArray[np.bool_], effort: Effort) -> list[Cost]:
-    """Time responses and the screening of all flips."""
+    """Measure the times of responses and of the prediction of all flips."""
     rows = np.linspace(0, len(masks) - 1, effort.responses).astype(int)
     costs = []
     evaluator = SpringEvaluator(find_problem(PROBLEM))
@@ -177,66 +193,70 @@ def measure_mechanics(masks: NDArray[np.bool_], effort: Effort) -> list[Cost]:
     evaluator.predict_flips(masks[rows[0]])
     for row in rows:
         start = time.process_time()
-        screening = evaluator.predict_flips(masks[row])
-        if screening is not None:
+        prediction = evaluator.predict_flips(masks[row])
+        if prediction is not None:
             seconds += time.process_time() - start
-            flips += len(screening.beams)
-    costs.append(Cost("low-rank screening, per flip", "one core", 1, 1e6 * seconds / flips))
+            flips += len(prediction.beams)
+    costs.append(Cost("low-rank update, per flip", "one core", 1, 1e6 * seconds / flips))
     return costs
 
 
 def network(name: str) -> TrainedModel:
-    """Return a network as it comes: weights do not change what it costs."""
+    """Return an untrained network; the time of a prediction does not depend on the weights."""
     problem = find_problem(PROBLEM)
     architecture = architecture_of(name)
     view = views[architecture.view](problem)
-    built = architecture.build(view.shape).to(memory_format=torch.channels_last).eval()
+    module = architecture.build(view.shape).to(memory_format=torch.channels_last).eval()
     return TrainedModel(
-        architecture=name, problem=problem, view=view, mean=0.0, deviation=1.0, network=built
+        architecture=name, problem=problem, view=view, mean=0.0, deviation=1.0, network=module
     )
 
 
 def measure_network(masks: NDArray[np.bool_], name: str, effort: Effort) -> list[Cost]:
-    """Time predictions in each precision, on the processor and on a GPU."""
+    """Measure the times of predictions for each precision, on the processor and on a GPU."""
     model = network(name)
     packed = np.packbits(masks, axis=1)
     costs = []
-    kinds = {"float32", find_precision("auto", torch.device("cpu"))}
+    precisions = {"float32", find_precision("auto", torch.device("cpu"))}
 
-    def add(what: str, where: str, batch: int, predict: Callable[..., object]) -> None:
-        chosen = packed[np.arange(batch) % len(packed)]
-        clock = time.process_time if where == "one core" else time.perf_counter
-        seconds = seconds_of(lambda: predict(chosen), effort.seconds, clock) / batch
-        costs.append(Cost(what, where, batch, 1e6 * seconds))
+    def add(precision: str, device: str, batch: int) -> None:
+        inputs = packed[np.arange(batch) % len(packed)]
+        where, clock = "one core", time.process_time
+        if device == "cuda":
+            where, clock = torch.cuda.get_device_name(), time.perf_counter
+        seconds = seconds_of(
+            lambda: model.predict(inputs, device=device, precision=precision),
+            effort.seconds,
+            clock,
+        )
+        costs.append(Cost(f"{name}, torch {precision}", where, batch, 1e6 * seconds / batch))
 
     for batch in effort.batches:
-        for kind in sorted(kinds, reverse=True):
-            add(f"{name}, torch {kind}", "one core", batch,
-                lambda p, k=kind: model.predict(p, device="cpu", precision=k))  # fmt: skip
+        for precision in sorted(precisions, reverse=True):
+            add(precision, "cpu", batch)
     if torch.cuda.is_available():
         for batch in GPU_BATCHES:
-            for kind in ("float32", "bfloat16"):
-                add(f"{name}, torch {kind}", torch.cuda.get_device_name(), batch,
-                    lambda p, k=kind: model.predict(p, device="cuda", precision=k))  # fmt: skip
+            for precision in ("float32", "bfloat16"):
+                add(precision, "cuda", batch)
     return costs
 
 
 def print_costs(costs: list[Cost]) -> None:
-    """Print one row for each way, with its speed-ups."""
+    """Print one row for each method, with the ratio of its time to that of Newton's method."""
     newton = costs[0].microseconds
-    print("\n| a candidate by | on | batch | us | faster than Newton |")
+    print("\n| method | device | batch | us per design | times as fast as Newton |")
     print("|---|---|---|---|---|")
     for cost in costs:
         print(
-            f"| {cost.what} | {cost.where} | {cost.batch} | {cost.microseconds:.4g} "
+            f"| {cost.method} | {cost.device} | {cost.batch} | {cost.microseconds:.4g} "
             f"| {newton / cost.microseconds:.3g} |"
         )
     if not torch.cuda.is_available():
-        print("\nno GPU here")
+        print("\nNo GPU was found.")
 
 
 def processor() -> str:
-    """Return what the processor calls itself."""
+    """Return the name of the processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -245,38 +265,43 @@ def processor() -> str:
 
 
 def main() -> None:
-    """Measure, print and write."""
+    """Measure, print the tables and write the record."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a rough look; writes only to --out")
-    parser.add_argument("--out", type=Path, help=f"JSON; default: {OUT}")
-    parser.add_argument("--models", nargs="+", choices=list(models), default=list(models))
-    given = parser.parse_args()
-    effort = QUICK if given.quick else FULL
+    parser.add_argument(
+        "--quick", action="store_true", help="short measurements; no file without --out"
+    )
+    parser.add_argument("--out", type=Path, help=f"JSON file; default: {RECORD}")
+    parser.add_argument(
+        "--models", nargs="+", choices=list(models), default=list(models), help="names of models"
+    )
+    options = parser.parse_args()
+    effort = QUICK if options.quick else FULL
     torch.set_num_threads(1)
     masks = designs(effort)
     rendering = measure_rendering(masks, effort)
     print(
-        f"{rendering['pictures_per_second']:.0f} pictures a second on one core; savefig makes "
-        f"{rendering['savefig_per_second']:.0f}: {rendering['ratio']:.0f} times as many\n"
+        f"Pictures per second on one core: {rendering['pictures_per_second']:.0f}; with savefig: "
+        f"{rendering['savefig_per_second']:.0f}; ratio: {rendering['ratio']:.0f}\n"
     )
-    print("| training | waits for data |\n|---|---|")
-    waiting = {}
-    for name in given.models:
-        waiting[name] = measure_waiting(masks, name, effort)
-        print(f"| {name} | {100.0 * waiting[name]:.2f} % |")
+    print("| model | preparation of inputs, fraction of the training time |\n|---|---|")
+    input_share = {}
+    for name in options.models:
+        input_share[name] = measure_input_share(masks, name, effort)
+        print(f"| {name} | {100.0 * input_share[name]:.2f} % |")
     costs = measure_mechanics(masks, effort)
-    for name in given.models:
+    for name in options.models:
         costs += measure_network(masks, name, effort)
     print_costs(costs)
-    out = given.out or (None if given.quick else OUT)
+    out = options.out or (None if options.quick else RECORD)
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
-        told = {
+        content = {
             "problem": PROBLEM, "processor": processor(), "gpu": torch.cuda.is_available(),
-            "rendering": rendering, "waiting": waiting, "costs": [asdict(each) for each in costs],
+            "rendering": rendering, "input_share": input_share,
+            "costs": [asdict(each) for each in costs],
             "provenance": provenance(torch=torch.__version__),
         }  # fmt: skip
-        out.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+        out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""What validation costs: ``python -m benchmarks.validation [--quick]``.
+"""Cost of validation: ``python -m benchmarks.validation [--quick]``.
 
-Times of the crane's levels over the whole stroke, and how the cost of linear frames grows with
-the number of struts. Printed as Markdown tables.
+Measure the time of each level of analysis of the crane over the full stroke, and the time of a
+linear frame analysis as a function of the number of struts. Markdown tables are printed.
 """
 
 from __future__ import annotations
@@ -27,41 +27,41 @@ REPEATS = 3
 def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="frames only")
+    parser.add_argument("--quick", action="store_true", help="only frame analyses of the crane")
     quick = parser.parse_args().quick
     crane_table(quick=quick)
-    growth_table()
+    size_table()
 
 
 def crane_table(*, quick: bool) -> None:
-    """Print what each level of the crane costs."""
-    jobs = [
+    """Print time and memory of each level of analysis of the crane."""
+    analyses = [
         ("frame", FemSettings(linear=True)),
         ("frame", FemSettings()),
         ("plane", FemSettings(linear=True)),
         ("plane", FemSettings()),
         ("solid", FemSettings(linear=True)),
     ]
-    print("| design | level | unknowns | factorisations | seconds | memory so far |")
+    print("| design | level | unknowns | factorisations | seconds | peak memory of the process |")
     print("|---|---|---|---|---|---|")
-    for what in ("crane", "human:crane", "machine:crane"):
-        part = PartSpec().of(find_design(what))
-        for level, settings in jobs[: 2 if quick else None]:
-            began = time.perf_counter()
+    for design in ("crane", "human:crane", "machine:crane"):
+        part = PartSpec().of(find_design(design))
+        for level, settings in analyses[: 2 if quick else None]:
+            start = time.perf_counter()
             analysis = levels[level](part, settings)
-            spent = time.perf_counter() - began
+            elapsed = time.perf_counter() - start
             name = f"{level}, {analysis.theory}" + (", linear" if settings.linear else "")
             cost = analysis.cost
             memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
             print(
-                f"| {what} | {name} | {cost['unknowns']:.0f} | {cost['factorisations']:.0f} "
-                f"| {spent:.2f} | {memory:.1f} GB |",
+                f"| {design} | {name} | {cost['unknowns']:.0f} | {cost['factorisations']:.0f} "
+                f"| {elapsed:.2f} | {memory:.1f} GB |",
                 flush=True,
             )
 
 
-def growth_table() -> None:
-    """Print how linear frames grow with the number of struts."""
+def size_table() -> None:
+    """Print the time of a linear frame analysis for several numbers of struts."""
     struts, seconds = [], []
     print("\n| struts | unknowns | seconds | us per strut |")
     print("|---|---|---|---|")
@@ -69,10 +69,10 @@ def growth_table() -> None:
         part = PartSpec().of(scaling(size).full_design())
         times = []
         for _ in range(REPEATS):
-            began = time.perf_counter()
+            start = time.perf_counter()
             system = frame_system(part, frame_mesh(part))
             solve_linear(system)
-            times.append(time.perf_counter() - began)
+            times.append(time.perf_counter() - start)
         struts.append(part.design.beam_count)
         seconds.append(min(times))
         print(
@@ -80,7 +80,7 @@ def growth_table() -> None:
             f"| {1e6 * seconds[-1] / struts[-1]:.0f} |"
         )
     exponent = np.polyfit(np.log(struts), np.log(seconds), 1)[0]
-    print(f"\nCost grows with the number of struts to the power {exponent:.2f}.")
+    print(f"\nThe time is proportional to the number of struts to the power {exponent:.2f}.")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""How quickly the page answers: alone, and with twenty others and eight searches.
+"""Response times of the page with one user, and with twenty users and eight searches.
 
-``python -m benchmarks.web`` starts a server of its own and prints a table. What needs Chromium
-and playwright is left out where they are missing.
+``python -m benchmarks.web`` starts a server and prints a table. The measurements in a browser
+require Chromium and playwright and are skipped without them.
 """
 
 from __future__ import annotations
@@ -29,32 +29,32 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 SESSIONS, SEARCHES = 20, 8
-LONGEST = 120.0
-"""Seconds to wait until all searches have begun."""
+START_LIMIT = 120.0
+"""Longest time until all searches have started, in seconds."""
 PAUSE = 0.5
-"""Seconds between two edits of a person."""
+"""Time between two edits of a session, in seconds."""
 
 
 @contextlib.contextmanager
-def serving() -> Iterator[tuple[str, int]]:
-    """Yield address and process of a server."""
+def running_server() -> Iterator[tuple[str, int]]:
+    """Start a server; yield its address and the number of its process."""
     with TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "bellcrank", "serve", "--port", "0", "--folder", folder]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
             assert process.stderr is not None
-            found = re.search(r"http://\S+?(?=/)", process.stderr.readline())
-            assert found is not None
+            address = re.search(r"http://\S+?(?=/)", process.stderr.readline())
+            assert address is not None
             try:
-                while not httpx.get(f"{found[0]}/api/about").json()["ready"]:
+                while not httpx.get(f"{address[0]}/api/about").json()["ready"]:
                     time.sleep(0.2)
-                yield found[0], process.pid
+                yield address[0], process.pid
             finally:
                 os.kill(process.pid, signal.SIGTERM)
                 process.wait(60)
 
 
 def megabytes(pid: int) -> float:
-    """Memory of a process and all it has started, what they share counted once."""
+    """Return the proportional set size of a process and its descendants, in megabytes."""
     children = Path(f"/proc/{pid}/task/{pid}/children")
     own = re.search(r"^Pss:\s+(\d+)", Path(f"/proc/{pid}/smaps_rollup").read_text(), re.MULTILINE)
     total = int(own[1]) / 1024 if own else 0.0
@@ -65,14 +65,14 @@ def megabytes(pid: int) -> float:
 
 
 def quantiles(seconds: list[float]) -> str:
-    """Median, 95th percentile and largest of some times, in milliseconds."""
+    """Return median, 95th percentile, maximum and number of times as text, in milliseconds."""
     ordered = sorted(1e3 * each for each in seconds)
-    last = ordered[min(len(ordered) - 1, int(0.95 * len(ordered)))]
-    return f"{statistics.median(ordered):7.1f} {last:7.1f} {ordered[-1]:7.1f}   ({len(ordered)})"
+    high = ordered[min(len(ordered) - 1, int(0.95 * len(ordered)))]
+    return f"{statistics.median(ordered):7.1f} {high:7.1f} {ordered[-1]:7.1f}   ({len(ordered)})"
 
 
 def flips(design: dict[str, Any], seed: int) -> Iterator[str]:
-    """Yield masks of a design with one beam after the other flipped."""
+    """Yield masks of a design; each differs from the last by one flipped beam."""
     bits = bytearray.fromhex(design["mask"])
     beams = design["problem"]["designable"]
     for k in range(10**6):
@@ -84,7 +84,7 @@ def flips(design: dict[str, Any], seed: int) -> Iterator[str]:
 async def edit(
     address: str, design: dict[str, Any], seed: int, count: int, pause: float
 ) -> list[float]:
-    """Flip beams as a person would, and return how long each answer took."""
+    """Edit a design with a pause after each flip; return the response times in seconds."""
     times = []
     masks = flips(design, seed)
     async with websockets.connect(f"{address.replace('http', 'ws')}/api/edit") as socket:
@@ -93,16 +93,16 @@ async def edit(
         )
         await socket.recv()
         for number in range(count):
-            begin = time.perf_counter()
+            start = time.perf_counter()
             await socket.send(json.dumps({"id": number, "mask": next(masks)}))
             await socket.recv()
-            times.append(time.perf_counter() - begin)
+            times.append(time.perf_counter() - start)
             await asyncio.sleep(pause)
     return times
 
 
-async def crowd(address: str, pid: int, design: dict[str, Any], seconds: float) -> None:
-    """Let many sessions edit and look while searches are queued, and say how they fare."""
+async def under_load(address: str, pid: int, design: dict[str, Any], seconds: float) -> None:
+    """Print the response times of many sessions that edit while searches are queued and run."""
     async with httpx.AsyncClient(base_url=address, timeout=60) as client:
         for k in range(SEARCHES):
             owner = "a" if k < SEARCHES - 2 else "bc"[k - SEARCHES + 2]
@@ -111,17 +111,17 @@ async def crowd(address: str, pid: int, design: dict[str, Any], seconds: float) 
                 "steps": 3000, "chains": 2, "seed": k,
             }  # fmt: skip
             (await client.post("/api/runs", json=body)).raise_for_status()
-        loads: list[float] = []
+        list_times: list[float] = []
         peak = megabytes(pid)
         order: list[str] = []
-        news = 0
+        messages = 0
 
-        async def look() -> None:
+        async def poll() -> None:
             nonlocal peak
             while True:
-                begin = time.perf_counter()
+                start = time.perf_counter()
                 runs = (await client.get("/api/runs")).json()
-                loads.append(time.perf_counter() - begin)
+                list_times.append(time.perf_counter() - start)
                 for run in reversed(runs):
                     if run["status"] != "queued" and run["title"] not in order:
                         order.append(run["title"])
@@ -129,69 +129,69 @@ async def crowd(address: str, pid: int, design: dict[str, Any], seconds: float) 
                 await asyncio.sleep(0.5)
 
         async def listen() -> None:
-            nonlocal news
+            nonlocal messages
             first = (await client.get("/api/runs")).json()[-1]["id"]
             async with websockets.connect(
                 f"{address.replace('http', 'ws')}/api/runs/{first}/live"
             ) as socket:
                 async for _ in socket:
-                    news += 1
+                    messages += 1
 
-        others = [asyncio.create_task(look()), asyncio.create_task(listen())]
-        begin = time.perf_counter()
+        tasks = [asyncio.create_task(poll()), asyncio.create_task(listen())]
+        start = time.perf_counter()
         count = int(seconds / PAUSE)
-        found = await asyncio.gather(
+        times = await asyncio.gather(
             *(edit(address, design, k, count, PAUSE) for k in range(SESSIONS))
         )
-        passed = time.perf_counter() - begin
-        while len(order) < SEARCHES and time.perf_counter() - begin < LONGEST:
+        elapsed = time.perf_counter() - start
+        while len(order) < SEARCHES and time.perf_counter() - start < START_LIMIT:
             await asyncio.sleep(0.5)
-        for task in others:
+        for task in tasks:
             task.cancel()
-        print(f"edit, {SESSIONS} sessions, {SEARCHES} searches   {quantiles(sum(found, []))}")  # noqa: RUF017
-        print(f"list of searches, meanwhile         {quantiles(loads)}")
-        print(f"news of a search                    {news / passed:.1f} a second, while it ran")
-        print(f"searches began in the order         {' '.join(order)}")
-        print(f"memory of all processes             {peak:.0f} MB at most")
+        print(f"edit, {SESSIONS} sessions, {SEARCHES} searches   {quantiles(sum(times, []))}")  # noqa: RUF017
+        print(f"list of searches under load         {quantiles(list_times)}")
+        print(f"messages of a running search        {messages / elapsed:.1f} per second")
+        print(f"order in which searches started     {' '.join(order)}")
+        print(f"largest memory of all processes     {peak:.0f} MB")
 
 
 def in_browser(address: str) -> None:
-    """Measure what a person sees."""
+    """Measure the page in a browser: paint, size, edits and the animation."""
     chromium = shutil.which("chromium")
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
         chromium = None
     if chromium is None:
-        print("Chromium or playwright is missing: nothing was measured in a browser")
+        print("measurements in a browser           skipped: Chromium or playwright is missing")
         return
-    with sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1440, "height": 900})
-        weight = 0
+        received = 0
 
-        def weigh(response: Any) -> None:
-            nonlocal weight
-            weight += int(response.headers.get("content-length", 0))
+        def add_size(response: Any) -> None:
+            nonlocal received
+            received += int(response.headers.get("content-length", 0))
 
-        page.on("response", weigh)
+        page.on("response", add_size)
         paints = []
         for _ in range(5):
             page.goto("about:blank")
             page.goto(address)
             page.locator("svg.canvas path.dot").first.wait_for(state="attached")
             drawn = page.evaluate("performance.now()")
-            page.wait_for_timeout(300)  # the browser notes its paints a little later
-            paints.append((page.evaluate(PAINTED), drawn))
+            page.wait_for_timeout(300)  # the paint entry is added after the paint
+            paints.append((page.evaluate(FIRST_PAINT), drawn))
         first, drawn = (statistics.median(each) for each in zip(*paints, strict=True))
-        print(f"first paint, task drawn             {first:.0f} ms, {drawn:.0f} ms")
-        print(f"all that is fetched                 {weight / 5000:.0f} kB")
+        print(f"first paint, problem drawn          {first:.0f} ms, {drawn:.0f} ms")
+        print(f"size of the page                    {received / 5000:.0f} kB")
         page.locator(".step.lattice h2 button").click()
         page.get_by_label("Start from").select_option("crane")
         page.wait_for_timeout(1000)
         page.locator(".tools label", has_text="By hand").click()
         page.locator(".readout .latency").wait_for()
-        page.evaluate(WATCH)
+        page.evaluate(RECORD_CLICKS)
         box = page.locator("svg.canvas").bounding_box()
         for k in range(60):
             page.mouse.click(
@@ -199,36 +199,36 @@ def in_browser(address: str) -> None:
                 box["y"] + box["height"] * (0.3 + 0.006 * k),
             )
             page.wait_for_timeout(120)
-        found = [each / 1e3 for each in page.evaluate("window.answered")]
-        print(f"click on a beam to moved lattice    {quantiles(found)}")
+        times = [each / 1e3 for each in page.evaluate("window.responseTimes")]
+        print(f"click to drawn deformed lattice     {quantiles(times)}")
         page.goto(f"{address}/#/design/builtin/machine-crane")
         page.locator('.player[data-ready="yes"]').wait_for()
         page.wait_for_timeout(500)
-        watch = page.context.new_cdp_session(page)
-        watch.send("Performance.enable", {"timeDomain": "threadTicks"})
-        before = used(watch)
-        frames, rate = page.evaluate(PLAYED)
-        work = 1e3 * (used(watch) - before) / frames
-        print(f"playback of the crane               {rate:.0f} frames a second")
-        print(f"processor time of a frame           {work:.1f} ms of the page's thread")
+        session = page.context.new_cdp_session(page)
+        session.send("Performance.enable", {"timeDomain": "threadTicks"})
+        before = thread_time(session)
+        frames, rate = page.evaluate(COUNT_FRAMES)
+        frame_time = 1e3 * (thread_time(session) - before) / frames
+        print(f"animation of the crane              {rate:.0f} frames per second")
+        print(f"time per frame of the page's thread {frame_time:.1f} ms")
         browser.close()
 
 
-def used(session: Any) -> float:
-    """Processor time that the page's thread has used, in seconds."""
+def thread_time(session: Any) -> float:
+    """Return the processor time of the main thread of the page, in seconds."""
     metrics = session.send("Performance.getMetrics")["metrics"]
     return float(next(each["value"] for each in metrics if each["name"] == "TaskDuration"))
 
 
-PAINTED = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
-WATCH = """() => {
-  window.answered = [];
+FIRST_PAINT = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
+RECORD_CLICKS = """() => {
+  window.responseTimes = [];
   let begin = 0;
   document.addEventListener("pointerdown", () => { begin = performance.now(); }, true);
   document.addEventListener("bellcrank-response", () => requestAnimationFrame(() =>
-    setTimeout(() => window.answered.push(performance.now() - begin))));
+    setTimeout(() => window.responseTimes.push(performance.now() - begin))));
 }"""
-PLAYED = """() => new Promise((done) => {
+COUNT_FRAMES = """() => new Promise((done) => {
   const times = [];
   const step = (now) => {
     times.push(now);
@@ -240,18 +240,21 @@ PLAYED = """() => new Promise((done) => {
 
 
 def main() -> None:
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=20.0, help="that the crowd lasts")
+    parser.add_argument(
+        "--seconds", type=float, default=20.0, help="duration of the edits of all sessions"
+    )
     seconds = parser.parse_args().seconds
-    print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f} before")
-    print("                                     median     95 %     all  (number), ms")
-    with serving() as (address, pid):
+    print(f"{os.cpu_count()} processors, initial load average {os.getloadavg()[0]:.1f}")
+    print("                                     median     95 %     max  (number), ms")
+    with running_server() as (address, pid):
         design = httpx.get(f"{address}/api/gallery/builtin/human-crane").json()
-        alone = asyncio.run(edit(address, design, 0, 300, 0.01))
-        print(f"edit of the crane, server alone     {quantiles(alone)}")
-        print(f"memory of all processes             {megabytes(pid):.0f} MB, idle")
+        times = asyncio.run(edit(address, design, 0, 300, 0.01))
+        print(f"edit of the crane, no other load    {quantiles(times)}")
+        print(f"memory of all processes             {megabytes(pid):.0f} MB before the load")
         in_browser(address)
-        asyncio.run(crowd(address, pid, design, seconds))
+        asyncio.run(under_load(address, pid, design, seconds))
 
 
 if __name__ == "__main__":

@@ -56,8 +56,8 @@ NAMES = {
 }  # fmt: skip
 """Lower-case names that are not used, with what replaces them."""
 
-READ_BY_PEOPLE = ("src/*.py", "src/*.toml", "reproduction/*.py", "web/src/*", "docs/*.md",
-                  "docs/*.py", "examples/*.py", "README.md")  # fmt: skip
+READ_BY_PEOPLE = ("src/*.py", "src/*.toml", "reproduction/*.py", "benchmarks/*.py", "web/src/*",
+                  "docs/*.md", "docs/*.py", "examples/*.py", "README.md")  # fmt: skip
 EXCEPT = {"docs/changelog.md"}
 
 

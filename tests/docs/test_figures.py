@@ -36,8 +36,8 @@ def three(value: float) -> str:
     return f"{rounded:,.0f}" if rounded >= 1000.0 else f"{rounded:g}"
 
 
-def competition() -> Rows:
-    for path in (DOCS / "competition").glob("*-*.json"):
+def search_comparison() -> Rows:
+    for path in (DOCS / "comparison").glob("*-*.json"):
         told = json.loads(path.read_text(encoding="utf-8"))
         unit = " responses" if told["problem"] == "crane" else ""
         for kind, budget in (
@@ -52,8 +52,8 @@ def competition() -> Rows:
             )  # fmt: skip
 
 
-def tournament() -> Rows:
-    results = read("competition/tournament")["results"]
+def move_comparison() -> Rows:
+    results = read("comparison/moves")["results"]
     for moves, words in (
         ("flip", "`flip`"),
         ("flip, node", "`flip`, `node`"),
@@ -100,7 +100,7 @@ def meshes() -> Rows:
     for told in read("validation/meshes")["rows"]:
         size = f"{told['size']:g} mm" + (" (default)" if told["size"] == 1.0 else "")
         yield row(
-            size, f"{told['unknowns']:,.0f}", f"{told['small_motions']:.6f}",
+            size, f"{told['unknowns']:,.0f}", f"{told['small_displacements']:.6f}",
             f"{told['efficiency']:.6f}", f"{told['force_N']:.2f}",
         )  # fmt: skip
 
@@ -121,11 +121,11 @@ def searched() -> Rows:
         for kind, words in (
             ("paper", "the paper's stiffness"),
             ("calibrated", "that of the struts"),
-            ("chosen", "that of the struts, ranked by frames"),
+            ("ranked", "that of the struts, ranked by frames"),
         ):
             told = read("validation/search")[f"{name}, {kind}"]
             yield row(
-                name, words, f"{told['promised']:.2f}", f"{told['frame']:.2f}",
+                name, words, f"{told['model']:.2f}", f"{told['frame']:.2f}",
                 f"{100.0 * told['median_deviation']:.0f} %",
                 f"{told['not_stable_as_frames']} of {len(told['rows'])}",
                 f"{told['touching_as_frames']} of {len(told['rows'])}",
@@ -136,9 +136,10 @@ def bundled() -> Rows:
     for each in read("machines/bundled")["rows"]:
         yield row(
             each["name"], each["parts"], f"{each['beams']} of {each['all_beams']}",
-            f"{each['building']:.2f}", f"{each['simulating']:.2f}", f"{each['linear']:.3f}",
-            f"{each['small']:.3f}", f"{each['efficiency']:.3f}",
-            "-" if each["designed"] is None else f"{each['designed']:.2f}",
+            f"{each['assembly_seconds']:.2f}", f"{each['simulation_seconds']:.2f}",
+            f"{each['linear_assembly']:.3f}", f"{each['small_stroke']:.3f}",
+            f"{each['full_stroke']:.3f}",
+            "-" if each["after_search"] is None else f"{each['after_search']:.2f}",
         )  # fmt: skip
 
 
@@ -152,7 +153,7 @@ def lengths() -> Rows:
     for told in read("machines/factorisation")["rows"]:
         yield row(
             told["actuators"], told["beams"], told["unknowns"], f"{told['assembly']:.0f}",
-            *(f"{told[key]:.1f}" for key in ("preparation", "response", "careful")),
+            *(f"{told[key]:.1f}" for key in ("preparation", "response", "verification")),
             f"{told['sparse']:.2f}", f"{told['banded']:.2f} ({told['half_bandwidth']})",
             f"{told['superlu']:.2f}",
         )  # fmt: skip
@@ -174,16 +175,16 @@ def rest_of(port: TwoPort) -> tuple[float, float, float]:
 
 def costs() -> Rows:
     cost = {
-        (each["what"], each["batch"]): each["microseconds"]
+        (each["method"], each["batch"]): each["microseconds"]
         for each in read("surrogate/costs")["costs"]
-        if each["where"] == "one core"
+        if each["device"] == "one core"
     }
     fire, newton = cost["`fire` response", 1], cost["Newton response (default)", 1]
     batch = "torch bfloat16"
     for words, value in (
         ("`fire` response (what the published code does)", fire),
         ("Newton response from rest (default)", newton),
-        ("low-rank update, per flip", cost["low-rank screening, per flip", 1]),
+        ("low-rank update, per flip", cost["low-rank update, per flip", 1]),
         ("`mlp`, batches of 256, bfloat16", cost[f"mlp, {batch}", 256]),
         ("`resnet18-w16`, batches of 256, bfloat16", cost[f"resnet18-w16, {batch}", 256]),
         ("`resnet50`, batches of 256, bfloat16", cost[f"resnet50, {batch}", 256]),
@@ -205,9 +206,9 @@ def shipped() -> Rows:
     yield row("R²", *(f"{each['r_squared']:.3f}" for each in told["epochs"]))
 
 
-def epochs() -> Rows:
+def training_set_size() -> Rows:
     found: dict[tuple[str, int], Any] = {}
-    for told in read("surrogate/learning")["rows"]:
+    for told in read("surrogate/training-set-size")["rows"]:
         runs = next(size for size in (25, 100, 400) if told["runs"] <= size)
         found[told["model"], runs] = f"{told['r_squared']:.2f} ({told['seconds']:.0f})"
     for model in ("linear", "mlp", "resnet18-w16"):
@@ -226,8 +227,8 @@ def surrogate_search() -> Rows:
         )  # fmt: skip
 
 
-def elsewhere() -> Rows:
-    told = read("surrogate/elsewhere")
+def independent_simulation() -> Rows:
+    told = read("surrogate/independent-simulation")
     yield row(
         "12 runs by another program: its own energy, equilibrium, chain and random numbers",
         f"{told['count']:,}", f"{told['r_squared']:.4f}", f"{told['determination']:.4f}",
@@ -236,11 +237,11 @@ def elsewhere() -> Rows:
 
 
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
-    "searches": (competition, tournament),
+    "searches": (search_comparison, move_comparison),
     "goals": (goals,),
     "validation": (levels, meshes, widths, correlation, searched),
     "machines": (bundled, contact, lengths, two_ports),
-    "surrogate": (costs, shipped, epochs, surrogate_search, elsewhere),
+    "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }
 
 

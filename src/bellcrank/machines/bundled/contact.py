@@ -10,7 +10,7 @@ from bellcrank.errors import UnknownName
 from bellcrank.machines.bundled import bundled_machines
 
 RECORD = "contact.json"
-"""Results of `check_contact`, written by ``python -m benchmarks.machines``."""
+"""Results of `check_contact`, written by ``python -m benchmarks.machines --contact``."""
 
 
 @dataclass(frozen=True, slots=True)

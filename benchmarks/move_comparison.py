@@ -1,11 +1,11 @@
-"""Comparison of parallel tempering with several moves: ``python -m benchmarks.tournament``.
+"""Comparison of parallel tempering with several moves: ``python -m benchmarks.move_comparison``.
 
-Each variant searches crane, anti-parallel and discs from the same seeds, with the same response
-(`unloaded_beams="prune_all"`). A design counts only if it is stable when its path is followed in
-small increments. Results go to ``docs/competition/tournament.json``: for each variant and problem
-the best efficiency of each seed, and the processor time. The default search and plain Metropolis
-are in the other records of that folder. The stored record also has variants that were dropped
-afterwards, with the commit at which they can be run.
+Each variant runs on the problems crane, anti-parallel and discs from the same seeds, with the same
+response (`unloaded_beams="prune_all"`). A design counts only if its equilibrium is stable when the
+load is applied in small increments. ``docs/comparison/moves.json`` contains the best efficiency
+and the processor time for each variant, problem and seed. The other records of that folder contain
+the default search and plain Metropolis. The committed record also contains variants that were
+removed from the package, and the commit at which they can be run.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import find_problem
 from bellcrank.search import advance_chain, make_evaluator, read_settings, start_chain
 
-TARGET = Path(__file__).parents[1] / "docs" / "competition" / "tournament.json"
+RECORD = Path(__file__).parents[1] / "docs" / "comparison" / "moves.json"
 PROBLEMS = ("crane", "anti-parallel", "discs")
 TEMPERING = {"search": "tempering", "steps": 10_000}
 VARIANTS = {
@@ -34,7 +34,7 @@ VARIANTS = {
 
 
 def run(name: str, problem_name: str, seed: int) -> tuple[float, float]:
-    """Return the best verified efficiency of one run, and its processor time."""
+    """Return the best verified efficiency and the processor time of one run."""
     problem = find_problem(problem_name)
     settings = read_settings({**VARIANTS[name], "unloaded_beams": "prune_all", "seed": seed})
     evaluator = make_evaluator(problem, settings)
@@ -56,11 +56,11 @@ def run(name: str, problem_name: str, seed: int) -> tuple[float, float]:
 def main() -> None:
     """Run all variants and write the record after each seed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=8)
-    parser.add_argument("--out", type=Path, default=TARGET)
+    parser.add_argument("--seeds", type=int, default=8, help="number of seeds")
+    parser.add_argument("--out", type=Path, default=RECORD, help="JSON file")
     options = parser.parse_args()
     record = {
-        "command": "python -m benchmarks.tournament",
+        "command": "python -m benchmarks.move_comparison",
         "unloaded_beams": "prune_all",
         "variants": VARIANTS,
         "results": {name: {problem: [] for problem in PROBLEMS} for name in VARIANTS},
