@@ -144,7 +144,7 @@ def design(
         stop.hint = f"Stopped. To continue: {plain(command)}"
         with SearchProgress(read_settings(folder.settings)) as progress:
             report = complete_design(
-                folder, workers=workers, tell=progress, ranking=progress.ranking, stop=stop
+                folder, workers=workers, progress=progress, ranking=progress.ranking, stop=stop
             )
         if report is None:
             stop.exit()  # a thread may still compute a block, which delays a usual exit

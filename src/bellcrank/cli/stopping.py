@@ -37,7 +37,7 @@ class StopRequest(threading.Event):
         self.hint: str | None = None
 
     def exit(self) -> None:
-        """Print the hint and end the process at once, whatever its threads are computing."""
+        """Print the hint and end the process at once, while its threads are still computing."""
         notes.print(self.hint or "Stopped.")
         sys.stdout.flush()
         sys.stderr.flush()

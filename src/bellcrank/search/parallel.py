@@ -104,7 +104,7 @@ class ChainRunner:
         self._stored_steps = 0
         self._state: State | None = None
 
-    def run(self, stopped: Callable[[], bool], tell: Callable[[Progress], None]) -> None:
+    def run(self, stopped: Callable[[], bool], progress: Callable[[Progress], None]) -> None:
         """Advance the chain to its end, or until `stopped()` or `close`."""
         folder, settings, chain = self._folder, self._settings, self.chain
         self._stored_steps, stored = folder.progress(chain)
@@ -121,12 +121,12 @@ class ChainRunner:
                     self._store()
             temperature = float(proposals.temperature[-1])
             accepted = int(proposals.accepted.sum())
-            tell(Progress(chain, state, temperature, len(proposals.accepted), accepted))
+            progress(Progress(chain, state, temperature, len(proposals.accepted), accepted))
         self.done = is_done(state, settings)
         self.close()
 
     def close(self) -> None:
-        """Store the complete blocks; whatever `run` computes afterwards is discarded."""
+        """Store the complete blocks; what `run` computes afterwards is discarded."""
         with self._lock:
             self._closed = True
             self._store()
@@ -146,7 +146,7 @@ def run_chains(
     settings: SearchSettings,
     *,
     workers: int | None = None,
-    tell: Callable[[Progress], None] = lambda _progress: None,
+    progress: Callable[[Progress], None] = lambda _progress: None,
     stop: threading.Event | None = None,
 ) -> bool:
     """Run all chains of a run to their end, or until `stop` is set.
@@ -162,7 +162,7 @@ def run_chains(
         Settings of the search.
     workers
         Number of threads; by default one for each core.
-    tell
+    progress
         Called with the progress of a chain after each block, from the thread of that chain.
     stop
         Event that requests a stop.
@@ -187,7 +187,7 @@ def run_chains(
             except IndexError:
                 return
             try:
-                runner.run(stopped, tell)
+                runner.run(stopped, progress)
             except BaseException as error:  # raised again below
                 errors.append(error)
 

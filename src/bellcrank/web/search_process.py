@@ -122,7 +122,7 @@ class ProgressReporter:
             point = (state.step, now, best, round(progress.temperature, 6))
             self._points.setdefault(progress.chain, []).append(point)
 
-    def trying(self, done: int, total: int) -> None:
+    def ranking(self, done: int, total: int) -> None:
         """Record how many candidates have been analysed as parts, and their number."""
         with self._lock:
             self._tried = done, total
@@ -227,11 +227,11 @@ def _search(
     settings = read_settings(folder.settings)
     with ProgressReporter(pipe, folder, settings) as reporter:
         report = complete_design(
-            folder, workers=workers, tell=reporter, ranking=reporter.trying, stop=listener.stop
+            folder, workers=workers, progress=reporter, ranking=reporter.ranking, stop=listener.stop
         )
         if report is None and listener.command == "stop":
             try:
-                report = conclude(folder, settings, reporter.trying)
+                report = conclude(folder, settings, reporter.ranking)
             except InvalidSettings:
                 return {"kind": "paused", "message": NO_DESIGN_YET}
             return {"kind": "stopped", "efficiency": report.selection.efficiency_after}

@@ -106,7 +106,7 @@ def complete_design(
     folder: RunFolder,
     *,
     workers: int | None = None,
-    tell: Callable[[Progress], None] = lambda _progress: None,
+    progress: Callable[[Progress], None] = lambda _progress: None,
     ranking: Callable[[int, int], None] = lambda _done, _total: None,
     stop: threading.Event | None = None,
 ) -> DesignReport | None:
@@ -118,7 +118,7 @@ def complete_design(
         Folder of the job.
     workers
         Number of chains that run in parallel, all cores by default; does not change results.
-    tell
+    progress
         Called with the progress of a chain, from the thread of that chain.
     ranking
         For a part: called with the number of candidates analysed as frames, and their total number.
@@ -139,7 +139,7 @@ def complete_design(
     with locked(folder.path / LOCK, wait=False):
         folder.status = "running"
         try:
-            done = run_chains(folder, settings, workers=workers, tell=tell, stop=stop)
+            done = run_chains(folder, settings, workers=workers, progress=progress, stop=stop)
             if done:
                 report = conclude(folder, settings, ranking)
                 folder.finish()

@@ -33,7 +33,7 @@ def find_design(name_or_path: str) -> Design:
     ----------
     name_or_path
         Name or path, as above. A result folder takes precedence over a bundled problem of the
-        same name (`hides_problem` tells the two cases apart).
+        same name (`hides_problem` distinguishes the two cases).
 
     Raises
     ------

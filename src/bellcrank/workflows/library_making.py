@@ -10,6 +10,7 @@ import math
 import shutil
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
@@ -180,9 +181,8 @@ def _search(
     for name, (problem, chains) in task.starts(settings.chains).items():
         own = replace(search, chains=chains)
         runs.append(_run(problem, own, path / name))
-        if not run_chains(
-            runs[-1], own, workers=workers, tell=lambda progress: report(task, progress), stop=stop
-        ):
+        progress = partial(report, task)
+        if not run_chains(runs[-1], own, workers=workers, progress=progress, stop=stop):
             return None
     return _select(task.problem(), runs, search)
 
