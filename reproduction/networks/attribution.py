@@ -33,7 +33,7 @@ from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Design
 from bellcrank.surrogate.backend import find_device
 from bellcrank.surrogate.evaluator import NetworkEvaluator
-from bellcrank.surrogate.matching import beams_between, renumbered
+from bellcrank.surrogate.matching import require_same_problem
 from bellcrank.surrogate.metrics import correlation, finite
 from bellcrank.surrogate.predictor import Predictor
 from bellcrank.surrogate.trained_model import run_network
@@ -154,13 +154,13 @@ def attribute(
         raise InvalidSettings(f"stride: expected at least 1 pixel, got {stride}")
     design = Design(replace(design.problem, stiffness=model.problem.stiffness), design.mask)
     problem, mask = design.problem, design.mask
-    number = beams_between(model.problem, problem)
+    require_same_problem(model.problem, problem)
     if not len(problem.designable):
         raise InvalidSettings(f"problem {problem.name!r} has no designable beam to flip")
     view = _picture_view(model)
     predictor = Predictor(problem, model, device=device)
     flips = NetworkEvaluator(predictor).predict_flips(mask)
-    packed = np.packbits(renumbered(mask[None], number)[0])
+    packed = np.packbits(mask)
     maps = {
         name: occlude(model, packed, stride, ink=ink, device=device) for name, ink in INKS.items()
     }
@@ -168,7 +168,7 @@ def attribute(
     changes["network"] = flips.change
     known, canvas = model.problem.lattice, view.renderer.canvas
     drawn = canvas.pixels_of(known.positions)
-    middles = drawn[known.beams].mean(axis=1)[number[problem.designable]]
+    middles = drawn[known.beams].mean(axis=1)[problem.designable]
     for name, values in maps.items():
         changes[name] = sample_map(values, stride, middles, canvas.height)
     # Pictures are to scale: the size of a pixel follows from the extents.

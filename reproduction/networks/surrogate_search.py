@@ -32,7 +32,7 @@ from bellcrank.model import Design, unpack_mask
 from bellcrank.provenance import provenance
 from bellcrank.search import Evaluator, MetropolisSettings, chain_blocks
 from bellcrank.surrogate.evaluator import NetworkEvaluator
-from bellcrank.surrogate.matching import beams_between, renumbered
+from bellcrank.surrogate.matching import require_same_problem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -125,7 +125,8 @@ def run_surrogate_search(
         If the dataset is for another problem.
     """
     settings = settings or SurrogateSearchSettings()
-    number_of = None if training is None else beams_between(training.problem, problem)
+    if training is not None:
+        require_same_problem(training.problem, problem)
     judge, seconds, acceptance = SpringEvaluator(problem), {}, {}
     designs: dict[str, list[dict[str, Any]]] = {"network": [], "mechanics": []}
     evaluators: dict[str, Evaluator] = {"network": NetworkEvaluator(predictor)}
@@ -145,8 +146,8 @@ def run_surrogate_search(
     masks = np.array([unpack_mask(design["mask"], beams) for design in found], np.bool_)
     for design, predicted in zip(found, predictor.predict(masks).tolist(), strict=True):
         design |= {"predicted": predicted, "distance": None}
-    if training is not None and number_of is not None:
-        packed = np.packbits(renumbered(masks, number_of), axis=1)
+    if training is not None:
+        packed = np.packbits(masks, axis=1)
         distances = smallest_distances(packed, training.packed).tolist()
         for design, distance in zip(found, distances, strict=True):
             design["distance"] = distance

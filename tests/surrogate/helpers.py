@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.model import Input, Lattice, Problem, Supports, problem_to_dict
+from bellcrank.model import Problem, problem_to_dict
 from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.recipes import Recipe
 from bellcrank.surrogate.trained_model import TrainedModel, architecture_of
@@ -94,51 +93,6 @@ def weights(model: TrainedModel) -> dict[str, Any]:
 def same_weights(first: TrainedModel, second: TrainedModel) -> bool:
     a, b = weights(first), weights(second)
     return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
-
-
-def moved(problem: Problem, seed: int = 1) -> tuple[Problem, NDArray[np.int64]]:
-    """The same problem with nodes and beams in another order, somewhere else, slightly noisy.
-
-    Returns
-    -------
-    Problem
-    (M,) int64
-        The old number of each new beam.
-    """
-    rng = np.random.default_rng(seed)
-    lattice = problem.lattice
-    old_node = rng.permutation(lattice.node_count)
-    new_node = np.argsort(old_node)
-    old_beam = rng.permutation(lattice.beam_count)
-    noise = rng.uniform(-1e-7, 1e-7, lattice.positions.shape)
-    beams = new_node[lattice.beams[old_beam]]
-    flipped = rng.random(len(beams)) < 0.5
-    beams[flipped] = beams[flipped, ::-1]
-    shift = np.array([17.25, -3.5])
-    supports = problem.supports
-    order = rng.permutation(len(problem.input.nodes))
-    given = Problem(
-        name="moved",
-        lattice=Lattice(lattice.positions[old_node] + noise + shift, beams),
-        supports=Supports(
-            fixed=new_node[supports.fixed],
-            fixed_x=new_node[supports.fixed_x],
-            fixed_y=new_node[supports.fixed_y],
-        ),
-        input=Input(
-            new_node[problem.input.nodes][order],
-            problem.input.direction[order],
-            problem.input.drive,
-            problem.input.amount,
-        ),
-        output=replace(problem.output, nodes=new_node[problem.output.nodes]),
-        stiffness=problem.stiffness,
-        initial=problem.initial[old_beam],
-        designable=np.flatnonzero(np.isin(old_beam, problem.designable)),
-        aggregate=problem.aggregate,
-        objective=problem.objective,
-    )
-    return given, old_beam
 
 
 def flat_bins(efficiency: NDArray[np.float64], count: int) -> tuple[Any, Any]:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidModel, InvalidProblem
-from bellcrank.surrogate.matching import beams_between, renumbered
+from bellcrank.surrogate.matching import require_same_problem
 from bellcrank.surrogate.trained_model import MODEL, TrainedModel, read_model
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Predictor:
         self.problem = problem
         self.model = model
         self.device = device
-        self._beams = beams_between(model.problem, problem)
+        require_same_problem(model.problem, problem)
 
     def predict(self, masks: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Predict the efficiencies of designs.
@@ -90,7 +90,7 @@ class Predictor:
                 f"masks: expected booleans of shape (n, {beams}), one for each beam of "
                 f"{self.problem.name!r}, got {given.dtype} of shape {given.shape}"
             )
-        packed = np.packbits(renumbered(given, self._beams), axis=1)
+        packed = np.packbits(given, axis=1)
         predicted = self.model.predict(packed, device=self.device)
         wrong = np.flatnonzero(~np.isfinite(predicted))
         if len(wrong):
@@ -148,7 +148,7 @@ def load_model(
         model = read_model(file)
     given = replace(problem, stiffness=model.problem.stiffness) if any_stiffness else problem
     try:
-        beams_between(model.problem, given)
+        require_same_problem(model.problem, given)
     except InvalidModel as error:
         if path is not None:
             raise
