@@ -1,6 +1,6 @@
 // Selection of the page by the address, and the state of the server.
 
-import { get, post, ServerError, type Response, type RunDetails } from "./api";
+import { get, ServerError, type RunDetails } from "./api";
 import { firstTask, TASK_KEY } from "./begin";
 import { clear, count, figure, h } from "./dom";
 import { Editor } from "./editor";
@@ -39,11 +39,6 @@ async function open(parts: string[]): Promise<Page> {
 
 async function designPage(source: string, key: string): Promise<Page> {
   const subject = await designSubject(encodeURIComponent(source), encodeURIComponent(key));
-  if (subject.efficiency === null) {
-    const { problem, mask } = subject;
-    const { response } = await post<{ response: Response | null }>("/tasks/check", { problem: { ...problem, initial: mask } });
-    subject.efficiency = response?.efficiency ?? null;
-  }
   const result = new Result(subject);
   const origin = subject.provenance["origin"];
   const element = h("div", { class: "page run" },

@@ -36,6 +36,8 @@ export class Player {
   /** Called when the stress is selected before it is computed. */
   onStressRequested: () => void = () => {};
   onError: (message: string) => void = () => {};
+  /** Called with the motion when it has been computed. */
+  onMotion: (motion: Motion) => void = () => {};
 
   constructor(private readonly problem: Problem, private readonly mask: string, private readonly scale: number) {
     this.drawing.setLattice(problem.positions, problem.beams);
@@ -87,6 +89,7 @@ export class Player {
       this.drawing.makeRoom(this.beams, this.motion.displacement.at(-1)!);
       this.show();
       this.element.dataset.ready = "yes";
+      this.onMotion(this.motion);
       if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
     } catch (error) {
       this.onError(sentence((error as Error).message));

@@ -30,6 +30,7 @@ export class Result {
   readonly element = h("aside", { class: "panel", "aria-label": "Result" });
   private readonly headline = h("p", { class: "headline" });
   private readonly warnings = h("ul", { class: "warnings", role: "alert" });
+  private readonly advice = h("div", { class: "advice" });
   private readonly table = h("table", { class: "figures" });
   private readonly trouble = h("p", { class: "fault", role: "alert" });
   private readonly partBox = h("div", { class: "content" });
@@ -45,8 +46,12 @@ export class Result {
     this.player = new Player(subject.problem, subject.mask, this.part.scale);
     this.player.onError = (text) => { this.trouble.textContent = text; };
     this.player.onStressRequested = () => void this.validate("frame");
+    this.player.onMotion = ({ efficiency }) => {
+      this.subject.efficiency ??= efficiency.at(-1) ?? null;
+      this.showTable();
+    };
     this.element.append(
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Efficiency"), this.headline, this.warnings, this.verdict(), this.table, this.trouble),
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Efficiency"), this.headline, this.warnings, this.advice, this.table, this.trouble),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Part"), this.partBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Download"), this.filesBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Next steps"), this.nextSteps()));
@@ -83,17 +88,18 @@ export class Result {
   }
 
   /** Suggestions for a design that does not move as required. */
-  private verdict(): HTMLElement | null {
+  private showAdvice(): void {
     const { efficiency, comparison } = this.subject;
-    if (efficiency === null) return null;
+    if (efficiency === null) return;
     const better = comparison?.efficiency ?? null;
     const defect = efficiency <= 0 ? "The output does not move in its direction."
       : better !== null && better > efficiency ? "The design drawn by hand has a higher efficiency." : "";
-    return defect ? h("div", { class: "advice" }, h("p", {}, defect), h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text)))) : null;
+    clear(this.advice, defect && h("p", {}, defect), defect && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
   }
 
   private showTable(): void {
     this.showHeadline();
+    this.showAdvice();
     const { efficiency, comparison, mask } = this.subject;
     const beams = bitsOf(mask, this.subject.problem.beams.length).reduce((a, b) => a + b, 0);
     const rows: (HTMLElement | null)[] = [
