@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 PATIENCE = 120.0
 """Seconds."""
@@ -58,9 +61,12 @@ def start_search(page: Any, effort: str = "Quick") -> str:
     return str(page.url.rsplit("/", 1)[1])
 
 
-def until(page: Any, condition: str) -> None:
-    """Wait for a condition; the page's policy forbids the browser's own way of doing so."""
+def until(page: Any, condition: str | Callable[[], bool]) -> None:
+    """Wait for a condition, an expression of the page or a function.
+
+    The content policy of the page forbids the browser's own way of doing so.
+    """
     end = time.monotonic() + PATIENCE
-    while not page.evaluate(condition):
+    while not (condition() if callable(condition) else page.evaluate(condition)):
         assert time.monotonic() < end, condition
         time.sleep(0.05)

@@ -39,10 +39,10 @@ def downloaded(page: Any, suffix: str) -> bytes:
 def test_a_task_is_defined_searched_followed_stopped_played_and_downloaded(page: Any) -> None:
     top = 8 * HEIGHT
     page.get_by_role("button", name="Clear").click()
-    assert summary(page, "supports") == "none"
+    until(page, lambda: summary(page, "supports") == "none")
     assert page.get_by_role("button", name="Design it").is_disabled()
     page.mouse.dblclick(*_at(page, 3.5, 0.0))
-    assert summary(page, "supports") == "8 nodes"
+    until(page, lambda: summary(page, "supports") == "8 nodes")
 
     tool(page, "Input")
     page.get_by_role("button", name="Clear").click()
@@ -55,13 +55,13 @@ def test_a_task_is_defined_searched_followed_stopped_played_and_downloaded(page:
     middle = top - 0.5 * HEIGHT
     drag(page, (tip, middle - 4 * amount), (tip, middle - 1.6))
     assert task(page)["problem"]["input"]["amount"] == pytest.approx(0.4, abs=0.02)
-    assert "4.0 mm down" in summary(page, "input")
+    until(page, lambda: "4.0 mm down" in summary(page, "input"))
     page.keyboard.press("Control+z")
     assert task(page)["problem"]["input"]["amount"] == amount
     page.keyboard.press("Control+Shift+z")
 
     tool(page, "Output")
-    assert summary(page, "output") == "2 nodes, left"
+    until(page, lambda: summary(page, "output") == "2 nodes, left")
     page.wait_for_timeout(400)
     assert not page.locator(".error").inner_text()
 
@@ -143,7 +143,7 @@ def test_beams_are_marked_and_mirrored_and_the_task_is_saved_and_loaded(
     page.locator(".beams .choice label", has_text="Absent").click()
     click(page, 4.0, 2 * HEIGHT)
     assert task(page)["rules"].count("never") in {1, 2}
-    assert summary(page, "beams") != total
+    until(page, lambda: summary(page, "beams") != total)
     page.locator(".step.lattice h2 button").click()
     with page.expect_download() as waiting:
         page.get_by_role("button", name="Save TOML").click()

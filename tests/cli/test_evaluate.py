@@ -158,7 +158,7 @@ def test_a_process_of_its_own_keeps_results_and_messages_apart(here: Path) -> No
 def test_a_design_keeps_the_objective_of_its_search(here: Path) -> None:
     settings = ("--search", "paper", "--steps", "200", "--chains", "1")
     made = call("design", "scaling-8", *settings, "--objective", "directional:200", "--out", "made")
-    assert made.code == 0, made.err
+    assert made.code == 3, made.err  # too few steps for an output in the wanted direction
     searched = json.loads((here / "made" / "summary.json").read_text())["efficiency"]
     (result,) = results_of(call("evaluate", "made", "--json"))
     assert result["efficiency"] == pytest.approx(searched, abs=1e-9)
