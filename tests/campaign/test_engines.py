@@ -122,6 +122,7 @@ def test_a_stop_does_not_wait_for_the_end_of_a_segment(tmp_path: Path) -> None:
     assert f"bellcrank campaign resume {store}" in log.read_text()
 
 
+@pytest.mark.slow
 def test_workers_end_with_a_killed_command_and_the_campaign_resumes_to_the_same_bytes(
     tmp_path: Path, tabled: Path
 ) -> None:

@@ -22,7 +22,11 @@ pytestmark = pytest.mark.usefixtures("here")
 
 
 @pytest.mark.parametrize(
-    ("design", "name"), [("human:crane", "card.pdf"), ("machine:pliers", "card.png")]
+    ("design", "name"),
+    [
+        ("human:crane", "card.pdf"),
+        pytest.param("machine:pliers", "card.png", marks=pytest.mark.slow),
+    ],
 )
 def test_a_card_is_drawn_on_one_page(here: Path, design: str, name: str) -> None:
     outcome = call("card", design, name)
@@ -56,7 +60,9 @@ def overlaps(boxes: list[tuple[str, Bbox]]) -> list[tuple[str, str]]:
     return found
 
 
-@pytest.mark.parametrize("name", ["human:crane", "human:pliers"])
+@pytest.mark.parametrize(
+    "name", ["human:crane", pytest.param("human:pliers", marks=pytest.mark.slow)]
+)
 def test_nothing_on_a_card_overlaps_and_nothing_is_cut(name: str) -> None:
     design = find_design(name)
     entry = {

@@ -39,6 +39,7 @@ def test_the_two_commands_stand_by_themselves() -> None:
     assert [block.strip() for block in blocks("")[:2]] == [START, TEST]
 
 
+@pytest.mark.slow
 def test_the_start_leaves_what_the_readme_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -26,7 +26,7 @@ GALLERY = [(k, name) for k in KINDS for name in builtin if gallery_design(k, nam
 FULL = ["crane", "scaling-8", "discs", "pliers"]
 FILLETS = [0.0, 0.05, 0.4, 0.97]
 LAYOUTS = [
-    (kind, seed)
+    pytest.param(kind, seed, marks=[pytest.mark.slow] if seed % 4 else [])
     for kind, count in (("regular", 67), ("jittered", 67), ("scattered", 66))
     for seed in range(100, 100 + count)
 ]

@@ -105,7 +105,8 @@ def test_every_flip_of_a_patch_with_dead_ends() -> None:
     assert {"present", "absent", "present dead end", "absent dead end"} == set(kinds)
 
 
-@pytest.mark.parametrize("kind", ["directional", pytest.param("isotropic", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["directional", "isotropic"])
 def test_every_flip_under_a_force_against_springs(kind: str) -> None:
     problem = patch(force=True, kind=kind)
     mask = random_masks(problem, 0.9, 1)[0]

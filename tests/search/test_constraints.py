@@ -277,6 +277,7 @@ def test_stiffness_falls_short_by_the_part_that_is_missing() -> None:
     assert response_violation(f"stiffness >= {stiffness / 2}", state) == 0.0
 
 
+@pytest.mark.slow
 def test_input_stiffness_is_that_of_the_condensed_structure() -> None:
     crane = find_problem("crane")
     small = replace(crane, input=replace(crane.input, amount=1e-5))

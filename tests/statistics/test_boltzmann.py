@@ -98,6 +98,7 @@ def test_visits_by_every_move_match_the_enumerated_distribution(exact: Exact, na
     assert deviation_of_moves(exact, name) < LARGEST_DEVIATION
 
 
+@pytest.mark.slow
 def test_visits_by_a_mixture_of_moves_match_too(exact: Exact) -> None:
     assert deviation_of_moves(exact, *moves) < LARGEST_DEVIATION
 
