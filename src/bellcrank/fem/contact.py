@@ -103,7 +103,7 @@ def find_contacts(
     struts : (s,) int64
         Beams of the lattice.
     rest : (s, k, 2) float64
-        Points along the centre lines at rest, mm.
+        Points along the centre lines at rest, which are straight, mm.
     stroke : iterable of (float, (s, k, 2) float64)
         Fraction of the full input and the same points in that state, in order of the load.
     width
@@ -138,21 +138,42 @@ def _overlaps(
 ) -> list[tuple[int, int, float]]:
     """Return the pairs of struts in contact in one state, with their overlap in mm."""
     import shapely
+    from scipy.spatial import cKDTree
 
+    each = moved.shape[1]
+    points, points_at_rest = moved.reshape(-1, 2), rest.reshape(-1, 2)
+    spacing = float(np.hypot(*np.diff(moved, axis=1).transpose(2, 0, 1)).max(initial=0.0))
+    # A point nearer than the width to a centre line is at most half a spacing further from one of
+    # its points, and centre lines that cross have points nearer than a spacing.
+    reach = max(width + 0.5 * spacing, spacing)
+    near = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    near = near[near[:, 0] // each != near[:, 1] // each]
     lines, before = shapely.linestrings(moved), shapely.linestrings(rest)
-    one, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=width)
-    one, other = one[one != other], other[one != other]
-    distance = shapely.distance(shapely.points(moved[one]), lines[other][:, None])
-    at_rest = shapely.distance(shapely.points(rest[one]), before[other][:, None])
-    checked = (distance < width) & (at_rest >= CLEARANCE * width)
-    overlap = np.where(checked, width - distance, -np.inf).max(axis=1, initial=-np.inf)
-    crossing = shapely.crosses(lines[one], lines[other]) & ~shapely.intersects(
-        before[one], before[other]
-    )
-    overlap[crossing] = width
+    directed = np.concatenate([near, near[:, ::-1]])
+    point, other = directed[:, 0], directed[:, 1] // each
+    far = _distances(points_at_rest[point], rest[other]) >= CLEARANCE * width
+    point, other = point[far], other[far]
+    one = point // each
+    overlap = width - shapely.distance(shapely.points(points[point]), lines[other])
+    strut = np.sort(near // each, axis=1)
+    first, second = np.divmod(np.unique(strut @ [len(moved), 1]), len(moved))
+    apart = ~shapely.intersects(before[first], before[second])
+    first, second = first[apart], second[apart]
+    crossing = shapely.crosses(lines[first], lines[second])
+    one, other = np.append(one, first[crossing]), np.append(other, second[crossing])
+    overlap = np.append(overlap, np.full(int(crossing.sum()), width))
     found: dict[tuple[int, int], float] = {}
-    for first, second, depth in zip(one.tolist(), other.tolist(), overlap.tolist(), strict=True):
+    for a, b, depth in zip(one.tolist(), other.tolist(), overlap.tolist(), strict=True):
         if depth > 0.0:
-            pair = (min(first, second), max(first, second))
+            pair = (min(a, b), max(a, b))
             found[pair] = max(depth, found.get(pair, 0.0))
     return [(*pair, depth) for pair, depth in found.items()]
+
+
+def _distances(points: NDArray[np.float64], lines: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n,) the distances of (n, 2) points from straight lines (n, k, 2), one for each."""
+    start, along = lines[:, 0], lines[:, -1] - lines[:, 0]
+    part = ((points - start) * along).sum(axis=1) / (along**2).sum(axis=1)
+    apart = start + np.clip(part, 0.0, 1.0)[:, None] * along - points
+    distance: NDArray[np.float64] = np.hypot(apart[:, 0], apart[:, 1])
+    return distance
