@@ -255,7 +255,7 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
         searches,
         select,
         verification_evaluator,
-    )  # fmt: skip
+    )
 
     settings = read_settings(task.settings)
     problem = problem_from_dict(task.problem, f"task {task.name!r}")
