@@ -12,7 +12,7 @@ from scipy.stats import spearmanr
 
 from bellcrank.errors import InvalidModel, InvalidSettings, OutputExists
 from bellcrank.mechanics import SpringEvaluator, Status
-from bellcrank.model import Design, Lattice, find_problem, human_design
+from bellcrank.model import find_problem, human_design
 from bellcrank.surrogate.models import models
 from bellcrank.surrogate.trained_model import TrainedModel
 from bellcrank.surrogate.views import views
@@ -29,7 +29,6 @@ from reproduction.networks.attribution_picture import draw_attribution
 torch = pytest.importorskip("torch")
 
 CANVAS = {"width": 72, "height": 48, "line": 1.5}
-SHIFT = np.array([3.0, -2.0])
 KINDS = ("mlp", "resnet18-w16")
 
 
@@ -188,25 +187,6 @@ def test_an_attribution_is_plain_data(explained, human):
     assert {len(values) for values in found["changes"].values()} == {len(found["beams"])} == {203}
     assert {name: len(rows) for name, rows in found["maps"].items()} == {"white": 12, "black": 12}
     assert set(found["correlations"]) == {"white", "black", "network", "low_rank"}
-
-
-def test_numbering_and_position_of_the_lattice_do_not_matter(explained, by_kind, crane, human):
-    beams = crane.lattice.beam_count
-    order = np.random.default_rng(2).permutation(beams)  # new beam i is old beam order[i]
-    number = np.argsort(order)
-    lattice = Lattice(crane.lattice.positions + SHIFT, crane.lattice.beams[order])
-    other = replace(
-        crane,
-        lattice=lattice,
-        initial=crane.initial[order],
-        designable=np.sort(number[crane.designable]),
-    )
-    found = attribute(by_kind["resnet18-w16"], Design(other, human.mask[order]), device="cpu")
-    there = np.searchsorted(explained.beams, order[found.beams])
-    assert np.allclose(found.changes["exact"], explained.changes["exact"][there], atol=1e-7)
-    assert np.allclose(found.changes["network"], explained.changes["network"][there], atol=1e-5)
-    assert np.allclose(found.changes["black"], explained.changes["black"][there], atol=1e-5)
-    assert np.allclose(found.low, explained.low + SHIFT)
 
 
 def test_a_design_without_a_response_cannot_be_explained(by_kind, crane, monkeypatch):
