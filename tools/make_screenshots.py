@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 WIDTH = 1280
+PATIENCE = 120.0
+"""Seconds to wait for the server and the page."""
 IS_READY = "fetch('/api/about').then((reply) => reply.json()).then((about) => about.ready)"
 
 
@@ -70,10 +73,12 @@ def main() -> None:
                 )
                 for name, (path, height, wait) in PICTURES.items():
                     page = browser.new_page(viewport={"width": WIDTH, "height": height})
-                    page.set_default_timeout(120_000)
+                    page.set_default_timeout(1000.0 * PATIENCE)
                     page.emulate_media(reduced_motion="reduce")
                     page.goto(f"{address}/#/{path}")
+                    end = time.monotonic() + PATIENCE
                     while not page.evaluate(IS_READY):
+                        assert time.monotonic() < end
                         page.wait_for_timeout(200)
                     wait(page)
                     page.wait_for_timeout(3000)

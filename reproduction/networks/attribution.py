@@ -133,8 +133,8 @@ def attribute(
     Parameters
     ----------
     model
-        Network on pictures, trained on the design's problem in any numbering. The design is
-        evaluated with the stiffness of that problem.
+        Network on pictures, trained on the design's problem. The design is evaluated with the
+        stiffness of that problem.
     design
         Design with a unique, stable response.
     stride
@@ -166,16 +166,16 @@ def attribute(
     }
     efficiency, changes = flip_effects(problem, mask)
     changes["network"] = flips.change
-    known, canvas = model.problem.lattice, view.renderer.canvas
-    drawn = canvas.pixels_of(known.positions)
-    middles = drawn[known.beams].mean(axis=1)[problem.designable]
+    lattice, canvas = problem.lattice, view.renderer.canvas
+    drawn = canvas.pixels_of(lattice.positions)
+    middles = drawn[lattice.beams[problem.designable]].mean(axis=1)
     for name, values in maps.items():
         changes[name] = sample_map(values, stride, middles, canvas.height)
     # Pictures are to scale: the size of a pixel follows from the extents.
-    unit = float(np.ptp(known.positions, axis=0).max() / np.ptp(drawn, axis=0).max())
+    unit = float(np.ptp(lattice.positions, axis=0).max() / np.ptp(drawn, axis=0).max())
     size = stride * np.array(maps["white"].shape[::-1], np.float64)
     corner = np.array([0.0, canvas.height - size[1]])
-    low = problem.lattice.positions.min(axis=0) + (corner - drawn.min(axis=0)) * unit
+    low = lattice.positions.min(axis=0) + (corner - drawn.min(axis=0)) * unit
     return Attribution(
         design=design,
         architecture=model.architecture,

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bellcrank.model.geometry import distances_to_segments
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -151,7 +153,8 @@ def _overlaps(
     lines, before = shapely.linestrings(moved), shapely.linestrings(rest)
     directed = np.concatenate([near, near[:, ::-1]])
     point, other = directed[:, 0], directed[:, 1] // each
-    far = _distances(points_at_rest[point], rest[other]) >= CLEARANCE * width
+    at_rest = distances_to_segments(points_at_rest[point], rest[other, 0], rest[other, -1])
+    far = at_rest >= CLEARANCE * width
     point, other = point[far], other[far]
     one = point // each
     overlap = width - shapely.distance(shapely.points(points[point]), lines[other])
@@ -168,12 +171,3 @@ def _overlaps(
             pair = (min(a, b), max(a, b))
             found[pair] = max(depth, found.get(pair, 0.0))
     return [(*pair, depth) for pair, depth in found.items()]
-
-
-def _distances(points: NDArray[np.float64], lines: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (n,) the distances of (n, 2) points from straight lines (n, k, 2), one for each."""
-    start, along = lines[:, 0], lines[:, -1] - lines[:, 0]
-    part = ((points - start) * along).sum(axis=1) / (along**2).sum(axis=1)
-    apart = start + np.clip(part, 0.0, 1.0)[:, None] * along - points
-    distance: NDArray[np.float64] = np.hypot(apart[:, 0], apart[:, 1])
-    return distance

@@ -153,10 +153,10 @@ def first_crossing(
     >>> first_crossing(square, np.array([[0, 2], [2, 3]]), np.array([0, 1])) is None
     True
     """
-    start, end = positions[beams[:, 0]], positions[beams[:, 1]]
-    inset = END_INSET * (end - start)
     import shapely
 
+    start, end = positions[beams[:, 0]], positions[beams[:, 1]]
+    inset = END_INSET * (end - start)
     lines = shapely.linestrings(np.stack([start + inset, end - inset], axis=1))
     first, second = shapely.STRtree(lines).query(lines, predicate="intersects")
     bad = np.flatnonzero((first < second) & (owner[first] != owner[second]))

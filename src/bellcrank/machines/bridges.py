@@ -59,10 +59,10 @@ def bridge(
     InvalidFile
         If another node lies between the ports.
     """
-    ends = np.concatenate(ports)
     import shapely
     from scipy.spatial import Delaunay, cKDTree
 
+    ends = np.concatenate(ports)
     hull = shapely.MultiPoint(positions[ends]).convex_hull
     inside = shapely.contains_xy(hull, *positions.T)
     inside[ends] = False

@@ -88,14 +88,14 @@ class _NodeMerger:
     """
 
     def __init__(self, plan: Plan, parts: dict[str, Part]) -> None:
+        from scipy.spatial import cKDTree
+
         self.plan, self.parts = plan, parts
         counts = [part.design.problem.lattice.node_count for part in parts.values()]
         self.offset = dict(zip(parts, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
         self.positions = np.concatenate([part.positions for part in parts.values()])
         self.owner = np.repeat(np.arange(len(parts)), counts)
         spacing = min(part.spacing for part in parts.values())
-        from scipy.spatial import cKDTree
-
         near = cKDTree(self.positions).query_pairs(MIN_DISTANCE * spacing, output_type="ndarray")
         self.near = near[self.owner[near[:, 0]] != self.owner[near[:, 1]]].reshape(-1, 2)
         apart = self.positions[self.near[:, 0]] - self.positions[self.near[:, 1]]
@@ -143,10 +143,10 @@ class _NodeMerger:
 
     def result(self) -> tuple[dict[str, NDArray[np.int64]], NDArray[np.float64]]:
         """Return the machine's node numbers of each part, and all positions."""
-        pairs, count = self.near[self.merged], len(self.positions)
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
+        pairs, count = self.near[self.merged], len(self.positions)
         links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
         _, piece = connected_components(links, directed=False)
         first, number = unique_rows(piece)

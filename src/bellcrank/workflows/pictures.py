@@ -159,7 +159,7 @@ def draw_validations(
             validation.response.displacement,
             validation.response.efficiency,
             name=name,
-            note="discrete model" + ("" if status == "converged" else f", {status}"),
+            note="spring model" + ("" if status == "converged" else f", {status}"),
         )
         columns.append((motion, stressed_part(validation.analyses[-1])))
     draw_stress(columns, path, stroke_labels(validations[0]), overwrite=overwrite)

@@ -202,6 +202,7 @@ def _depths(struts: Struts) -> NDArray[np.float64]:
 def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the half-widths up to `limit` at which surfaces meet, ascending, and the points."""
     import shapely
+    from scipy.spatial import cKDTree
 
     nodes = struts.positions
     points = shapely.points(nodes)
@@ -211,8 +212,6 @@ def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDA
     share = np.sum((nodes[node] - tail) * axis, axis=1) / np.sum(axis * axis, axis=1)
     facing = (share > 0.0) & (share < 1.0) & ~np.any(struts.beams[strut] == node[:, None], axis=1)
     across = (tail + share[:, None] * axis)[facing]
-    from scipy.spatial import cKDTree
-
     pairs = cKDTree(nodes).query_pairs(2.0 * limit, output_type="ndarray")
     one = np.concatenate([nodes[node[facing]], nodes[pairs[:, 0]]])
     two = np.concatenate([across, nodes[pairs[:, 1]]])

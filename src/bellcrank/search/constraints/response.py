@@ -15,6 +15,7 @@ from bellcrank.mechanics import (
     output_stiffness,
     predict_output_stiffness,
 )
+from bellcrank.model.geometry import distances_to_segments
 from bellcrank.search.constraints.constraint import (
     Constraint,
     ConstraintType,
@@ -215,10 +216,10 @@ def segment_distances(
     a, b, c, d = first[:, 0], first[:, 1], second[:, 0], second[:, 1]
     apart = np.minimum.reduce(
         [
-            _distance_to_segment(a, c, d),
-            _distance_to_segment(b, c, d),
-            _distance_to_segment(c, a, b),
-            _distance_to_segment(d, a, b),
+            distances_to_segments(a, c, d),
+            distances_to_segments(b, c, d),
+            distances_to_segments(c, a, b),
+            distances_to_segments(d, a, b),
         ]
     )
     sides = _cross(b - a, c - a) * _cross(b - a, d - a)
@@ -230,18 +231,6 @@ def segment_distances(
 def _cross(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
     product: NDArray[np.float64] = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     return product
-
-
-def _distance_to_segment(
-    point: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return (n,) the distances of (n, 2) points from segments."""
-    along, offset = end - start, point - start
-    square = np.maximum((along * along).sum(axis=1), 1e-300)
-    part = np.clip((offset * along).sum(axis=1) / square, 0.0, 1.0)
-    rest = offset - part[:, None] * along
-    distance: NDArray[np.float64] = np.hypot(rest[:, 0], rest[:, 1])
-    return distance
 
 
 for _name, _usage, _parse, _make in (
