@@ -1,13 +1,11 @@
-"""Agreement of the spring model with finite elements: ``python -m benchmarks.fidelity``.
+"""Agreement of the models of searches with finite elements: ``python -m benchmarks.fidelity``.
 
-Five studies, selected by ``--only correlate,width,search,levels,meshes``:
+Four studies, selected by ``--only correlate,search,levels,meshes``:
 
-- correlate: compare the efficiencies of several hundred designs in the spring model, with the
-  paper's stiffness and with the stiffness of the struts, with nonlinear frame analyses,
-- width: fit the stiffness of the angular springs to frame analyses for several strut widths, and
-  compare the paper's stiffness with them,
-- search: compare the efficiency of the best design of a search in the spring model with that of a
-  frame analysis, for either stiffness, and for candidates ranked by frame analysis,
+- correlate: compare the efficiencies of several hundred designs in the spring model, and as frames
+  with one element in each beam as searches use them, with frames of 8 elements,
+- search: compare the efficiency of the best design of a search, in the spring model and as frames,
+  with that of frames of 8 elements,
 - levels: compute the efficiencies of the bundled designs at all levels of analysis,
 - meshes: compute the efficiency of the full crane in plane stress for several mesh sizes.
 
@@ -21,7 +19,6 @@ from __future__ import annotations
 import argparse
 import json
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -29,24 +26,26 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from bellcrank.fem import FemSettings, levels
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    ModelEvaluator,
+    SpringEvaluator,
+    Status,
+    model_evaluator,
+)
 from bellcrank.model import (
     Design,
     Problem,
-    Stiffness,
     builtin,
     find_problem,
     gallery_design,
-    pack_mask,
     unpack_mask,
 )
-from bellcrank.part import PartSpec, calibrated
-from bellcrank.part.calibration import JOINT
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.plots import style
 from bellcrank.plots.saving import save_figure
 from bellcrank.provenance import provenance
 from bellcrank.search import (
-    SearchSettings,
     advance_chain,
     make_evaluator,
     read_settings,
@@ -66,11 +65,7 @@ PROBLEMS = ("crane", "anti-parallel")
 SIZES = (2.0, 1.4, 1.0, 0.7, 0.5)
 """Largest sides of triangles, mm."""
 WIDTH = 2.0
-"""Strut width of all studies except `width_study`, mm."""
-WIDTHS = (1.0, 1.5, 2.0, 3.0, 4.0)
-"""Strut widths of `width_study`, mm."""
-FACTORS = np.round(np.arange(0.30, 1.01, 0.05), 2)
-"""Values of the factor c in ``docs/validation.md``, "Stiffness of struts in the spring model"."""
+"""Strut width, mm."""
 STEPS = 5_000
 """Steps of each chain that samples designs."""
 CHAINS = {"paper": 8, "basin-hopping": 4}
@@ -114,16 +109,14 @@ def analyse_frame(job: tuple[str, str, float]) -> dict[str, object]:
     }
 
 
-def spring_model(problem: Problem, masks: list[str]) -> np.ndarray:
-    """Return the efficiency of each design in the spring model; nan without a stable response."""
-    evaluator = SpringEvaluator(problem)
-    efficiencies = []
+def efficiencies(evaluator: ModelEvaluator, masks: list[str]) -> np.ndarray:
+    """Return the efficiency of each design; nan without a stable response."""
+    found = []
     for mask in masks:
-        response = evaluator.evaluate(
-            unpack_mask(mask, problem.lattice.beam_count), VERIFICATION_INCREMENT
-        )
-        efficiencies.append(response.efficiency if response.status is Status.CONVERGED else np.nan)
-    return np.array(efficiencies)
+        bits = unpack_mask(mask, evaluator.problem.lattice.beam_count)
+        response = evaluator.evaluate(bits, VERIFICATION_INCREMENT)
+        found.append(response.efficiency if response.status is Status.CONVERGED else np.nan)
+    return np.array(found)
 
 
 def agreement(model: np.ndarray, frame: np.ndarray) -> dict[str, float]:
@@ -140,8 +133,14 @@ def agreement(model: np.ndarray, frame: np.ndarray) -> dict[str, float]:
     }
 
 
+def frames_of_searches(problem: Problem, masks: list[str]) -> np.ndarray:
+    """Return the efficiency of each design as a frame of a search; nan without a response."""
+    frame = frame_problem(problem, PartSpec(width=WIDTH))
+    return efficiencies(model_evaluator(frame), masks)
+
+
 def correlation_study(pool: ProcessPoolExecutor) -> None:
-    """Compare the spring model with frame analyses for both stiffnesses, and draw the figure."""
+    """Compare both models of searches with frame analyses, and draw the figure."""
     record: dict[str, object] = {"width": WIDTH, "provenance": provenance()}
     columns = {}
     for name in PROBLEMS:
@@ -150,12 +149,12 @@ def correlation_study(pool: ProcessPoolExecutor) -> None:
         rows = list(pool.map(analyse_frame, jobs, chunksize=8))
         frame = np.array([row["frame"] for row in rows], dtype=np.float64)
         problem = find_problem(name)
-        paper = spring_model(problem, masks)
-        fitted = spring_model(calibrated(problem, WIDTH), masks)
-        for row, first, second in zip(rows, paper, fitted, strict=True):
-            row |= {"paper": first, "calibrated": second}
-        measures = {"paper": agreement(paper, frame), "calibrated": agreement(fitted, frame)}
-        columns[name] = (paper, fitted, frame)
+        paper = efficiencies(SpringEvaluator(problem), masks)
+        element = frames_of_searches(problem, masks)
+        for row, first, second in zip(rows, paper, element, strict=True):
+            row |= {"paper": first, "element": second}
+        measures = {"paper": agreement(paper, frame), "element": agreement(element, frame)}
+        columns[name] = (paper, element, frame)
         record[name] = {
             **measures,
             "designs": len(rows),
@@ -170,85 +169,29 @@ def correlation_study(pool: ProcessPoolExecutor) -> None:
     _scatter(columns)
 
 
-def width_study(pool: ProcessPoolExecutor) -> None:
-    """Fit the stiffness of the angular springs to frame analyses of several strut widths."""
-    name = "crane"
-    problem = find_problem(name)
-    masks = sample_designs(name)[::4]
-    record: dict[str, object] = {"provenance": provenance(), "joint": JOINT, "widths": {}}
-    for width in WIDTHS:
-        jobs = [(name, mask, width) for mask in masks]
-        frame = np.array([row["frame"] for row in pool.map(analyse_frame, jobs, chunksize=4)])
-        rows = {}
-        for factor in FACTORS:
-            angle = problem.stiffness.bond * factor * (width / 10.0) ** 2 / 6.0
-            stiffness = Stiffness(problem.stiffness.bond, angle)
-            rows[str(factor)] = agreement(
-                spring_model(replace(problem, stiffness=stiffness), masks), frame
-            )
-        best = max(rows, key=lambda factor: rows[factor]["determination"])
-        paper = agreement(spring_model(problem, masks), frame)
-        record["widths"][str(width)] = {"best": best, "paper": paper, "factors": rows}  # type: ignore[index]
-        default = rows[str(JOINT)]
-        print(
-            f"| {width} mm | {best} | {rows[best]['determination']:.3f} | "
-            f"{default['determination']:.3f} | {paper['determination']:.3f} |"
-        )
-    _write("widths", record)
-
-
-METHODS = {
-    "paper": "the paper's stiffness",
-    "calibrated": "that of the struts",
-    "ranked": "that of the struts, ranked by frames",
-}
-"""Methods of a search for a part; the last is that of ``bellcrank design --strut-width``."""
+METHODS = {"paper": "springs of the paper", "frames": "frames"}
+"""Models of a search for a part; the last is that of ``bellcrank design``."""
 
 
 def run_search(job: tuple[str, str, int]) -> dict[str, object]:
     """Run one search and analyse its best design as a frame."""
     name, method, seed = job
-    problem = find_problem(name)
-    settings = read_settings(
-        {"steps": 20_000, "seed": seed, "chains": 1, "goals": [f"no-contact {WIDTH / 10.0}"]}
-    )
-    if method == "ranked":
-        efficiency, mask = best_ranked(problem, settings)
-    else:
-        task = calibrated(problem, WIDTH) if method == "calibrated" else problem
-        efficiency, mask = best_in_model(task, settings)
-    return {"seed": seed, "model": efficiency, **analyse_frame((name, mask, WIDTH))}
-
-
-def best_ranked(problem: Problem, settings: SearchSettings) -> tuple[float, str]:
-    """Return efficiency and mask of the design that ``bellcrank design`` selects for the part."""
+    goals = [f"no-contact {WIDTH / 10.0}"]
+    settings = read_settings({"steps": 20_000, "seed": seed, "chains": 1, "goals": goals})
+    part = PartSpec(width=WIDTH) if method == "frames" else None
     with TemporaryDirectory() as temporary:
-        folder = start_design(problem, settings, Path(temporary) / "run", PartSpec(width=WIDTH))
+        folder = start_design(find_problem(name), settings, Path(temporary) / "run", part)
         report = complete_design(folder, workers=1)
     assert report is not None
-    return report.selection.efficiency_after, report.selection.design.mask_hex
-
-
-def best_in_model(task: Problem, settings: SearchSettings) -> tuple[float, str]:
-    """Return efficiency and mask of the best verified design of a chain in the spring model."""
-    evaluator = make_evaluator(task, settings)
-    state = start_chain(evaluator, settings, 0)
-    best, mask = -np.inf, ""
-    verifier = SpringEvaluator(task)
-    while state.step < settings.steps:
-        state, rows = advance_chain(evaluator, settings, 0, state)
-        for index in np.flatnonzero(rows.accepted & (rows.status == Status.CONVERGED)):
-            if rows.efficiency[index] > best:
-                bits = np.unpackbits(rows.mask[index])[: task.lattice.beam_count].astype(bool)
-                cleaned = clean(Design(task, bits))
-                response = verifier.evaluate(cleaned.mask, VERIFICATION_INCREMENT)
-                if response.status is Status.CONVERGED and response.efficiency > best:
-                    best, mask = response.efficiency, pack_mask(cleaned.mask)
-    return float(best), mask
+    selection = report.selection
+    mask = selection.design.mask_hex
+    return {
+        "seed": seed, "model": selection.efficiency_after, **analyse_frame((name, mask, WIDTH))
+    }  # fmt: skip
 
 
 def search_study(pool: ProcessPoolExecutor) -> None:
-    """Compare the efficiencies of searches in the spring model with those of frame analyses."""
+    """Compare the efficiencies of searches in both models with those of frame analyses."""
     record: dict[str, object] = {"width": WIDTH, "provenance": provenance()}
     for name in PROBLEMS:
         for method, description in METHODS.items():
@@ -357,33 +300,31 @@ def _write(name: str, record: dict[str, object]) -> None:
     (FOLDER / f"{name}.json").write_text(json.dumps(record, indent=1) + "\n")
 
 
-def _scatter(efficiencies: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
-    """Draw the efficiency of frames against that of the spring model, for both stiffnesses."""
+def _scatter(found: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+    """Draw the efficiency of frames of 8 elements against that of both models of searches."""
     figure = style.new_figure(9.0, 4.4)
     style.add_heading(
         figure,
-        f"Discrete model against nonlinear frames, struts {WIDTH:g} mm wide on 10 mm",
+        f"Models of searches against frames of 8 elements, struts {WIDTH:g} mm wide on 10 mm",
         "each dot is one design of a search; on the line both efficiencies are equal",
         0.25,
         0.2,
     )
-    for index, title in enumerate(("paper's stiffness", "stiffness of the struts")):
+    for index, title in enumerate(("springs of the paper", "frames, as searched")):
         axes = figure.add_axes((0.075 + 0.5 * index, 0.13, 0.40, 0.66))
-        for (name, columns), colour in zip(
-            efficiencies.items(), (style.OUTPUT, style.INPUT), strict=True
-        ):
+        for (name, columns), colour in zip(found.items(), (style.OUTPUT, style.INPUT), strict=True):
             measures = agreement(columns[index], columns[2])
             label = f"{name}: R² {measures['r_squared']:.3f}"
             axes.plot(
                 columns[index], columns[2], linestyle="none", marker="o", markersize=3.0,
                 color=colour, alpha=0.6, markeredgewidth=0.0, label=label,
             )  # fmt: skip
-        values = np.concatenate([np.concatenate(columns) for columns in efficiencies.values()])
+        values = np.concatenate([np.concatenate(columns) for columns in found.values()])
         low, high = np.nanmin(values), np.nanmax(values)
         axes.plot([low, high], [low, high], color=style.IDLE, linewidth=1.0, zorder=1)
         font = {"family": style.FONT, "size": style.SMALL_SIZE, "color": style.INK}
-        axes.set_xlabel(f"efficiency by the discrete model, {title}", **font)
-        axes.set_ylabel("efficiency by nonlinear frames", **font)
+        axes.set_xlabel(f"efficiency by {title}", **font)
+        axes.set_ylabel("efficiency by frames of 8 elements", **font)
         axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE)
         axes.legend(frameon=False, prop={"family": style.FONT, "size": style.SMALL_SIZE})
         for side in ("top", "right"):
@@ -393,7 +334,6 @@ def _scatter(efficiencies: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]])
 
 STUDIES = {
     "correlate": correlation_study,
-    "width": width_study,
     "search": search_study,
     "levels": level_study,
     "meshes": mesh_study,

@@ -1,11 +1,10 @@
-"""Assembly, simulation and optimisation of the bundled machines: ``python -m benchmarks.machines``.
+"""Prediction and simulation of the bundled machines: ``python -m benchmarks.machines``.
 
-For each machine, measure the times of the assembly of the lattice, of the linear assembly and of
-the simulation; the efficiency by the linear assembly, of the lattice for a small stroke and at
-the full stroke; and the efficiency after a search over all beams. A Markdown table is printed, and
-the results are written to ``docs/machines/bundled.json``. ``--work`` is the folder of the
-searches; a search in it is resumed. ``--contact`` checks the contact of struts instead, and writes
-the record that is part of the package.
+For each machine, measure the times of the assembly of the lattice, of the prediction from its parts
+and of the simulation; the efficiency at rest, predicted, simulated, and of frames with eight
+elements of each strut; and that of the spring model. A Markdown table is printed, and the results
+are written to ``docs/machines/bundled.json``. ``--contact`` checks the contact of struts instead,
+and writes the record that is part of the package.
 """
 
 from __future__ import annotations
@@ -13,28 +12,25 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from bellcrank.machines import Machine, linear_assembly
+from bellcrank.machines import assembled_ports, predict, simulate, two_port_at
 from bellcrank.machines.bundled import bundled_machine, bundled_machines
 from bellcrank.machines.bundled.contact import RECORD as RECORD_NAME
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, model_evaluator
 from bellcrank.model.storage import write_text
+from bellcrank.part import spring_problem
 from bellcrank.provenance import provenance
-from bellcrank.search import HoppingSettings
-from bellcrank.workflows import complete_design, reopen_design, start_design
 from bellcrank.workflows.validation import check_contact
 
 ROOT = Path(__file__).parents[1]
 CONTACT_RECORD = ROOT / "src" / "bellcrank" / "machines" / "bundled" / RECORD_NAME
 RECORD = ROOT / "docs" / "machines" / "bundled.json"
-SMALL_STROKE = 1e-3
-"""Fraction of the stroke for the efficiency for small displacements."""
-GOALS = {"gripper": ("mirror x",)}
-"""Constraints of the searches."""
-WITHOUT_SEARCH = ("wave",)
-"""Machines that are too large for a search in a benchmark."""
+POINTS = 20
+"""Increments of the stroke."""
+ELEMENTS = 8
+"""Elements of each strut in the frame analysis that validates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +43,16 @@ class Row:
         Name of the machine.
     parts, nodes, beams, all_beams
         Numbers of parts, nodes and beams; `all_beams` includes absent beams.
-    assembly_seconds, linear_assembly_seconds, simulation_seconds
-        Times of the assembly of the lattice, of the linear assembly, and of the response at the
-        full stroke in increments of 1/32.
-    linear_assembly, small_stroke, full_stroke
-        Efficiency by the linear assembly, of the lattice for a small stroke, and of the lattice
-        at the full stroke.
-    after_search
-        Efficiency after a search that starts from the assembled machine; None without a search.
+    assembly_seconds, prediction_seconds, simulation_seconds
+        Times of the assembly of the lattice, of the prediction and of the simulation.
+    rest
+        Efficiency for small strokes.
+    predicted, simulated
+        Efficiency at the full stroke, from the condensed parts and of the whole lattice.
+    divided
+        Efficiency of the whole lattice with eight elements of each strut.
+    springs
+        Efficiency at the full stroke in the spring model.
     """
 
     name: str
@@ -63,46 +61,30 @@ class Row:
     beams: int
     all_beams: int
     assembly_seconds: float
-    linear_assembly_seconds: float
+    prediction_seconds: float
     simulation_seconds: float
-    linear_assembly: float
-    small_stroke: float
-    full_stroke: float
-    after_search: float | None
+    rest: float
+    predicted: float
+    simulated: float
+    divided: float
+    springs: float
 
 
-def searched_efficiency(machine: Machine, name: str, options: argparse.Namespace) -> float | None:
-    """Return the efficiency after a search; the result of a finished search is read."""
-    if not options.steps or name in WITHOUT_SEARCH:
-        return None
-    folder = options.work / f"{name}-{options.steps}-{options.chains}"
-    if (summary := folder / "summary.json").exists():
-        return float(json.loads(summary.read_text())["efficiency"])
-    settings = HoppingSettings(
-        steps=options.steps, chains=options.chains, goals=GOALS.get(name, ())
-    )
-    if folder.exists():
-        run = reopen_design(folder)
-    else:
-        run = start_design(machine.design.problem, settings, folder)
-    report = complete_design(run)
-    assert report is not None
-    return report.selection.efficiency_after
-
-
-def measure(name: str, options: argparse.Namespace) -> Row:
+def measure(name: str) -> Row:
     """Measure one machine."""
-    linear_assembly(bundled_machine(name))  # loads files and kernels before the measurement
+    for run in (predict, simulate):
+        run(bundled_machine(name), 1)  # loads files and kernels before the measurement
     start = time.perf_counter()
     machine = bundled_machine(name)
     assembled = time.perf_counter()
+    predicted = predict(machine, POINTS)
+    condensed = time.perf_counter()
+    simulated = simulate(machine, POINTS)
+    end = time.perf_counter()
     problem, mask = machine.design.problem, machine.design.mask
-    response = SpringEvaluator(problem).evaluate(mask, VERIFICATION_INCREMENT)
-    simulated = time.perf_counter()
-    linear = linear_assembly(machine)
-    linearized = time.perf_counter()
-    amount = SMALL_STROKE * problem.input.amount
-    small = replace(problem, input=replace(problem.input, amount=amount))
+    parts = assembled_ports(machine)
+    divided = model_evaluator(problem, elements=ELEMENTS).evaluate(mask, VERIFICATION_INCREMENT)
+    springs = model_evaluator(spring_problem(problem)).evaluate(mask, VERIFICATION_INCREMENT)
     return Row(
         name=name,
         parts=len(machine.parts),
@@ -110,12 +92,13 @@ def measure(name: str, options: argparse.Namespace) -> Row:
         beams=machine.design.beam_count,
         all_beams=problem.lattice.beam_count,
         assembly_seconds=assembled - start,
-        linear_assembly_seconds=linearized - simulated,
-        simulation_seconds=simulated - assembled,
-        linear_assembly=linear.efficiency,
-        small_stroke=SpringEvaluator(small).evaluate(mask).efficiency,
-        full_stroke=response.efficiency,
-        after_search=searched_efficiency(machine, name, options),
+        prediction_seconds=condensed - assembled,
+        simulation_seconds=end - condensed,
+        rest=two_port_at(parts, parts.rest()).efficiency,
+        predicted=float(predicted.efficiency[-1]),
+        simulated=float(simulated.efficiency[-1]),
+        divided=divided.efficiency,
+        springs=springs.efficiency,
     )
 
 
@@ -134,23 +117,21 @@ def main() -> None:
         return
     rows = []
     print(
-        "| machine | parts | beams | assembly, s | simulation, s | linear assembly "
-        "| small stroke | full stroke | after a search |"
+        "| machine | parts | beams | prediction, s | simulation, s | at rest | predicted "
+        "| simulated | 8 elements a strut | spring model |"
     )
-    print("|---" * 9 + "|")
+    print("|---" * 10 + "|")
     for name in options.machines:
-        row = measure(name, options)
+        row = measure(name)
         rows.append(asdict(row))
         print(
             f"| {row.name} | {row.parts} | {row.beams} of {row.all_beams} "
-            f"| {row.assembly_seconds:.2f} | {row.simulation_seconds:.2f} "
-            f"| {row.linear_assembly:.3f} | {row.small_stroke:.3f} | {row.full_stroke:.3f} "
-            f"| {'-' if row.after_search is None else f'{row.after_search:.2f}'} |",
+            f"| {row.prediction_seconds:.2f} | {row.simulation_seconds:.2f} | {row.rest:.3f} "
+            f"| {row.predicted:.3f} | {row.simulated:.3f} | {row.divided:.3f} "
+            f"| {row.springs:.3f} |",
             flush=True,
         )
-    record = {
-        "steps": options.steps, "chains": options.chains, "rows": rows, "provenance": provenance(),
-    }  # fmt: skip
+    record = {"points": POINTS, "elements": ELEMENTS, "rows": rows, "provenance": provenance()}
     options.out.parent.mkdir(parents=True, exist_ok=True)
     write_text(options.out, json.dumps(record, indent=1) + "\n", overwrite=True)
 
@@ -158,15 +139,10 @@ def main() -> None:
 def parse() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--work", type=Path, default=Path("machines"), help="folder of searches")
     parser.add_argument("--contact", action="store_true", help="only check the contact of struts")
     parser.add_argument(
         "--machines", nargs="+", default=bundled_machines(), help="names of machines"
     )
-    parser.add_argument(
-        "--steps", type=int, default=10_000, help="steps of each chain; 0 for no search"
-    )
-    parser.add_argument("--chains", type=int, default=2, help="chains of a search")
     parser.add_argument("--out", type=Path, default=RECORD, help="JSON file")
     return parser.parse_args()
 

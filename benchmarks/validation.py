@@ -13,9 +13,7 @@ import time
 import numpy as np
 
 from bellcrank.fem import FemSettings, levels
-from bellcrank.fem.frame.equilibrium import solve_linear
-from bellcrank.fem.frame.mesh import frame_mesh
-from bellcrank.fem.frame.system import frame_system
+from bellcrank.fem.frame.equations import FrameEquations, part_frame
 from bellcrank.model.builtin.scaling import scaling
 from bellcrank.part import PartSpec
 from bellcrank.workflows import find_design
@@ -70,13 +68,13 @@ def size_table() -> None:
         times = []
         for _ in range(REPEATS):
             start = time.perf_counter()
-            system = frame_system(part, frame_mesh(part))
-            solve_linear(system)
+            equations = FrameEquations(part_frame(part))
+            equations.solve_linear()
             times.append(time.perf_counter() - start)
         struts.append(part.design.beam_count)
         seconds.append(min(times))
         print(
-            f"| {struts[-1]} | {len(system.free)} | {seconds[-1]:.3f} "
+            f"| {struts[-1]} | {equations.count} | {seconds[-1]:.3f} "
             f"| {1e6 * seconds[-1] / struts[-1]:.0f} |"
         )
     exponent = np.polyfit(np.log(struts), np.log(seconds), 1)[0]

@@ -13,10 +13,10 @@ Actuators can drive each other. The motion of each then depends on the load at i
 
 from pathlib import Path
 
-from bellcrank.machines import assemble, linear_assembly, mean_ports, two_port_at
+from bellcrank.machines import assemble, mean_ports, predict, two_port_at
 from bellcrank.machines.library import library
 from bellcrank.machines.plan import read_plan
-from bellcrank.mechanics import SpringEvaluator
+from bellcrank.mechanics import model_evaluator
 from bellcrank.plots import draw_motion
 from bellcrank.workflows.pictures import motion_of
 
@@ -59,14 +59,15 @@ ports = ["first.input"]
 ports = ["second.output"]
 """)
 machine = assemble(read_plan("two-stage.toml"), lambda entry: library().find(entry).design)
-print(f"linear assembly: {linear_assembly(machine).efficiency:.2f}")
+print(f"predicted from its parts: {predict(machine).efficiency[-1]:.2f}")
 
 # %%
 # One lattice
 # -----------
 # The machine is an ordinary design, which every command accepts.
 
-response = SpringEvaluator(machine.design.problem).evaluate(machine.design.mask)
+evaluator = model_evaluator(machine.design.problem)
+response = evaluator.evaluate(machine.design.mask)
 print(f"simulation at the full stroke: {response.efficiency:.2f}")
 draw_motion(motion_of(machine.design), "two-stage.png", title="two stages")
 

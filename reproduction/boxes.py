@@ -15,13 +15,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.mechanics import FrameEvaluator, Status
 from bellcrank.model import Input, Output, Problem, Supports, lattices
-from bellcrank.part import PartSpec, calibrated
+from bellcrank.part import PartSpec, frame_problem
+from bellcrank.search.constraints import mirror_images
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 TASKS = ("inverter", "gripper")
+STARTING_SHARE = 0.9
+"""Probability with which `stable_start` keeps a beam."""
 GAP = 2.0
 """Depth of the gap of the gripper, lattice units; it extends one row to each side."""
 
@@ -33,7 +37,7 @@ class Box:
     Parameters
     ----------
     problem
-        Problem on a lattice, with stiffness calibrated for the struts.
+        Problem on a lattice, as a frame of the struts.
     spec
         Size and material of all designs.
     low, high : (2,) mm
@@ -68,7 +72,7 @@ def box_of(
     stroke
         Input displacement, lattice units.
     spring
-        Stiffness of the spring at the output, units of the discrete model.
+        Stiffness of the spring at the output, units of the discrete model: a strut has 10.
     width
         Strut width, mm.
     """
@@ -111,7 +115,22 @@ def box_of(
         initial=initial,
     )
     free = np.intersect1d(problem.designable, np.flatnonzero(initial))
-    problem = calibrated(replace(problem, designable=free), spec.width, spec.scale)
+    problem = stable_start(frame_problem(replace(problem, designable=free), spec))
     reach = 0.5 * spec.width
     size = spec.scale * np.array([right, top])
     return Box(problem, spec, np.full(2, -reach), size + reach, void)
+
+
+def stable_start(problem: Problem) -> Problem:
+    """Return the problem with a stable initial design, symmetric about the horizontal middle.
+
+    Thin struts of a full lattice buckle in front of the input. Then one designable beam in ten is
+    left out at random, with its mirror image, until the design is stable.
+    """
+    evaluator = FrameEvaluator(problem)
+    images, rng = mirror_images(problem, "y"), np.random.default_rng(0)
+    initial = problem.initial.copy()
+    while evaluator.evaluate(initial).status is not Status.CONVERGED:
+        present = rng.random(len(problem.designable)) < STARTING_SHARE
+        initial[problem.designable] = present & present[images]
+    return replace(problem, initial=initial)

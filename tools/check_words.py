@@ -39,7 +39,7 @@ WORDS = {
 
 NAMES = {
     "standing": "part_model", "stand": "part_model", "felt": "PortResponse", "feel": "linearize",
-    "chaining": "linear_assembly", "unite": "merge_nodes", "union": "merge_nodes",
+    "chaining": "prediction", "unite": "merge_nodes", "union": "merge_nodes",
     "straight": "LinearResponse", "stretches": "surrogate_transition",
     "course": "settings of active learning", "knowledge": "state of active learning",
     "lesson": "state of active learning", "driving": "surrogate_search",

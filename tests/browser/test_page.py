@@ -11,9 +11,9 @@ import pytest
 import trimesh
 
 from bellcrank.fem import FemSettings
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.model import problem_from_dict, read_design, unpack_mask
-from bellcrank.part import PartSpec, calibrated
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.workflows import validate
 
 from .driving import click, drag, start_search, summary, task, tool, until
@@ -116,9 +116,8 @@ def test_a_design_is_changed_by_hand_and_evaluated_by_the_solver(page: Any) -> N
     problem = problem_from_dict({**kept["problem"], "designable": _free(kept)})
     mask = unpack_mask(kept["hand"], problem.lattice.beam_count)
     assert mask.sum() == len(mask) - 3
-    exact = (
-        SpringEvaluator(calibrated(problem, 2.0)).evaluate(mask, VERIFICATION_INCREMENT).efficiency
-    )
+    frame = frame_problem(problem, PartSpec(width=2.0))
+    exact = FrameEvaluator(frame).evaluate(mask, VERIFICATION_INCREMENT).efficiency
     shown = float(page.locator(".readout strong").inner_text().replace("−", "-"))
     assert shown == pytest.approx(exact, abs=6e-4)
     page.keyboard.press("Control+z")

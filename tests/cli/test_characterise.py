@@ -100,3 +100,22 @@ def test_bad_input_is_refused_in_one_line(here: Path) -> None:
     write(here / "mine.json", "{}")
     assert "mine.json: exists already" in refusal("characterise", "crane", "--out", "mine.json")
     assert "no folder" in refusal("characterise", "crane", "--out", "no/where.json", code=1)
+
+
+def test_a_record_says_of_which_model_it_is(here: Path) -> None:
+    own, springs, frames = (
+        call("characterise", name, "--points", 1, "--load", "free", *model, "--json").data
+        for name, model in (
+            ("human:crane", ()),
+            ("down-9-free", ("--model", "springs")),
+            ("down-9-free", ()),
+        )
+    )
+    assert [each["model"] for each in (own, springs, frames)] == ["springs", "springs", "frames"]
+    assert springs["mask"] == frames["mask"]
+    assert springs["rest"]["efficiency"] < 0.8 * frames["rest"]["efficiency"]
+    del own["model"]
+    write(here / "old.json", own)
+    assert read_characterisation(here / "old.json").model == "springs"
+    assert "132 beams; frames" in call("characterise", "down-9-free", "--points", 1).out
+    assert "unknown model 'beams'" in refusal("characterise", "down-9-free", "--model", "beams")

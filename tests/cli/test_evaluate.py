@@ -8,10 +8,20 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from bellcrank import __version__
-from bellcrank.model import builtin, find_problem, gallery_design, read_design, write_design
+from bellcrank.model import (
+    Section,
+    builtin,
+    find_problem,
+    gallery_design,
+    problem_to_dict,
+    read_design,
+    write_design,
+)
+from tests.reference3d import NAMES, read_reference
 
 from .helpers import SMALL, Outcome, call, files, table, write
 
@@ -158,10 +168,11 @@ def test_a_process_of_its_own_keeps_results_and_messages_apart(here: Path) -> No
 def test_a_design_keeps_the_objective_of_its_search(here: Path) -> None:
     settings = ("--search", "paper", "--steps", "200", "--chains", "1")
     made = call("design", "scaling-8", *settings, "--objective", "directional:200", "--out", "made")
-    assert made.code == 3, made.err  # too few steps for an output in the wanted direction
-    searched = json.loads((here / "made" / "summary.json").read_text())["efficiency"]
+    assert made.code in {0, 3}, made.err  # so few steps need not find a design that works
+    summary = json.loads((here / "made" / "summary.json").read_text())
+    searched = summary["figures"][0]["efficiency"]
     (result,) = results_of(call("evaluate", "made", "--json"))
-    assert result["efficiency"] == pytest.approx(searched, abs=1e-9)
+    assert result["efficiency"] == searched
     assert result["objective"] == "directional:200"
     (motion,) = results_of(call("evaluate", "made", "--objective", "displacement", "--json"))
     assert motion["efficiency"] > searched + 0.01
@@ -183,3 +194,93 @@ def test_efficiencies_by_other_definitions_are_labelled(here: Path) -> None:
     picture = (here / "two.svg").read_text()
     assert "human:crane (displacement)" in picture
     assert "human:pliers (force)" in picture
+
+
+# ---- models
+
+
+@pytest.mark.usefixtures("here")
+def test_the_model_is_a_frame_where_the_problem_has_a_section(here: Path) -> None:
+    crane = find_problem("crane")
+    write(here / "frame.json", problem_to_dict(replace(crane, section=Section(0.2, 0.5))))
+    (springs,) = results_of(call("evaluate", "crane", "--json"))
+    (frame,) = results_of(call("evaluate", "frame.json", "--json"))
+    (default,) = results_of(call("evaluate", "crane", "--model", "frames", "--json"))
+    (back,) = results_of(call("evaluate", "frame.json", "--model", "springs", "--json"))
+    assert (springs["model"], frame["model"]) == ("springs", "frames")
+    assert (frame["elements"], frame["bowing"]) == (1, True)
+    assert "elements" not in springs
+    assert back == springs
+    # The default part has struts of 2 mm x 5 mm on 10 mm; efficiencies do not depend on E.
+    assert default["efficiency"] == pytest.approx(frame["efficiency"], abs=1e-9)
+    assert "spring model" in call("evaluate", "crane").out
+    assert "frames, as searched" in call("evaluate", "frame.json").out
+    (linear,) = results_of(call("evaluate", "frame.json", "--elements", "1", "--json"))
+    assert (linear["elements"], linear["bowing"]) == (1, False)
+    assert linear["efficiency"] == pytest.approx(-0.0558174726, abs=1e-9)
+    assert "frames, 1 element" in call("evaluate", "frame.json", "--elements", "1").out
+
+
+@pytest.mark.usefixtures("here")
+def test_more_elements_bend_struts_between_their_ends() -> None:
+    options = ("--model", "frames", "--json")
+    (one,) = results_of(call("evaluate", "human:crane", "--elements", "1", *options))
+    (eight,) = results_of(call("evaluate", "human:crane", "--elements", "8", *options))
+    (searched,) = results_of(call("evaluate", "human:crane", *options))
+    assert one["efficiency"] == pytest.approx(1.26179, abs=1e-4)
+    assert eight["efficiency"] == pytest.approx(1.21003, abs=1e-4)
+    assert searched["efficiency"] == pytest.approx(1.20613, abs=1e-4)
+    assert (eight["elements"], eight["bowing"]) == (8, False)
+
+
+@pytest.mark.parametrize("model", ["springs", "frames"])
+@pytest.mark.usefixtures("here")
+def test_the_motion_of_the_output_and_the_input_force_are_reported(model: str) -> None:
+    (row,) = results_of(call("evaluate", "human:crane", "--model", model, "--json"))
+    crane = find_problem("crane")
+    moved = np.array(row["output_displacement"])
+    assert moved @ [-1.0, 0.0] == pytest.approx(row["efficiency"] * crane.input.amount)
+    assert row["off_axis"] == pytest.approx(abs(moved[1] / moved[0]))
+    assert 0.0 < abs(row["output_rotation_deg"]) < 90.0
+    force = np.array(row["input_force"])
+    assert force[1] < 0.0
+    # The mean force along the path is about half of the force at its end.
+    work = 0.5 * crane.input.amount * -force[1]
+    assert row["energy"] == pytest.approx(work, rel=0.3)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_frames_agree_with_an_independent_code(here: Path, name: str) -> None:
+    problem, data = read_reference(name)
+    write(here / "frame.json", problem_to_dict(problem))
+    rows = [
+        row
+        for row in data["results"]
+        if row["element"] == "corotational" and row["theory"] == "bernoulli"
+        and row["amount"] == data["input"]["amount"]
+    ]  # fmt: skip
+    write(here / "masks.json", {"masks": [row["mask"] for row in rows]})
+    options = ("--designs", "masks.json", "--elements", "1", "--json")
+    found = results_of(call("evaluate", "frame.json", *options))
+    plane = problem.lattice.dimension == 2
+    error = 1e-10 if plane else 1e-3
+    for one, known in zip(found, rows, strict=True):
+        assert one["status"] == "converged"
+        assert one["efficiency"] == pytest.approx(known["efficiency"], abs=error)
+        wanted = known["mean_output_displacement"][: problem.lattice.dimension]
+        assert one["output_displacement"] == pytest.approx(wanted, abs=error)
+        rotation = known["output_rotation_deg"]
+        assert one["output_rotation_deg"] == pytest.approx(
+            rotation[2] if plane else rotation, abs=10.0 * error
+        )
+        force = known["input_force"][: problem.lattice.dimension]
+        assert one["input_force"] == pytest.approx(force, abs=5.0 * error * max(map(abs, force)))
+
+
+def test_a_design_without_response_has_no_figures(here: Path) -> None:
+    write(here / "masks.json", {"masks": ["0" * 88]})
+    words = ("evaluate", "crane", "--designs", "masks.json", "--json")
+    for model in ("springs", "frames"):
+        (row,) = results_of(call(*words, "--model", model))
+        assert row["beams"] == 0
+        assert row["off_axis"] is None

@@ -125,7 +125,7 @@ def test_a_displacement_beyond_the_lattice_is_refused(here: Path) -> None:
 
 
 def test_a_stroke_is_given_in_beam_lengths_and_millimetres(here: Path, lift: str) -> None:
-    few = ("--search", "paper", "--steps", "2", "--chains", "1")
+    few = ("--model", "springs", "--search", "paper", "--steps", "2", "--chains", "1")
     small = call("design", lift, *few, "--out", "small").err
     assert "0.2 beam lengths" in small
     assert "2 mm" in small

@@ -85,7 +85,8 @@ def test_an_entry_goes_wherever_a_design_does(tmp_path: Path) -> None:
     entry = find_entry("down-9-free")
     told = call("evaluate", "down-9-free", "--json").data["results"][0]
     assert told["mask"] == entry.design.mask_hex
-    assert told["efficiency"] == pytest.approx(entry.efficiency, abs=1e-8)
+    # `evaluate` leaves out the shortening of bent beams.
+    assert told["efficiency"] == pytest.approx(entry.efficiency, rel=0.02)
     found = call("characterise", entry.name[:-2], "--points", 2, "--json").data
     assert found["rest"]["efficiency"] == pytest.approx(
         entry.characterisation.rest.efficiency, rel=1e-6

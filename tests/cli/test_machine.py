@@ -53,6 +53,7 @@ def test_a_plan_becomes_a_design_that_every_command_takes(plan: Path) -> None:
         design.beam_count, design.problem.lattice.node_count,
     )  # fmt: skip
     found = SpringEvaluator(design.problem).evaluate(design.mask).efficiency
+    assert (told["model"], design.problem.section) == ("springs", None)
     assert told["efficiency"] == pytest.approx(found, abs=1e-8)
     evaluated = call("evaluate", plan.with_suffix(".json"), "--json").data["results"][0]
     assert evaluated["efficiency"] == told["efficiency"]
@@ -67,18 +68,31 @@ def test_it_says_what_it_made(plan: Path, tmp_path: Path) -> None:
     assert (tmp_path / "made.json").exists()
 
 
-def test_linear_assembly_and_simulation_are_compared(plan: Path) -> None:
-    found = call("machine", "predict", plan, "--points", 4, "--json").data
-    built = call("machine", "build", plan, "--json").data
-    assert found["linear"]["efficiency"] == pytest.approx(built["efficiency"], rel=0.1)
-    assert found["linear"]["input_stiffness"] > 0.0
-    simulation = found["simulation"]
+@pytest.mark.parametrize("model", ["springs", "frames"])
+def test_prediction_and_simulation_are_compared(plan: Path, model: str) -> None:
+    chosen = ("--model", model)
+    found = call("machine", "predict", plan, "--points", 4, *chosen, "--json").data
+    built = call("machine", "build", plan, *chosen, "--json").data
+    assert found["model"] == built["model"] == model
+    assert found["rest"]["efficiency"] == pytest.approx(built["efficiency"], rel=0.2)
+    assert found["rest"]["input_stiffness"] > 0.0
+    predicted, simulation = found["prediction"], found["simulation"]
     assert simulation["efficiency"] == pytest.approx(built["efficiency"], rel=1e-6)
+    within = 0.05 if model == "springs" else 1e-6
+    assert predicted["efficiency"] == pytest.approx(simulation["efficiency"], rel=within)
     assert (simulation["status"], simulation["reached"]) == ("converged", 1.0)
-    assert len(simulation["motion"]) == len(simulation["output"]) == 5
-    outcome = call("machine", "predict", plan, "--points", 2)
-    for words in ("linear assembly", "simulated, full stroke", "u_out/u_in"):
+    assert len(simulation["motion"]) == len(predicted["output"]) == 5
+    outcome = call("machine", "predict", plan, "--points", 2, *chosen)
+    for words in (model, "predicted from its parts, full stroke", "simulated, full stroke"):
         assert words in outcome.out
+
+
+def test_parts_of_different_models_are_refused_in_one_line(plan: Path) -> None:
+    plan.write_text(PLAN.replace('entry = "lever.json"\njoin', 'entry = "strut-6"\njoin'))
+    said = refusal("machine", "predict", plan)
+    assert "parts first and second have different models (--model reads all parts as one)" in said
+    assert "springs against frames" in said
+    assert "unknown model 'beams'" in refusal("machine", "build", plan, "--model", "beams")
 
 
 def test_a_stroke_that_snaps_is_reported(plan: Path) -> None:
@@ -100,7 +114,8 @@ def test_a_bundled_machine_is_a_design_by_its_name(here: Path) -> None:
     built = call("machine", "build", "sorter-left", "--out", here / "sorter.json", "--json").data
     for name in ("sorter-left", "machine:sorter-left"):
         found = call("evaluate", name, "--json").data["results"][0]
-        assert found["efficiency"] == pytest.approx(built["efficiency"], abs=1e-8)
+        # `evaluate` leaves out the shortening of bent beams.
+        assert found["efficiency"] == pytest.approx(built["efficiency"], rel=0.02)
 
 
 def test_a_bundled_machine_is_built_by_its_name(
@@ -137,10 +152,11 @@ def test_what_is_wrong_is_said_in_one_line(plan: Path, tmp_path: Path) -> None:
 
 
 def test_a_machine_is_designed_further_from_what_it_is(plan: Path) -> None:
-    built = call("machine", "build", plan, "--json").data
+    built = call("machine", "build", plan, "--model", "frames", "--json").data
     whole = plan.with_suffix(".json")
     out = plan.parent / "better"
     call("design", "--from", whole, "--steps", "200", "--chains", "1", "--out", out)
     summary = json.loads((out / "summary.json").read_text())
-    assert summary["initial_efficiency"] == pytest.approx(built["efficiency"], abs=1e-8)
+    # `design` reports frames of eight elements a beam.
+    assert summary["initial_efficiency"] == pytest.approx(built["efficiency"], rel=2e-3)
     assert summary["efficiency"] > summary["initial_efficiency"]

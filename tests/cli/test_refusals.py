@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bellcrank.model import problem_to_dict
 from bellcrank.storage.locking import LOCK, locked
+from tests.reference3d import read_reference
 
 from .helpers import LIFT, PROBLEM, SETTINGS, SMALL, call, files, refusal, write
 
@@ -365,3 +367,53 @@ def test_an_existing_picture_is_not_written_over(here: Path) -> None:
     write(here / "p.png", "precious")
     line = refusal("plot", PROBLEM, "--rest", "--out", "p.png")
     assert line.startswith("error: p.png: exists already; remove it")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("--elements", "1"),
+            "elements: only beams of frames are divided, the spring model is not",
+        ),
+        (("--model", "frames", "--elements", "0"), "elements: expected at least 1 in each beam"),
+        (("--model", "shells"), "unknown model 'shells'; known: springs, frames"),
+    ],
+)
+def test_models_that_do_not_exist_are_refused(words: tuple[str, ...], message: str) -> None:
+    assert refusal("evaluate", "crane", *words).startswith(f"error: {message}")
+
+
+def test_the_spring_model_is_refused_in_space(here: Path) -> None:
+    problem, _ = read_reference("octet-crane")
+    write(here / "space.json", problem_to_dict(problem))
+    line = refusal("evaluate", "space.json", "--model", "springs")
+    assert line == (
+        "error: spring model: problem 'octet-crane' is in space; only problems in the plane are "
+        "accepted here"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--paper", "--model", "frames"), "--paper: --model frames contradicts it; "),
+        (("--paper", "--search", "tempering"), "--paper: --search tempering contradicts it; "),
+        (("--paper", "--strut-width", "2mm"), "--paper: --strut-width 2mm contradicts it; "),
+        (("--paper", "--unloaded-beams", "prune_all"), "--paper: --unloaded-beams prune_all"),
+        (("--paper", "--set", "hot=1"), "--paper: --set hot 1 contradicts it; "),
+        (("--model", "springs", "--material", "pla"), "--material: a part is made of frames; "),
+        (("--model", "shells"), "unknown model 'shells'; known: springs, frames"),
+    ],
+)
+def test_contradictory_models_of_a_design_are_refused(words: tuple[str, ...], message: str) -> None:
+    assert refusal("design", PROBLEM, *words).startswith(f"error: {message}")
+
+
+def test_designs_in_space_have_no_spring_model_and_no_mirror_images(here: Path) -> None:
+    problem, _ = read_reference("octet-crane")
+    write(here / "space.json", problem_to_dict(problem))
+    line = refusal("design", "space.json", "--model", "springs")
+    assert line.startswith("error: spring model: problem 'octet-crane' is in space")
+    line = refusal("design", "space.json", "--goal", "mirror x")
+    assert line.startswith("error: goal 'mirror x': problem 'octet-crane' is in space")

@@ -14,6 +14,7 @@ import pytest
 from bellcrank.machines import TwoPort
 from bellcrank.machines.bundled import bundled_machines, find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
+from bellcrank.machines.library import Library, bundled_folder
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -87,15 +88,6 @@ def levels() -> Rows:
             yield row(f"`{name}`", *("-" if value is None else f"{value:.3f}" for value in found))
 
 
-def widths() -> Rows:
-    for width, told in read("validation/widths")["widths"].items():
-        best, ours = told["factors"][told["best"]], told["factors"]["0.55"]
-        yield row(
-            f"{float(width):g} mm", told["best"],
-            *(f"{each['determination']:.3f}" for each in (best, ours, told["paper"])),
-        )  # fmt: skip
-
-
 def meshes() -> Rows:
     for told in read("validation/meshes")["rows"]:
         size = f"{told['size']:g} mm" + (" (default)" if told["size"] == 1.0 else "")
@@ -107,28 +99,12 @@ def meshes() -> Rows:
 
 def correlation() -> Rows:
     for name in ("crane", "anti-parallel"):
-        for kind, words in (("paper", "the paper's"), ("calibrated", "of the struts")):
+        for kind, words in (("paper", "springs of the paper"), ("element", "frames, as searched")):
             told = read("validation/correlation")[name][kind]
-            keys = ("r_squared", "determination", "rank_correlation")
             yield row(
-                name, words, *(f"{told[key]:.3f}" for key in keys),
-                f"{told['slope']:.2f}", f"{told['median_ratio']:.2f}",
-            )  # fmt: skip
-
-
-def searched() -> Rows:
-    for name in ("crane", "anti-parallel"):
-        for kind, words in (
-            ("paper", "the paper's stiffness"),
-            ("calibrated", "that of the struts"),
-            ("ranked", "that of the struts, ranked by frames"),
-        ):
-            told = read("validation/search")[f"{name}, {kind}"]
-            yield row(
-                name, words, f"{told['model']:.2f}", f"{told['frame']:.2f}",
-                f"{100.0 * told['median_deviation']:.0f} %",
-                f"{told['not_stable_as_frames']} of {len(told['rows'])}",
-                f"{told['touching_as_frames']} of {len(told['rows'])}",
+                name, words, f"{told['r_squared']:.3f}", f"{told['determination']:.3f}",
+                f"{told['rank_correlation']:.4f}", f"{told['slope']:.3f}",
+                f"{told['median_ratio']:.3f}",
             )  # fmt: skip
 
 
@@ -136,17 +112,41 @@ def bundled() -> Rows:
     for each in read("machines/bundled")["rows"]:
         yield row(
             each["name"], each["parts"], f"{each['beams']} of {each['all_beams']}",
-            f"{each['assembly_seconds']:.2f}", f"{each['simulation_seconds']:.2f}",
-            f"{each['linear_assembly']:.3f}", f"{each['small_stroke']:.3f}",
-            f"{each['full_stroke']:.3f}",
-            "-" if each["after_search"] is None else f"{each['after_search']:.2f}",
+            f"{each['prediction_seconds']:.2f}", f"{each['simulation_seconds']:.2f}",
+            *(
+                f"{each[key]:.3f}"
+                for key in ("rest", "predicted", "simulated", "divided", "springs")
+            ),
         )  # fmt: skip
+
+
+def test_recorded_predictions_and_simulations_agree_within_2_percent() -> None:
+    for each in read("machines/bundled")["rows"]:
+        for simulated in (each["simulated"], each["divided"]):
+            assert each["predicted"] == pytest.approx(simulated, rel=0.02), each["name"]
 
 
 def contact() -> Rows:
     for name in bundled_machines():
         plan = find_plan(name).table
         yield row(f"`{name}`", len(plan.parts), plan.about, bundled_contact(name).message)
+
+
+def entries() -> Rows:
+    found = {
+        (each.direction, each.kind, each.columns): each
+        for each in Library((bundled_folder(),)).summaries
+    }
+    for direction in ("right", "up-right", "up", "up-left", "left", "down-left", "down",
+                      "down-right"):  # fmt: skip
+        cells = [
+            found[direction, kind, columns]
+            for kind in ("free", "loaded", "light")
+            for columns in (7, 9, 12)
+        ]
+        yield row(
+            direction, *(f"{each.efficiency:.2f} ({each.lever_efficiency:.2f})" for each in cells)
+        )
 
 
 def lengths() -> Rows:
@@ -239,8 +239,8 @@ def independent_simulation() -> Rows:
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (search_comparison, move_comparison),
     "goals": (goals,),
-    "validation": (levels, meshes, widths, correlation, searched),
-    "machines": (bundled, contact, lengths, two_ports),
+    "validation": (levels, meshes, correlation),
+    "machines": (bundled, contact, entries, lengths, two_ports),
     "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }
 

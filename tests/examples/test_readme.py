@@ -81,8 +81,11 @@ def test_the_part_of_the_readme_is_that_of_its_record() -> None:
     record = json.loads((README.parent / "docs" / "start" / "summary.json").read_text())
     text = " ".join(README.read_text(encoding="utf-8").split())
     part = record["as_part"]
-    assert f"efficiency {record['efficiency']:.2f} in the spring model" in text
-    assert f"{part['efficiency']:.2f} as a frame of struts" in text
+    assert f"efficiency {record['efficiency']:.2f} by frames of 8 elements" in text
+    assert f"{record['search_efficiency']:.2f} in the search" in text
+    eight = record["figures"][1]
+    assert f"sideways, by {eight['off_axis']:.0%}".replace("%", " %") in text
+    assert f"turns by {abs(eight['output_rotation_deg']):.0f} degrees" in text
     assert (part["status"], part["contacts"], part["part"]["width"]) == ("converged", [], 2.0)
     assert f"3 mm down, output {3.0 * part['efficiency']:.0f} mm up" in text
 

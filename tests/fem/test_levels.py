@@ -210,6 +210,36 @@ def test_struts_of_one_joint_do_not_touch_at_it_but_where_they_close() -> None:
     assert find_contacts(np.array([0, 1]), rest, [(1.0, closed)], 2.0).overlap[0] > 0.5
 
 
+def test_struts_in_space_touch_where_they_pass_nearer_than_a_diameter() -> None:
+    along = np.linspace(-5.0, 5.0, 3)
+    rest = np.zeros((2, 3, 3))
+    rest[0, :, 0], rest[1, :, 1], rest[1, :, 2] = along + 0.7, along - 0.3, 4.0
+    stroke = [(load, rest - [[[0.0] * 3], [[0.0, 0.0, 4.0 * load]]]) for load in (0.25, 0.6, 0.75)]
+    contacts = find_contacts(np.array([3, 8]), rest, stroke, 2.0)
+    # Neither end of any segment is near the other strut.
+    assert contacts.pairs.tolist() == [[3, 8]]
+    assert contacts.overlap == pytest.approx([1.0])
+    assert contacts.onset.tolist() == [0.6]
+
+
+def test_contact_is_the_same_in_a_plane_of_space_whatever_its_orientation() -> None:
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+
+    def in_space(lines: np.ndarray) -> np.ndarray:
+        return np.pad(lines, ((0, 0), (0, 0), (0, 1))) @ turn.T
+
+    rng = np.random.default_rng(4)
+    starts = rng.uniform(0.0, 30.0, (12, 1, 2))
+    part = np.linspace(0.0, 1.0, 5)[:, None]
+    rest = starts + part * rng.uniform(-12.0, 12.0, (12, 1, 2))
+    stroke = [(1.0, rest + 4.0 * rng.normal(size=rest.shape))]
+    expected = find_contacts(np.arange(12), rest, stroke, 2.0)
+    found = find_contacts(np.arange(12), in_space(rest), [(1.0, in_space(stroke[0][1]))], 2.0)
+    assert len(expected.pairs) > 3
+    assert found.pairs.tolist() == expected.pairs.tolist()
+    assert found.overlap == pytest.approx(expected.overlap, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("wrong", "word"), [({"elements": 0}, "elements"), ({"size": -1.0}, "size")]
 )

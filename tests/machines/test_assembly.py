@@ -220,7 +220,7 @@ def test_designable_is_all_but_ports_and_supports() -> None:
             {"a": {"entry": "full"}, "b": {"entry": "stiff", "join": "a.output"}},
             [],
             {},
-            "parts a and b have different stiffness: bond 5 and angle 0.1 against 7 and 0.1",
+            "parts a and b have different stiffness: bond 5 and angle 0.1 against bond 7",
         ),
         (
             {"a": {"entry": "full"}, "b": {"entry": "full", "at": [-13.0, 0.0]}},

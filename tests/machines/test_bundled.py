@@ -1,14 +1,12 @@
-"""Bundled machines: assembly, linear assembly against the whole lattice, simulation."""
+"""Bundled machines: assembly, simulation, contact."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
 
 from bellcrank.errors import InvalidSettings, UnknownName
-from bellcrank.machines import linear_assembly
 from bellcrank.machines.bundled import bundled_machine, bundled_machines, find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.elementary import strut_named
@@ -17,19 +15,6 @@ from bellcrank.workflows.validation import check_contact
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-SMALL = 1e-3
-"""Fraction of the stroke in which the response is linear."""
-
-
-@pytest.mark.parametrize("name", bundled_machines())
-def test_linear_assembly_agrees_with_a_small_stroke_of_the_whole_lattice(name: str) -> None:
-    machine = bundled_machine(name)
-    problem = machine.design.problem
-    drive = replace(problem.input, amount=SMALL * problem.input.amount)
-    response = SpringEvaluator(replace(problem, input=drive)).evaluate(machine.design.mask)
-    assert response.status is Status.CONVERGED
-    assert linear_assembly(machine).efficiency == pytest.approx(response.efficiency, rel=0.05)
 
 
 @pytest.mark.parametrize("name", bundled_machines())

@@ -58,6 +58,41 @@ def small() -> dict[str, Any]:
     return copy.deepcopy(SMALL)
 
 
+SPACE = {
+    "schema": "bellcrank/problem/1",
+    "name": "small-space",
+    "positions": [
+        [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0],
+        [0.0, 0.0, 2.0], [1.0, 0.0, 2.0], [0.0, 1.0, 2.0],
+    ],
+    "beams": [
+        [0, 3], [1, 4], [2, 5], [3, 4], [4, 5], [5, 3], [0, 4], [1, 5], [2, 3],
+        [3, 6], [4, 7], [5, 8], [6, 7], [7, 8], [8, 6], [3, 7], [4, 8], [5, 6],
+    ],
+    "initial": "ffffc0",
+    "designable": [3, 4, 5, 12, 13],
+    "stiffness": {"bond": 5.0, "angle": 0.1},
+    "supports": {"fixed": [0], "fixed_x": [1], "fixed_y": [1, 2], "fixed_z": [2]},
+    "input": {"nodes": [6], "direction": [0.0, 0.0, -1.0], "drive": "displacement", "amount": 0.1},
+    "output": {
+        "nodes": [7, 8],
+        "direction": [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]],
+        "spring": None,
+        "spring_kind": None,
+    },
+    "aggregate": "mean",
+    "section": {"shape": "round", "diameter": 0.2},
+    "material": {"young": 1.0, "poisson": 0.48},
+}  # fmt: skip
+
+
+@pytest.fixture
+def space() -> dict[str, Any]:
+    """A frame problem in space of nine nodes and 18 beams, as the content of its file."""
+    return copy.deepcopy(SPACE)
+
+
 @pytest.fixture
 def reference() -> Path:
     """The folder of reference problems that lies beside the repository."""

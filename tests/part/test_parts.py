@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from bellcrank.errors import InvalidFile, InvalidSettings, UnknownName
 from bellcrank.model import find_problem, human_design
@@ -18,12 +16,10 @@ from bellcrank.part import (
     Part,
     PartSpec,
     Section,
-    calibrated,
     materials,
     read_length,
     read_part,
 )
-from bellcrank.part.calibration import equivalent_width
 from bellcrank.part.pieces import beam_pieces, check_supported
 
 if TYPE_CHECKING:
@@ -125,18 +121,10 @@ def test_a_file_that_describes_no_part_is_refused(tmp_path: Path, text: str, wor
         read_part(path)
 
 
-@given(st.floats(0.05, 9.9), st.floats(1.0, 50.0))
-def test_calibrated_springs_stand_for_struts_of_their_width(width: float, scale: float) -> None:
-    crane = find_problem("crane")
-    ratio = width / 10.0
-    fitted = calibrated(crane, ratio * scale, scale)
-    assert equivalent_width(fitted, scale) == pytest.approx(ratio * scale)
-    assert fitted.stiffness.bond == crane.stiffness.bond
-
-
-def test_struts_wider_than_long_have_no_springs() -> None:
-    with pytest.raises(InvalidSettings, match=r"width: expected more than 0 and less"):
-        calibrated(find_problem("crane"), 12.0)
+def test_the_part_of_a_section_has_it_in_millimetres() -> None:
+    assert PartSpec.of_section(Section(0.15, 0.4), 8.0) == PartSpec(
+        width=1.2, thickness=3.2, scale=8.0
+    )
 
 
 def test_loose_pieces_are_found_and_named() -> None:

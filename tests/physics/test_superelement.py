@@ -88,7 +88,7 @@ def test_condensation_is_the_schur_complement_of_the_twins_dense_stiffness(index
     element = Superelement(design, [free_nodes(ports)])
     active = element.active
     u = 0.02 * np.random.default_rng(index).standard_normal((len(active), 2))
-    u *= (element.system.block >= 0)[:, None] * active[:, None]
+    u *= (element.model.system.block >= 0)[:, None] * active[:, None]
     found = element.condense(u)
     undriven = replace(design.problem, input=replace(design.problem.input, drive="force"))
     twin = Twin(undriven, design.mask)

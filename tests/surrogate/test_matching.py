@@ -10,7 +10,7 @@ import pytest
 
 from bellcrank.campaign.dataset import reverse
 from bellcrank.errors import InvalidModel, InvalidProblem
-from bellcrank.model import Lattice, Stiffness, Supports, find_problem
+from bellcrank.model import Lattice, Section, Stiffness, Supports, find_problem
 from bellcrank.surrogate.matching import require_same_problem
 from bellcrank.surrogate.predictor import Predictor, load_predictor
 
@@ -82,6 +82,10 @@ CHANGES: list[tuple[Callable[[Any], Any], str]] = [
     (further, "amount"),
     (forced, "drive"),
     (lambda problem: replace(problem, aggregate="sum"), "aggregate"),
+    (
+        lambda problem: replace(problem, section=Section(0.2, 0.5)),
+        r"cross-section .* None in training, Section",
+    ),
     (
         lambda problem: replace(problem, objective="directional:4"),
         r"exponent of the objective .* 2\.0 in training, 4\.0 here",

@@ -10,9 +10,9 @@ import pytest
 import trimesh
 
 from bellcrank.fem import levels
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator, SpringEvaluator
 from bellcrank.model import find_problem, human_design, problem_to_dict
-from bellcrank.part import calibrated, materials
+from bellcrank.part import PartSpec, frame_problem, materials
 from bellcrank.search import DEFAULT_SEARCH, searches
 from bellcrank.web.page_files import page_files
 from bellcrank.web.task_files import read_task, write_task
@@ -288,18 +288,21 @@ def test_two_parts_make_a_machine_and_parts_that_do_not_fit_are_named(client: Te
     refusal(client.post("/api/machines", json={"plan": plan}), 404)
 
 
-def test_a_task_for_a_part_is_answered_with_the_stiffness_of_its_struts(client: TestClient) -> None:
+def test_a_task_for_a_part_is_answered_with_the_section_of_its_struts(client: TestClient) -> None:
     problem = client.get("/api/problems/crane").json()
     part = {"width": 1.6, "thickness": 5.0, "scale": 10.0, "material": "ninjaflex"}
     plain = client.post("/api/tasks/check", json={"problem": problem}).json()
     meant = client.post("/api/tasks/check", json={"problem": problem, "part": part}).json()
-    assert plain["stiffness"] == problem["stiffness"]
-    expected = calibrated(find_problem("crane"), 1.6).stiffness
-    assert meant["stiffness"] == {"bond": expected.bond, "angle": expected.angle}
+    assert (plain["section"], plain["material"]) == (None, None)
+    frame = frame_problem(find_problem("crane"), PartSpec(width=1.6))
+    data = problem_to_dict(frame)
+    assert (meant["section"], meant["material"]) == (data["section"], data["material"])
+    response = FrameEvaluator(frame).evaluate(frame.initial)
+    assert meant["response"]["efficiency"] == pytest.approx(response.efficiency, abs=1e-9)
     assert meant["response"]["efficiency"] != plain["response"]["efficiency"]
     wide = client.post("/api/tasks/check", json={"problem": problem, "part": {**part, "width": 12}})
     message, about = refusal(wide)
-    assert message.startswith("width: expected more than 0 and less than")
+    assert message.startswith("width: struts 12 mm wide are not slender where the shortest is")
     assert about == "width"
 
 

@@ -8,10 +8,10 @@ from bellcrank.export import Export
 from bellcrank.fem import FemSettings, levels
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Status
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports
-from bellcrank.part import PartSpec
-from bellcrank.search import Verdict
+from bellcrank.part import PartSpec, frame_problem
+from bellcrank.search import HoppingSettings, Verdict
 from bellcrank.search.constraints import ConstrainedEvaluator, LoadCase
-from bellcrank.workflows.candidate_ranking import fault_of
+from bellcrank.search.verification import Verifier
 from bellcrank.workflows.fabricate import print_warnings, profile_for
 
 SPEC = PartSpec(width=1.5)
@@ -43,8 +43,13 @@ def test_a_frame_reports_contact_in_the_middle_of_the_stroke(sweep: Design) -> N
     assert f"{contact['first_at']:.0%} of the stroke" in " ".join(analysis.warnings)
 
 
-def test_a_candidate_with_contact_along_the_stroke_has_a_fault(sweep: Design) -> None:
-    assert "touch" in str(fault_of(levels["frame"](SPEC.of(sweep), FemSettings(elements=3))))
+def test_a_frame_with_contact_along_the_stroke_has_a_fault(sweep: Design) -> None:
+    verifier = Verifier(frame_problem(sweep.problem, SPEC), HoppingSettings())
+    verification = verifier.verify(sweep.mask)
+    assert verification.is_stable
+    assert verification.fault == "beams touch along the stroke"
+    assert verification.contacts.pairs.tolist() == [[1, 2]]
+    assert verification.contacts.first == 0.375
 
 
 def test_a_linear_analysis_checks_its_only_state(sweep: Design) -> None:

@@ -15,7 +15,13 @@ export interface Problem {
   output: { nodes: number[]; direction: Point | Point[]; spring: number | null; spring_kind: string | null };
   aggregate: string;
   objective?: string;
+  /** Cross-section and material of the beams of a frame, in lattice units; without them a problem is one of the spring model. */
+  section?: { shape: string; width?: number; thickness?: number; diameter?: number } | null;
+  material?: { young: number; poisson: number } | null;
 }
+
+/** The mechanical model of a problem in words. */
+export function modelOf(problem: Problem): string { return problem.section ? "frames" : "spring model"; }
 
 export interface Response {
   status: string;

@@ -6,7 +6,7 @@ import type { Hold, Region, Task } from "./task";
 
 export type Brush = "keep" | "never" | "auto";
 
-/** Settings of a search; `forPart` searches a part with struts of a width in mm, else the spring model as given. */
+/** Settings of a search; `forPart` searches frames with struts of a width in mm, else the spring model. */
 export interface Settings { method: string; steps: number; chains: number; seed: number; forPart: boolean; width: number; material: string }
 
 export interface Fault { key: string; message: string }
@@ -33,7 +33,7 @@ export interface TaskEditor {
   setDirection(region: "input" | "output", direction: Point): void;
   change(region: "input" | "output", changes: Record<string, unknown>): void;
   /** Evaluate again after a change of the part. */
-  updateStiffness(): void;
+  updateModel(): void;
   startSearch(): Promise<void>;
   saveHandDesign(title: string): Promise<void>;
   save(suffix: ".toml" | ".json"): Promise<void>;

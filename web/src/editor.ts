@@ -1,6 +1,6 @@
 // The page on which a task is defined, and a design is drawn by hand.
 
-import { bitsOf, fetchRegistries, hexOf, post, ServerError, session, Solver, type Part, type Point, type Problem, type Registries, type Response } from "./api";
+import { bitsOf, fetchRegistries, hexOf, modelOf, post, ServerError, session, Solver, type Part, type Point, type Problem, type Registries, type Response } from "./api";
 import { TASK_KEY } from "./begin";
 import { Canvas, type Tool } from "./canvas";
 import { where } from "./drawing";
@@ -40,7 +40,7 @@ export class Editor implements TaskEditor {
   private readonly canvas: Canvas;
   private readonly panels: Panels;
   private readonly solver: Solver;
-  private stiffness: Problem["stiffness"] | null = null;
+  private frame: Pick<Problem, "section" | "material"> = {};
   private readonly hint = h("p", { class: "hint" });
   private readonly errorLine = h("p", { class: "error", role: "alert" });
   private readonly readout = h("div", { class: "readout", "aria-live": "polite" });
@@ -78,8 +78,8 @@ export class Editor implements TaskEditor {
   get task(): Task { return this.history.value; }
   get problem(): Problem { return problemOf(this.task); }
 
-  /** The problem with the stiffness of the part, as computed by the server. */
-  private get partProblem(): Problem { return this.settings.forPart && this.stiffness ? { ...this.problem, stiffness: this.stiffness } : this.problem; }
+  /** The problem as a frame of the struts of the part, with the section computed by the server. */
+  private get partProblem(): Problem { return this.settings.forPart ? { ...this.problem, ...this.frame } : this.problem; }
 
   /** The part to be designed; null without one, or before its material is known. */
   private get part(): Part | null {
@@ -87,7 +87,7 @@ export class Editor implements TaskEditor {
     return forPart && material ? { width, thickness: 5, scale: this.task.scale, material } : null;
   }
 
-  updateStiffness(): void {
+  updateModel(): void {
     void this.check().then(() => this.evaluate());
   }
 
@@ -240,12 +240,13 @@ export class Editor implements TaskEditor {
     const requested = new AbortController();
     this.checking = requested;
     try {
-      const found = await post<{ response: Response | null; stiffness: Problem["stiffness"] | null }>("/tasks/check", body, requested.signal);
+      const found = await post<{ response: Response | null } & Pick<Problem, "section" | "material">>("/tasks/check", body, requested.signal);
       this.checked = found.response ? text : "";
       this.fault = null;
       this.response = found.response;
-      if (found.stiffness && JSON.stringify(found.stiffness) !== JSON.stringify(this.stiffness)) {
-        this.stiffness = found.stiffness;
+      const frame = found.section && found.material ? { section: found.section, material: found.material } : {};
+      if (JSON.stringify(frame) !== JSON.stringify(this.frame)) {
+        this.frame = frame;
         this.evaluate();
       }
     } catch (error) {
@@ -265,7 +266,7 @@ export class Editor implements TaskEditor {
     const converged = !error && response.status === "converged";
     clear(this.readout,
       h("strong", {}, error ? "–" : figure(response.efficiency, 3)),
-      h("span", {}, error ? sentence(error.message) : converged ? "spring model: output / input displacement" : sentence(response.message)),
+      h("span", {}, error ? sentence(error.message) : converged ? `${modelOf(this.partProblem)}: output / input displacement` : sentence(response.message)),
       converged && full !== null && full !== undefined && h("span", {}, `full lattice: ${figure(full, 3)}`),
       h("span", { class: "latency" }, `${latency.toFixed(0)} ms, ${where(bits).length} beams`));
     this.readout.dataset.latency = latency.toFixed(1);

@@ -1,6 +1,6 @@
 // Animation of a design along its computed path, with amplification and colours.
 
-import { post, type Motion, type Problem } from "./api";
+import { modelOf, post, type Motion, type Problem } from "./api";
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, where } from "./drawing";
 import { choice, clear, field, figure, h, icon, s } from "./dom";
@@ -173,7 +173,7 @@ export class Player {
     const stroke = input.drive === "displacement" ? `${figure(this.part * input.amount * this.scale, 2)} mm in` : `${figure(100 * this.part, 0)} % of the force`;
     const efficiency = motion.efficiency[near] ?? null;
     const out = efficiency === null || input.drive !== "displacement" ? "" : `${figure(this.part * input.amount * this.scale * efficiency, 2)} mm out`;
-    const lines = [figure(efficiency, 3), "spring model", stroke, out, motion.snapped[near] ? "after a snap-through" : ""];
+    const lines = [figure(efficiency, 3), modelOf(this.problem), stroke, out, motion.snapped[near] ? "after a snap-through" : ""];
     if (this.readout.childElementCount !== 5) {
       clear(this.readout, h("strong"), h("span"), h("span"), h("span"), h("span", { class: "alarm" }));
     }

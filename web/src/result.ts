@@ -1,6 +1,6 @@
 // The panel beside a design: efficiency, part, files and next steps.
 
-import { fetchBlob, fetchFile, fetchRegistries, get, post, type Comparison, type Part, type Problem, type Registries, type ServerError } from "./api";
+import { fetchBlob, fetchFile, fetchRegistries, get, modelOf, post, type Comparison, type Part, type Problem, type Registries, type ServerError } from "./api";
 import { bitsOf, hexOf } from "./api";
 import { TASK_KEY } from "./begin";
 import { button, clear, download, field, figure, h, number, select } from "./dom";
@@ -82,7 +82,7 @@ export class Result {
     const quantity = problem.input.drive === "displacement" && (problem.objective ?? "displacement") === "displacement" ? "Output displacement / input displacement"
       : `Objective: ${problem.objective ?? "output / input"}`;
     clear(this.headline, h("strong", {}, figure(useFrame ? frame.efficiency : this.subject.efficiency, 2)),
-      h("span", {}, h("b", { class: "model" }, useFrame ? `frame of ${this.part.width} mm struts` : "spring model"), h("br"), quantity));
+      h("span", {}, h("b", { class: "model" }, useFrame ? `frame of ${this.part.width} mm struts` : modelOf(problem)), h("br"), quantity));
     const warnings = frame ? [...frame.warnings, ...frame.doubts] : [];
     clear(this.warnings, ...warnings.map((text) => h("li", {}, sentence(text))));
   }

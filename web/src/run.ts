@@ -1,6 +1,6 @@
 // The progress of a search, and its result.
 
-import { fetchRegistries, follow, get, post, remove, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
+import { fetchRegistries, follow, get, modelOf, post, remove, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
 import { bitsOf } from "./api";
 import { Chart } from "./chart";
 import { Drawing, where } from "./drawing";
@@ -143,7 +143,7 @@ export class RunPage {
     const share = Math.min(1, done / run.total);
     const running = run.status === "running";
     const tried = this.update?.tried;
-    const last: [string, string] = tried ? ["candidates analysed", `${tried[0]} of ${tried[1]}`] : ["time left", duration(this.update?.left)];
+    const last: [string, string] = tried ? ["candidates verified", `${tried[0]} of at most ${tried[1]}`] : ["time left", duration(this.update?.left)];
     const rows: [string, string][] = [
       ["best so far", figure(run.efficiency ?? this.chart.best, 3)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
@@ -185,7 +185,7 @@ export class RunPage {
 
   private stateText(run: Run, known: boolean, done: number): string {
     if (run.status !== "running") return run.status;
-    if (known) return "best design so far, spring model";
+    if (known) return `best design so far, ${modelOf(this.run.problem)}`;
     return done ? "No admissible design yet." : "Starting …";
   }
 

@@ -31,10 +31,10 @@ export class SearchBox {
     };
     const effort = EFFORTS.find(([, , steps, chains]) => steps === settings.steps && chains === settings.chains)?.[0] ?? "";
     const forPart = h("input", { type: "checkbox", checked: settings.forPart, "data-key": "for-part" });
-    forPart.addEventListener("change", () => { update({ forPart: forPart.checked }); editor.updateStiffness(); });
+    forPart.addEventListener("change", () => { update({ forPart: forPart.checked }); editor.updateModel(); });
     const method = select(methods.map(({ name, title }) => [name, title]), settings.method, (picked) => update({ method: picked }));
     method.dataset.key = "method";
-    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => { update({ width: value }); editor.updateStiffness(); });
+    const width = number(settings.width, { min: 0.1, step: "any" }, (value) => { update({ width: value }); editor.updateModel(); });
     width.dataset.key = "width";
     const { missing } = editor;
     return h("section", { class: "step search open" },
@@ -50,8 +50,8 @@ export class SearchBox {
           field("Method", method, "", methods.find(({ name }) => name === settings.method)?.summary ?? ""),
           h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000), whole("chains", "Chains", 1, 64), whole("seed", "Seed", 0, 2 ** 31)),
           h("label", { class: "tick" }, forPart, "Design a part with struts of this width"),
-          settings.forPart ? field("Strut width", width, "mm", "The best candidates are ranked by nonlinear frame analysis.")
-            : h("p", { class: "note" }, "The spring model uses the stiffness of the task, by default that of the paper.")),
+          settings.forPart ? field("Strut width", width, "mm", "Designs are frames of such struts; the best are verified with 8 elements in each strut.")
+            : h("p", { class: "note" }, "The discrete model of the paper; its springs are those of struts half as wide as long.")),
         h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !!missing || !!editor.fault || !settings.method || this.busy,
           onclick: () => void this.start() }, "Design it"),
         missing && h("p", { class: "note" }, missing.message),

@@ -23,6 +23,14 @@ DesignName = Annotated[
         help="Design file, result folder, human:NAME, machine:NAME, library entry, or problem."
     ),
 ]
+ModelName = Annotated[
+    str | None,
+    typer.Option(
+        "--model",
+        help="Mechanical model: springs, or frames (of the default part where the problem has no "
+        "section). \\[frames if the problem has a section]",
+    ),
+]
 PartFile = Annotated[
     Path | None,
     typer.Option("--part", help="TOML file with width, thickness, scale, material and fillet."),
@@ -57,6 +65,24 @@ def design_named(text: str) -> Design:
             "not the bundled problem of that name"
         )
     return find_design(text)
+
+
+def design_in_model(design: Design, model: str | None) -> Design:
+    """Return a design with its problem in a mechanical model; unchanged without one.
+
+    Raises
+    ------
+    UnknownName
+        If there is no such model.
+    """
+    if model is None:
+        return design
+    from dataclasses import replace
+
+    from bellcrank.part import models
+    from bellcrank.workflows import spec_for
+
+    return replace(design, problem=models[model](design.problem, spec_for(design)))
 
 
 def part_of(

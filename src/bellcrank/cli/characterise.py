@@ -12,7 +12,13 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
-from bellcrank.cli.arguments import UNLOADED_BEAMS, DesignName, design_named
+from bellcrank.cli.arguments import (
+    UNLOADED_BEAMS,
+    DesignName,
+    ModelName,
+    design_in_model,
+    design_named,
+)
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.errors import InvalidSettings
 
@@ -33,9 +39,10 @@ def characterise(
             "it resists), in lattice units; repeatable. \\[free, blocked, matched spring]"
         ),
     ] = None,
+    model: ModelName = None,
     unloaded_beams: Annotated[
         str,
-        typer.Option(help=UNLOADED_BEAMS),
+        typer.Option(help=f"{UNLOADED_BEAMS} Springs only: frames do not depend on them."),
     ] = "keep",
     out: Annotated[
         Path | None,
@@ -56,7 +63,7 @@ def characterise(
     )
     from bellcrank.machines.pictures import draw_characterisation
 
-    chosen = design_named(design)
+    chosen = design_in_model(design_named(design), model)
     loads = None if load is None else [Load.read(text) for text in load]
     if points < 1:
         raise InvalidSettings(f"--points: expected at least one, got {points}")
@@ -107,7 +114,7 @@ def _targets(out: Path | None, *, overwrite: bool) -> list[Path]:
 
 def _print(found: Characterisation, name: str) -> None:
     """Print the two-port and the end of each curve."""
-    results.print(f"{plain(name)}: {found.beams} beams; lattice units")
+    results.print(f"{plain(name)}: {found.beams} beams; {found.model}; lattice units")
     linear = Table("at rest", "", box=SIMPLE)
     for label, value in _figures(found.rest):
         linear.add_row(label, value)

@@ -6,7 +6,7 @@ import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.table import Table
@@ -23,7 +23,7 @@ from bellcrank.cli.console import (
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from bellcrank.model import Problem
+    from bellcrank.model import Design, Problem
     from bellcrank.part import PartSpec
     from bellcrank.workflows import DesignReport
 
@@ -42,12 +42,21 @@ def design(
             help="Objective: displacement, directional:N or force; default: by the drive."
         ),
     ] = None,
-    search: Annotated[
-        str,
+    model: Annotated[
+        str | None,
         typer.Option(
-            help="Search method: basin-hopping, tempering or paper (Bonfanti et al. 2020).",
+            help="Mechanical model: frames (beams that are the struts of a part) or springs. "
+            "\\[frames]"
         ),
-    ] = "basin-hopping",
+    ] = None,
+    paper: Annotated[
+        bool,
+        typer.Option("--paper", help="Springs and search of the paper (Bonfanti et al. 2020)."),
+    ] = False,
+    search: Annotated[
+        str | None,
+        typer.Option(help="Search method: basin-hopping, tempering or paper. \\[basin-hopping]"),
+    ] = None,
     unloaded_beams: Annotated[
         str | None,
         typer.Option(help=UNLOADED_BEAMS),
@@ -64,7 +73,10 @@ def design(
     ] = None,
     goal: Annotated[
         list[str] | None,
-        typer.Option(help="Constraint on the design, for example 'mass <= 0.6'; repeatable."),
+        typer.Option(
+            help="Constraint on the design, for example 'mass <= 0.6'; repeatable. For a part, "
+            "without any: 'no-contact WIDTH'."
+        ),
     ] = None,
     strokes: Annotated[
         str | None,
@@ -72,8 +84,9 @@ def design(
     ] = None,
     strut_width: Annotated[
         str | None,
-        typer.Option(help="Strut width of the part, for example 1.6mm; sets the stiffness."),
+        typer.Option(help="Strut width of the part, for example 1.6mm. \\[2mm]"),
     ] = None,
+    thickness: Annotated[str | None, typer.Option(help="Thickness of the part. \\[5mm]")] = None,
     scale: Annotated[
         str | None, typer.Option(help="Length of a lattice unit of the part. \\[10mm]")
     ] = None,
@@ -104,9 +117,6 @@ def design(
         raise InvalidSettings(
             "give one of these: a problem to design for, --from DESIGN, or --resume DIR"
         )
-    part = _part(strut_width, scale, material)
-    if resume is not None and part is not None:
-        raise InvalidSettings("--strut-width, --scale and --material are kept from the run's start")
     if workers is not None and workers < 1:
         raise InvalidSettings(f"workers: expected at least 1, got {workers}")
     given = {
@@ -117,17 +127,28 @@ def design(
         **settings_of("--set", more),
     }  # fmt: skip
     chosen = {key: value for key, value in given.items() if value is not None}
-    if resume is not None and (chosen or out is not None):
-        what = next(iter(chosen), "out").replace("_", "-")
+    lengths = {
+        "width": strut_width, "thickness": thickness, "scale": scale, "material": material
+    }  # fmt: skip
+    wanted = {key: value for key, value in lengths.items() if value is not None}
+    _check_model(model, search, chosen, wanted, paper=paper)
+    others = {"model": model, "paper": paper or None, "search": search, "out": out, **lengths}
+    changed = [*chosen, *(key for key, value in others.items() if value is not None)]
+    if resume is not None and changed:
+        what = changed[0].replace("_", "-").replace("width", "strut-width")
         raise InvalidSettings(
             f"--{what} cannot be changed with --resume; to continue from the design of that run, "
             f"start a new one with --from {resume}"
         )
     # Input is refused before the modules that take long to import.
-    task = None if resume is not None else _task(problem, str(begin))
+    model = "springs" if paper else model or "frames"
+    task, part = None, None
+    if resume is None:
+        task, part = _in_model(_design(problem, str(begin)), model, wanted)
     from bellcrank.search import read_settings
 
-    settings = read_settings({"search": search, **chosen})
+    method = "paper" if paper else search or "basin-hopping"
+    settings = read_settings({"search": method, **chosen})
     from bellcrank.cli.progress import SearchProgress
     from bellcrank.workflows import complete_design, reopen_design, start_design
 
@@ -144,7 +165,7 @@ def design(
         stop.hint = f"Stopped. To continue: {plain(command)}"
         with SearchProgress(read_settings(folder.settings)) as progress:
             report = complete_design(
-                folder, workers=workers, progress=progress, ranking=progress.ranking, stop=stop
+                folder, workers=workers, progress=progress, verifying=progress.verifying, stop=stop
             )
         if report is None:
             stop.exit()  # a thread may still compute a block, which delays a usual exit
@@ -184,28 +205,83 @@ def _print_stroke(task: Problem, scale: float) -> None:
         )
 
 
-def _task(problem: str | None, begin: str) -> Problem:
-    """Return the named problem, or the task of a design with that design as the initial one."""
+PAPER = {"unloaded_beams": "keep", "cost": "exponential", "schedule": "linear"}
+"""Settings of the paper's search that have an option of their own."""
+PAPER_OPTIONS = ("steps", "chains", "seed", "objective")
+"""Options that go with ``--paper``."""
+
+
+def _check_model(
+    model: str | None,
+    search: str | None,
+    chosen: dict[str, Any],
+    part: dict[str, str],
+    *,
+    paper: bool,
+) -> None:
+    """Refuse options that contradict each other.
+
+    Raises
+    ------
+    InvalidSettings
+    """
+    if paper:
+        given = {"model": model, "search": search, **chosen, **part}
+        known = {"model": "springs", "search": "paper", **PAPER}
+        for key, value in given.items():
+            if value is not None and key not in PAPER_OPTIONS and known.get(key) != value:
+                raise InvalidSettings(
+                    f"--paper: {_option(key)} {value} contradicts it; the paper's model and "
+                    "search leave only --steps, --chains, --seed and --objective to choose"
+                )
+    if model == "springs" and part:
+        raise InvalidSettings(
+            f"{_option(next(iter(part)))}: a part is made of frames; leave out --model springs"
+        )
+
+
+OPTIONS = {
+    "width": "--strut-width", "goals": "--goal",
+    **{
+        key: f"--{key.replace('_', '-')}"
+        for key in ("model", "search", "strokes", "thickness", "scale", "material", *PAPER)
+    },
+}  # fmt: skip
+
+
+def _option(key: str) -> str:
+    """Return the option of a setting."""
+    return OPTIONS.get(key, f"--set {key}")
+
+
+def _design(problem: str | None, begin: str) -> Design:
+    """Return the named problem with its initial design, or a design as the initial one."""
     from bellcrank.model import find_problem
 
     if problem is not None:
-        return find_problem(problem)
+        return find_problem(problem).full_design()
     design = design_named(begin)
-    return replace(design.problem, initial=design.mask)
+    return replace(design, problem=replace(design.problem, initial=design.mask))
 
 
-def _part(width: str | None, scale: str | None, material: str | None) -> PartSpec | None:
-    """Return the part to design, if its options are given."""
-    if width is None:
-        if scale is not None or material is not None:
-            raise InvalidSettings(
-                "--scale and --material describe a part: give --strut-width as well"
-            )
-        return None
-    from bellcrank.part import PartSpec, materials
+def _in_model(design: Design, model: str, part: dict[str, str]) -> tuple[Problem, PartSpec | None]:
+    """Return a problem in its mechanical model, and for frames the part that is designed.
 
-    given = {"width": width, "scale": scale, "material": material and materials[material].name}
-    return PartSpec().changed({key: value for key, value in given.items() if value is not None})
+    A problem that has a section keeps it unless the part is given.
+    """
+    from bellcrank.part import frame_problem, materials, models
+    from bellcrank.workflows import spec_for
+
+    make = models[model]
+    if model == "springs":
+        return make(design.problem, spec_for(design)), None
+    changes = dict(part)
+    if "material" in changes:
+        changes["material"] = materials[changes["material"]].name
+    spec = spec_for(design).changed(changes)
+    if part:
+        return frame_problem(design.problem, spec), spec
+    return make(design.problem, spec), spec
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:
@@ -218,17 +294,15 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
 
 def _print_report(report: DesignReport) -> None:
     """Print the results in a table, with warnings."""
-    from bellcrank.mechanics import objective_name
-    from bellcrank.workflows.report import part_rows
+    from bellcrank.workflows.report import figure_table
 
     selection = report.selection
     table = Table.grid(padding=(0, 2))
-    objective = objective_name(selection.design.problem)
-    table.add_row(
-        f"efficiency ({objective}), spring model", f"[bold]{selection.efficiency_after:.4f}[/]"
-    )
-    for name, value in part_rows(report):
-        table.add_row(name, value)
+    figures = Table.grid(padding=(0, 2))
+    for name, *values in figure_table(report):
+        figures.add_row(name, *(f"[bold]{plain(value)}[/]" if name.startswith("efficiency") else
+                                plain(value) for value in values))  # fmt: skip
+    results.print(figures)
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
     table.add_row("initial design", f"{report.initial_efficiency:.4f}")
     if report.human_response is not None:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
-from bellcrank.cli.arguments import UNLOADED_BEAMS, design_named
+from bellcrank.cli.arguments import UNLOADED_BEAMS, ModelName, design_in_model, design_named
 from bellcrank.cli.console import announce_compilation, print_json, results
-
-if TYPE_CHECKING:
-    from bellcrank.mechanics import Response
 
 
 @app.command()
@@ -29,50 +25,58 @@ def evaluate(
         Path | None,
         typer.Option(help="JSON file with results\\[].mask or masks. \\[the design itself]"),
     ] = None,
+    model: ModelName = None,
+    elements: Annotated[
+        int | None,
+        typer.Option(
+            help="Number of linear elements of each beam of a frame. \\[one that includes the "
+            "shortening of bent beams, as in searches]"
+        ),
+    ] = None,
     objective: Annotated[
         str | None,
         typer.Option(help="displacement, directional:N or force. \\[that of the design]"),
     ] = None,
     unloaded_beams: Annotated[
         str,
-        typer.Option(help=UNLOADED_BEAMS),
+        typer.Option(help=f"{UNLOADED_BEAMS} Springs only: frames do not depend on them."),
     ] = "keep",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Compute the response of designs, each from rest to the full stroke."""
-    from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, objective_name
+    from bellcrank.mechanics import (
+        VERIFICATION_INCREMENT,
+        model_evaluator,
+        objective_name,
+    )
     from bellcrank.model import pack_mask, read_masks
+    from bellcrank.workflows.figures import figure_text, figures_of, model_record, model_words
 
     design = design_named(problem)
     masks = read_masks(designs, design.problem) if designs else [design.mask]
-    evaluator = SpringEvaluator(design.problem, objective, unloaded_beams)  # type: ignore[arg-type]
-    ratio = objective_name(design.problem, objective)
+    task = design_in_model(design, model).problem
+    evaluator = model_evaluator(task, objective, unloaded_beams, elements)  # type: ignore[arg-type]
+    about = {
+        "objective": objective_name(task, objective),
+        **model_record(task, elements),
+    }
     announce_compilation()
     rows = []
     for mask in masks:
         response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
-        row = {"mask": pack_mask(mask), **_row(response)}
-        rows.append({**row, "beams": int(mask.sum()), "objective": ratio})
+        row = {"mask": pack_mask(mask), **figures_of(evaluator, response)}
+        rows.append({**row, "beams": int(mask.sum()), **about})
     if as_json:
         print_json(json.dumps({"results": rows}, indent=1))
         return
-    table = Table("design", "beams", f"efficiency ({ratio})", "energy", "status", box=SIMPLE)
+    columns = ("design", "beams", "efficiency", "off-axis", "rotation", "energy", "status")
+    caption = f"efficiency ({about['objective']}), {model_words(task, elements)}"
+    table = Table(*columns, box=SIMPLE, caption=caption)
     for number, row in enumerate(rows):
         table.add_row(
-            str(number), str(row["beams"]), _number(row["efficiency"]), _number(row["energy"]),
-            row["status"],
+            str(number), str(row["beams"]), figure_text(row["efficiency"], "{:.7f}"),
+            figure_text(row["off_axis"], "{:.1%}"),
+            figure_text(row["output_rotation_deg"], "{:.2f} deg"),
+            figure_text(row["energy"], "{:.7f}"), row["status"],
         )  # fmt: skip
     results.print(table)
-
-
-def _row(response: Response) -> dict[str, Any]:
-    """Return a response as plain data; numbers that are not finite become null."""
-    numbers = {"efficiency": response.efficiency, "energy": response.energy}
-    return {
-        **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
-        "status": response.status.label,
-    }
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.7f}"

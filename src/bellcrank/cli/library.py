@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from bellcrank.cli.app import INTERRUPTED, app
-from bellcrank.cli.arguments import DesignName, design_named
+from bellcrank.cli.arguments import DesignName, design_in_model, design_named
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json
 from bellcrank.cli.library_view import MakingProgress, print_entries, print_entry, warn
 from bellcrank.errors import InvalidSettings
@@ -121,6 +121,9 @@ def show(
 def add(
     design: DesignName,
     points: Annotated[int, typer.Option(help="Number of increments of the stroke.")] = 20,
+    model: Annotated[
+        str, typer.Option(help="Mechanical model in which it is measured: frames or springs.")
+    ] = "frames",
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
@@ -131,7 +134,7 @@ def add(
     from bellcrank.storage.files import make_folder
     from bellcrank.workflows.library_measurement import measure
 
-    chosen = design_named(design)
+    chosen = design_in_model(design_named(design), model)
     if points < 1:
         raise InvalidSettings(f"--points: expected at least one, got {points}")
     make_folder(user_folder())

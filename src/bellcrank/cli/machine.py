@@ -14,11 +14,14 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from bellcrank.cli.app import app
+from bellcrank.cli.arguments import ModelName, design_in_model
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
-    from bellcrank.machines import LinearResponse, Machine, Plan, PortCurve
+    from collections.abc import Iterator
+
+    from bellcrank.machines import Machine, Plan, PortCurve, TwoPort
     from bellcrank.mechanics import Response
     from bellcrank.model import Design
 
@@ -60,6 +63,7 @@ def build(
         Path | None,
         typer.Option(help="Design file to write. \\[NAME.json, beside a plan file]"),
     ] = None,
+    model: ModelName = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -67,7 +71,7 @@ def build(
     from dataclasses import replace
 
     from bellcrank.machines.bundled import find_plan
-    from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
+    from bellcrank.mechanics import VERIFICATION_INCREMENT, model_evaluator
     from bellcrank.model import write_design
     from bellcrank.model.storage import already_exists, check_folder
 
@@ -79,9 +83,9 @@ def build(
     if target.exists() and not overwrite:
         raise already_exists(target)
     start = time.perf_counter()
-    built = _assemble(found)
+    built = _assemble(found, model)
     announce_compilation()
-    response = SpringEvaluator(built.design.problem).evaluate(
+    response = model_evaluator(built.design.problem).evaluate(
         built.design.mask, VERIFICATION_INCREMENT
     )
     seconds = time.perf_counter() - start
@@ -94,7 +98,7 @@ def build(
         status = "" if response.is_admissible else f" ({response.status.message})"
         value = "-" if efficiency is None else f"{efficiency:.4f}"
         _print_rows(
-            **{name: record[name] for name in ("name", "nodes", "beams", "designable")},
+            **{name: record[name] for name in ("name", "model", "nodes", "beams", "designable")},
             parts=", ".join(record["parts"]),
             efficiency=f"{value}{status}",
         )
@@ -105,52 +109,73 @@ def build(
 def predict(
     plan: PlanName,
     points: Annotated[int, typer.Option(help="Number of increments of the stroke.")] = 20,
+    model: ModelName = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compare the linear assembly of a machine with the simulation of its whole lattice."""
-    from bellcrank.machines import linear_assembly, simulate
+    """Predict a machine from its condensed parts, and simulate its whole lattice."""
+    from bellcrank.machines import assembled_ports, simulate, two_port_at
+    from bellcrank.machines import predict as predict_curve
     from bellcrank.machines.bundled import find_plan
 
     if points < 1:
         raise InvalidSettings(f"--points: expected at least one, got {points}")
-    built = _assemble(find_plan(plan))
+    built = _assemble(find_plan(plan), model)
     announce_compilation()
-    linear = linear_assembly(built)
-    curve = simulate(built, points)
+    parts = assembled_ports(built)
+    rest = two_port_at(parts, parts.rest())
+    predicted, simulated = predict_curve(built, points), simulate(built, points)
     if as_json:
-        print_json(json.dumps(_prediction(built, linear, curve), indent=1))
+        print_json(json.dumps(_prediction(built, rest, predicted, simulated), indent=1))
         return
-    complete = curve.reached == 1.0
-    where = "full stroke" if complete else f"{curve.reached:.1%} of the stroke, where it snaps"
-    last = f"{curve.efficiency[-1]:.4f}" if len(curve.motion) > 1 else "-"
     rows = {
         "name": built.design.problem.name,
-        "efficiency, linear assembly": f"{linear.efficiency:.4f}",
-        f"efficiency, simulated, {where}": last,
-        "input stiffness, linear assembly": f"{linear.input_stiffness:.4g}",
+        "model": _model(built),
+        "efficiency at rest": f"{rest.efficiency:.4f}",
+        "input stiffness at rest": f"{rest.input_stiffness:.4g}",
+        **dict(_endings(("predicted from its parts", predicted), ("simulated", simulated))),
     }
     _print_rows(**rows)
-    table = Table("u_in", "u_out", "u_out/u_in", "F_in", "energy", box=SIMPLE)
-    count = len(curve.motion) - 1
+    columns = ("u_in", "u_out", "u_out, simulated", "u_out/u_in", "F_in", "energy")
+    table = Table(*columns, box=SIMPLE)
+    count = min(len(predicted.motion), len(simulated.motion)) - 1
     for point in sorted({math.ceil(count * row / ROWS) for row in range(1, ROWS + 1)} - {0}):
-        values = (curve.motion, curve.output, curve.efficiency, curve.input_force, curve.energy)
+        values = (
+            predicted.motion, predicted.output, simulated.output, predicted.efficiency,
+            predicted.input_force, predicted.energy,
+        )  # fmt: skip
         table.add_row(*(f"{value[point]:.4g}" for value in values))
     results.print(table)
 
 
-def _assemble(plan: Plan) -> Machine:
+def _endings(*curves: tuple[str, PortCurve]) -> Iterator[tuple[str, str]]:
+    """Yield label and efficiency at the end of the stroke for each curve."""
+    for label, curve in curves:
+        where = "full stroke"
+        if curve.reached < 1.0:
+            where = f"{curve.reached:.1%} of the stroke, where it snaps"
+        last = f"{curve.efficiency[-1]:.4f}" if len(curve.motion) > 1 else "-"
+        yield f"efficiency, {label}, {where}", last
+
+
+def _assemble(plan: Plan, model: str | None) -> Machine:
     """Assemble a machine; files of parts are relative to the plan."""
     from bellcrank.machines import assemble
 
-    return assemble(plan, partial(_find_part, Path(plan.source).parent))
+    return assemble(plan, partial(_find_part, Path(plan.source).parent, model))
 
 
-def _find_part(folder: Path, entry: str) -> Design:
+def _find_part(folder: Path, model: str | None, entry: str) -> Design:
     """Return the design of a part: a file beside the plan, or a named design."""
     from bellcrank.workflows import find_design
 
     path = folder / entry
-    return find_design(str(path) if path.exists() else entry)
+    return design_in_model(find_design(str(path) if path.exists() else entry), model)
+
+
+def _model(built: Machine) -> str:
+    from bellcrank.mechanics import model_name
+
+    return model_name(built.design.problem)
 
 
 def _record(built: Machine, response: Response) -> dict[str, Any]:
@@ -158,6 +183,7 @@ def _record(built: Machine, response: Response) -> dict[str, Any]:
     problem = built.design.problem
     return {
         "name": problem.name,
+        "model": _model(built),
         "parts": list(built.parts),
         "nodes": problem.lattice.node_count,
         "beams": built.design.beam_count,
@@ -167,19 +193,28 @@ def _record(built: Machine, response: Response) -> dict[str, Any]:
     }
 
 
-def _prediction(built: Machine, linear: LinearResponse, curve: PortCurve) -> dict[str, Any]:
-    """Return linear assembly and simulation as plain data."""
-    columns = ("motion", "output", "input_force", "energy")
+def _prediction(
+    built: Machine, rest: TwoPort, predicted: PortCurve, simulated: PortCurve
+) -> dict[str, Any]:
+    """Return prediction and simulation as plain data."""
     return {
         "name": built.design.problem.name,
+        "model": _model(built),
         "parts": list(built.parts),
-        "linear": {"efficiency": linear.efficiency, "input_stiffness": linear.input_stiffness},
-        "simulation": {
-            "efficiency": float(curve.efficiency[-1]) if len(curve.motion) > 1 else None,
-            "status": curve.status.label,
-            "reached": curve.reached,
-            **{name: getattr(curve, name).tolist() for name in columns},
-        },
+        "rest": {"efficiency": rest.efficiency, "input_stiffness": rest.input_stiffness},
+        "prediction": _curve(predicted),
+        "simulation": _curve(simulated),
+    }
+
+
+def _curve(curve: PortCurve) -> dict[str, Any]:
+    """Return a curve as plain data."""
+    columns = ("motion", "output", "input_force", "energy")
+    return {
+        "efficiency": float(curve.efficiency[-1]) if len(curve.motion) > 1 else None,
+        "status": curve.status.label,
+        "reached": curve.reached,
+        **{name: getattr(curve, name).tolist() for name in columns},
     }
 
 

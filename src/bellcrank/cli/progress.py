@@ -49,10 +49,10 @@ class SearchProgress(Live):
             line = f"searching {share:3.0f} %  {figures}  left {self._time_left():.0f} s"
             self._show(done, self._total, figures, line)
 
-    def ranking(self, done: int, total: int) -> None:
-        """Show the number of candidates that have been analysed as frames."""
-        self._bar.update(self._task, description="ranking")
-        figures = f"frame analysis of candidates: {done} of {total}"
+    def verifying(self, done: int, total: int) -> None:
+        """Show the number of candidates that have been verified, and the largest number."""
+        self._bar.update(self._task, description="verifying")
+        figures = f"verified candidates: {done} of at most {total}"
         self._show(done, total, figures, figures)
 
     def _figures(self) -> str:

@@ -170,7 +170,7 @@ def _plan(
     """Return each level with each of its theories or laws, in order."""
     from bellcrank.fem import FemSettings, levels
     from bellcrank.fem.continuum.laws import laws
-    from bellcrank.fem.frame import theories
+    from bellcrank.mechanics.frames.system import theories
     from bellcrank.part import read_length
 
     longest = None if size is None else read_length("size", size)
@@ -251,10 +251,11 @@ def _saver(path: Path | None, *, required: bool) -> Callable[[Validation], None]
 def _print(validation: Validation) -> None:
     """Print the figures of each level in a table, one column for each."""
     from bellcrank.mechanics import objective_name
+    from bellcrank.workflows.figures import model_words
 
     table = Table(box=SIMPLE)
     table.add_column("")
-    table.add_column("spring model", justify="right")
+    table.add_column(model_words(validation.design.problem), justify="right")
     columns = [_column(analysis) for analysis in validation.analyses]
     for analysis in validation.analyses:
         table.add_column(_heading(analysis), justify="right")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.model.geometry import distances_to_segments
+from bellcrank.model.geometry import distances_to_segments, inner_distances
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -81,7 +81,7 @@ by up to 0.5 mm')
 
 
 def centre_lines(ends: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (s, k, 2) points along straight struts from (s, 2, 2) their ends."""
+    """Return (s, k, d) points along straight struts from (s, 2, d) their ends."""
     along = np.linspace(0.0, 1.0, SAMPLES)[None, :, None]
     lines: NDArray[np.float64] = ends[:, :1] * (1.0 - along) + ends[:, 1:] * along
     return lines
@@ -97,19 +97,18 @@ def find_contacts(
 
     Struts overlap near a joint that they share, so a point on the centre line of one strut counts
     only if it was more than `CLEARANCE` widths away from the centre line of the other at rest. It
-    is in contact if it is now less than one width away. Centre lines that cross, and did not cross
-    at rest, are in contact too.
+    is in contact if it is now less than one width away; where centre lines cross, that is zero.
 
     Parameters
     ----------
     struts : (s,) int64
         Beams of the lattice.
-    rest : (s, k, 2) float64
+    rest : (s, k, d) float64
         Points along the centre lines at rest, which are straight, mm.
-    stroke : iterable of (float, (s, k, 2) float64)
+    stroke : iterable of (float, (s, k, d) float64)
         Fraction of the full input and the same points in that state, in order of the load.
     width
-        Width of the struts, mm.
+        Width of the struts, in space their diameter, mm.
 
     Returns
     -------
@@ -139,35 +138,41 @@ def _overlaps(
     rest: NDArray[np.float64], moved: NDArray[np.float64], width: float
 ) -> list[tuple[int, int, float]]:
     """Return the pairs of struts in contact in one state, with their overlap in mm."""
-    import shapely
+    one, part, other, piece = _near_segments(moved, width)
+    first = np.stack([moved[one, part], moved[one, part + 1]], axis=1)
+    second = np.stack([moved[other, piece], moved[other, piece + 1]], axis=1)
+    between, fraction = inner_distances(first, second)
+    found: dict[tuple[int, int], float] = {}
+    # Both ends of a segment, and the point between them that is nearest to the other strut.
+    for distance, where in (
+        (distances_to_segments(first[:, 0], second[:, 0], second[:, 1]), 0.0 * fraction),
+        (distances_to_segments(first[:, 1], second[:, 0], second[:, 1]), 0.0 * fraction + 1.0),
+        (between, fraction),
+    ):
+        near = distance < width
+        i, j, k, share = one[near], other[near], part[near], where[near, None]
+        point = (1.0 - share) * rest[i, k] + share * rest[i, k + 1]
+        clear = distances_to_segments(point, rest[j, 0], rest[j, -1]) >= CLEARANCE * width
+        pairs = np.sort(np.column_stack([i, j])[clear], axis=1).tolist()
+        for (a, b), depth in zip(pairs, (width - distance[near][clear]).tolist(), strict=True):
+            found[a, b] = max(depth, found.get((a, b), 0.0))
+    return [(*pair, depth) for pair, depth in found.items()]
+
+
+def _near_segments(
+    moved: NDArray[np.float64], width: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return all pairs of segments that may be nearer than a width, in both orders.
+
+    Each as strut and number of the segment along it, for both segments.
+    """
     from scipy.spatial import cKDTree
 
-    each = moved.shape[1]
-    points, points_at_rest = moved.reshape(-1, 2), rest.reshape(-1, 2)
-    spacing = float(np.hypot(*np.diff(moved, axis=1).transpose(2, 0, 1)).max(initial=0.0))
-    # A point nearer than the width to a centre line is at most half a spacing further from one of
-    # its points, and centre lines that cross have points nearer than a spacing.
-    reach = max(width + 0.5 * spacing, spacing)
-    near = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    each = moved.shape[1] - 1
+    middles = 0.5 * (moved[:, :-1] + moved[:, 1:]).reshape(len(moved) * each, -1)
+    longest = float(np.linalg.norm(np.diff(moved, axis=1), axis=2).max(initial=0.0))
+    near = cKDTree(middles).query_pairs(width + longest, output_type="ndarray")
     near = near[near[:, 0] // each != near[:, 1] // each]
-    lines, before = shapely.linestrings(moved), shapely.linestrings(rest)
     directed = np.concatenate([near, near[:, ::-1]])
-    point, other = directed[:, 0], directed[:, 1] // each
-    at_rest = distances_to_segments(points_at_rest[point], rest[other, 0], rest[other, -1])
-    far = at_rest >= CLEARANCE * width
-    point, other = point[far], other[far]
-    one = point // each
-    overlap = width - shapely.distance(shapely.points(points[point]), lines[other])
-    strut = np.sort(near // each, axis=1)
-    first, second = np.divmod(np.unique(strut @ [len(moved), 1]), len(moved))
-    apart = ~shapely.intersects(before[first], before[second])
-    first, second = first[apart], second[apart]
-    crossing = shapely.crosses(lines[first], lines[second])
-    one, other = np.append(one, first[crossing]), np.append(other, second[crossing])
-    overlap = np.append(overlap, np.full(int(crossing.sum()), width))
-    found: dict[tuple[int, int], float] = {}
-    for a, b, depth in zip(one.tolist(), other.tolist(), overlap.tolist(), strict=True):
-        if depth > 0.0:
-            pair = (min(a, b), max(a, b))
-            found[pair] = max(depth, found.get(pair, 0.0))
-    return [(*pair, depth) for pair, depth in found.items()]
+    first, second = np.divmod(directed[:, 0], each), np.divmod(directed[:, 1], each)
+    return *first, *second

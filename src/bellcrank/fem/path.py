@@ -1,10 +1,11 @@
 """Equilibrium path of a part from rest to the full input.
 
 Each step starts with a predictor, the tangent or a cubic, and ends with Newton's method. The step
-is halved if the corrector ends far from the predictor, which may be another path, and if stability
-is lost, so that the load at which this happens is found. The softest mode there shows what kind of
-loss it is: if the load does work along the mode, the path turns back at a limit point and the part
-snaps through; if not, another path branches off at a bifurcation and the part buckles.
+is halved if the motion departs from the tangents at both of its ends, where it may have jumped to
+another path, and if stability is lost, so that the load at which this happens is found. The softest
+mode there shows what kind of loss it is: if the load does work along the mode, the path turns back
+at a limit point and the part snaps through; if not, another path branches off at a bifurcation and
+the part buckles.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SMALLEST_STEP = 1e-4
-LARGEST_DEPARTURE = 0.5
-"""Largest distance of the corrector from the predictor, as a fraction of the predicted motion."""
+LARGEST_DEPARTURE = 0.1
+"""Largest departure of a step from the mean of the tangents at its ends, as a part of the motion.
+On a smooth path it is of third order in the step."""
 MAX_RESIDUAL_INCREASES = 3
 """Number of first iterations in which the residual may grow; later growth means divergence."""
 LARGEST_CURVATURE = 0.3
@@ -122,7 +124,7 @@ class Equations(Protocol):
         ...
 
     def distance(self, change: NDArray[np.float64]) -> float:
-        """Return the norm of a change of the unknowns, mm."""
+        """Return the largest component of a change of the displacements, mm."""
         ...
 
 
@@ -246,11 +248,8 @@ class _Continuation:
             # An unstable equilibrium shows that the path ends with a loss of stability, even if
             # Newton's method does not converge closer to it.
             unstable |= found is not None and found[0].negative_eigenvalues > 0
-            if (
-                found is None
-                or found[0].negative_eigenvalues
-                or self._departs(found[0], here, predicted)
-            ):
+            slope = None if found is None else self._joined_rate(found[0], found[2], here, rate)
+            if found is None or slope is None:
                 step = (load - here.load) / 2.0
                 if step < SMALLEST_STEP:
                     loss = self._kind_of_loss(tangent, rate, initial_stiffness)
@@ -262,7 +261,7 @@ class _Continuation:
             here, iterations, tangent = found
             states.append(here)
             self.report(here)
-            rate = self._rate(tangent, here)
+            rate = slope
             if iterations <= FEW_ITERATIONS:
                 step = min(self.control.largest, step * 2.0)
         return EquilibriumPath(states, PathStatus.CONVERGED, self.factorisations)
@@ -322,10 +321,24 @@ class _Continuation:
         is_smooth = departure < LARGEST_CURVATURE * self.equations.distance(linear_prediction)
         return curved if is_smooth else linear_prediction
 
-    def _departs(self, state: PathState, here: PathState, predicted: NDArray[np.float64]) -> bool:
-        """Return whether a state is so far from its prediction that it may be on another path."""
-        departure = self.equations.distance(state.unknowns - here.unknowns - predicted)
-        return departure > LARGEST_DEPARTURE * self.equations.distance(predicted)
+    def _joined_rate(
+        self,
+        state: PathState,
+        tangent: FactorisedStiffness,
+        here: PathState,
+        rate: NDArray[np.float64],
+    ) -> NDArray[np.float64] | None:
+        """Return the rate at a state; None if it is unstable, or may not be on the path from here.
+
+        A jump to another path is in the tangent of neither end.
+        """
+        if state.negative_eigenvalues:
+            return None
+        slope = self._rate(tangent, state)
+        motion = state.unknowns - here.unknowns
+        mean = 0.5 * (state.load - here.load) * (rate + slope)
+        departure = self.equations.distance(motion - mean)
+        return slope if departure <= LARGEST_DEPARTURE * self.equations.distance(motion) else None
 
     def _kind_of_loss(
         self, tangent: FactorisedStiffness, rate: NDArray[np.float64], initial_stiffness: float

@@ -19,9 +19,9 @@ from bellcrank.machines.characterisation_files import (
 )
 from bellcrank.machines.curves import Load, PortCurve, trace
 from bellcrank.machines.elementary import DIRECTIONS, elementary, strut
-from bellcrank.machines.linear_assembly import LinearResponse, linear_assembly
 from bellcrank.machines.plan import Plan, read_plan
 from bellcrank.machines.ports import INPUT, OUTPUT, Port, mean_ports, ports_of
+from bellcrank.machines.prediction import assembled_ports, predict
 from bellcrank.machines.two_port import TwoPort, two_port_at
 
 __all__ = [
@@ -29,7 +29,6 @@ __all__ = [
     "INPUT",
     "OUTPUT",
     "Characterisation",
-    "LinearResponse",
     "Load",
     "Machine",
     "Plan",
@@ -37,14 +36,15 @@ __all__ = [
     "PortCurve",
     "TwoPort",
     "assemble",
+    "assembled_ports",
     "characterisation_from_dict",
     "characterisation_to_dict",
     "characterise",
     "default_loads",
     "elementary",
-    "linear_assembly",
     "mean_ports",
     "ports_of",
+    "predict",
     "read_characterisation",
     "read_plan",
     "simulate",

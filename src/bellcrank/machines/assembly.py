@@ -89,8 +89,8 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
     ------
     InvalidFile
         If an entry does not exist, welded ports do not meet, parts overlap, a port is driven both
-        by the machine's input and by a part, a port lies on supports, or a group of parts has no
-        support. The message names the parts.
+        by the machine's input and by a part, a port lies on supports, a group of parts has no
+        support, or parts have different models, sections or materials. The message names the parts.
     """
     check_inputs(plan)
     parts = place_parts(plan, find)
@@ -101,6 +101,7 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
     present = np.concatenate([present, np.ones(len(beams) - count, np.bool_)])
     supports = machine_supports(plan, parts, nodes)
     given, wanted = machine_input(plan, parts, nodes), machine_output(plan, parts, nodes)
+    model = next(iter(parts.values())).design.problem
     try:
         lattice = Lattice(positions, beams)
         check_supported(plan, nodes, lattice, supports)
@@ -110,7 +111,9 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
             supports=supports,
             input=given,
             output=wanted,
-            stiffness=next(iter(parts.values())).design.problem.stiffness,
+            stiffness=model.stiffness,
+            section=model.section,
+            material=model.material,
             initial=present,
             designable=designable_beams(plan, parts, nodes, beams, (supports, given, wanted)),
         )

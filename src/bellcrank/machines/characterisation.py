@@ -11,7 +11,8 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.machines.curves import Load, PortCurve, trace
 from bellcrank.machines.ports import Port, mean_ports, ports_of
 from bellcrank.machines.two_port import TwoPort, two_port_at
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Status, model_evaluator, model_name
+from bellcrank.model import require_plane
 from bellcrank.provenance import provenance
 
 if TYPE_CHECKING:
@@ -41,6 +42,8 @@ class Characterisation:
         Number of beams.
     unloaded_beams
         Treatment of unloaded beams.
+    model
+        Mechanical model: ``"springs"`` or ``"frames"``.
     drive
         Drive of the problem: ``"displacement"`` or ``"force"``.
     input, output
@@ -60,6 +63,7 @@ class Characterisation:
     mask: str
     beams: int
     unloaded_beams: UnloadedBeams
+    model: str
     drive: str
     input: Port
     output: Port
@@ -94,18 +98,21 @@ def characterise(
     Parameters
     ----------
     design
-        Actuator.
+        Actuator; with a section its beams are those of a frame, without one it is in the spring
+        model.
     loads
         Loads at the output; by default those of `default_loads`.
     points
         Number of equal increments of the stroke.
     unloaded_beams
-        As for `bellcrank.mechanics.SpringEvaluator`.
+        As for `bellcrank.mechanics.SpringEvaluator`; frames do not depend on them.
 
     Raises
     ------
     InvalidSettings
         If the design is a mechanism without resistance, or a load is impossible.
+    InvalidProblem
+        If the problem is in space.
 
     Examples
     --------
@@ -116,6 +123,7 @@ def characterise(
     >>> print(f"{lever.rest.efficiency:.3f} {lever.curves[0].efficiency[-1]:.3f}")
     0.818 1.010
     """
+    require_plane(design.problem, "characterisation")
     element = mean_ports(design, unloaded_beams)
     rest = two_port_at(element, element.rest())
     chosen = default_loads(rest) if loads is None else tuple(loads)
@@ -133,6 +141,7 @@ def characterise(
         mask=design.mask_hex,
         beams=design.beam_count,
         unloaded_beams=unloaded_beams,
+        model=model_name(design.problem),
         drive=design.problem.input.drive,
         input=given,
         output=wanted,
@@ -167,7 +176,7 @@ def _branch_warnings(design: Design, element: Superelement, free: PortCurve) -> 
     """Compare the free curve with the response, which detects second equilibria."""
     problem = design.problem
     bare = replace(problem, output=replace(problem.output, spring=None, spring_kind=None))
-    response = SpringEvaluator(bare, "displacement", element.unloaded_beams).evaluate(
+    response = model_evaluator(bare, "displacement", element.unloaded_beams).evaluate(
         design.mask, VERIFICATION_INCREMENT
     )
     if response.status is Status.SNAPPED:

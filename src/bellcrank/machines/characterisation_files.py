@@ -3,12 +3,14 @@
 Keys are those of `Characterisation`, arrays are lists, and an infinite compliance is null::
 
     {"schema": "bellcrank/two-port/1", "name": "crane", "problem_hash": "...", "mask": "...",
-     "beams": 352, "unloaded_beams": "keep", "drive": "displacement",
+     "beams": 352, "unloaded_beams": "keep", "model": "springs", "drive": "displacement",
      "input": {"nodes": [...], "centre": [9.0, 8.66], "direction": [0.0, -1.0]}, "output": {...},
      "rest": {"input_stiffness": 9.686, "efficiency": -0.0439, "output_compliance": 0.1675},
      "curves": [{"load": "free", "motion": [...], "input_force": [...], "output": [...],
                  "output_force": [...], "energy": [...], "status": "converged", "reached": 1.0}],
      "warnings": [], "provenance": {...}}
+
+A file without ``model`` is of the spring model.
 """
 
 from __future__ import annotations
@@ -77,6 +79,7 @@ class CharacterisationTable(Table):
     mask: str
     beams: int
     unloaded_beams: UnloadedBeams
+    model: Literal["springs", "frames"] = "springs"
     drive: Literal["displacement", "force"]
     input: PortTable
     output: PortTable
@@ -99,7 +102,7 @@ def characterisation_to_dict(found: Characterisation) -> dict[str, Any]:
     ('bellcrank/two-port/1', ['free', 'blocked', 'spring:5.97'])
     """
     compliance = found.rest.output_compliance
-    same = ("name", "problem_hash", "mask", "beams", "unloaded_beams", "drive")
+    same = ("name", "problem_hash", "mask", "beams", "unloaded_beams", "model", "drive")
     return {
         "schema": SCHEMA,
         **{name: getattr(found, name) for name in same},
@@ -140,6 +143,7 @@ def characterisation_from_dict(data: Mapping[str, Any], source: str) -> Characte
         mask=table.mask,
         beams=table.beams,
         unloaded_beams=table.unloaded_beams,
+        model=table.model,
         drive=table.drive,
         input=_read_port(table.input),
         output=_read_port(table.output),

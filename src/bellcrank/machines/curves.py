@@ -15,7 +15,7 @@ from bellcrank.mechanics import Conditions, Status, follow
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import State, Superelement
+    from bellcrank.mechanics import Movable, State
 
 LoadKind = Literal["free", "blocked", "spring", "force"]
 
@@ -123,14 +123,14 @@ class PortCurve:
         return efficiency
 
 
-def trace(element: Superelement, load: Load, points: int) -> PortCurve:
+def trace(element: Movable, load: Load, points: int) -> PortCurve:
     """Follow the equilibrium of an actuator along its stroke, against a load.
 
     Parameters
     ----------
     element
-        Actuator from `mean_ports`. A problem that is driven by a force is loaded up to its full
-        force.
+        Actuator from `mean_ports`, or machine from `assembled_ports`. A problem that is driven by
+        a force is loaded up to its full force.
     load
         Load at the output.
     points
@@ -169,7 +169,7 @@ def trace(element: Superelement, load: Load, points: int) -> PortCurve:
     return _curve(load, states, status, reached)
 
 
-def _conditions(element: Superelement, load: Load, fraction: float) -> Conditions:
+def _conditions(element: Movable, load: Load, fraction: float) -> Conditions:
     """Return the boundary conditions at a fraction of the stroke."""
     given = element.design.problem.input
     displaced = given.drive == "displacement"

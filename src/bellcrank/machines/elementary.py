@@ -14,6 +14,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.model import Input, Output, Problem, Supports, lattices
+from bellcrank.part import PartSpec, frame_problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -122,7 +123,9 @@ def strut(length: int) -> Problem:
 
 
 def strut_named(name: str) -> Design | None:
-    """Return the strut with a name like ``strut-6``; None for other names.
+    """Return the strut with a name like ``strut-6`` as a frame; None for other names.
+
+    Its beams are struts of the default part, 2 mm wide on 10 mm.
 
     Raises
     ------
@@ -138,7 +141,7 @@ def strut_named(name: str) -> Design | None:
     kind, _, length = name.partition("-")
     if kind != "strut" or not length.isdecimal():
         return None
-    return strut(int(length)).full_design()
+    return frame_problem(strut(int(length)), PartSpec()).full_design()
 
 
 def _lattice(columns: int, rows: int) -> Lattice:

@@ -17,14 +17,15 @@ import numpy as np
 
 from bellcrank.errors import BellcrankError, InvalidFile
 from bellcrank.machines.plan import ROTATION_STEP, port_name
+from bellcrank.model import require_plane
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
     from bellcrank.machines.plan import PartTable, Plan
-    from bellcrank.model import Design, Input, Output
+    from bellcrank.model import Design, Input, Output, Problem
 
 HALF = math.sqrt(3.0) / 2.0
 COSINE = (1.0, 0.5, -0.5, -1.0, -0.5, 0.5)
@@ -128,17 +129,19 @@ def place_parts(plan: Plan, find: Callable[[str], Design]) -> dict[str, Part]:
     Raises
     ------
     InvalidFile
-        If an entry does not exist or is not a design, or parts have different stiffness.
+        If an entry does not exist, is not a design or is in space, or parts have different
+        models, stiffness, sections or materials.
     """
     parts: dict[str, Part] = {}
     for name in plan.order:
         table = plan.table.parts[name]
         try:
             design = find(table.entry)
+            require_plane(design.problem, "machine")
         except BellcrankError as error:
             raise InvalidFile(f"{plan.source}: parts.{name}.entry: {error}") from None
         parts[name] = _placed(name, table, design, parts)
-    _check_stiffness(plan, parts)
+    _check_models(plan, parts)
     return {name: parts[name] for name in plan.table.parts}
 
 
@@ -154,15 +157,40 @@ def _placed(name: str, table: PartTable, design: Design, parts: dict[str, Part])
     return replace(part, placement=replace(placement, shift=shift))
 
 
-def _check_stiffness(plan: Plan, parts: dict[str, Part]) -> None:
-    """Check that all parts have the stiffness of the first: a problem has one for all beams."""
+def _check_models(plan: Plan, parts: dict[str, Part]) -> None:
+    """Check that all parts have the model of the first: a problem has one for all beams."""
     first = next(iter(parts.values()))
-    own = first.design.problem.stiffness
     for part in parts.values():
-        other = part.design.problem.stiffness
-        if (other.bond, other.angle) != (own.bond, own.angle):
+        for what, one, other in _differences(first.design.problem, part.design.problem):
             raise InvalidFile(
-                f"{plan.source}: parts {first.name} and {part.name} have different stiffness: "
-                f"bond {own.bond:g} and angle {own.angle:g} against {other.bond:g} and "
-                f"{other.angle:g}; all parts of a machine must have the same"
+                f"{plan.source}: parts {first.name} and {part.name} have different {what}: {one} "
+                f"against {other}; all parts of a machine must have the same"
             )
+
+
+def _differences(first: Problem, other: Problem) -> Iterator[tuple[str, str, str]]:
+    """Yield what differs between the models of two problems, and both values as text."""
+    if (first.section is None) != (other.section is None):
+        names = ["springs" if each.section is None else "frames" for each in (first, other)]
+        yield "models (--model reads all parts as one)", names[0], names[1]
+    for what, describe in (
+        ("stiffness", _stiffness_text), ("sections", _section_text), ("materials", _material_text),
+    ):  # fmt: skip
+        one, two = describe(first), describe(other)
+        if one != two:
+            yield what, one, two
+
+
+def _stiffness_text(problem: Problem) -> str:
+    return f"bond {problem.stiffness.bond:g} and angle {problem.stiffness.angle:g}"
+
+
+def _section_text(problem: Problem) -> str:
+    section = problem.section
+    return "" if section is None else f"width {section.width:g}, thickness {section.thickness:g}"
+
+
+def _material_text(problem: Problem) -> str:
+    material = problem.material
+    # Young's modulus may contain the rounding errors of a mean length.
+    return "" if material is None else f"young {material.young:.6g}, poisson {material.poisson:g}"

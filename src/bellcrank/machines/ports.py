@@ -2,7 +2,8 @@
 
 Each port has one coordinate, the mean of the displacement of its nodes along their unit
 directions, as in the efficiency. The conjugate force is distributed equally over the nodes. The
-nodes of an input that is driven by a displacement move along their directions only.
+nodes of an input that is driven by a displacement move along their directions only. The nodes of
+frames rotate freely.
 
 Forces are external forces on the actuator. Quantities are in lattice units.
 """

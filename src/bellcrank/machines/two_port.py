@@ -29,7 +29,7 @@ from bellcrank.mechanics import Conditions
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import State, Superelement
+    from bellcrank.mechanics import Movable, State
 
 ROUNDING = 1e-8
 """Ratio of free to blocked input stiffness below which the free one is attributed to rounding."""
@@ -152,7 +152,7 @@ class TwoPort:
         return self.input_stiffness + self.efficiency * spring * self.efficiency_against(spring)
 
 
-def two_port_at(element: Superelement, state: State) -> TwoPort:
+def two_port_at(element: Movable, state: State) -> TwoPort:
     """Return the linear two-port of an actuator around one of its equilibria.
 
     Parameters

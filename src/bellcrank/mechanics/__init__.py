@@ -12,7 +12,6 @@ Examples
 from bellcrank.mechanics.analysis import (
     Core,
     Strain,
-    load_bearing_core,
     loaded_beams,
     output_stiffness,
     predict_output_stiffness,
@@ -26,8 +25,17 @@ from bellcrank.mechanics.evaluator import (
     SpringEvaluator,
     UnloadedBeams,
 )
-from bellcrank.mechanics.following import PathEnd, follow
+from bellcrank.mechanics.following import Movable, PathEnd, follow
+from bellcrank.mechanics.frames.evaluator import FrameEvaluator
+from bellcrank.mechanics.frames.quantities import quantities
+from bellcrank.mechanics.frames.stroke import Quantities
 from bellcrank.mechanics.memory import check_memory, evaluators_that_fit
+from bellcrank.mechanics.models import (
+    ModelEvaluator,
+    load_bearing_core,
+    model_evaluator,
+    model_name,
+)
 from bellcrank.mechanics.objectives import (
     Objective,
     efficiency_of,
@@ -35,6 +43,7 @@ from bellcrank.mechanics.objectives import (
     objective_of,
     objectives,
 )
+from bellcrank.mechanics.output import OutputMotion, output_motion
 from bellcrank.mechanics.status import Outcome, Status
 from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction, increment_at
 from bellcrank.mechanics.superelement import (
@@ -43,6 +52,7 @@ from bellcrank.mechanics.superelement import (
     State,
     Superelement,
     free_nodes,
+    state_of,
     uniform_motion,
 )
 
@@ -53,10 +63,15 @@ __all__ = [
     "Core",
     "Coupling",
     "FlipPrediction",
+    "FrameEvaluator",
     "LinearEquations",
+    "ModelEvaluator",
+    "Movable",
     "Objective",
     "Outcome",
+    "OutputMotion",
     "PathEnd",
+    "Quantities",
     "Response",
     "SpringEvaluator",
     "State",
@@ -74,11 +89,16 @@ __all__ = [
     "increment_at",
     "load_bearing_core",
     "loaded_beams",
+    "model_evaluator",
+    "model_name",
     "objective_name",
     "objective_of",
     "objectives",
+    "output_motion",
     "output_stiffness",
     "predict_output_stiffness",
+    "quantities",
+    "state_of",
     "strain_of",
     "uniform_motion",
 ]

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from bellcrank.mechanics.evaluator import SpringEvaluator
 from bellcrank.mechanics.kernels.arrays import PRUNE_ALL, PRUNE_DEAD_ENDS
 from bellcrank.mechanics.objectives import objective_of
 from bellcrank.mechanics.system import allocate_structure, build_system
@@ -15,7 +14,43 @@ from bellcrank.mechanics.system import allocate_structure, build_system
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.model import Design, Problem
+    from bellcrank.mechanics.kernels.arrays import Scratch, Structure, System
+    from bellcrank.model import Problem
+
+
+class ComputedResponse(Protocol):
+    """A `bellcrank.mechanics.SpringEvaluator` with the response that it computed last."""
+
+    system: System
+    structure: Structure
+    scratch: Scratch
+    displacement: NDArray[np.float64]
+    core: int
+
+    def inverse_blocks(
+        self, rows: NDArray[np.int64], columns: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Return blocks of the inverse stiffness of the last flip prediction."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Strain:
+    """Strain energy of the beams of a design at an equilibrium.
+
+    Parameters
+    ----------
+    energy : (M,) float64
+        Energy of each beam; in the spring model its own, and half of that of each angular spring
+        it belongs to.
+    input_forces : (i, d) float64
+        External force on each input node.
+    input_force
+        Sum of the forces on the input nodes, each along its direction.
+    """
+
+    energy: NDArray[np.float64]
+    input_forces: NDArray[np.float64]
+    input_force: float
 
 
 class Core:
@@ -27,13 +62,14 @@ class Core:
 
     Examples
     --------
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
     >>> int(Core(SpringEvaluator(crane)).of(crane.initial).sum())
     352
     """
 
-    def __init__(self, evaluator: SpringEvaluator) -> None:
+    def __init__(self, evaluator: ComputedResponse) -> None:
         self._system = evaluator.system
         self._kind = PRUNE_ALL if evaluator.core == PRUNE_ALL else PRUNE_DEAD_ENDS
         self._structure = allocate_structure(evaluator.system)
@@ -45,19 +81,6 @@ class Core:
         core = np.zeros(len(mask), np.uint8)
         find_core(self._system, mask.astype(np.uint8), self._kind, self._structure, core)
         return core.astype(bool)
-
-
-def load_bearing_core(design: Design) -> NDArray[np.bool_]:
-    """Return (M,) the beams of a design that can carry load: see `SpringEvaluator.load_bearing`.
-
-    Examples
-    --------
-    >>> from bellcrank.model import find_problem
-    >>> crane = find_problem("crane").full_design()
-    >>> bool(load_bearing_core(crane).all())
-    True
-    """
-    return SpringEvaluator(design.problem, "displacement").load_bearing(design.mask)
 
 
 def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -85,27 +108,12 @@ def loaded_beams(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.bool_]
     return structure.present.astype(bool)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Strain:
-    """Strain energy of the beams of a design at an equilibrium.
-
-    Parameters
-    ----------
-    energy : (M,) float64
-        Energy of each beam: its own, and half of that of each angular spring it belongs to.
-    input_force
-        Force on the whole input along its direction: derivative of the energy by its motion.
-    """
-
-    energy: NDArray[np.float64]
-    input_force: float
-
-
-def strain_of(evaluator: SpringEvaluator) -> Strain:
+def strain_of(evaluator: ComputedResponse) -> Strain:
     """Compute the strain energy of the beams in the response computed last.
 
     Examples
     --------
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> evaluator = SpringEvaluator(find_problem("crane"))
     >>> response = evaluator.evaluate(evaluator.problem.initial)
@@ -139,10 +147,11 @@ def strain_of(evaluator: SpringEvaluator) -> Strain:
     force = np.zeros_like(u)
     np.add.at(force, second, end_force)
     np.add.at(force, first, -end_force)
-    return Strain(energy, float((force[system.input_nodes] * system.input_direction).sum()))
+    at_input = force[system.input_nodes]
+    return Strain(energy, at_input, float((at_input * system.input_direction).sum()))
 
 
-def output_stiffness(evaluator: SpringEvaluator) -> float:
+def output_stiffness(evaluator: ComputedResponse) -> float:
     """Return the stiffness of the output of the design evaluated last.
 
     ``1 / (t' K^-1 t)``, with K the tangent stiffness at full load and t the mean of the wanted
@@ -158,6 +167,7 @@ def output_stiffness(evaluator: SpringEvaluator) -> float:
 
     Examples
     --------
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
     >>> evaluator = SpringEvaluator(crane)
@@ -174,7 +184,7 @@ def output_stiffness(evaluator: SpringEvaluator) -> float:
 
 
 def predict_output_stiffness(
-    evaluator: SpringEvaluator, beams: NDArray[np.int64], present: NDArray[np.bool_]
+    evaluator: ComputedResponse, beams: NDArray[np.int64], present: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Predict the stiffness of the output after each flip, for the last flip prediction.
 

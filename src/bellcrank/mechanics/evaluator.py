@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from bellcrank.errors import InvalidProblem, InvalidSettings
+from bellcrank.mechanics.analysis import Core, Strain, output_stiffness, strain_of
 from bellcrank.mechanics.kernels.arrays import PRUNE_DEAD_ENDS, Reference, Structure, System
 from bellcrank.mechanics.memory import check_memory
 from bellcrank.mechanics.objectives import objective_of
+from bellcrank.mechanics.output import output_motion
 from bellcrank.mechanics.status import Status
 from bellcrank.mechanics.system import (
     allocate_flip_workspace,
@@ -22,9 +24,12 @@ from bellcrank.mechanics.system import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.mechanics.kernels.flip_prediction import FlipWorkspace
+    from bellcrank.mechanics.output import OutputMotion
     from bellcrank.mechanics.status import Outcome
     from bellcrank.model import Problem
 
@@ -54,6 +59,9 @@ class Response:
         Displacement of each node, in lattice units. Loose pieces are at rest.
     penalty
         Penalty for violated constraints of a search, in units of the efficiency; else 0.
+    reached
+        Fraction of the load up to which the path of a frame is stable. Where it is below 1, the
+        displacement is that of the last stable state, and the efficiency nan.
     """
 
     status: Outcome
@@ -61,6 +69,7 @@ class Response:
     energy: float
     displacement: NDArray[np.float64]
     penalty: float = 0.0
+    reached: float = 1.0
 
     @property
     def score(self) -> float:
@@ -141,6 +150,7 @@ class SpringEvaluator:
         unloaded_beams: UnloadedBeams = "keep",
     ) -> None:
         self.core = core_code(unloaded_beams)
+        self.unloaded_beams: UnloadedBeams = unloaded_beams
         check_memory(problem)
         self.problem = problem
         self.system: System = build_system(problem, objective_of(problem, objective))
@@ -211,6 +221,34 @@ class SpringEvaluator:
         self.reference.present[:] = self.structure.present
         self.reference.active[:] = self.structure.active
         self.reference.u[:] = self.displacement
+
+    def for_problem(self, problem: Problem) -> SpringEvaluator:
+        """Return an evaluator of the displacement in another problem, with the same settings."""
+        return SpringEvaluator(problem, "displacement", self.unloaded_beams)
+
+    def core_finder(self) -> Callable[[NDArray[np.bool_]], NDArray[np.bool_]]:
+        """Return a function like `load_bearing` that leaves the last response as it is."""
+        return Core(self).of
+
+    def strain(self) -> Strain:
+        """Return energies and input forces in the response computed last."""
+        return strain_of(self)
+
+    def largest_strain(self) -> float:
+        """Return the largest absolute strain of a beam that carries load in the last response."""
+        system, structure = self.system, self.structure
+        moved = structure.active[system.beams].astype(bool).any(axis=1) & (structure.present != 0)
+        ends = (system.positions + self.displacement)[system.beams[moved]]
+        length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        return float(np.abs(length / system.rest_length[moved] - 1.0).max(initial=0.0))
+
+    def output_motion(self) -> OutputMotion:
+        """Return the motion of the output in the response computed last."""
+        return output_motion(self.problem, self.displacement)
+
+    def output_stiffness(self) -> float:
+        """Return the stiffness of the output; see `bellcrank.mechanics.output_stiffness`."""
+        return output_stiffness(self)
 
     def load_bearing(self, mask: ArrayLike) -> NDArray[np.bool_]:
         """Return the beams of a design that can carry load: no loose pieces, no dead ends.

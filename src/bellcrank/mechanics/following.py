@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from bellcrank.mechanics.status import Status
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics.superelement import Condensed, State, Superelement
+    from bellcrank.mechanics.superelement import Condensed, State
+    from bellcrank.model import Design
 
 MAX_ITERATIONS = 12
 SMALL_STEP = 1e-7
@@ -29,6 +30,51 @@ LARGEST_SOFTENING = 0.7
 """Least ratio of the lowest stiffnesses at the ends of an increment, in either direction, so that
 no loss of stability between them is missed."""
 SMALLEST_INCREMENT = 1.0 / 4096.0
+
+
+class Movable(Protocol):
+    """What `follow` moves: a superelement, or an assembly of several.
+
+    See `bellcrank.mechanics.Superelement` for the attributes.
+    """
+
+    design: Design
+    measures: NDArray[np.float64]
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """(k,) whether each coordinate belongs to a piece that the input reaches."""
+
+    def rest(self) -> State:
+        """Return the state at rest."""
+
+    def linear(self, state: State, conditions: Conditions) -> LinearEquations:
+        """Return the linear equations around a state."""
+
+    def condense(
+        self,
+        displacement: NDArray[np.float64],
+        *,
+        softened: bool = True,
+        predicted: bool = False,
+    ) -> Condensed | None:
+        """Condense the tangent stiffness to the coordinates."""
+
+    def predict_tension(self, motion: NDArray[np.float64]) -> None:
+        """Compute the tension to first order after a motion."""
+
+    def moved(
+        self, displacement: NDArray[np.float64], motion: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the displacement after a motion."""
+
+    def motion(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the motion from one displacement to another."""
+
+    def state(
+        self, z: NDArray[np.float64], displacement: NDArray[np.float64], found: Condensed
+    ) -> State:
+        """Return the state of an equilibrium that was condensed to `found`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +96,7 @@ class PathEnd:
     status: Status
 
 
-def follow(element: Superelement, state: State, conditions: Conditions) -> PathEnd:
+def follow(element: Movable, state: State, conditions: Conditions) -> PathEnd:
     """Change the conditions on a superelement in increments that stay on one stable path.
 
     An increment is accepted if it ends in a stable equilibrium, if the tangents at both of its
@@ -112,7 +158,7 @@ def follow(element: Superelement, state: State, conditions: Conditions) -> PathE
                 _tangent(element, before, conditions, part)
                 + _tangent(element, found, conditions, part)
             )
-            moved = after.displacement - state.displacement
+            moved = element.motion(state.displacement, after.displacement)
             if _is_consistent(mean, moved) and _keeps_stiffness(element, conditions, before, found):
                 state, before, fraction = after, found, end
                 increment *= 2.0
@@ -122,7 +168,7 @@ def follow(element: Superelement, state: State, conditions: Conditions) -> PathE
     return PathEnd(state, fraction, status)
 
 
-def _check(element: Superelement, state: State, conditions: Conditions) -> None:
+def _check(element: Movable, state: State, conditions: Conditions) -> None:
     name, count = element.design.problem.name, len(element.measures)
     if len(conditions.value) != count:
         raise InvalidSettings(
@@ -141,7 +187,7 @@ def _check(element: Superelement, state: State, conditions: Conditions) -> None:
 
 
 def _tangent(
-    element: Superelement,
+    element: Movable,
     found: Condensed,
     conditions: Conditions,
     change: NDArray[np.float64],
@@ -150,7 +196,7 @@ def _tangent(
     linear = LinearEquations(found.stiffness, element.measures, conditions)
     load = element.measures.T @ np.where(conditions.prescribed, 0.0, change)
     step, _ = linear.solve(load, change[conditions.prescribed])
-    moved: NDArray[np.float64] = np.tensordot(step, found.responses, axes=1)
+    moved: NDArray[np.float64] = found.response(step)
     return moved
 
 
@@ -161,10 +207,10 @@ def _is_consistent(mean: NDArray[np.float64], moved: NDArray[np.float64]) -> boo
 
 
 def _keeps_stiffness(
-    element: Superelement, conditions: Conditions, before: Condensed, after: Condensed
+    element: Movable, conditions: Conditions, before: Condensed, after: Condensed
 ) -> bool:
     """Whether the lowest stiffnesses of two states differ little."""
-    pairs = [(before.lowest, after.lowest)]
+    pairs = list(zip(before.lowest, after.lowest, strict=True))
     both = [
         LinearEquations(found.stiffness, element.measures, conditions).lowest()[0]
         for found in (before, after)
@@ -177,7 +223,7 @@ def _keeps_stiffness(
 
 
 def find_equilibrium(
-    element: Superelement, start: State, conditions: Conditions
+    element: Movable, start: State, conditions: Conditions
 ) -> tuple[State, Condensed] | None:
     """Find the stable equilibrium closest to a state by Newton's method.
 
@@ -198,7 +244,7 @@ def find_equilibrium(
         step = _newton_step(linear, found, z)
         if step is None:
             return None
-        moved = found.interior_step + np.tensordot(step, found.responses, axes=1)
+        moved = found.interior_step + found.response(step)
         size = float(np.abs(moved).max())
         if last:
             good = whole and size <= TOLERANCE and linear.is_stable()
@@ -207,8 +253,7 @@ def find_equilibrium(
             return None
         element.predict_tension(moved)
         predicted = True
-        z, displacement = z + step, displacement + moved
-        element.move(z, displacement)
+        z, displacement = z + step, element.moved(displacement, moved)
         last = size <= SMALL_STEP and whole
     return None
 

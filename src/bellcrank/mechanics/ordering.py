@@ -13,17 +13,19 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.kernels.arrays import Ints
 
 
-def coupled_nodes(beams: Ints, held: NDArray[np.bool_]) -> csc_matrix:
+def coupled_nodes(beams: Ints, held: NDArray[np.bool_], *, springs: bool = True) -> csc_matrix:
     """Return the pattern of the nodes that share a beam or an angular spring in some design.
 
-    Removing beams makes more distant beams neighbours around a node. All nodes that have a
-    beam to the same node are therefore taken as coupled.
+    Removing beams makes more distant beams neighbours around a node. With angular springs, all
+    nodes that have a beam to the same node are therefore taken as coupled.
 
     Parameters
     ----------
     beams : (M, 2) int64
     held : (N,) bool
         Nodes that are not unknowns; they are left out.
+    springs
+        Whether there are angular springs.
 
     Returns
     -------
@@ -40,13 +42,14 @@ def coupled_nodes(beams: Ints, held: NDArray[np.bool_]) -> csc_matrix:
     free_entry = columns >= 0
     entries = (np.ones(int(free_entry.sum())), (rows[free_entry], columns[free_entry]))
     around = csc_matrix(entries, shape=(len(held), len(free)))
-    pattern = csc_matrix(around.T @ around)
+    pattern = csc_matrix(around.T @ around if springs else around[free])
+    pattern.sum_duplicates()
     pattern.sort_indices()
     pattern.data[:] = 1.0
     return pattern
 
 
-def elimination_order(beams: Ints, held: NDArray[np.bool_]) -> Ints:
+def elimination_order(beams: Ints, held: NDArray[np.bool_], *, springs: bool = True) -> Ints:
     """Order the free nodes so that their factor stays sparse (multiple minimum degree).
 
     The order is computed once for each problem, on the pattern that covers all designs. With
@@ -58,6 +61,8 @@ def elimination_order(beams: Ints, held: NDArray[np.bool_]) -> Ints:
     beams : (M, 2) int64
     held : (N,) bool
         Nodes that are not unknowns.
+    springs
+        Whether there are angular springs.
 
     Returns
     -------
@@ -68,7 +73,7 @@ def elimination_order(beams: Ints, held: NDArray[np.bool_]) -> Ints:
     from scipy.sparse.linalg import splu
 
     block = np.full(len(held), -1)
-    pattern = coupled_nodes(beams, held)
+    pattern = coupled_nodes(beams, held, springs=springs)
     count = pattern.shape[0]
     if count:
         # A dominant diagonal keeps the pivots on the diagonal.
@@ -83,7 +88,7 @@ def elimination_order(beams: Ints, held: NDArray[np.bool_]) -> Ints:
     return block
 
 
-def factor_capacity(beams: Ints, block: Ints) -> int:
+def factor_capacity(beams: Ints, block: Ints, *, springs: bool = True) -> int:
     """Return an upper bound on the blocks below the diagonal of the factor of any design.
 
     For each row of the factor, the nonzero entries are the columns on the paths from the entries
@@ -95,8 +100,10 @@ def factor_capacity(beams: Ints, block: Ints) -> int:
     beams : (M, 2) int64
     block : (N,) int64
         Elimination index of each node, -1 for held nodes.
+    springs
+        Whether there are angular springs.
     """
-    pattern = coupled_nodes(beams, block < 0)
+    pattern = coupled_nodes(beams, block < 0, springs=springs)
     order = block[block >= 0]
     node_at = np.argsort(order)
     starts, entries = pattern.indptr.tolist(), order[pattern.indices].tolist()

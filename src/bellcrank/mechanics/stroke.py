@@ -1,4 +1,4 @@
-"""Equilibria of the spring model along the stroke."""
+"""Equilibria along the stroke."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from bellcrank.mechanics.evaluator import VERIFICATION_INCREMENT, SpringEvaluator
+from bellcrank.mechanics.evaluator import VERIFICATION_INCREMENT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import ArrayLike
 
-    from bellcrank.mechanics.evaluator import Response, UnloadedBeams
+    from bellcrank.mechanics.evaluator import Response
+    from bellcrank.mechanics.models import ModelEvaluator
     from bellcrank.model import Problem
 
 STATES = 8
@@ -50,27 +51,26 @@ class StrokeEvaluator:
 
     Parameters
     ----------
-    problem
-        Lattice, supports, full input and output.
-    unloaded_beams
-        As in `SpringEvaluator`.
+    evaluator
+        Evaluator of the problem with the full input. Its own response is left as it is.
     states
         Number of states, the full input included.
 
     Examples
     --------
+    >>> from bellcrank.mechanics import SpringEvaluator
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
-    >>> [load for load, _ in StrokeEvaluator(crane, states=4).evaluate(crane.initial)]
+    >>> stroke = StrokeEvaluator(SpringEvaluator(crane), states=4)
+    >>> [load for load, _ in stroke.evaluate(crane.initial)]
     [0.25, 0.5, 0.75, 1.0]
     """
 
-    def __init__(
-        self, problem: Problem, unloaded_beams: UnloadedBeams = "keep", states: int = STATES
-    ) -> None:
+    def __init__(self, evaluator: ModelEvaluator, states: int = STATES) -> None:
+        problem = evaluator.problem
+        loads = [state / states for state in range(1, states + 1)]
         self._evaluators = [
-            (load, SpringEvaluator(at_fraction(problem, load), "displacement", unloaded_beams))
-            for load in (state / states for state in range(1, states + 1))
+            (load, evaluator.for_problem(at_fraction(problem, load))) for load in loads
         ]
 
     def evaluate(self, mask: ArrayLike) -> Iterator[tuple[float, Response]]:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics.conditions import LinearEquations
 from bellcrank.mechanics.evaluator import core_code
-from bellcrank.mechanics.kernels.arrays import ACTIVE, HELD
-from bellcrank.mechanics.objectives import objective_of
+from bellcrank.mechanics.frames.condensation import FrameCondensation
+from bellcrank.mechanics.spring_condensation import SpringCondensation
 from bellcrank.mechanics.status import Status
-from bellcrank.mechanics.system import allocate_scratch, allocate_structure, build_system
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -34,8 +33,10 @@ class Coupling:
     Parameters
     ----------
     nodes : (n,) int64
-    motions : (m, n, 2)
-        Displacement of the nodes per unit of each coordinate.
+    motions : (m, n, k)
+        Motion of the nodes per unit of each coordinate: displacements only, so that the nodes of
+        a frame rotate freely, or also rotations: k = 3 in the plane and k = 6 in space, where
+        successive rotations are composed.
     """
 
     nodes: NDArray[np.int64]
@@ -55,19 +56,23 @@ def uniform_motion(nodes: NDArray[np.int64], direction: NDArray[np.float64]) -> 
     Parameters
     ----------
     nodes : (n,) int64
-    direction : (n, 2) unit vectors
+    direction : (n, d) unit vectors
     """
     return Coupling(nodes, direction[None])
 
 
-def free_nodes(nodes: NDArray[np.int64]) -> Coupling:
+def free_nodes(nodes: NDArray[np.int64], unknowns: int = 2) -> Coupling:
     """Move nodes independently, by the coordinates x, y of the first, of the second, ...
 
     Parameters
     ----------
     nodes : (n,) int64
+    unknowns
+        Coordinates of each node. With 3 in the plane the last one is its rotation, with 6 in space
+        the last three are its rotations about the axes.
     """
-    return Coupling(nodes, np.eye(2 * len(nodes)).reshape(-1, len(nodes), 2))
+    count = len(nodes)
+    return Coupling(nodes, np.eye(unknowns * count).reshape(-1, count, unknowns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,8 +83,8 @@ class State:
     ----------
     z : (m,)
         Generalised coordinates of the couplings.
-    displacement : (N, 2)
-        Displacement of all nodes.
+    displacement : (N, c)
+        Displacement of all nodes; in frames also their rotation, in space as a unit quaternion.
     coordinates : (k,)
         Coordinates to which conditions apply.
     force : (k,)
@@ -105,7 +110,7 @@ class State:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Condensed:
-    """First-order behaviour of a superelement around one displacement.
+    """First-order behaviour of a superelement around one configuration.
 
     Parameters
     ----------
@@ -113,20 +118,103 @@ class Condensed:
         By the coordinates z; the interior follows.
     force : (m,)
         Work per unit of each coordinate; the interior is in equilibrium after `interior_step`.
-    responses : (m, N, 2)
-        Displacement of all nodes per unit of each coordinate.
-    interior_step : (N, 2)
+    response
+        Function from a change of the coordinates (m,) to the motion (N, b) of all nodes.
+    interior_step : (N, b)
         Newton step of the interior with the boundary nodes held; zero in equilibrium.
     lowest
         Estimated stiffness of the softest motion of the interior while the boundary nodes are
-        held; infinite if there is no interior.
+        held, of each part; infinite if there is no interior.
     """
 
     stiffness: NDArray[np.float64]
     force: NDArray[np.float64]
-    responses: NDArray[np.float64]
+    response: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     interior_step: NDArray[np.float64]
-    lowest: float
+    lowest: tuple[float, ...]
+
+
+def state_of(
+    z: NDArray[np.float64],
+    displacement: NDArray[np.float64],
+    found: Condensed,
+    measures: NDArray[np.float64],
+    energy: float,
+) -> State:
+    """Return the state of an equilibrium that was condensed to `found`.
+
+    Parameters
+    ----------
+    z : (m,)
+        Coordinates.
+    displacement : (N, c)
+        Displacement of all nodes.
+    measures : (k, m)
+        Coordinates to which conditions apply, q = measures z.
+    energy
+        Elastic energy.
+    """
+    size = float(np.abs(found.stiffness).max())
+    return State(
+        z=z,
+        displacement=displacement,
+        coordinates=measures @ z,
+        # In equilibrium the force by z is the transposed measures times that by coordinate.
+        force=np.linalg.pinv(measures.T) @ found.force,
+        energy=energy,
+        stiffness=0.5 * (found.stiffness + found.stiffness.T),
+        asymmetry=float(np.abs(found.stiffness - found.stiffness.T).max()) / size,
+    )
+
+
+class Condensation(Protocol):
+    """The mechanics of one design while unknowns of its boundary nodes are prescribed.
+
+    A configuration (N, c) is a state of the nodes, a motion (N, b) leads from one to another: b
+    unknowns of each node, displacements and in frames rotations.
+    """
+
+    status: Status
+    """MECHANISM if a piece can move although the boundary is held."""
+    active: NDArray[np.bool_]
+    """(N,) nodes of pieces that the input of the problem reaches and that can carry load."""
+    interior_step: NDArray[np.float64]
+    """(N, b) Newton step of the interior in the last condensation."""
+
+    @property
+    def gradient(self) -> NDArray[np.float64]:
+        """(N, b) derivative of the energy in the last condensation."""
+
+    def rest(self) -> NDArray[np.float64]:
+        """Return the configuration at rest."""
+
+    def energy(self, configuration: NDArray[np.float64]) -> float:
+        """Return the elastic energy."""
+
+    def condense(
+        self,
+        configuration: NDArray[np.float64],
+        motions: NDArray[np.float64],
+        softening: float,
+        predicted: bool,
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+        """Return the lowest stiffness of the interior, and (m, N, b) forces and responses.
+
+        Forces are the stiffness times each motion (m, N, b) of the boundary, responses the
+        motion of all nodes with the interior following. The lowest stiffness is negative if the
+        interior is not stable.
+        """
+
+    def predict_tension(self, motion: NDArray[np.float64]) -> None:
+        """Compute the tensions to first order after a motion, for the next condensation."""
+
+    def moved(
+        self, configuration: NDArray[np.float64], motion: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the configuration after a motion."""
+
+    def motion(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the motion from one configuration to another."""
 
 
 class Superelement:
@@ -179,44 +267,37 @@ class Superelement:
         self.unloaded_beams: UnloadedBeams = unloaded_beams
         self._boundary = _checked(np.concatenate([each.nodes for each in couplings]), design)
         undriven = replace(problem, input=replace(problem.input, drive="force"))
-        system = build_system(undriven, objective_of(undriven, "displacement"))
-        self.system = system._replace(
-            load=np.zeros_like(system.load), ground=np.zeros_like(system.ground)
+        held = _held_unknowns(design, couplings)
+        free = replace(design, problem=undriven)
+        self.model: Condensation = (
+            SpringCondensation(free, held, core)
+            if problem.section is None
+            else FrameCondensation(free, held)
         )
-        self.structure = allocate_structure(self.system)
-        self.scratch = allocate_scratch(self.system, self.structure)
-        self._held = self.system.held.copy()
-        self._held[self._boundary] = HELD
-        self._free = np.flatnonzero(self.system.block >= 0)
-        self._order = self.system.block[self._free]
-        blocks = np.arange(len(self.scratch.step))
-        self._mode = np.cos(1.0 + np.stack([3.0 * blocks, 3.0 * blocks + 1.0], axis=1))
-        self._find_structure(core)
-        self.motions = self._motions_of(couplings)
+        if self.model.status is not Status.CONVERGED:
+            raise InvalidSettings(
+                f"{problem.name}: {self.model.status.message}, even while its ports are held"
+            )
+        self.motions = self._motions_of(couplings, held.shape)
         self._fixed = ~self.motions.reshape(len(self.motions), -1).any(axis=1)
         self.measures = self._checked_measures(measures)
-        self._by_coordinate = np.linalg.pinv(self.measures.T)
 
-    def _find_structure(self, core: int) -> None:
-        from bellcrank.mechanics.kernels.structure import find_structure
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """(N,) nodes of pieces that the input reaches and that can carry load."""
+        return self.model.active
 
-        # Pieces are classified with held boundary nodes, and beams between these still move.
-        classified = self.system._replace(held=self._held)
-        mask = self.design.mask.astype(np.uint8)
-        status = Status(find_structure(classified, mask, core, self.structure))
-        if status is not Status.CONVERGED:
-            raise InvalidSettings(
-                f"{self.design.problem.name}: {status.message}, even while its ports are held"
-            )
-        self.active: NDArray[np.bool_] = self.structure.active == ACTIVE
-
-    def _motions_of(self, couplings: Sequence[Coupling]) -> NDArray[np.float64]:
-        """Return (m, N, 2) the motion of the nodes per coordinate, without the interior."""
-        count = sum(each.count for each in couplings)
-        motions, first = np.zeros((count, *self.system.positions.shape)), 0
+    def _motions_of(
+        self, couplings: Sequence[Coupling], shape: tuple[int, ...]
+    ) -> NDArray[np.float64]:
+        """Return (m, N, b) the motion of the nodes per coordinate, without the interior."""
+        motions, first = np.zeros((sum(each.count for each in couplings), *shape)), 0
         for each in couplings:
             live = self.active[each.nodes]
-            motions[first : first + each.count, each.nodes] = each.motions * live[:, None]
+            unknowns = each.motions.shape[2]
+            motions[first : first + each.count, each.nodes, :unknowns] = (
+                each.motions * live[:, None]
+            )
             first += each.count
         return motions
 
@@ -236,17 +317,15 @@ class Superelement:
         """(k,) whether each coordinate belongs to a piece that the input reaches."""
         return np.asarray(self.measures.any(axis=1))
 
-    def move(self, z: NDArray[np.float64], displacement: NDArray[np.float64]) -> None:
-        """Set the displacement (N, 2) of the boundary nodes to the coordinates z."""
-        moved = np.tensordot(z, self.motions, axes=1)
-        displacement[self._boundary] = moved[self._boundary]
+    def moved(
+        self, displacement: NDArray[np.float64], motion: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the displacement (N, c) after a motion (N, b)."""
+        return self.model.moved(displacement, motion)
 
-    def energy(self, displacement: NDArray[np.float64]) -> float:
-        """Return the elastic energy at displacements (N, 2) of the nodes."""
-        from bellcrank.mechanics.kernels.condensation import energy_at
-
-        found: float = energy_at(self.system, self.structure, displacement, self.scratch)
-        return found
+    def motion(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the motion (N, b) that leads from one displacement to another."""
+        return self.model.motion(start, end)
 
     def condense(
         self,
@@ -259,7 +338,7 @@ class Superelement:
 
         Parameters
         ----------
-        displacement : (N, 2)
+        displacement : (N, c)
             Any displacement, in equilibrium or not.
         softened
             False leaves out the part that can make the stiffness indefinite.
@@ -271,54 +350,39 @@ class Superelement:
         Condensed or None
             None if the interior is not stable while the boundary nodes are held.
         """
-        from bellcrank.mechanics.kernels.condensation import condense
-
-        count, blocks = len(self.motions), len(self.scratch.step)
-        ordered = np.zeros((count, blocks, 2))
-        ordered[:, self._order] = self.motions[:, self._free]
-        forcing, responses = np.zeros_like(ordered), np.zeros_like(ordered)
-        lowest = condense(
-            self.system, self.structure, self._held, displacement, 1.0 if softened else 0.0,
-            predicted, ordered, forcing, responses, self._mode, self.scratch,
-        )  # fmt: skip
+        lowest, forcing, responses = self.model.condense(
+            displacement, self.motions, 1.0 if softened else 0.0, predicted
+        )
         if lowest < 0.0:
             return None
-        whole = np.zeros((count, *displacement.shape))
-        whole[:, self._free] = responses[:, self._order]
-        interior_step = np.zeros_like(displacement)
-        interior_step[self._free] = self.scratch.step[self._order]
+        count = len(self.motions)
         stiffness = forcing.reshape(count, -1) @ responses.reshape(count, -1).T
         stiffness[self._fixed, self._fixed] = 1.0
-        force = whole.reshape(count, -1) @ self.scratch.gradient.ravel()
-        return Condensed(stiffness, force, whole, interior_step, lowest)
+        force = responses.reshape(count, -1) @ self.model.gradient.ravel()
+        return Condensed(
+            stiffness,
+            force,
+            lambda change: np.tensordot(change, responses, axes=1),
+            self.model.interior_step,
+            (lowest,),
+        )
 
-    def predict_tension(self, step: NDArray[np.float64]) -> None:
-        """Compute the tension to first order after a step (N, 2) from the last condensation.
+    def predict_tension(self, motion: NDArray[np.float64]) -> None:
+        """Compute the tension to first order after a motion (N, b) from the last condensation.
 
         See `bellcrank.mechanics.kernels.newton.predict_tension`.
         """
-        from bellcrank.mechanics.kernels.condensation import tension_after
-
-        ordered = np.zeros_like(self.scratch.step)
-        ordered[self._order] = step[self._free]
-        tension_after(self.system, self.structure, ordered, self.scratch)
+        self.model.predict_tension(motion)
 
     def state(
         self, z: NDArray[np.float64], displacement: NDArray[np.float64], found: Condensed
     ) -> State:
         """Return the state of an equilibrium that was condensed to `found`."""
-        size = float(np.abs(found.stiffness).max())
-        asymmetry = float(np.abs(found.stiffness - found.stiffness.T).max()) / size
-        return State(
-            z=z,
-            displacement=displacement,
-            coordinates=self.measures @ z,
-            # In equilibrium the force by z is the transposed measures times that by coordinate.
-            force=self._by_coordinate @ found.force,
-            energy=self.energy(displacement),
-            stiffness=0.5 * (found.stiffness + found.stiffness.T),
-            asymmetry=asymmetry,
-        )
+        return state_of(z, displacement, found, self.measures, self.energy(displacement))
+
+    def energy(self, displacement: NDArray[np.float64]) -> float:
+        """Return the elastic energy at displacements (N, c) of the nodes."""
+        return self.model.energy(displacement)
 
     def rest(self) -> State:
         """Return the state at rest, without any force.
@@ -328,7 +392,7 @@ class Superelement:
         InvalidSettings
             If the interior is a mechanism, even while the boundary nodes are held.
         """
-        z, displacement = np.zeros(len(self.motions)), np.zeros_like(self.system.positions)
+        z, displacement = np.zeros(len(self.motions)), self.model.rest()
         found = self.condense(displacement)
         if found is None:
             raise InvalidSettings(
@@ -340,6 +404,16 @@ class Superelement:
     def linear(self, state: State, conditions: Conditions) -> LinearEquations:
         """Return the linear equations around a state."""
         return LinearEquations(state.stiffness, self.measures, conditions)
+
+
+def _held_unknowns(design: Design, couplings: Sequence[Coupling]) -> NDArray[np.bool_]:
+    """Return (N, b) the unknowns of the nodes that the couplings prescribe."""
+    lattice, framed = design.problem.lattice, design.problem.section is not None
+    unknowns = 3 * (lattice.dimension - 1) if framed else lattice.dimension
+    held = np.zeros((lattice.node_count, unknowns), dtype=bool)
+    for each in couplings:
+        held[each.nodes, : each.motions.shape[2]] = True
+    return held
 
 
 def _checked(boundary: NDArray[np.int64], design: Design) -> NDArray[np.int64]:

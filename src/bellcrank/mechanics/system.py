@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidProblem
 from bellcrank.mechanics.kernels.arrays import (
     HELD,
     HELD_X,
@@ -25,6 +24,7 @@ from bellcrank.mechanics.kernels.arrays import (
 from bellcrank.mechanics.kernels.cholesky import PANEL
 from bellcrank.mechanics.kernels.flip_prediction import RANK, FlipWorkspace
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
+from bellcrank.model import require_plane
 
 if TYPE_CHECKING:
     from bellcrank.mechanics.objectives import Objective
@@ -82,14 +82,10 @@ def build_system(problem: Problem, objective: Objective) -> System:
     Raises
     ------
     InvalidProblem
-        If the lattice is not planar.
+        If the problem is in space.
     """
+    require_plane(problem, "spring model")
     lattice = problem.lattice
-    if lattice.positions.shape[1] != 2:
-        raise InvalidProblem(
-            f"problem {problem.name!r}: expected planar positions (N, 2), "
-            f"got {lattice.positions.shape}"
-        )
     beams = lattice.beams.astype(np.int64)
     positions = np.array(lattice.positions)
     incident_start, incident_beam = incident_beams(positions, beams)
@@ -196,7 +192,7 @@ def allocate_scratch(system: System, structure: Structure) -> Scratch:
 def _allocate_vectors(nodes: int) -> Vectors:
     single = {
         name: np.zeros((nodes, 2))
-        for name in Vectors._fields
+        for name in Vectors.__annotations__
         if name != "rotation" and not name.startswith("knot")
     }
     return Vectors(

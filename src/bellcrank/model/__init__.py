@@ -1,7 +1,8 @@
 """Lattices, problems and designs.
 
-A `Problem` is a `Lattice` with supports, input and output. A `Design` is a problem with a mask of
-the beams that are present. All objects are immutable and validated on construction.
+A `Problem` is a `Lattice` with supports, input and output; a frame problem also has the
+cross-section and the material of its beams. A `Design` is a problem with a mask of the beams that
+are present. All objects are immutable and validated on construction.
 
 Examples
 --------
@@ -38,16 +39,19 @@ from bellcrank.model.gallery import gallery_design, human_counterpart, human_des
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
 from bellcrank.model.masks import pack_mask, unpack_mask
-from bellcrank.model.problem import Design, Problem, problem_to_dict
+from bellcrank.model.problem import Design, Problem, problem_to_dict, require_plane
 from bellcrank.model.regions import regions
 from bellcrank.model.schema import problem_from_dict
+from bellcrank.model.section import Elasticity, Section
 
 __all__ = [
     "Design",
+    "Elasticity",
     "Input",
     "Lattice",
     "Output",
     "Problem",
+    "Section",
     "Stiffness",
     "Supports",
     "builtin",
@@ -65,6 +69,7 @@ __all__ = [
     "read_masks",
     "read_problem",
     "regions",
+    "require_plane",
     "unpack_mask",
     "write_design",
     "write_problem",

@@ -53,6 +53,20 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
+def positive_number(name: str, value: ArrayLike) -> float:
+    """Return a finite number greater than zero.
+
+    Raises
+    ------
+    InvalidProblem
+        If `value` is not one.
+    """
+    number = real_array(name, value)
+    if number.ndim != 0 or number <= 0.0:
+        raise InvalidProblem(f"{name}: expected a number greater than 0, got {value!r}")
+    return float(number)
+
+
 def index_array(name: str, values: ArrayLike) -> NDArray[np.int64]:
     """Cast `values` to integers without rounding.
 

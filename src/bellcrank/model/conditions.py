@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from bellcrank.errors import InvalidProblem
-from bellcrank.model.arrays import id_list, locked, real_array, rebuild
+from bellcrank.model.arrays import id_list, locked, positive_number, real_array, rebuild
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+Aggregate = Literal["mean", "sum"]
 Drive = Literal["displacement", "force"]
 SpringKind = Literal["directional", "isotropic"]
 
@@ -43,8 +45,12 @@ class Stiffness:
 
     def __post_init__(self) -> None:
         for name in ("bond", "angle"):
-            value = _positive(f"stiffness.{name}", getattr(self, name))
+            value = positive_number(f"stiffness.{name}", getattr(self, name))
             object.__setattr__(self, name, value)
+
+
+ROLLERS = ("fixed_x", "fixed_y", "fixed_z")
+"""Names of the supports in one coordinate, in the order of the coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,9 +59,12 @@ class Supports:
 
     Parameters
     ----------
-    fixed, fixed_x, fixed_y : int64, node ids
-        Nodes fixed in both coordinates, in x only, and in y only. They are sorted, and a node
-        fixed in x and in y is moved to `fixed`.
+    fixed : int64, node ids
+        Nodes fixed in all coordinates, sorted.
+    fixed_x, fixed_y, fixed_z : int64, node ids
+        Nodes fixed in one coordinate, sorted, without those in `fixed`. A `Problem` moves the
+        nodes that are fixed in x and in y (in space, in x, in y and in z) to `fixed`, and has
+        nodes in `fixed_z` only in space.
 
     Raises
     ------
@@ -64,30 +73,46 @@ class Supports:
 
     Examples
     --------
-    >>> supports = Supports(fixed=[4], fixed_x=[1, 2], fixed_y=[3, 2])
+    >>> supports = Supports(fixed=[4], fixed_x=[1, 2], fixed_y=[3, 2]).merged(2)
     >>> supports.fixed, supports.fixed_x, supports.fixed_y
     (array([2, 4]), array([1]), array([3]))
+    >>> Supports(fixed=[4], fixed_x=[1, 2], fixed_y=[3, 2]).merged(3).fixed
+    array([4])
     """
 
     fixed: NDArray[np.int64] = field(default_factory=_no_nodes)
     fixed_x: NDArray[np.int64] = field(default_factory=_no_nodes)
     fixed_y: NDArray[np.int64] = field(default_factory=_no_nodes)
+    fixed_z: NDArray[np.int64] = field(default_factory=_no_nodes)
 
     def __post_init__(self) -> None:
-        fixed = id_list("supports.fixed", self.fixed)
-        fixed_x = id_list("supports.fixed_x", self.fixed_x)
-        fixed_y = id_list("supports.fixed_y", self.fixed_y)
-        fixed = np.union1d(fixed, np.intersect1d(fixed_x, fixed_y))
+        fixed = np.sort(id_list("supports.fixed", self.fixed))
         object.__setattr__(self, "fixed", locked(fixed))
-        object.__setattr__(self, "fixed_x", locked(np.setdiff1d(fixed_x, fixed)))
-        object.__setattr__(self, "fixed_y", locked(np.setdiff1d(fixed_y, fixed)))
+        for name in ROLLERS:
+            nodes = id_list(f"supports.{name}", getattr(self, name))
+            object.__setattr__(self, name, locked(np.setdiff1d(nodes, fixed)))
 
     __reduce__ = rebuild
 
     @property
     def nodes(self) -> NDArray[np.int64]:
         """All supported nodes, sorted."""
-        return np.unique(np.concatenate([self.fixed, self.fixed_x, self.fixed_y]))
+        return np.unique(np.concatenate([self.fixed, *self.rollers(3)]))
+
+    def rollers(self, dimension: int) -> list[NDArray[np.int64]]:
+        """Return the nodes fixed in x, in y and, in dimension 3, in z only."""
+        return [getattr(self, name) for name in ROLLERS[:dimension]]
+
+    def merged(self, dimension: int) -> Supports:
+        """Return supports whose nodes fixed in all coordinates are in `fixed`.
+
+        Parameters
+        ----------
+        dimension
+            Spatial dimension, 2 or 3.
+        """
+        held = reduce(np.intersect1d, self.rollers(dimension))
+        return replace(self, fixed=np.union1d(self.fixed, held)) if len(held) else self
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +123,7 @@ class Input:
     ----------
     nodes : (n,) int64, node ids
         Driven nodes.
-    direction : (n, 2) float64, unit vectors
+    direction : (n, 2) float64, in space (n, 3), unit vectors
         One vector for each node; a single vector is used for all nodes.
     drive
         ``"displacement"`` prescribes amount x direction as displacement of each node,
@@ -134,7 +159,7 @@ class Input:
         direction = _unit_vectors("input.direction", self.direction, len(nodes))
         object.__setattr__(self, "nodes", locked(nodes))
         object.__setattr__(self, "direction", locked(direction))
-        object.__setattr__(self, "amount", _positive("input.amount", self.amount))
+        object.__setattr__(self, "amount", positive_number("input.amount", self.amount))
 
     __reduce__ = rebuild
 
@@ -147,7 +172,7 @@ class Output:
     ----------
     nodes : (n,) int64, node ids
         Observed nodes.
-    direction : (n, 2) float64, unit vectors
+    direction : (n, 2) float64, in space (n, 3), unit vectors
         One vector for each node; a single vector is used for all nodes.
     spring
         Stiffness k_ext of the spring at each node, with energy ``1/2 k_ext ...``; None for no
@@ -183,19 +208,12 @@ class Output:
         if self.spring is None and self.spring_kind is not None:
             raise InvalidProblem("output.spring_kind: given without output.spring")
         if self.spring is not None:
-            object.__setattr__(self, "spring", _positive("output.spring", self.spring))
+            object.__setattr__(self, "spring", positive_number("output.spring", self.spring))
             object.__setattr__(self, "spring_kind", self.spring_kind or "directional")
         object.__setattr__(self, "nodes", locked(nodes))
         object.__setattr__(self, "direction", locked(direction))
 
     __reduce__ = rebuild
-
-
-def _positive(name: str, value: float) -> float:
-    number = real_array(name, value)
-    if number.ndim != 0 or number <= 0.0:
-        raise InvalidProblem(f"{name}: expected a number greater than 0, got {value!r}")
-    return float(number)
 
 
 def _region(name: str, values: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -207,12 +225,12 @@ def _region(name: str, values: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _unit_vectors(name: str, values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     vectors = real_array(name, values)
-    if vectors.shape not in {(2,), (count, 2)}:
+    if vectors.shape not in {(2,), (3,), (count, 2), (count, 3)}:
         raise InvalidProblem(
-            f"{name}: expected one vector, shape (2,), or one per node, shape ({count}, 2), "
-            f"got shape {vectors.shape}"
+            f"{name}: expected one vector, shape (2,), in space (3,), or one per node, shape "
+            f"({count}, 2), in space ({count}, 3), got shape {vectors.shape}"
         )
-    vectors = np.broadcast_to(vectors, (count, 2))
+    vectors = np.broadcast_to(vectors, (count, vectors.shape[-1]))
     lengths = np.linalg.norm(vectors, axis=1)
     bad = np.flatnonzero(np.abs(lengths - 1.0) > 1e-6)
     if len(bad):

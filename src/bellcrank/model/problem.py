@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,8 +19,17 @@ from bellcrank.model.arrays import (
     real_array,
     rebuild,
 )
-from bellcrank.model.conditions import Input, Output, Stiffness, Supports
+from bellcrank.model.checks import (
+    check_connection,
+    check_coordinates,
+    check_regions,
+    check_section,
+    check_slender,
+    check_texts,
+)
+from bellcrank.model.conditions import Aggregate, Input, Output, Stiffness, Supports
 from bellcrank.model.masks import pack_mask
+from bellcrank.model.section import DEFAULT_MATERIAL, Elasticity, Section
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,23 +40,24 @@ if TYPE_CHECKING:
 
 PROBLEM_SCHEMA = "bellcrank/problem/1"
 
-Aggregate = Literal["mean", "sum"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
     """A lattice with supports, input, output and the beams to design.
+
+    With a section the beams are those of a frame, in the plane or in space; without one they are
+    the springs of the paper's model, in the plane.
 
     Parameters
     ----------
     name
         Name of the problem.
     lattice
-        Nodes and all beams that may exist; planar.
+        Nodes and all beams that may exist; planar, or in space if there is a section.
     supports, input, output
         Disjoint sets of nodes.
     stiffness
-        Stiffness of beams and joints.
+        Stiffness of beams and joints of the spring model.
     initial : (M,) bool
         Beams present in the initial design; all by default.
     designable : (D,) int64, beam indices
@@ -58,12 +68,20 @@ class Problem:
         sums (the published code, for forces).
     objective
         Name of the objective; None for the default of the drive.
+    section
+        Cross-section of the beams of a frame, in lattice units; round in space. None for the
+        spring model.
+    material
+        Material of the beams of a frame; by default Young's modulus is 1 and Poisson's ratio
+        0.48.
 
     Raises
     ------
     InvalidProblem
-        If regions overlap or name unknown nodes, no path of beams connects output and input, or
-        no beam is designable.
+        If regions overlap or name unknown nodes, no path of beams connects output and input,
+        no beam is designable, directions or supports have other coordinates than the positions,
+        positions in space have no round section, a material has no section, or a beam is not
+        longer than wide.
 
     Examples
     --------
@@ -80,6 +98,12 @@ class Problem:
     ... )
     >>> problem.full_design().beam_count
     4
+
+    The same as a frame:
+
+    >>> frame = replace(problem, section=Section(width=0.2, thickness=0.5))
+    >>> frame.material
+    Elasticity(young=1.0, poisson=0.48)
     """
 
     name: str
@@ -93,16 +117,20 @@ class Problem:
     designable: NDArray[np.int64] = None  # type: ignore[assignment]
     aggregate: Aggregate = "mean"
     objective: str | None = None
+    section: Section | None = None
+    material: Elasticity | None = None
 
     def __post_init__(self) -> None:
-        _check_texts(self)
-        if self.lattice.dimension != 2:
-            raise InvalidProblem(
-                "positions: expected a lattice in the plane, shape (N, 2), "
-                f"got shape {self.lattice.positions.shape}"
-            )
-        _check_regions(self)
-        _check_connection(self)
+        lattice, given, wanted = self.lattice, self.input, self.output
+        check_texts(self.name, self.aggregate, self.objective)
+        check_section(lattice, self.section, self.material)
+        check_coordinates(lattice, self.supports, given, wanted)
+        supports = self.supports.merged(lattice.dimension)
+        object.__setattr__(self, "supports", supports)
+        check_regions(lattice, supports, given, wanted)
+        check_connection(lattice, given, wanted)
+        if self.section is not None and self.material is None:
+            object.__setattr__(self, "material", DEFAULT_MATERIAL)
         beam_count = self.lattice.beam_count
         initial = np.ones(beam_count, dtype=np.bool_) if self.initial is None else self.initial
         initial = boolean_mask("initial", initial, beam_count)
@@ -118,6 +146,10 @@ class Problem:
             )
         object.__setattr__(self, "initial", locked(initial))
         object.__setattr__(self, "designable", locked(designable))
+        if self.section is not None:
+            possible = initial.copy()
+            possible[designable] = True
+            check_slender(lattice, self.section, possible)
 
     __reduce__ = rebuild
 
@@ -196,6 +228,33 @@ class Design:
         return replace(self, mask=np.asarray(mask), efficiency=None)
 
 
+def require_plane(problem: Problem, what: str) -> None:
+    """Check that a problem is in the plane, at the entrance of work that is only defined there.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    what
+        The work, for the error.
+
+    Raises
+    ------
+    InvalidProblem
+        If the positions have three coordinates.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> require_plane(find_problem("crane"), "outline")
+    """
+    if problem.lattice.dimension != 2:
+        raise InvalidProblem(
+            f"{what}: problem {problem.name!r} is in space; only problems in the plane are "
+            "accepted here"
+        )
+
+
 def problem_to_dict(problem: Problem) -> dict[str, Any]:
     """Return a problem in full as plain data (schema ``bellcrank/problem/1``).
 
@@ -238,6 +297,11 @@ def problem_to_dict(problem: Problem) -> dict[str, Any]:
     }
     if problem.objective is not None:
         data["objective"] = problem.objective
+    if problem.lattice.dimension == 3:
+        data["supports"]["fixed_z"] = problem.supports.fixed_z.tolist()
+    if problem.section is not None and problem.material is not None:
+        data["section"] = problem.section.to_dict()
+        data["material"] = asdict(problem.material)
     return data
 
 
@@ -246,43 +310,3 @@ def _one_or_each(vectors: NDArray[np.float64]) -> list[Any]:
     same = bool((vectors == vectors[0]).all())
     written: list[Any] = vectors[0].tolist() if same else vectors.tolist()
     return written
-
-
-def _check_texts(problem: Problem) -> None:
-    if not isinstance(problem.name, str) or not problem.name.strip():
-        raise InvalidProblem(f"name: expected some text, got {problem.name!r}")
-    if problem.aggregate not in get_args(Aggregate):
-        raise InvalidProblem(f"aggregate: expected 'mean' or 'sum', got {problem.aggregate!r}")
-    objective = problem.objective
-    if objective is not None and (not isinstance(objective, str) or not objective.strip()):
-        raise InvalidProblem(f"objective: expected a name, got {objective!r}")
-
-
-def _check_regions(problem: Problem) -> None:
-    regions = {
-        "supports.fixed": problem.supports.fixed,
-        "supports.fixed_x": problem.supports.fixed_x,
-        "supports.fixed_y": problem.supports.fixed_y,
-        "input.nodes": problem.input.nodes,
-        "output.nodes": problem.output.nodes,
-    }
-    owner: dict[int, str] = {}
-    for name, nodes in regions.items():
-        check_ids(name, nodes, problem.lattice.node_count, "node")
-        for node in nodes.tolist():
-            if node in owner:
-                raise InvalidProblem(
-                    f"{name}: node {node} is also in {owner[node]}; regions must not overlap"
-                )
-            owner[node] = name
-
-
-def _check_connection(problem: Problem) -> None:
-    # One connected node is sufficient: regions of a jammed packing may contain discs without
-    # contacts.
-    reached = problem.lattice.reachable(problem.input.nodes)
-    if not reached[problem.output.nodes].any():
-        raise InvalidProblem(
-            f"output.nodes: node {problem.output.nodes[0]} and all other output nodes are not "
-            "connected to the input by beams, even in the full lattice"
-        )

@@ -4,6 +4,8 @@ In a problem file a region is an inline table whose key is the kind of region::
 
     nodes = [{ row = -1, rightmost = 3 }, { box = [0, 8, 2, 10] }, { ids = [4, 5] }]
 
+Rows exist only in the plane.
+
 To add a kind, register a function ``(lattice, value, ...) -> node ids`` with
 ``@regions.register("key")``. Further parameters are further keys.
 
@@ -45,12 +47,19 @@ MAX_NEAREST = 1.5
 def find_rows(lattice: Lattice) -> list[NDArray[np.int64]]:
     """Return the nodes of each row of equal y, rows from the bottom, nodes from the left.
 
+    Raises
+    ------
+    InvalidProblem
+        If the lattice is in space.
+
     Examples
     --------
     >>> from bellcrank.model import lattices
     >>> find_rows(lattices["triangular-rows"]([2, 1], [0.0, 0.5]))
     [array([0, 1]), array([2])]
     """
+    if lattice.dimension != 2:
+        raise InvalidProblem("row: expected a lattice in the plane; in space use box or nearest")
     y = lattice.positions[:, 1]
     order = np.argsort(y, kind="stable")
     same = 1e-3 * float(np.median(lattice.rest_length))
@@ -129,44 +138,51 @@ def rows(
 def box(lattice: Lattice, box: Sequence[float]) -> NDArray[np.int64]:
     """Return the nodes within ``[x_min, y_min, x_max, y_max]``, edges included.
 
+    In space the box is ``[x_min, y_min, z_min, x_max, y_max, z_max]``.
+
     Raises
     ------
     InvalidProblem
-        If `box` is not four numbers, or a minimum exceeds its maximum.
+        If `box` has another number of values, or a minimum exceeds its maximum.
     """
-    if len(box) != 4 or not (box[0] <= box[2] and box[1] <= box[3]):
-        raise InvalidProblem(f"box: expected [x_min, y_min, x_max, y_max], got {list(box)}")
+    dimension = lattice.dimension
+    low, high = np.array(box[:dimension]), np.array(box[dimension:])
+    if len(box) != 2 * dimension or not (low <= high).all():
+        axes = "xyz"[:dimension]
+        form = ", ".join(f"{axis}_{end}" for end in ("min", "max") for axis in axes)
+        raise InvalidProblem(f"box: expected [{form}], got {list(box)}")
     # Nodes on an edge are included despite rounding errors.
     slack = 1e-6 * float(np.median(lattice.rest_length))
-    low, high = np.array(box[:2]) - slack, np.array(box[2:]) + slack
-    plane = lattice.positions[:, :2]
-    return np.flatnonzero(((plane >= low) & (plane <= high)).all(axis=1))
+    inside = (lattice.positions >= low - slack) & (lattice.positions <= high + slack)
+    return np.flatnonzero(inside.all(axis=1))
 
 
 @regions.register("nearest")
 def nearest(lattice: Lattice, nearest: Sequence[float], *, count: int = 1) -> NDArray[np.int64]:
-    """Return the `count` nodes nearest to a point ``[x, y]``.
+    """Return the `count` nodes nearest to a point ``[x, y]``, in space ``[x, y, z]``.
 
     Raises
     ------
     InvalidProblem
-        If `nearest` is not two numbers, no node is within `MAX_NEAREST` beam lengths of the point,
+        If `nearest` is not a point, no node is within `MAX_NEAREST` beam lengths of the point,
         or the lattice has fewer than `count` nodes.
     """
-    if len(nearest) != 2:
-        raise InvalidProblem(f"nearest: expected a point [x, y], got {list(nearest)}")
+    axes = "xyz"[: lattice.dimension]
+    if len(nearest) != len(axes):
+        raise InvalidProblem(f"nearest: expected a point [{', '.join(axes)}], got {list(nearest)}")
     if not 1 <= count <= lattice.node_count:
         raise InvalidProblem(f"count: expected 1 to {lattice.node_count} nodes, got {count}")
-    plane = lattice.positions[:, :2]
-    distance = np.linalg.norm(plane - np.array(nearest), axis=1)
+    distance = np.linalg.norm(lattice.positions - np.array(nearest), axis=1)
     length = float(np.median(lattice.rest_length))
     if distance.min() > MAX_NEAREST * length:
-        low, high = plane.min(axis=0).tolist(), plane.max(axis=0).tolist()
+        low, high = lattice.positions.min(axis=0), lattice.positions.max(axis=0)
+        extent = " and ".join(
+            f"{axis} = {a:.4g} to {b:.4g}" for axis, a, b in zip(axes, low, high, strict=True)
+        )
         raise InvalidProblem(
             f"nearest: the node nearest to {list(nearest)} is {distance.min():.4g} lattice units "
             f"({distance.min() / length:.3g} beam lengths) away; expected a point within "
-            f"{MAX_NEAREST:g} beam lengths of the lattice, which extends from "
-            f"x = {low[0]:.4g} to {high[0]:.4g} and from y = {low[1]:.4g} to {high[1]:.4g}"
+            f"{MAX_NEAREST:g} beam lengths of the lattice, which extends from {extent}"
         )
     return np.sort(np.argsort(distance, kind="stable")[:count])
 

@@ -10,17 +10,18 @@ number. Both forms can be combined.
     aggregate = "mean"              # or "sum"; optional
     objective = "displacement"      # optional, by default chosen by the drive
 
-    [lattice]                       # or: positions = [[x, y], ...], beams = [[a, b], ...]
+    [lattice]                       # or: positions = [[x, y], ...], beams = [[a, b], ...];
+                                    # in space [[x, y, z], ...]
     kind = "triangular-rows"        # a name in `bellcrank.model.lattices`
     counts = [5, 6, 5, 6]           # its parameters; `seed` for the disordered ones
     first_x = [0.5, 0.0, 0.5, 0.0]
 
     [supports]                      # lists of regions and node numbers
-    fixed = [{ row = 0 }]           # also fixed_x, fixed_y: rollers
+    fixed = [{ row = 0 }]           # also fixed_x, fixed_y: rollers; in space also fixed_z
 
     [input]
     nodes = [{ row = -1, rightmost = 2 }]
-    direction = [0, -1]             # one unit vector, or one for each node
+    direction = [0, -1]             # one unit vector, or one for each node; in space [0, 0, -1]
     drive = "displacement"          # or "force"
     amount = 0.1                    # lattice units, at most the size of the lattice
 
@@ -30,10 +31,20 @@ number. Both forms can be combined.
     spring = 0.5                    # optional
     spring_kind = "directional"     # or "isotropic"; optional
 
-    [stiffness]                     # optional, with optional keys
+    [stiffness]                     # of the spring model; optional, with optional keys
     bond = 5.0
     angle = 0.1
 
+    [section]                       # makes the beams those of a frame; optional
+    shape = "rectangle"             # or: shape = "round", diameter = 0.2
+    width = 0.2                     # in the plane of the lattice, lattice units
+    thickness = 0.5                 # normal to it, lattice units
+
+    [material]                      # of a frame; optional, these are the defaults
+    young = 1.0
+    poisson = 0.48
+
+Positions in space need a round section. Without a section a problem is one of the spring model.
 Regions are described in `bellcrank.model.regions`. Further keys are optional: `initial`, the mask
 of the beams present in the initial design; `designable`, the numbers of the beams that a search
 may change; or, in place of `designable`, `frozen`, a list of regions whose beams it may not change
@@ -58,6 +69,7 @@ from bellcrank.model.masks import unpack_mask
 from bellcrank.model.parsing import Table, parse
 from bellcrank.model.problem import Problem
 from bellcrank.model.regions import regions
+from bellcrank.model.section import Elasticity, Section, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -82,6 +94,7 @@ class SupportsTable(Table):
     fixed: list[Any] = Field(default_factory=list)
     fixed_x: list[Any] = Field(default_factory=list)
     fixed_y: list[Any] = Field(default_factory=list)
+    fixed_z: list[Any] = Field(default_factory=list)
 
 
 class InputTable(Table):
@@ -102,6 +115,22 @@ class OutputTable(Table):
     spring_kind: Literal["directional", "isotropic"] | None = None
 
 
+class SectionTable(Table):
+    """``[section]``."""
+
+    shape: Shape
+    width: float | None = None
+    thickness: float | None = None
+    diameter: float | None = None
+
+
+class ElasticityTable(Table):
+    """``[material]``."""
+
+    young: float
+    poisson: float
+
+
 class ProblemTable(Table):
     """A problem file."""
 
@@ -119,6 +148,8 @@ class ProblemTable(Table):
     frozen: list[Any] = Field(default_factory=list)
     aggregate: Literal["mean", "sum"] = "mean"
     objective: str | None = None
+    section: SectionTable | None = None
+    material: ElasticityTable | None = None
 
 
 def problem_from_dict(data: Mapping[str, Any], source: str = "problem") -> Problem:
@@ -177,6 +208,7 @@ def _build(table: ProblemTable) -> Problem:
             fixed=_nodes(lattice, supports.fixed, "supports.fixed"),
             fixed_x=_nodes(lattice, supports.fixed_x, "supports.fixed_x"),
             fixed_y=_nodes(lattice, supports.fixed_y, "supports.fixed_y"),
+            fixed_z=_nodes(lattice, supports.fixed_z, "supports.fixed_z"),
         ),
         input=Input(
             nodes=_nodes(lattice, inputs.nodes, "input.nodes"),
@@ -195,6 +227,8 @@ def _build(table: ProblemTable) -> Problem:
         designable=table.designable,  # type: ignore[arg-type]  # checked there
         aggregate=table.aggregate,
         objective=table.objective,
+        section=_section(table.section),
+        material=Elasticity(**table.material.model_dump()) if table.material else None,
     )
     return _freeze(problem, table)
 
@@ -270,6 +304,33 @@ def _region(lattice: Lattice, entry: dict[str, Any], where: str) -> list[int]:
     if not nodes:
         raise InvalidProblem(f"{where}: no node lies in this region")
     return nodes
+
+
+SECTION_KEYS: dict[Shape, tuple[str, ...]] = {
+    "rectangle": ("width", "thickness"),
+    "round": ("diameter",),
+}
+"""Lengths of each shape."""
+
+
+def _section(table: SectionTable | None) -> Section | None:
+    if table is None:
+        return None
+    known = SECTION_KEYS[table.shape]
+    lengths = table.model_dump(exclude={"shape"}, exclude_none=True)
+    for key in known:
+        if key not in lengths:
+            raise InvalidFile(
+                f"key 'section.{key}' is missing (section.shape is {table.shape!r}, whose keys "
+                f"are {', '.join(known)})"
+            )
+    for key in lengths:
+        if key not in known:
+            raise InvalidFile(
+                f"unknown key 'section.{key}' (section.shape is {table.shape!r}, whose keys are "
+                f"{', '.join(known)})"
+            )
+    return Section(**lengths) if table.shape == "rectangle" else Section.round(**lengths)
 
 
 def _initial(table: ProblemTable, lattice: Lattice) -> NDArray[np.bool_] | None:

@@ -7,11 +7,11 @@
 ('ninjaflex', 4.33)
 """
 
-from bellcrank.part.calibration import calibrated
+from bellcrank.model.section import Section
+from bellcrank.part.frames import frame_problem, models, spring_problem
 from bellcrank.part.lengths import read_length
 from bellcrank.part.materials import Material, materials
 from bellcrank.part.part import Part
-from bellcrank.part.section import Section
 from bellcrank.part.spec import PartSpec, read_part
 
 __all__ = [
@@ -19,8 +19,10 @@ __all__ = [
     "Part",
     "PartSpec",
     "Section",
-    "calibrated",
+    "frame_problem",
     "materials",
+    "models",
     "read_length",
     "read_part",
+    "spring_problem",
 ]

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.model import require_plane
 from bellcrank.part.outline import room_for_fillet, strut_outline
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.model import Design
+    from bellcrank.model import Design, Section
     from bellcrank.part.materials import Material
     from bellcrank.part.outline import Outline
-    from bellcrank.part.section import Section
 
 
 FILLET = 0.25
@@ -36,7 +36,7 @@ class Part:
     material
         Material of the struts.
     section
-        Cross-section of the struts.
+        Cross-section of the struts, a rectangle; mm.
     scale
         Length of a lattice unit, mm.
     fillet
@@ -46,13 +46,14 @@ class Part:
     Raises
     ------
     InvalidSettings
-        If there are no beams, or the struts are not longer than wide.
+        If there are no beams, the struts are round, or they are not longer than wide.
+    InvalidProblem
+        If the problem is in space.
 
     Examples
     --------
     >>> from bellcrank.part.materials import Material
-    >>> from bellcrank.part.section import Section
-    >>> from bellcrank.model import find_problem
+    >>> from bellcrank.model import Section, find_problem
     >>> crane = find_problem("crane").full_design()
     >>> rubber = Material(name="rubber", young=12.0, poisson=0.48)
     >>> part = Part(crane, rubber, Section(2.0, 5.0))
@@ -67,6 +68,11 @@ class Part:
     fillet: float | None = None
 
     def __post_init__(self) -> None:
+        require_plane(self.design.problem, "part")
+        if self.section.shape != "rectangle":
+            raise InvalidSettings(
+                f"section: expected a rectangle for a part in the plane, got {self.section.shape!r}"
+            )
         if self.fillet is not None and not 0.0 <= self.fillet < float("inf"):
             raise InvalidSettings(f"fillet: expected a radius of 0 mm or more, got {self.fillet!r}")
         if not 0.0 < self.scale < float("inf"):
@@ -118,10 +124,14 @@ class Part:
     def stiffness_unit(self) -> float:
         """Stiffness in N / mm that corresponds to 1 in the problem.
 
-        A beam of the spring model has the stiffness 2 k and its strut that of an elastic bar.
-        Forces and springs of a problem are multiplied by this factor, so that they strain the
-        struts as they strain the beams.
+        A beam of the spring model has the stiffness 2 k, one of a frame E A / L, and its strut
+        that of an elastic bar. Forces and springs of a problem are multiplied by this factor, so
+        that they strain the struts as they strain the beams.
         """
-        stiffness = self.design.problem.stiffness
-        length = float(np.mean(self.design.problem.lattice.rest_length)) * self.scale
-        return self.material.young * self.section.area / length / (2.0 * stiffness.bond)
+        problem = self.design.problem
+        length = float(np.mean(problem.lattice.rest_length))
+        if problem.section is None or problem.material is None:
+            modelled = 2.0 * problem.stiffness.bond
+        else:
+            modelled = problem.material.young * problem.section.area / length
+        return self.material.young * self.section.area / (length * self.scale) / modelled

@@ -10,10 +10,10 @@ from pydantic import Field
 
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.model.parsing import Table, parse, read_toml
+from bellcrank.model.section import Section
 from bellcrank.part.lengths import read_length
 from bellcrank.part.materials import Material, materials
 from bellcrank.part.part import Part
-from bellcrank.part.section import Section
 
 if TYPE_CHECKING:
     import os
@@ -52,17 +52,42 @@ class PartSpec:
     fillet: float | None = None
     material: str | Material = "ninjaflex"
 
+    @property
+    def registered_material(self) -> Material:
+        """The material, looked up if it is a name; UnknownName if there is none of that name."""
+        return materials[self.material] if isinstance(self.material, str) else self.material
+
     def of(self, design: Design) -> Part:
         """Return the part of a design.
 
         Raises
         ------
-        InvalidSettings, UnknownName
+        InvalidSettings, InvalidProblem, UnknownName
         """
-        material = self.material
-        if isinstance(material, str):
-            material = materials[material]
-        return Part(design, material, Section(self.width, self.thickness), self.scale, self.fillet)
+        for name in ("width", "thickness"):
+            length = getattr(self, name)
+            if not 0.0 < length < math.inf:
+                raise InvalidSettings(f"{name}: expected a length above 0 mm, got {length:g}")
+        section = Section(self.width, self.thickness)
+        return Part(design, self.registered_material, section, self.scale, self.fillet)
+
+    @classmethod
+    def of_section(cls, section: Section, scale: float = 10.0) -> PartSpec:
+        """Return the part whose struts have a section in lattice units.
+
+        Parameters
+        ----------
+        scale
+            Length of a lattice unit, mm.
+
+        Examples
+        --------
+        >>> spec = PartSpec.of_section(Section(0.16, 0.4))
+        >>> spec.width, spec.thickness
+        (1.6, 4.0)
+        """
+        scaled = section.scaled(scale)
+        return cls(width=scaled.width, thickness=scaled.thickness, scale=scale)
 
     def changed(self, changes: Mapping[str, Any]) -> PartSpec:
         """Return a copy with some values replaced; lengths may be texts with units.

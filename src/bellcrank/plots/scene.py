@@ -9,6 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.mechanics import load_bearing_core
+from bellcrank.model import require_plane
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class Motion:
     Raises
     ------
     InvalidProblem
-        If the displacement has not one row for each node.
+        If the problem is in space, or the displacement has not one row for each node.
     InvalidSettings
         If `magnify` is not positive and finite.
 
@@ -58,6 +59,7 @@ class Motion:
     magnify: float = 1.0
 
     def __post_init__(self) -> None:
+        require_plane(self.design.problem, "picture")
         expected = (self.design.problem.lattice.node_count, 2)
         given = np.array(self.displacement, dtype=np.float64)
         if given.shape != expected:

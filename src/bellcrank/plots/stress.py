@@ -1,4 +1,4 @@
-"""Stress of parts: the spring model, the finite elements, and curves along the stroke.
+"""Stress of parts: the model of the design, the finite elements, and curves along the stroke.
 
 One column for each design; below them efficiency and force along the stroke.
 """
@@ -89,7 +89,7 @@ def draw_stress(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Draw designs in the spring model and as parts with their stress, one column each.
+    """Draw designs in their model and as parts with their stress, one column each.
 
     Parameters
     ----------

@@ -5,8 +5,9 @@ the next (`advance_chain`) with a generator around it (`chain_blocks`); `run_cha
 chains in a run folder; `select` chooses one design from the results.
 
 Modules: `registry` (searches), `settings`, `evaluator` (interface to the models), `blocks`,
-`parallel`, `selection`, `cleaning`; `markov` (Metropolis chains, tempering), `hopping` (the
-default search), `constraints` (goals and load cases), `kernels` (compiled loops).
+`parallel`, `selection`, `cleaning`, `verification` (of finished frames); `markov` (Metropolis
+chains, tempering), `hopping` (the default search), `constraints` (goals and load cases), `kernels`
+(compiled loops).
 
 Examples
 --------

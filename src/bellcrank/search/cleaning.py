@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics import SpringEvaluator, loaded_beams
+from bellcrank.mechanics import loaded_beams, model_evaluator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bellcrank.mechanics import ModelEvaluator
     from bellcrank.model import Design, Problem
 
 
@@ -26,7 +27,7 @@ def pieces(problem: Problem, mask: NDArray[np.bool_]) -> int:
     return int(connected_components(graph, directed=False)[0])
 
 
-def clean(design: Design, evaluator: SpringEvaluator | None = None) -> Design:
+def clean(design: Design, evaluator: ModelEvaluator | None = None) -> Design:
     """Return a design without the beams that carry no load.
 
     Loose pieces and dead ends are removed first, then parts connected by a single node or to
@@ -45,6 +46,8 @@ def clean(design: Design, evaluator: SpringEvaluator | None = None) -> Design:
     >>> clean(crane).beam_count
     352
     """
-    evaluator = evaluator or SpringEvaluator(design.problem, "displacement")
+    evaluator = evaluator or model_evaluator(design.problem, "displacement")
     core = evaluator.load_bearing(design.mask)
-    return design.with_mask(loaded_beams(design.problem, core))
+    if design.problem.section is None:
+        core = loaded_beams(design.problem, core)
+    return design.with_mask(core)

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
-from bellcrank.mechanics import FlipPrediction, Response, SpringEvaluator, check_memory
+from bellcrank.mechanics import FlipPrediction, Response, check_memory, model_evaluator
 from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Evaluator(Protocol):
-    """A model that computes the efficiency of designs: springs, a network, finite elements."""
+    """A model that computes the efficiency of designs: springs, frames, a network."""
 
     problem: Problem
 
@@ -46,10 +46,22 @@ class Evaluator(Protocol):
         """
 
 
-def make_evaluator(problem: Problem, settings: SearchSettings) -> Evaluator:
+def make_evaluator(
+    problem: Problem, settings: SearchSettings, elements: int | None = None
+) -> Evaluator:
     """Return the evaluator of a search.
 
-    Without goals and with a single stroke it is a plain `SpringEvaluator`, which is faster.
+    Without goals and with a single stroke it is the plain evaluator of the mechanical model
+    (`bellcrank.mechanics.model_evaluator`), which is faster.
+
+    Parameters
+    ----------
+    problem
+        A problem with a section is evaluated as a frame.
+    settings
+        Settings of the search.
+    elements : int, optional
+        As in `bellcrank.mechanics.model_evaluator`.
 
     Raises
     ------
@@ -57,14 +69,19 @@ def make_evaluator(problem: Problem, settings: SearchSettings) -> Evaluator:
         If the problem needs more memory than is available, or the objective or a goal does not
         apply to it.
     """
-    check_memory(problem, evaluators=len(settings.strokes), predict_flips=settings.predicts_flips)
-    options = settings.objective, settings.unloaded_beams
+    # Only the spring model predicts flips by a dense inverse.
+    dense = settings.predicts_flips and problem.section is None
+    check_memory(problem, evaluators=len(settings.strokes), predict_flips=dense)
+    options = settings.objective, settings.unloaded_beams, elements
     if not settings.goals and settings.strokes == (1.0,):
-        return SpringEvaluator(problem, *options)
-    return ConstrainedEvaluator(at_strokes(problem, settings.strokes), settings.goals, *options)
+        return model_evaluator(problem, *options)
+    cases = at_strokes(problem, settings.strokes)
+    return ConstrainedEvaluator(cases, settings.goals, *options)
 
 
-def verification_evaluator(problem: Problem, settings: SearchSettings, **changes: Any) -> Evaluator:
+def verification_evaluator(
+    problem: Problem, settings: SearchSettings, elements: int | None = None, **changes: Any
+) -> Evaluator:
     """Return the evaluator of finished designs: all beams count, and the goals of the search hold.
 
     Parameters
@@ -73,7 +90,10 @@ def verification_evaluator(problem: Problem, settings: SearchSettings, **changes
         Lattice, supports, input and output.
     settings
         Settings of the search.
+    elements : int, optional
+        As in `bellcrank.mechanics.model_evaluator`.
     changes
         Settings that differ from those of the search.
     """
-    return make_evaluator(problem, replace(settings, **{"unloaded_beams": "keep", **changes}))
+    changed = replace(settings, **{"unloaded_beams": "keep", **changes})
+    return make_evaluator(problem, changed, elements)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from bellcrank.errors import NoDesignFound
-from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, Status, model_evaluator
 from bellcrank.model import Design, Problem
 from bellcrank.search.cleaning import clean, pieces
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bellcrank.mechanics import ModelEvaluator
     from bellcrank.search.evaluator import Evaluator
+    from bellcrank.search.verification import Verification
 
 CandidateRule: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.uint8]], list[int]]"
 """From efficiencies (n,) and packed masks (n, bytes) of the accepted designs, in order, to the
@@ -71,11 +73,14 @@ class Finalist:
         The cleaned design: one piece, all beams carry load.
     response
         Its response from rest.
+    verification
+        Its verification as a frame, if there is one.
     """
 
     found: Candidate
     design: Design
     response: Response
+    verification: Verification | None = None
 
 
 Refusals: TypeAlias = "list[tuple[float, str]]"
@@ -100,6 +105,8 @@ class Selection:
         Efficiency before and after cleaning, both from rest, with all beams kept.
     refused
         Number of rejected candidates of higher efficiency, by reason.
+    verification
+        Verification of a frame with several elements in each beam.
     """
 
     design: Design
@@ -108,6 +115,7 @@ class Selection:
     efficiency_before: float
     efficiency_after: float
     refused: dict[str, int]
+    verification: Verification | None = None
 
 
 def plateaus(
@@ -221,13 +229,13 @@ def candidates_of(
 def _cleaned(
     problem: Problem,
     candidates: Iterable[Candidate],
-    springs: SpringEvaluator,
+    plain: ModelEvaluator,
     evaluator: Evaluator,
 ) -> Iterator[tuple[Candidate, Design]]:
     """Yield each candidate with its cleaned design, each cleaned design once."""
     seen: set[bytes] = set()
     for candidate in candidates:
-        cleaned = clean(Design(problem, _bits(problem, candidate)), springs)
+        cleaned = clean(Design(problem, _bits(problem, candidate)), plain)
         if isinstance(evaluator, ConstrainedEvaluator):
             cleaned = cleaned.with_mask(evaluator.with_mirror_images(cleaned.mask))
         key = np.packbits(cleaned.mask).tobytes()
@@ -271,8 +279,8 @@ def select(
     Parameters
     ----------
     evaluator
-        Evaluator with the constraints and strokes of the search, with all beams kept; a plain
-        `SpringEvaluator` by default.
+        Evaluator with the constraints and strokes of the search, with all beams kept; that of
+        the problem's mechanical model by default.
     choose
         Selects one of the qualified designs; the most efficient by default.
 
@@ -284,11 +292,11 @@ def select(
     candidates = list(candidates)
     # The design keeps the objective of its search, so that any reader computes the same figure.
     problem = replace(problem, objective=objective or problem.objective)
-    springs = SpringEvaluator(problem)
-    evaluator = evaluator or springs
+    plain = model_evaluator(problem)
+    evaluator = evaluator or plain
     finalists: list[Finalist] = []
     refused: Refusals = []
-    for candidate, design in _cleaned(problem, candidates, springs, evaluator):
+    for candidate, design in _cleaned(problem, candidates, plain, evaluator):
         response = evaluator.evaluate(design.mask, largest_increment=VERIFICATION_INCREMENT)
         if (reason := _reason_against(evaluator, design, response)) is not None:
             refused.append((response.efficiency, reason))
@@ -307,6 +315,7 @@ def select(
         efficiency_before=evaluator.evaluate(_bits(problem, chosen.found)).efficiency,
         efficiency_after=best,
         refused={reason: reasons.count(reason) for reason in sorted(set(reasons))},
+        verification=chosen.verification,
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidModel
+from bellcrank.model.conditions import ROLLERS
 from bellcrank.surrogate.trained_model import lattice_hash
 
 if TYPE_CHECKING:
@@ -72,19 +73,20 @@ def _task(problem: Problem) -> dict[str, Any]:
     from bellcrank.mechanics.objectives import objective_of
 
     task: dict[str, Any] = {}
-    for name in ("fixed", "fixed_x", "fixed_y"):
+    for name in ("fixed", *ROLLERS):
         task[f"support ({name})"] = np.sort(getattr(problem.supports, name))
     for name, region in (("input", problem.input), ("output", problem.output)):
         order = np.argsort(region.nodes)
         task[f"{name} region"] = region.nodes[order]
-        directions = np.broadcast_to(region.direction, (len(order), 2))
-        task[f"{name} direction"] = directions[order]
+        task[f"{name} direction"] = region.direction[order]
     task["drive"] = problem.input.drive
     task["amount"] = problem.input.amount
     task["output spring"] = problem.output.spring
     task["spring_kind"] = problem.output.spring_kind
     task["stiffness of beams"] = problem.stiffness.bond
     task["stiffness of joints"] = problem.stiffness.angle
+    task["cross-section"] = problem.section
+    task["material"] = problem.material
     task["aggregate"] = problem.aggregate
     # None and the name of the default are the same objective.
     objective = objective_of(problem)

@@ -136,7 +136,7 @@ class Job:
         }
 
     def problem(self) -> Problem:
-        """Read the task, with the stiffness of struts if it is for a part."""
+        """Read the task."""
         started = self.path / "run" / "run.json"
         if started.exists():
             from bellcrank.storage import RunFolder

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, ModelEvaluator, Status, model_evaluator
 from bellcrank.model import Design, human_design, unpack_mask
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.web.task_files import problem_of
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class CachedProblem:
     """A problem with its evaluator."""
 
     problem: Problem
-    evaluator: SpringEvaluator
+    evaluator: ModelEvaluator
 
 
 _cache: OrderedDict[str, CachedProblem] = OrderedDict()
@@ -48,7 +49,7 @@ def cached(text: str) -> CachedProblem:
         _cache.move_to_end(text)
         return _cache[text]
     problem = problem_of(json.loads(text))
-    _cache[text] = CachedProblem(problem, SpringEvaluator(problem))
+    _cache[text] = CachedProblem(problem, model_evaluator(problem))
     while len(_cache) > CACHED:
         _cache.popitem(last=False)
     return _cache[text]
@@ -64,9 +65,10 @@ def load_kernels() -> bool:
     """Load the kernels that the page needs, or compile them."""
     design = human_design("crane")
     assert design is not None
-    evaluator = SpringEvaluator(design.problem)
-    evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
-    evaluator.predict_flips(design.mask)
+    for problem in (design.problem, frame_problem(design.problem, PartSpec())):
+        evaluator = model_evaluator(problem)
+        evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
+        evaluator.predict_flips(design.mask)
     return True
 
 

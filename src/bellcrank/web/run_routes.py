@@ -55,7 +55,7 @@ async def start_run(body: RunBody, state: State) -> dict[str, str]:
 def _validated(body: RunBody) -> tuple[Problem, Record]:
     """Return problem and record of a request; an invalid one is refused before it is queued."""
     from bellcrank.model import unpack_mask
-    from bellcrank.part import PartSpec
+    from bellcrank.part import PartSpec, frame_problem
     from bellcrank.search import read_settings
     from bellcrank.search.constraints import parse_goal
 
@@ -74,6 +74,7 @@ def _validated(body: RunBody) -> tuple[Problem, Record]:
     part = None
     if body.part is not None:
         spec = PartSpec.from_dict(body.part)
+        problem = frame_problem(problem, spec)
         spec.of(problem.full_design())
         part = spec.to_dict()
     if body.reference is not None:

@@ -66,11 +66,11 @@ class ProgressReporter:
     """Collects the progress of the chains and sends it ten times a second."""
 
     def __init__(self, pipe: Connection, folder: RunFolder, settings: SearchSettings) -> None:
-        from bellcrank.mechanics import SpringEvaluator
+        from bellcrank.mechanics import model_evaluator
 
         self._pipe = pipe
         self._problem = folder.problem
-        self._evaluator = SpringEvaluator(folder.problem)
+        self._evaluator = model_evaluator(folder.problem)
         self._total = settings.chains * settings.steps
         self._lock = threading.Lock()
         self._chains: dict[int, dict[str, Any]] = {}
@@ -122,8 +122,8 @@ class ProgressReporter:
             point = (state.step, now, best, round(progress.temperature, 6))
             self._points.setdefault(progress.chain, []).append(point)
 
-    def ranking(self, done: int, total: int) -> None:
-        """Record how many candidates have been analysed as parts, and their number."""
+    def verifying(self, done: int, total: int) -> None:
+        """Record how many candidates have been verified, and the largest number."""
         with self._lock:
             self._tried = done, total
 
@@ -227,11 +227,15 @@ def _search(
     settings = read_settings(folder.settings)
     with ProgressReporter(pipe, folder, settings) as reporter:
         report = complete_design(
-            folder, workers=workers, progress=reporter, ranking=reporter.ranking, stop=listener.stop
+            folder,
+            workers=workers,
+            progress=reporter,
+            verifying=reporter.verifying,
+            stop=listener.stop,
         )
         if report is None and listener.command == "stop":
             try:
-                report = conclude(folder, settings, reporter.ranking)
+                report = conclude(folder, settings, reporter.verifying)
             except InvalidSettings:
                 return {"kind": "paused", "message": NO_DESIGN_YET}
             return {"kind": "stopped", "efficiency": report.selection.efficiency_after}

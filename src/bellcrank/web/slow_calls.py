@@ -155,7 +155,7 @@ def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:
     """
     from bellcrank.machines.assembly import assemble
     from bellcrank.machines.plan import MachineTable, plan_of
-    from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
+    from bellcrank.mechanics import VERIFICATION_INCREMENT, model_evaluator
     from bellcrank.model import problem_to_dict
     from bellcrank.model.parsing import parse
     from bellcrank.web.limits import check_size
@@ -170,7 +170,8 @@ def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:
     built = assemble(plan_of(parse(MachineTable, plan, source), source), find)
     problem = built.design.problem
     check_size(problem.lattice.node_count, problem.lattice.beam_count)
-    response = SpringEvaluator(problem).evaluate(built.design.mask, VERIFICATION_INCREMENT)
+    evaluator = model_evaluator(problem)
+    response = evaluator.evaluate(built.design.mask, VERIFICATION_INCREMENT)
     return {
         "problem": problem_to_dict(problem),
         "mask": built.design.mask_hex,

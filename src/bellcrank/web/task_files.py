@@ -15,6 +15,7 @@ from bellcrank.model import (
     problem_from_dict,
     problem_to_dict,
     read_design,
+    require_plane,
 )
 from bellcrank.model.parsing import read_table
 from bellcrank.web.limits import check_lattice, check_size
@@ -37,9 +38,11 @@ def problem_of(data: Mapping[str, Any], source: str = "task") -> Problem:
     positions, beams = data.get("positions"), data.get("beams")
     check_size(*(len(each) if isinstance(each, list) else 0 for each in (positions, beams)))
     try:
-        return problem_from_dict(data, source)
+        problem = problem_from_dict(data, source)
     except (OverflowError, RecursionError) as error:
         raise InvalidFile(f"{source}: a number is too large ({error})") from None
+    require_plane(problem, source)
+    return problem
 
 
 def read_task(text: str, suffix: str) -> tuple[Problem, dict[str, Any] | None, Design | None]:
@@ -81,6 +84,7 @@ def _read(path: Path) -> tuple[Problem, dict[str, Any] | None, Design | None]:
 
 def _check(problem: Problem) -> None:
     check_size(problem.lattice.node_count, problem.lattice.beam_count)
+    require_plane(problem, UPLOAD)
 
 
 def write_task(problem: Problem, lattice: Mapping[str, Any] | None, suffix: str) -> str:

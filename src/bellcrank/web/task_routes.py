@@ -12,7 +12,7 @@ from bellcrank.errors import UnknownName
 from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.model import builtin, lattices, problem_to_dict
 from bellcrank.model.calls import call_with_keys
-from bellcrank.part import PartSpec, calibrated
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.web import quick_calls
 from bellcrank.web.limits import check_lattice, check_size
 from bellcrank.web.requests import LatticeBody, SaveBody, TaskBody, TextBody
@@ -90,19 +90,20 @@ async def save_task(body: SaveBody) -> dict[str, str]:
 async def check_task(body: TaskBody, state: State) -> dict[str, Any]:
     """Check a task and return the response of its initial design.
 
-    For a part, the result contains the calibrated stiffness of its springs.
+    For a part, the result contains the section and the material that make the task that of a
+    frame; both are None for the spring model.
     """
 
-    def with_part_stiffness() -> dict[str, Any]:
+    def as_part() -> dict[str, Any]:
         problem = problem_of(body.problem)
         if body.part is None:
             return body.problem
-        spec = PartSpec.from_dict(body.part, "part")
-        stiffness = calibrated(problem, spec.width, spec.scale).stiffness
-        return {**body.problem, "stiffness": {"bond": stiffness.bond, "angle": stiffness.angle}}
+        frame = frame_problem(problem, PartSpec.from_dict(body.part, "part"))
+        data = problem_to_dict(frame)
+        return {**body.problem, "section": data["section"], "material": data["material"]}
 
-    problem = await run_in_threadpool(with_part_stiffness)
-    result = {"stiffness": problem.get("stiffness"), "response": None}
+    problem = await run_in_threadpool(as_part)
+    result = {key: problem.get(key) for key in ("section", "material")} | {"response": None}
     if not state.ready:
         return result
     return {

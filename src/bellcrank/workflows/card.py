@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.export import Export, check_print
 from bellcrank.fem import FemSettings
-from bellcrank.mechanics import objective_name
+from bellcrank.mechanics import VERIFICATION_INCREMENT, model_evaluator, objective_name
+from bellcrank.part import frame_problem
 from bellcrank.plots.card import Card, draw_card
 from bellcrank.plots.saving import check_target
 from bellcrank.plots.scene import Motion
 from bellcrank.provenance import provenance
+from bellcrank.search.verification import ELEMENTS
 from bellcrank.workflows.fabricate import profile_for
+from bellcrank.workflows.figures import figure_text, figures_of, model_words
 from bellcrank.workflows.pictures import stressed_part, stroke_labels
 from bellcrank.workflows.validation import problem_identity, read_record, validate
 
@@ -26,7 +30,7 @@ if TYPE_CHECKING:
     from bellcrank.plots.card import Table
     from bellcrank.workflows.validation import Validation
 
-ANALYSES = 6
+ANALYSES = 3
 """Largest number of analyses in the table."""
 
 
@@ -91,17 +95,24 @@ def card_of(
     validation = validate(design, spec, [("frame", FemSettings())])
     bundle = Export(part=spec.of(design))
     response = validation.response
+    frame = replace(design, problem=frame_problem(design.problem, spec))
+    evaluator = model_evaluator(frame.problem, elements=ELEMENTS)
+    found = figures_of(evaluator, evaluator.evaluate(design.mask, VERIFICATION_INCREMENT))
+    efficiency = f"{response.efficiency:.3f}, spring model"
+    if design.problem.section is not None:
+        efficiency = figure_text(found["efficiency"], "{:.3f}, ")
+        efficiency += model_words(design.problem, ELEMENTS)
     return Card(
         title=title or design.problem.name,
-        note=f"efficiency ({objective_name(design.problem)}) {response.efficiency:.3f} in the "
-        f"spring model · {design.beam_count} beams · {design_hash(design)}",
+        note=f"efficiency ({objective_name(design.problem)}) {efficiency} · "
+        f"{design.beam_count} beams · {design_hash(design)}",
         motion=Motion(design, response.displacement, response.efficiency),
         curve=stressed_part(validation.analyses[0]).curve,
         labels=stroke_labels(validation),
         tables=[
             _part_table(bundle, bundle.part),
             _print_table(bundle, profile_for(None, spec)),
-            _fem_table(validation, recorded),
+            _fem_table(validation, recorded, _motion_rows(spec.of(frame), found)),
             _origin_table(design),
         ],
         footer=_footer(design),
@@ -140,8 +151,10 @@ def _print_table(bundle: Export, profile: PrintProfile) -> Table:
     return "Printing", rows
 
 
-def _fem_table(validation: Validation, recorded: list[dict[str, Any]]) -> Table:
-    """Return efficiencies by level, from the record or else from the frame analysis."""
+def _fem_table(
+    validation: Validation, recorded: list[dict[str, Any]], motion: list[tuple[str, str]]
+) -> Table:
+    """Return efficiencies by level, from the record or else from the frame analysis, and motion."""
     entries = recorded or validation.to_dict()["results"]
     rows = []
     for entry in entries[:ANALYSES]:
@@ -154,7 +167,17 @@ def _fem_table(validation: Validation, recorded: list[dict[str, Any]]) -> Table:
     contacts = validation.analyses[0].contacts
     if contacts.first is not None:
         rows.append(("contact", f"frame, from {contacts.first:.0%} of the stroke"))
-    return "Efficiency by finite elements", rows
+    return "As a part, by finite elements", [*rows, *motion]
+
+
+def _motion_rows(part: Part, found: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return the motion of the output and the input force of a part."""
+    force, unit = found["input_force"], part.stiffness_unit * part.scale
+    return [
+        ("off-axis", figure_text(found["off_axis"], "{:.0%} of the motion")),
+        ("rotation", figure_text(found["output_rotation_deg"], "{:.1f} deg")),
+        ("force", figure_text(force and [unit * each for each in force], "{:.3g} N")),
+    ]
 
 
 def _origin_table(design: Design) -> Table:

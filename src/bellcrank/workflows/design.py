@@ -2,34 +2,42 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import BellcrankError
-from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, Status
+from bellcrank.errors import BellcrankError, InvalidSettings
+from bellcrank.fem import FemSettings
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    Response,
+    Status,
+    model_evaluator,
+)
 from bellcrank.model import Design, Problem, human_counterpart, write_design
-from bellcrank.part import PartSpec, calibrated
+from bellcrank.part import PartSpec, models
 from bellcrank.provenance import provenance
 from bellcrank.search import (
     Candidate,
     Progress,
     SearchSettings,
+    Selection,
     advance_chain,
     candidates_of,
     make_evaluator,
-    most_efficient,
     read_settings,
     run_chains,
     searches,
-    select,
     start_chain,
     verification_evaluator,
 )
+from bellcrank.search.choice import select_design
+from bellcrank.search.verification import ELEMENTS
 from bellcrank.storage import RunFolder, check_no_run, remove_temporaries
 from bellcrank.storage.locking import LOCK, locked
-from bellcrank.workflows.candidate_ranking import FINE, LEVEL, CandidateRanking, is_held
+from bellcrank.workflows.figures import figures_of, model_record
 from bellcrank.workflows.report import RESULTS, DesignReport, write_report
 from bellcrank.workflows.validation import Validation, replace_record, validate
 
@@ -48,9 +56,8 @@ def prepare(problem: Problem, settings: SearchSettings) -> None:
         If the initial design has no unique, stable response.
     """
     evaluator = make_evaluator(problem, settings)
-    few = replace(
-        settings, steps=2
-    )  # one evaluates the initial design, the other may predict flips
+    # One step evaluates the initial design, the other may predict flips.
+    few = replace(settings, steps=2)
     advance_chain(evaluator, few, 0, start_chain(evaluator, few))
 
 
@@ -62,13 +69,15 @@ def start_design(
     Parameters
     ----------
     problem
-        Problem to be solved.
+        Problem to be solved, in the spring model or as a frame.
     settings
         Settings of the search.
     out
         New folder.
     part
-        Part to be designed; the springs of the problem are given the stiffness of its struts.
+        Part to be designed. The beams of a problem of the spring model become its struts; a
+        problem with a section keeps it. Without goals of its own, the search has the goal that no
+        two struts come nearer than their width.
 
     Raises
     ------
@@ -82,9 +91,12 @@ def start_design(
     check_no_run(out)
     notes = {}
     if part is not None:
-        part.of(problem.full_design())
-        problem = calibrated(problem, part.width, part.scale)
+        problem = models["frames"](problem, part)
+        if problem.lattice.dimension == 2:
+            part.of(problem.full_design())
         notes["part"] = part.to_dict()
+        if not settings.goals and problem.section is not None:
+            settings = replace(settings, goals=(f"no-contact {problem.section.width:g}",))
     prepare(problem, settings)
     return RunFolder.create(out, problem, settings.to_dict(), notes=notes)
 
@@ -107,7 +119,7 @@ def complete_design(
     *,
     workers: int | None = None,
     progress: Callable[[Progress], None] = lambda _progress: None,
-    ranking: Callable[[int, int], None] = lambda _done, _total: None,
+    verifying: Callable[[int, int], None] = lambda _done, _total: None,
     stop: threading.Event | None = None,
 ) -> DesignReport | None:
     """Run or resume a design job and write its results.
@@ -120,8 +132,8 @@ def complete_design(
         Number of chains that run in parallel, all cores by default; does not change results.
     progress
         Called with the progress of a chain, from the thread of that chain.
-    ranking
-        For a part: called with the number of candidates analysed as frames, and their total number.
+    verifying
+        For a frame: called with the number of candidates verified and the largest number.
     stop
         Event that stops the search after the current block of steps; completed steps are stored.
 
@@ -141,7 +153,7 @@ def complete_design(
         try:
             done = run_chains(folder, settings, workers=workers, progress=progress, stop=stop)
             if done:
-                report = conclude(folder, settings, ranking)
+                report = conclude(folder, settings, verifying)
                 folder.finish()
                 return report
         except BaseException:
@@ -191,11 +203,11 @@ def verify(design: Design, settings: SearchSettings, response: Response) -> dict
 def conclude(
     folder: RunFolder,
     settings: SearchSettings,
-    ranking: Callable[[int, int], None] = lambda _done, _total: None,
+    verifying: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> DesignReport:
     """Select, clean, verify and compare a design, and write the result files.
 
-    For a part, the best candidates are ranked by nonlinear frame analysis (`candidate_ranking`).
+    Candidates of a frame are verified with more elements (`bellcrank.search.verification`).
 
     Raises
     ------
@@ -208,10 +220,10 @@ def conclude(
     problem = folder.problem
     spec = _part_of(folder)
     candidates, proposals, best = accepted_candidates(folder, settings)
-    evaluator = verification_evaluator(problem, settings)
-    choose = most_efficient if spec is None else CandidateRanking(spec, settings, ranking)
-    selection = select(problem, candidates, settings.objective, evaluator, choose)
-    all_beams = verification_evaluator(problem, settings, goals=())
+    limit = math.nan if spec is None else spec.registered_material.strain_limit
+    selection = select_design(problem, candidates, settings, limit, verifying)
+    elements = None if problem.section is None else ELEMENTS
+    all_beams = verification_evaluator(problem, settings, elements, goals=())
     human = human_counterpart(problem)
     human_response = None
     if human is not None:
@@ -226,13 +238,14 @@ def conclude(
         human_response=human_response,
         proposals=proposals,
         best_by_chain=best,
+        figures=_figures(selection),
         part=spec,
         validation=_validated(selection.design, spec),
     )
     part = {} if spec is None else {"part": spec.to_dict()}
     design = replace(
         selection.design,
-        efficiency=selection.efficiency_after,
+        efficiency=report.efficiency,
         provenance=provenance(**_origin(report), **part),
     )
     write_design(design, folder.path / "design.json", overwrite=True)
@@ -245,11 +258,25 @@ def conclude(
     return report
 
 
+def _figures(selection: Selection) -> list[dict[str, Any]]:
+    """Return the figures of the design by the model of the search, and by its verification."""
+    problem, found = selection.design.problem, selection.verification
+    rows = []
+    for elements in [None] if found is None else [None, found.elements]:
+        evaluator = model_evaluator(problem, elements=elements)
+        response = evaluator.evaluate(selection.design.mask, VERIFICATION_INCREMENT)
+        rows.append({**model_record(problem, elements), **figures_of(evaluator, response)})
+    return rows
+
+
 def _validated(design: Design, spec: PartSpec | None) -> Validation | None:
-    """Return the frame analysis of a part; None without a part, or if it is not supported."""
-    if spec is None or not is_held(design):
+    """Return the frame analysis of a part; None without one, in space, or if it is not held."""
+    if spec is None or design.problem.lattice.dimension == 3:
         return None
-    return validate(design, spec, [(LEVEL, FINE)])
+    try:
+        return validate(design, spec, [("frame", FemSettings())])
+    except InvalidSettings:
+        return None
 
 
 def _part_of(folder: RunFolder) -> PartSpec | None:

@@ -12,7 +12,7 @@ from bellcrank.export import Export, check_print, exporters
 from bellcrank.export.profiles import profiles
 from bellcrank.export.slicer import find_slicer, slice_solid
 from bellcrank.fem.contact import centre_lines, find_contacts
-from bellcrank.mechanics import StrokeEvaluator
+from bellcrank.mechanics import StrokeEvaluator, model_evaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.part.outline import strut_outline
 from bellcrank.part.outline.grips import filled, with_pointer
@@ -153,9 +153,10 @@ def print_warnings(bundle: Export, profile: PrintProfile) -> list[str]:
     part = bundle.part
     sentences = [warning.sentence for warning in check_print(bundle, profile.rules)]
     sentences += connection_warnings(part.design)
+    states = StrokeEvaluator(model_evaluator(part.design.problem)).evaluate(part.design.mask)
     stroke = (
         (load, centre_lines((part.positions + part.scale * response.displacement)[part.struts]))
-        for load, response in StrokeEvaluator(part.design.problem).evaluate(part.design.mask)
+        for load, response in states
     )
     beams, rest = np.flatnonzero(part.design.mask), centre_lines(part.positions[part.struts])
     contacts = find_contacts(beams, rest, stroke, part.section.width)

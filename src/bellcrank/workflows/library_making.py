@@ -1,5 +1,8 @@
 """Making of entries: a search for each task, then selection, measurement and writing.
 
+Searches are of frames of the default part. Candidates are verified as in `bellcrank design`;
+without one that has no fault there is no entry.
+
 Each entry is written once, when it is complete. Searches are run folders, which can be resumed, so
 that an interrupted run continues to the same entries.
 """
@@ -16,27 +19,25 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.errors import InvalidSettings
 from bellcrank.machines.library.catalogue import entry_files, read_summary
 from bellcrank.machines.library.files import write_entry
-from bellcrank.mechanics import Response, Status
-from bellcrank.search import Verdict, read_settings, run_chains, select, verification_evaluator
+from bellcrank.part import PartSpec
+from bellcrank.search import read_settings, run_chains
+from bellcrank.search.choice import select_design
 from bellcrank.storage.files import make_folder
 from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows import reopen_design, start_design
 from bellcrank.workflows.design import accepted_candidates
-from bellcrank.workflows.library_measurement import MIN_INPUT_STIFFNESS, measure
+from bellcrank.workflows.library_measurement import measure
 
 if TYPE_CHECKING:
     import threading
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from bellcrank.machines.library.catalogue import Summary
     from bellcrank.machines.library.entry import Entry
     from bellcrank.machines.library.tasks import EntryTask, MakeSettings
     from bellcrank.model import Problem
-    from bellcrank.search import Candidate, Evaluator, Progress, SearchSettings, Selection
+    from bellcrank.search import Candidate, Progress, SearchSettings, Selection
     from bellcrank.storage import RunFolder
 
 SEARCHES = "searches"
@@ -148,10 +149,13 @@ def _rank(summary: Summary) -> float:
 def _entry(
     task: EntryTask, found: Selection, notes: dict[str, Any], old: Summary | None
 ) -> tuple[Entry | None, str]:
-    """Measure a design if it is better than the existing entry; also return a note."""
-    if old is not None and not found.efficiency_after > _rank(old) + EQUAL:
+    """Measure a design; also return a note. None if the existing entry is better."""
+    try:
+        entry = measure(found.design, task.direction, task.columns, task.kind, notes=notes)
+    except InvalidSettings as error:
+        raise _NoUsableDesign(str(error)) from None
+    if old is not None and not entry.efficiency > _rank(old) + EQUAL:
         return None, f"none better than {old.name}"
-    entry = measure(found.design, task.direction, task.columns, task.kind, notes=notes)
     return entry, "made" if old is None else f"made in place of {old.name}"
 
 
@@ -215,11 +219,14 @@ def _select(
             {"begun_with": run.path.name, "best": value if math.isfinite(value) else None}
             for value in best
         ]
-    evaluator = InputStiffnessCheck(verification_evaluator(problem, settings))
+    limit = PartSpec().registered_material.strain_limit
     try:
-        chosen = select(problem, candidates, settings.objective, evaluator)
+        chosen = select_design(problem, candidates, settings, limit)
     except InvalidSettings as error:
         raise _NoUsableDesign(str(error)) from None
+    assert chosen.verification is not None
+    if chosen.verification.fault is not None:
+        raise _NoUsableDesign(f"no design without a fault: {chosen.verification.fault}")
     notes = {
         "kind": "machine",
         "settings": settings.to_dict(),
@@ -230,35 +237,3 @@ def _select(
         "refused": chosen.refused,
     }
     return chosen, notes
-
-
-class InputStiffnessCheck:
-    """An evaluator that rejects designs without input stiffness.
-
-    A bar between the ports follows the input without resistance, and is not an actuator.
-
-    Parameters
-    ----------
-    evaluator
-        Evaluator of the search, with its constraints.
-    """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self.evaluator = evaluator
-        self.problem = evaluator.problem
-
-    def evaluate(
-        self, mask: NDArray[np.bool_], largest_increment: float = 1.0, **start: Any
-    ) -> Response:
-        """Return the response; its status is FORBIDDEN if nothing resists the input."""
-        response = self.evaluator.evaluate(mask, largest_increment, **start)
-        if start.get("warm_start"):
-            return response
-        stiffness = 2.0 * response.energy / self.problem.input.amount**2
-        if response.status is Status.CONVERGED and not stiffness > MIN_INPUT_STIFFNESS:
-            return replace(response, status=Verdict.FORBIDDEN)
-        return response
-
-    def __getattr__(self, name: str) -> Any:
-        """Return other attributes of the evaluator."""
-        return getattr(self.evaluator, name)

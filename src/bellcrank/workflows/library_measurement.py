@@ -18,7 +18,8 @@ from bellcrank.machines.library.entry import (
     kinds,
 )
 from bellcrank.machines.library.lever import plain_lever
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Status, model_evaluator
+from bellcrank.part import PartSpec, models
 from bellcrank.provenance import provenance
 from bellcrank.workflows import spec_for, validate
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bellcrank.model import Design, Problem
-    from bellcrank.part import PartSpec
 
 MIN_INPUT_STIFFNESS = 1e-6
 """Input stiffness below which a design is a mechanism without resistance."""
@@ -46,7 +46,7 @@ def measure(
     Parameters
     ----------
     design
-        Actuator.
+        Actuator; with a section it is measured as a frame.
     direction, columns, kind
         Properties of its task; by default those of a design of the user.
     points
@@ -67,7 +67,7 @@ def measure(
     ('left', 1.01, 1.21)
     """
     problem = design.problem
-    response = SpringEvaluator(problem).evaluate(design.mask, VERIFICATION_INCREMENT)
+    response = model_evaluator(problem).evaluate(design.mask, VERIFICATION_INCREMENT)
     if response.status is not Status.CONVERGED:
         raise InvalidSettings(f"{problem.name}: not a usable actuator: {response.status.message}")
     found = characterise(design, points=points)
@@ -85,6 +85,21 @@ def measure(
         lever=lever_result(problem, () if kind == OWN else kinds[kind].goals),
         provenance={**provenance(**(notes or {})), **({"design": origin} if origin else {})},
     )
+
+
+def measure_again(entry: Entry, points: int = 20) -> Entry:
+    """Return an entry with all its results measured again, as frames of the default part.
+
+    Its search and its origin are kept.
+
+    Raises
+    ------
+    InvalidSettings
+        As `measure`.
+    """
+    design = replace(entry.design, problem=models["frames"](entry.design.problem, PartSpec()))
+    origin = {key: value for key, value in entry.provenance.items() if key not in provenance()}
+    return measure(design, entry.direction, entry.columns, entry.kind, points=points, notes=origin)
 
 
 def frame_result(design: Design, spec: PartSpec) -> FrameResult:

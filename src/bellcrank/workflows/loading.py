@@ -1,4 +1,4 @@
-"""The loading path of a design in the spring model, from rest to the full stroke."""
+"""The loading path of a design in its model, from rest to the full stroke."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import SpringEvaluator, Status, at_fraction, increment_at, strain_of
+from bellcrank.mechanics import Status, at_fraction, increment_at, model_evaluator
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +29,7 @@ class LoadingPath:
     ----------
     fraction : (K,) float64
         Fractions of the stroke, from 0 to 1.
-    displacement : (K, N, 2) float64
+    displacement : (K, N, d) float64
         Displacement of the nodes, lattice units.
     energy : (K, M) float64
         Strain energy of each beam (see `bellcrank.mechanics.Strain`).
@@ -85,14 +85,14 @@ def loading_path(
     snapped = np.zeros(states, dtype=bool)
     for k, fraction in enumerate(fractions.tolist()):
         share = max(fraction, SMALL)
-        evaluator = SpringEvaluator(at_fraction(problem, share), objective)
+        evaluator = model_evaluator(at_fraction(problem, share), objective)
         response = evaluator.evaluate(design.mask, increment_at(share))
         if response.status not in {Status.CONVERGED, Status.SNAPPED}:
             raise InvalidSettings(f"{problem.name}: no motion to show: {response.status.message}")
         efficiency[k] = response.efficiency
         snapped[k] = response.status is Status.SNAPPED
         if fraction > 0.0:
-            strain = strain_of(evaluator)
+            strain = evaluator.strain()
             displacement[k] = response.displacement
             energy[k], force[k] = strain.energy, strain.input_force
         report(k + 1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.export.formats.vtu import mesh_to_bytes
-from bellcrank.mechanics import SpringEvaluator, Status
+from bellcrank.mechanics import Status, model_evaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.plots import (
     ChainPath,
@@ -26,6 +26,7 @@ from bellcrank.plots import (
 from bellcrank.plots.saving import check_target
 from bellcrank.search import MetropolisSettings, SearchSettings, read_settings, searches
 from bellcrank.storage import RunFolder
+from bellcrank.workflows.figures import model_words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,7 +82,7 @@ def motion_of(
     design: Design, objective: str | None = None, *, name: str = "", magnify: float = 1.0
 ) -> Motion:
     """Compute the response of a design and return it for drawing."""
-    response = SpringEvaluator(design.problem, objective).evaluate(design.mask)
+    response = model_evaluator(design.problem, objective).evaluate(design.mask)
     note = "" if response.status is Status.CONVERGED else response.status.label
     return Motion(
         design, response.displacement, response.efficiency, name=name, note=note, magnify=magnify
@@ -89,7 +90,10 @@ def motion_of(
 
 
 def draw_report(report: DesignReport, folder: RunFolder) -> None:
-    """Draw ``efficiency.png``, ``motion.png`` and, with a human design, ``comparison.png``."""
+    """Draw ``efficiency.png``, ``motion.png`` and, with a human design, ``comparison.png``.
+
+    Designs in space have only the first.
+    """
     selection = report.selection
     paths = chain_paths(folder, report.settings)
     found = selection.found
@@ -107,6 +111,8 @@ def draw_report(report: DesignReport, folder: RunFolder) -> None:
         ),
         overwrite=True,
     )
+    if selection.design.problem.lattice.dimension == 3:
+        return
     machine = Motion(
         selection.design,
         selection.response.displacement,
@@ -159,7 +165,8 @@ def draw_validations(
             validation.response.displacement,
             validation.response.efficiency,
             name=name,
-            note="spring model" + ("" if status == "converged" else f", {status}"),
+            note=model_words(validation.design.problem)
+            + ("" if status == "converged" else f", {status}"),
         )
         columns.append((motion, stressed_part(validation.analyses[-1])))
     draw_stress(columns, path, stroke_labels(validations[0]), overwrite=overwrite)

@@ -8,8 +8,9 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.mechanics import objective_name
+from bellcrank.mechanics import model_name, objective_name
 from bellcrank.model.storage import write_text
+from bellcrank.workflows.figures import figure_text, model_words
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -55,10 +56,13 @@ class DesignReport:
         Response of the human design by the same objective.
     proposals, best_by_chain
         Number of designs evaluated; best efficiency that each chain accepted.
+    figures
+        Figures of the design at full load (`figures_of`) by the model of the search, and for a
+        frame also with the elements of its verification.
     part
         Part for which the design was searched, if any.
     validation
-        Frame analysis of that part, if all its pieces are supported.
+        Frame analysis of that part, if it is in the plane and all its pieces are supported.
     """
 
     folder: Path
@@ -70,6 +74,7 @@ class DesignReport:
     human_response: Response | None
     proposals: int
     best_by_chain: list[float]
+    figures: list[dict[str, Any]]
     part: PartSpec | None = None
     validation: Validation | None = None
 
@@ -79,12 +84,19 @@ class DesignReport:
         found = []
         if self.selection.efficiency_after <= 0.0:
             found.append("the output does not move in the wanted direction")
-        if self.part is not None:
-            if self.validation is None:
-                found.append("the part is not held by any support")
-            else:
-                found += self.validation.analyses[0].warnings
-        return found
+        warnings = [] if self.validation is None else self.validation.analyses[0].warnings
+        verification = self.selection.verification
+        if verification is not None and verification.fault is not None and not warnings:
+            found.append(verification.fault)
+        return found + warnings
+
+    @property
+    def efficiency(self) -> float:
+        """Efficiency to store with the design: the verified one of a frame if there is one."""
+        found = self.selection.verification
+        if found is None or not math.isfinite(found.response.efficiency):
+            return self.selection.efficiency_after
+        return found.response.efficiency
 
     @property
     def agreement(self) -> float:
@@ -104,7 +116,9 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
     return {
         "schema": "bellcrank/summary/1",
         "problem": selection.design.problem.name,
-        "efficiency": selection.efficiency_after,
+        "model": model_name(selection.design.problem),
+        "efficiency": report.efficiency,
+        "search_efficiency": selection.efficiency_after,
         "efficiency_before_cleaning": selection.efficiency_before,
         "status": selection.response.status.label,
         "beams": selection.design.beam_count,
@@ -113,6 +127,8 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "verified": report.verified,
         "initial_efficiency": _finite(report.initial_efficiency),
         "human_efficiency": human.efficiency if human else None,
+        "verification": _verification(report),
+        "figures": report.figures,
         "as_part": _as_part(report),
         "found": {
             "chain": selection.found.chain,
@@ -134,25 +150,72 @@ def _as_part(report: DesignReport) -> dict[str, Any] | None:
     return {key: data[key] for key in (*figures, "contacts", "warnings", "part")}
 
 
-def part_rows(report: DesignReport) -> list[tuple[str, str]]:
-    """Return the figures of the frame analysis as rows of a name and a value."""
-    if report.part is None:
+def _verification(report: DesignReport) -> dict[str, Any] | None:
+    """Return the verification of a frame as plain data."""
+    found = report.selection.verification
+    if found is None:
+        return None
+    return {
+        "elements": found.elements,
+        "efficiency": _finite(found.response.efficiency),
+        "difference": _finite(difference(report)),
+        "status": found.response.status.label,
+        "principal_strain": _finite(found.strain),
+        "fault": found.fault,
+    }
+
+
+def difference(report: DesignReport) -> float:
+    """Return the relative difference of the efficiency of a verified frame from the search's."""
+    found = report.selection.verification
+    assert found is not None
+    searched = report.selection.efficiency_after
+    return (found.response.efficiency - searched) / abs(searched) if searched else math.nan
+
+
+def figure_table(report: DesignReport, number: str = "{:.4f}") -> list[list[str]]:
+    """Return the figures of the design as rows of texts, the first one with the models.
+
+    A frame has the figures of the search and those of its verification.
+    """
+    problem, found = report.selection.design.problem, report.selection.verification
+    efficiencies = [number.format(report.selection.efficiency_after)]
+    models = [model_words(problem)]
+    if found is not None:
+        models.append(model_words(problem, found.elements))
+        verified = found.response.status.label
+        if found.is_stable:
+            verified = f"{number.format(found.response.efficiency)} ({difference(report):+.1%})"
+        efficiencies.append(verified)
+    rows = [["", *models], [f"efficiency ({objective_name(problem)})", *efficiencies]]
+    for name, key, form in (
+        ("off-axis motion", "off_axis", "{:.1%}"),
+        ("rotation of the output", "output_rotation_deg", "{:.1f} deg"),
+    ):
+        rows.append([name, *(figure_text(each[key], form) for each in report.figures)])
+    rows.append(["input force", *(_force(report, each["input_force"]) for each in report.figures)])
+    return [*rows, *_part_rows(report)]
+
+
+def _force(report: DesignReport, force: list[float] | None) -> str:
+    """Return the size of the input force: of a part in the plane in N, else in lattice units."""
+    design, part = report.selection.design, report.part
+    if part is None or design.problem.lattice.dimension == 3:
+        return figure_text(force, "{:.4g} lattice units")
+    made = part.of(design)
+    return figure_text(force and [x * made.stiffness_unit * made.scale for x in force], "{:.3g} N")
+
+
+def _part_rows(report: DesignReport) -> list[list[str]]:
+    """Return stress, strain and contact of the part with the elements of its verification."""
+    if report.validation is None or not math.isfinite(report.validation.analyses[0].efficiency):
         return []
-    name = f"frame of {report.part.width:g} mm struts"
-    if report.validation is None:
-        return [(name, "not analysed: a piece is not supported")]
     analysis = report.validation.analyses[0]
-    if not math.isfinite(analysis.efficiency):
-        return [(name, f"not stable: {analysis.status.message}")]
-    last = analysis.last
-    first = analysis.contacts.first
-    contact = "no contact" if first is None else f"contact from {first:.0%} of the stroke"
+    last, first = analysis.last, analysis.contacts.first
+    contact = "none" if first is None else f"from {first:.0%} of the stroke"
     return [
-        (f"efficiency, {name}", f"{analysis.efficiency:.4f}"),
-        (
-            "largest stress and strain, frame",
-            f"{last.stress:.2g} MPa, {last.strain:.0%}; {contact}",
-        ),
+        ["largest stress, strain", "", f"{last.stress:.2g} MPa, {last.strain:.0%}"],
+        ["contact", "", contact],
     ]
 
 
@@ -164,10 +227,10 @@ def summary_text(report: DesignReport) -> str:
     """Return the summary as Markdown (``summary.md``)."""
     selection = report.selection
     initial = ("initial design", f"{report.initial_efficiency:.6f}")
-    objective = objective_name(selection.design.problem)
+    models, *figures = (" | ".join(row) for row in figure_table(report, "{:.6f}"))
+    rule = "|---" * (1 + len(report.figures))
+    figures_table = "\n".join([f"| {models} |", f"{rule}|", *(f"| {row} |" for row in figures)])
     rows = [
-        (f"efficiency ({objective}), spring model", f"{selection.efficiency_after:.6f}"),
-        *part_rows(report),
         ("before cleaning", f"{selection.efficiency_before:.6f}"),
         initial,
         *((f"from rest by {name}", f"{value:.9f}") for name, value in report.checks.items()),
@@ -182,22 +245,25 @@ def summary_text(report: DesignReport) -> str:
         rows.insert(rows.index(initial) + 1, human)
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
     refused = "".join(
-        f"\nNot chosen, though better in the spring model: {count} ({reason})."
+        f"\nNot chosen, though more efficient in the model of the search: {count} ({reason})."
         for reason, count in selection.refused.items()
     )
+    flat = selection.design.problem.lattice.dimension == 2
+    motion = "![the design at rest and displaced](motion.png)\n\n" if flat else ""
     return f"""# {selection.design.problem.name}
+
+{figures_table}
 
 | | |
 |---|---|
 {table}
 
-Cleaning removes beams without load: loose pieces, dead ends, and pieces that are connected by a
-single node or to supports only. Dead ends soften joints in the spring model but not in a real part,
-so the efficiency after cleaning is the one to expect.
+Off-axis motion is the size of the mean output displacement normal to the wanted direction over
+that along it. Cleaning removes beams without load: loose pieces, dead ends, and pieces that are
+connected by a single node or to supports only. Dead ends soften joints in the spring model but not
+in a real part, so the efficiency after cleaning is the one to expect.
 {refused}
-![the design at rest and displaced](motion.png)
-
-![efficiency along the chains](efficiency.png)
+{motion}![efficiency along the chains](efficiency.png)
 """
 
 

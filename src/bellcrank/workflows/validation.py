@@ -13,7 +13,8 @@ from bellcrank.fem.results import finite
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     Response,
-    SpringEvaluator,
+    model_evaluator,
+    model_name,
     objective_name,
 )
 from bellcrank.model.parsing import read_json
@@ -55,7 +56,7 @@ class Validation:
     spec
         Size and material of the part.
     response
-        Response of the spring model with the stiffness of the design's problem.
+        Response in the model of searches: springs, or a frame with one element in each beam.
     plan
         Levels and settings.
     analyses
@@ -77,12 +78,16 @@ class Validation:
         """Return plain data; the figures of the first analysis are repeated at the top."""
         given = self.design.problem.input
         stroke = given.amount * self.spec.scale if given.drive == "displacement" else None
-        stiffness = self.design.problem.stiffness
-        discrete = {
+        problem = self.design.problem
+        discrete: dict[str, Any] = {
+            "model": model_name(problem),
             "efficiency": finite(self.response.efficiency),
             "status": self.response.status.label,
-            "stiffness": {"bond": stiffness.bond, "angle": stiffness.angle},
         }
+        if problem.section is None:
+            discrete["stiffness"] = {
+                "bond": problem.stiffness.bond, "angle": problem.stiffness.angle
+            }  # fmt: skip
         results = [
             {
                 **analysis.to_dict(),
@@ -115,8 +120,15 @@ def problem_identity(design: Design) -> str:
 
 
 def spec_for(design: Design) -> PartSpec:
-    """Return the part for which a design was searched, or the default part."""
-    return PartSpec.from_dict(design.provenance.get("part") or {}, "provenance.part")
+    """Return the part for which a design was searched.
+
+    By default the struts have the section of its problem on 10 mm, or without one that of the
+    default part.
+    """
+    recorded = design.provenance.get("part")
+    if recorded is None and design.problem.section is not None:
+        return PartSpec.of_section(design.problem.section)
+    return PartSpec.from_dict(recorded or {}, "provenance.part")
 
 
 def with_stroke(design: Design, stroke: str | float, scale: float) -> Design:
@@ -230,7 +242,7 @@ def validate(
     """
     check_plan(design, spec, plan)
     part = spec.of(design)
-    response = SpringEvaluator(design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
+    response = model_evaluator(design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
     validation = Validation(design, spec, response, plan, [])
     for index, (level, settings) in enumerate(plan):
         analysis = levels[level].analyse(

@@ -9,13 +9,11 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.contact import find_contacts
-from bellcrank.fem.frame.elements import energy, strain_of
-from bellcrank.fem.frame.equilibrium import FrameEquations, solve_linear
-from bellcrank.fem.frame.mesh import frame_mesh, theories
-from bellcrank.fem.frame.system import frame_system
+from bellcrank.fem.frame.equations import FrameEquations, part_frame
 from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import PathStatus, follow_path
 from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
+from bellcrank.mechanics.frames.system import theories
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,8 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.fem.contact import Contacts
-    from bellcrank.fem.frame.equilibrium import FrameState
-    from bellcrank.fem.frame.mesh import FrameMesh
+    from bellcrank.fem.frame.equations import FrameState, PartFrame
     from bellcrank.fem.levels import FemSettings
     from bellcrank.part.part import Part
 
@@ -52,13 +49,12 @@ def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], N
         If a piece of the part is not held, in a linear analysis.
     """
     began = time.perf_counter()
-    mesh = frame_mesh(part, settings.elements, settings.theory)
-    system = frame_system(part, mesh)
-    equations = FrameEquations(system)
+    frame = part_frame(part, settings.elements, settings.theory)
+    equations = FrameEquations(frame)
     status, loss = PathStatus.CONVERGED, None
     if settings.linear:
         try:
-            states = [solve_linear(system)]
+            states = [equations.solve_linear()]
         except RuntimeError:
             raise InvalidSettings(
                 f"the part cannot be analysed: {PathStatus.MECHANISM.message}"
@@ -68,11 +64,6 @@ def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], N
         path = follow_path(equations, report=lambda state: report(state.load))
         states = [equations.complete(state) for state in path.states]
         status, loss, factorisations = path.status, path.loss, path.factorisations
-    points = [
-        point_of(part, mesh, state, linear=settings.linear)
-        for state in states
-        if state.load or len(states) == 1
-    ]
     return Analysis(
         part=part,
         level="frame",
@@ -80,9 +71,9 @@ def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], N
         linear=settings.linear,
         status=status,
         loss=loss,
-        points=points,
-        contacts=contacts_of(part, mesh, states),
-        field=field_of(part, mesh, states[-1], linear=settings.linear),
+        points=[point_of(part, frame, state) for state in states if state.load or len(states) == 1],
+        contacts=contacts_of(part, frame, states),
+        field=field_of(part, frame, states[-1]),
         cost={
             "seconds": time.perf_counter() - began,
             "unknowns": equations.count,
@@ -94,57 +85,61 @@ def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], N
 levels.register("frame")(Level(analyse_frame, check_frame, title="Frame", duration="seconds"))
 
 
-def point_of(part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool) -> StrokePoint:
+def point_of(part: Part, frame: PartFrame, state: FrameState) -> StrokePoint:
     """Return the figures of an equilibrium."""
-    stress, strain = fibre_stress_and_strain(part, mesh, state.displacement, linear=linear)
+    stress, strain = fibre_stress_and_strain(part, state)
+    nodes = part.design.problem.input.nodes
+    force = state.reaction + state.load * frame.load
     return stroke_point(
         part,
         state.load,
-        mesh.at_lattice(state.displacement),
-        input_forces(part, mesh, state),
-        energy=float(energy(mesh, state.displacement, linear=linear).sum()),
+        state.displacement[: len(part.positions), :2],
+        force[nodes, :2],
+        energy=energy(frame, state),
         stress=float(stress.max()),
         strain=float(strain.max()),
     )
 
 
-def input_forces(part: Part, mesh: FrameMesh, state: FrameState) -> NDArray[np.float64]:
-    """Return (i, 2) the forces on the input nodes, N; 0 for nodes without struts."""
-    given = part.design.problem.input
-    nodes = mesh.node[given.nodes]
-    present = (nodes >= 0)[:, None]
-    if given.drive == "displacement":
-        return np.where(present, state.reaction[nodes, :2], 0.0)
-    force = state.load * given.amount * part.stiffness_unit * part.scale
-    return np.where(present, force * given.direction, 0.0)
+def energy(frame: PartFrame, state: FrameState) -> float:
+    """Return the elastic energy of the struts, N mm."""
+    axial, first, second = state.resultants.T
+    extension, own, other = frame.stiffness[:, :3].T
+    bending = own * (first**2 + second**2) - 2.0 * other * first * second
+    return float((axial**2 / extension + bending / (own**2 - other**2)).sum() / 2.0)
 
 
 def fibre_stress_and_strain(
-    part: Part, mesh: FrameMesh, displacement: NDArray[np.float64], *, linear: bool
+    part: Part, state: FrameState
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return (e,) the largest absolute stress of each element, MPa, and its largest strain.
 
     Both are those of the outermost fibres. Stress is uniaxial, so that its absolute value is the
     von Mises stress.
     """
-    strain = strain_of(mesh, displacement, linear=linear)
-    forces = np.einsum("eij,ej->ei", mesh.stiffness, strain)
     section, young = part.section, part.material.young
-    bending = np.abs(forces[:, 1:]).max(axis=1) * section.width / (2.0 * young * section.inertia)
-    axial = strain[:, 0] / mesh.length
+    moment = np.abs(state.resultants[:, 1:]).max(axis=1)
+    bending = moment * section.width / (2.0 * young * section.inertia)
+    axial = state.resultants[:, 0] / (young * section.area)
     # Compression in one direction is extension across it.
     across = part.material.poisson * (bending - axial)
     return young * (np.abs(axial) + bending), np.maximum(axial + bending, across)
 
 
-def contacts_of(part: Part, mesh: FrameMesh, states: Sequence[FrameState]) -> Contacts:
+def contacts_of(part: Part, frame: PartFrame, states: Sequence[FrameState]) -> Contacts:
     """Find the struts that touch in any equilibrium of the path."""
-    struts, lines = mesh.lines()
-    stroke = ((state.load, (mesh.positions + state.displacement[:, :2])[lines]) for state in states)
-    return find_contacts(struts, mesh.positions[lines], stroke, part.section.width)
+    rest = frame.positions[frame.lines]
+    stroke = ((state.load, rest + state.displacement[frame.lines, :2]) for state in states)
+    return find_contacts(frame.struts, rest, stroke, part.section.width)
 
 
-def field_of(part: Part, mesh: FrameMesh, state: FrameState, *, linear: bool) -> Field:
-    """Return a state for pictures and files."""
-    stress, _ = fibre_stress_and_strain(part, mesh, state.displacement, linear=linear)
-    return Field(mesh.positions, state.displacement[:, :2], mesh.elements, stress)
+def field_of(part: Part, frame: PartFrame, state: FrameState) -> Field:
+    """Return a state for pictures and files, without the nodes that have no struts."""
+    nodes, elements = np.unique(frame.elements, return_inverse=True)
+    stress, _ = fibre_stress_and_strain(part, state)
+    return Field(
+        frame.positions[nodes],
+        state.displacement[nodes, :2],
+        elements.reshape(-1, 2),
+        stress,
+    )

@@ -92,7 +92,7 @@ def plain_lever(problem: Problem, goals: Sequence[str] = ()) -> Design:
     Parameters
     ----------
     problem
-        Problem with fixed supports.
+        Problem with fixed supports, of the spring model or of a frame.
     goals
         Constraints that it must satisfy.
 

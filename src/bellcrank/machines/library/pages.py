@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from bellcrank.machines.library.entry import kind_title, kinds
 from bellcrank.machines.library.thumbnails import Thumbnail, thumbnail
-from bellcrank.mechanics import SpringEvaluator
+from bellcrank.mechanics import model_evaluator
 from bellcrank.model.storage import already_exists, write_text
 from bellcrank.storage.files import make_folder
 
@@ -67,7 +67,7 @@ def write_page(known: Library, folder: Path, *, overwrite: bool = False) -> Path
 
 def draw(entry: Entry) -> Thumbnail:
     """Draw an entry at rest and at its full stroke, under the load that it was designed for."""
-    response = SpringEvaluator(entry.design.problem).evaluate(entry.design.mask)
+    response = model_evaluator(entry.design.problem).evaluate(entry.design.mask)
     return thumbnail(entry.design, response.displacement)
 
 

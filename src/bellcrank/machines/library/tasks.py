@@ -12,7 +12,8 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.machines.library.entry import kinds, stem
 from bellcrank.machines.library.lever import plain_lever
-from bellcrank.mechanics import SpringEvaluator, Status
+from bellcrank.mechanics import Status, model_evaluator
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import HoppingSettings
 
 if TYPE_CHECKING:
@@ -45,8 +46,12 @@ class EntryTask:
         return stem(self.direction, self.columns, self.kind)
 
     def problem(self) -> Problem:
-        """Return the problem of the search; beams at unused supports may be removed."""
-        given = elementary(self.columns, self.direction, kinds[self.kind].spring)
+        """Return the problem of the search; beams at unused supports may be removed.
+
+        Its beams are struts of the default part, 2 mm wide on 10 mm.
+        """
+        made = elementary(self.columns, self.direction, kinds[self.kind].spring)
+        given = frame_problem(made, PartSpec())
         lattice = given.lattice
         held = np.isin(lattice.beams, given.supports.nodes).all(axis=1)
         at_ports = lattice.beams_touching(np.concatenate([given.input.nodes, given.output.nodes]))
@@ -68,7 +73,7 @@ class EntryTask:
         initial = problem.initial.copy()
         initial[problem.designable] = lever.mask[problem.designable]
         # With the complete port the lever may snap; a search cannot start there.
-        if SpringEvaluator(problem).evaluate(initial).status is not Status.CONVERGED:
+        if model_evaluator(problem).evaluate(initial).status is not Status.CONVERGED:
             return {"full": (problem, chains)}
         starts = {
             "full": (problem, chains - chains // 2),

@@ -160,8 +160,7 @@ def _defer(function: F, options: dict[str, Any] | None) -> F:
 def kernel(function: F) -> F:
     """Compile a function that only other kernels call.
 
-    It gets no wrapper for calls from Python: unpacking sixty arrays for each call would take a
-    third of the compilation time.
+    It gets no wrapper for calls from Python, which would only take time to compile.
     """
     return cast(
         "F",

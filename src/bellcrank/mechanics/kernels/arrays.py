@@ -9,10 +9,12 @@ N nodes, M beams; n free nodes (with at least one free coordinate). Each free no
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bellcrank.mechanics.kernels.bundle import Bundle
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,7 +36,8 @@ HANGING = 2
 """A node of a piece that hangs from one held node: it follows as a rigid body, without stress."""
 
 
-class System(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class System(Bundle):
     """A problem as arrays. Lengths in lattice units."""
 
     positions: Floats
@@ -82,7 +85,8 @@ class System(NamedTuple):
     """Displacement error that changes the efficiency by less than its tolerance."""
 
 
-class Structure(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Structure(Bundle):
     """The load-bearing graph of one design, and the pattern of its stiffness."""
 
     present: Bytes
@@ -124,7 +128,8 @@ class Structure(NamedTuple):
     the same two for springs."""
 
 
-class Reference(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Reference(Bundle):
     """Equilibrium at full load of a reference design, from which warm starts begin."""
 
     present: Bytes
@@ -138,7 +143,8 @@ class Reference(NamedTuple):
 MAX_KNOTS = 8
 
 
-class Vectors(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Vectors(Bundle):
     """Displacements and directions on the loading path; (N, 2) each unless stated."""
 
     previous: Floats
@@ -176,7 +182,8 @@ class Vectors(NamedTuple):
     """(MAX_KNOTS,) lowest stiffness there."""
 
 
-class Scratch(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Scratch(Bundle):
     """Working memory, and the factor of the stiffness computed last."""
 
     length: Floats

@@ -1,16 +1,22 @@
-"""The load-bearing core of a design, found before any equilibrium."""
+"""The load-bearing core of a design, found before any equilibrium; of springs and of frames."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from bellcrank.mechanics.kernels._compile import kernel
-from bellcrank.mechanics.kernels.arrays import (
-    PRUNE_ALL,
-    PRUNE_DEAD_ENDS,
-    Bytes,
-    Structure,
-    System,
-)
+from bellcrank.mechanics.kernels.arrays import PRUNE_ALL, PRUNE_DEAD_ENDS
 from bellcrank.mechanics.kernels.fields import pair
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    from bellcrank.mechanics.frames.kernels import arrays as frames
+    from bellcrank.mechanics.kernels import arrays as springs
+    from bellcrank.mechanics.kernels.arrays import Bytes
+
+    System: TypeAlias = springs.System | frames.Frame
+    Structure: TypeAlias = springs.Structure | frames.Structure
 
 DEPTH, LOW, SLOT, ARRIVED_BY, MARK, STACK = range(6)
 """Columns of `structure.search`."""

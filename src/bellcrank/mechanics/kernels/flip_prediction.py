@@ -21,11 +21,13 @@ sensitivity, is -a.(V h).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.adjoint import find_anchored, neighbours_around, solve_adjoint
 from bellcrank.mechanics.kernels.arrays import ACTIVE
+from bellcrank.mechanics.kernels.bundle import Bundle
 from bellcrank.mechanics.kernels.cholesky import find_inverse
 from bellcrank.mechanics.kernels.energy import measure_beam
 from bellcrank.mechanics.kernels.fields import clear
@@ -41,7 +43,8 @@ REMAINDER = 1e-6
 stress, instead of making the equations singular."""
 
 
-class FlipWorkspace(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class FlipWorkspace(Bundle):
     """Working memory of `predict_flips`. n blocks, N nodes."""
 
     inverse: Floats

@@ -21,11 +21,7 @@ from bellcrank.search.constraints.constraint import (
     parse_goal,
 )
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator, penalty_of
-from bellcrank.search.constraints.response import (
-    largest_strain,
-    near_pairs,
-    segment_distances,
-)
+from bellcrank.search.constraints.response import near_pairs
 from bellcrank.search.constraints.structure import mass_of, mirror_images  # registers
 
 __all__ = [
@@ -37,11 +33,9 @@ __all__ = [
     "LoadCase",
     "at_strokes",
     "constraints",
-    "largest_strain",
     "mass_of",
     "mirror_images",
     "near_pairs",
     "parse_goal",
     "penalty_of",
-    "segment_distances",
 ]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Response, SpringEvaluator
+    from bellcrank.mechanics import ModelEvaluator, Response
     from bellcrank.model import Problem
 
 TOLERANCE = 1e-6
@@ -56,7 +56,7 @@ class DeformedDesign:
         along it, otherwise at full load only.
     """
 
-    evaluator: SpringEvaluator
+    evaluator: ModelEvaluator
     mask: NDArray[np.bool_]
     core: NDArray[np.bool_]
     response: Response
@@ -64,7 +64,7 @@ class DeformedDesign:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(N, 2) positions of the nodes at full load."""
+        """(N, d) positions of the nodes at full load."""
         return self.evaluator.problem.lattice.positions + self.response.displacement
 
 

@@ -10,12 +10,11 @@ import numpy as np
 
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
-    Core,
     FlipPrediction,
     Response,
-    SpringEvaluator,
     Status,
     UnloadedBeams,
+    model_evaluator,
 )
 from bellcrank.search.constraints.cases import LoadCase, check_compatible
 from bellcrank.search.constraints.constraint import TOLERANCE, DeformedDesign, parse_goal
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bellcrank.mechanics import ModelEvaluator
     from bellcrank.search.constraints.constraint import Constraint
     from bellcrank.storage import Proposals
 
@@ -68,8 +68,8 @@ class ConstrainedEvaluator:
         Load cases; response and flip prediction are those of the first.
     goals
         Texts such as ``"mass <= 0.6"``.
-    objective, unloaded_beams
-        As in `SpringEvaluator`.
+    objective, unloaded_beams, elements
+        As in `bellcrank.mechanics.model_evaluator`.
 
     Raises
     ------
@@ -91,15 +91,16 @@ class ConstrainedEvaluator:
         goals: Sequence[str] = (),
         objective: str | None = None,
         unloaded_beams: UnloadedBeams = "keep",
+        elements: int | None = None,
     ) -> None:
         check_compatible(cases)
         self.cases = list(cases)
         self.goals = tuple(goals)
         self.weights = [case.weight / sum(case.weight for case in cases) for case in cases]
         self.evaluators = [
-            SpringEvaluator(case.problem, objective, unloaded_beams) for case in cases
+            model_evaluator(case.problem, objective, unloaded_beams, elements) for case in cases
         ]
-        self._cores = [Core(evaluator) for evaluator in self.evaluators]
+        self._cores = [evaluator.core_finder() for evaluator in self.evaluators]
         original = cases[0].problem
         parsed = [parse_goal(goal) for goal in goals]
         # One constraint per case, since supports, input and output may differ.
@@ -225,9 +226,9 @@ class ConstrainedEvaluator:
         ]
 
     def _core(self, design: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        core = self._cores[0].of(design)
+        core = self._cores[0](design)
         for other in self._cores[1:]:
-            core |= other.of(design)
+            core |= other(design)
         return core
 
     def _structure_violation(self, design: NDArray[np.bool_], core: NDArray[np.bool_]) -> float:
@@ -251,7 +252,7 @@ class ConstrainedEvaluator:
         design: NDArray[np.bool_],
         core: NDArray[np.bool_],
         violation: float,
-        respond: Callable[[SpringEvaluator], Response],
+        respond: Callable[[ModelEvaluator], Response],
         largest_violation: float = math.inf,
         lower_bound: float = -math.inf,
         *,

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
-    SpringEvaluator,
     Status,
     StrokeEvaluator,
-    UnloadedBeams,
-    output_stiffness,
     predict_output_stiffness,
 )
-from bellcrank.model.geometry import distances_to_segments
+from bellcrank.model.geometry import segment_distances
 from bellcrank.search.constraints.constraint import (
     Constraint,
     ConstraintType,
@@ -34,41 +31,39 @@ from bellcrank.search.constraints.constraint import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bellcrank.mechanics import ModelEvaluator, SpringEvaluator
     from bellcrank.model import Problem
 
 MIN_PREDICTED_VIOLATION = 0.02
 """Smaller predicted violations are within the error of the prediction."""
 
 
-def stiffness(_problem: Problem, bound: float) -> Constraint:
-    """Bound the output stiffness at full load from below (`mechanics.output_stiffness`)."""
+def stiffness(problem: Problem, bound: float) -> Constraint:
+    """Bound the output stiffness at full load from below (`mechanics.output_stiffness`).
+
+    Only the spring model predicts it for flips.
+    """
 
     def predicted(deformed: DeformedDesign, beams: NDArray[np.int64]) -> NDArray[np.float64]:
-        after = predict_output_stiffness(deformed.evaluator, beams, deformed.mask[beams])
+        springs = cast("SpringEvaluator", deformed.evaluator)
+        after = predict_output_stiffness(springs, beams, deformed.mask[beams])
         violation: NDArray[np.float64] = np.maximum(0.0, 1.0 - after / bound)
         return np.where(violation < MIN_PREDICTED_VIOLATION, 0.0, violation)
 
     return Constraint(
-        response_violation=lambda deformed: below(output_stiffness(deformed.evaluator), bound),
-        predicted_violation=predicted,
+        response_violation=lambda deformed: below(deformed.evaluator.output_stiffness(), bound),
+        predicted_violation=predicted if problem.section is None else None,
         evaluation_cost=2,
     )
 
 
-def largest_strain(deformed: DeformedDesign) -> float:
-    """Return the largest |r - r0| / r0 of a load-bearing beam."""
-    lattice = deformed.evaluator.problem.lattice
-    beams, rest = lattice.beams[deformed.core], lattice.rest_length[deformed.core]
-    if not len(beams):
-        return 0.0
-    ends = deformed.positions[beams]
-    return float((np.abs(np.hypot(*(ends[:, 1] - ends[:, 0]).T) - rest) / rest).max())
-
-
 def strain(_problem: Problem, bound: float) -> Constraint:
-    """Bound the strain of every beam at full load from above."""
+    """Bound the strain of every beam at full load from above.
+
+    That of the axis in the spring model, the largest principal strain in frames.
+    """
     return Constraint(
-        response_violation=lambda deformed: above(largest_strain(deformed), bound),
+        response_violation=lambda deformed: above(deformed.evaluator.largest_strain(), bound),
         evaluation_cost=1,
     )
 
@@ -102,16 +97,13 @@ def no_snapping(_problem: Problem, _value: None) -> Constraint:
     miss about one design in a hundred among those near a loss of stability.
     """
     # Separate evaluators: the one that holds the response must keep its equilibrium.
-    verifiers: dict[tuple[float, int], SpringEvaluator] = {}
+    verifiers: dict[ModelEvaluator, ModelEvaluator] = {}
 
     def violation(deformed: DeformedDesign) -> float:
         evaluator = deformed.evaluator
-        key = (evaluator.problem.input.amount, evaluator.core)
-        if key not in verifiers:
-            verifiers[key] = SpringEvaluator(
-                evaluator.problem, "displacement", get_args(UnloadedBeams)[evaluator.core]
-            )
-        verified = verifiers[key].evaluate(deformed.mask, VERIFICATION_INCREMENT)
+        if evaluator not in verifiers:
+            verifiers[evaluator] = evaluator.for_problem(evaluator.problem)
+        verified = verifiers[evaluator].evaluate(deformed.mask, VERIFICATION_INCREMENT)
         return float(verified.status is not Status.CONVERGED)
 
     return Constraint(response_violation=violation, evaluation_cost=4)
@@ -130,7 +122,7 @@ def no_contact(_problem: Problem, width: float) -> Constraint:
     at full load only.
     """
     # Separate evaluators: the one that holds the response must keep its equilibrium.
-    strokes: dict[tuple[float, int], StrokeEvaluator] = {}
+    strokes: dict[ModelEvaluator, StrokeEvaluator] = {}
 
     def faults(positions: NDArray[np.float64], struts: NDArray[np.int64]) -> float:
         _, distance = near_pairs(positions, struts, width)
@@ -141,12 +133,10 @@ def no_contact(_problem: Problem, width: float) -> Constraint:
         worst = faults(deformed.positions, struts)
         if deformed.verified:
             evaluator = deformed.evaluator
-            key = (evaluator.problem.input.amount, evaluator.core)
-            if key not in strokes:
-                unloaded_beams = get_args(UnloadedBeams)[evaluator.core]
-                strokes[key] = StrokeEvaluator(evaluator.problem, unloaded_beams)
+            if evaluator not in strokes:
+                strokes[evaluator] = StrokeEvaluator(evaluator)
             rest = evaluator.problem.lattice.positions
-            for _, response in strokes[key].evaluate(deformed.mask):
+            for _, response in strokes[evaluator].evaluate(deformed.mask):
                 worst = max(worst, faults(rest + response.displacement, struts))
         return counted(worst)
 
@@ -172,7 +162,7 @@ def near_pairs(
 
     Parameters
     ----------
-    positions : (N, 2)
+    positions : (N, d)
     beams : (n, 2)
     width
         0 for crossings only.
@@ -188,49 +178,13 @@ def near_pairs(
     if len(beams) < 2:
         return np.empty((0, 2), np.int64), np.empty(0)
     ends = positions[beams]
-    longest = float(np.hypot(*(ends[:, 1] - ends[:, 0]).T).max())
+    longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
     pairs = cKDTree(ends.mean(axis=1)).query_pairs(longest + width, output_type="ndarray")
     one, other = beams[pairs[:, 0]], beams[pairs[:, 1]]
     pairs = pairs[~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2))]
     distance = segment_distances(ends[pairs[:, 0]], ends[pairs[:, 1]])
     near = (distance < width) | (distance == 0.0)
     return np.asarray(pairs[near], dtype=np.int64), distance[near]
-
-
-def segment_distances(
-    first: NDArray[np.float64], second: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return (n,) the distances between pairs of segments, 0 where they cross.
-
-    Parameters
-    ----------
-    first, second : (n, 2, 2)
-        End points of the segments.
-
-    Examples
-    --------
-    >>> bar = np.array([[[0.0, 0.0], [2.0, 0.0]]])
-    >>> segment_distances(bar, bar + [0.0, 0.5]), segment_distances(bar, bar[:, :, ::-1] + [1, -1])
-    (array([0.5]), array([0.]))
-    """
-    a, b, c, d = first[:, 0], first[:, 1], second[:, 0], second[:, 1]
-    apart = np.minimum.reduce(
-        [
-            distances_to_segments(a, c, d),
-            distances_to_segments(b, c, d),
-            distances_to_segments(c, a, b),
-            distances_to_segments(d, a, b),
-        ]
-    )
-    sides = _cross(b - a, c - a) * _cross(b - a, d - a)
-    others = _cross(d - c, a - c) * _cross(d - c, b - c)
-    distance: NDArray[np.float64] = np.where((sides < 0.0) & (others < 0.0), 0.0, apart)
-    return distance
-
-
-def _cross(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-    product: NDArray[np.float64] = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    return product
 
 
 for _name, _usage, _parse, _make in (

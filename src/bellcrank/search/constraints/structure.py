@@ -143,11 +143,13 @@ def mirror_images(problem: Problem, axis: str) -> NDArray[np.int64]:
     Raises
     ------
     ValueError
-        If a beam has no designable image.
+        If the lattice is in space, or a beam has no designable image.
     """
     from scipy.spatial import cKDTree
 
     lattice, beams = problem.lattice, problem.designable
+    if lattice.dimension != 2:
+        raise ValueError(f"problem {problem.name!r} is in space; expected one in the plane")
     column = AXES[axis]
     ends = lattice.positions[lattice.beams[beams]]
     nodes = ends.reshape(-1, 2)

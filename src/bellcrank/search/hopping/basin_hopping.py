@@ -185,7 +185,7 @@ def perturb(
     while True:
         centre = middle[int(rng.integers(len(middle)))]
         radius = settings.radius * length * rng.uniform(0.5, 1.5)
-        inside = problem.designable[np.hypot(*(middle - centre).T) < radius]
+        inside = problem.designable[np.linalg.norm(middle - centre, axis=1) < radius]
         perturbed = mask.copy()
         perturbed[inside] = rng.random(len(inside)) < rng.uniform(settings.min_density, 1.0)
         if (perturbed != mask).any():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,11 +32,14 @@ class Cost:
         The function itself.
     change
         Its change, from an efficiency and (n,) changes of the efficiency.
+    inverse
+        The efficiency of a cost; minus infinity where every efficiency has a lower cost.
     """
 
     code: int
     of: Callable[[float], float]
     change: Callable[[float, NDArray[np.float64]], NDArray[np.float64]]
+    inverse: Callable[[float], float]
 
 
 def _exponential_change(efficiency: float, change: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -43,10 +47,16 @@ def _exponential_change(efficiency: float, change: NDArray[np.float64]) -> NDArr
     return math.exp(-efficiency) * growth
 
 
+def _exponential_inverse(cost: float) -> float:
+    return -math.log(cost) if 0.0 < cost < math.inf else -math.inf
+
+
 costs: Registry[Cost] = Registry("cost")
-costs.register("exponential")(Cost(0, exponential_cost, _exponential_change))
+costs.register("exponential")(Cost(0, exponential_cost, _exponential_change, _exponential_inverse))
 """exp(-efficiency), the cost of the paper."""
-costs.register("negative")(Cost(1, negative_cost, lambda _efficiency, change: -change))
+costs.register("negative")(
+    Cost(1, negative_cost, lambda _efficiency, change: -change, operator.neg)
+)
 """-efficiency, the cost of the code published with the paper."""
 
 schedules: Registry[Schedule] = Registry("schedule")

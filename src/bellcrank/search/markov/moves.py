@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 class Move(Protocol):
     """A rule that selects beams to flip."""
 
+    is_symmetric: bool
+    """Whether the same beams are selected with equal probability in both directions."""
+
     def propose(
         self, current: EvaluatedDesign, rng: np.random.Generator
     ) -> NDArray[np.int64] | None:
@@ -44,6 +47,8 @@ moves: Registry[Move] = Registry("move")
 
 class Flip:
     """Remove or add one designable beam, each with the same probability (the paper)."""
+
+    is_symmetric = True
 
     def propose(
         self, current: EvaluatedDesign, rng: np.random.Generator
@@ -67,6 +72,7 @@ class Balanced:
     prediction.
     """
 
+    is_symmetric = False
     MAX_LOG_WEIGHT = 3.0
     MIN_LOG_WEIGHT = -5.0
     """Every flip keeps a positive probability, whatever its prediction."""
@@ -99,6 +105,7 @@ class Node:
     Redrawing, in which each beam is present with probability 1/2, makes the move reversible.
     """
 
+    is_symmetric = False
     CLEAR = FILL = 1.0 / 3.0
     """Probabilities of removing and of adding all beams."""
 

@@ -35,7 +35,12 @@ def metropolis_step(
         return current
     mask = current.mask.copy()
     mask[beams] ^= True
-    response = current.evaluator.evaluate(mask, warm_start=True)
+    bound = -math.inf
+    if current.problem.section is not None and move.is_symmetric and uniform > 0.0:
+        # A frame that is rejected in any case need not be verified to be reached from rest.
+        highest = current.cost - current.temperature * math.log(uniform)
+        bound = current.cost_function.inverse(highest)
+    response = current.evaluator.evaluate(mask, warm_start=True, lower_bound=bound)
     current.is_last = False
     proposed = EvaluatedDesign(
         current.evaluator, current.cost_function, current.temperature, mask, response

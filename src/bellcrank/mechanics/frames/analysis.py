@@ -1,0 +1,199 @@
+"""Deformation, energy, strain and forces of a frame in equilibrium."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from bellcrank.mechanics.analysis import Strain
+
+if TYPE_CHECKING:
+    from bellcrank.mechanics.frames.equilibria import Equilibrium
+    from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, State, Structure
+    from bellcrank.mechanics.kernels.arrays import Floats, Ints
+    from bellcrank.model import Problem
+
+
+class ComputedFrame(Protocol):
+    """A `bellcrank.mechanics.FrameEvaluator` with the response that it computed last."""
+
+    problem: Problem
+    divisions: int
+    frame: Frame
+    structure: Structure
+    memory: Memory
+    state: State
+
+    @property
+    def beams(self) -> Ints:
+        """Beams of the lattice that the frame has."""
+
+    @property
+    def end(self) -> Equilibrium:
+        """The last state of the path."""
+
+
+def deformations(frame: Frame, beams: Ints, start: State, end: State) -> Floats:
+    """Return the deformations of beams, in which their energy is quadratic.
+
+    Parameters
+    ----------
+    beams : (m,)
+        Indices of beams of the frame.
+    start, end
+        States of their first and second ends.
+
+    Returns
+    -------
+    (m, 3) or (m, 6)
+        In the plane elongation and both end rotations relative to the chord; in space
+        elongation, twist, and the rotations of each end about two axes normal to the beam. The
+        elongation includes the shortening by bending where the frame does.
+    """
+    shift = end.u - start.u
+    rest = frame.rest[beams, 0]
+    if len(frame.unit) == 3:
+        shift[:, 2] = 0.0
+    chord = rest + shift
+    length = np.linalg.norm(chord, axis=1)
+    # From the difference of squares: that of the lengths loses digits.
+    elongation = ((rest + chord) * shift).sum(axis=1) / (length + frame.rest_length[beams])
+    bow = frame.bow[beams]
+    if len(frame.unit) == 3:
+        turn = np.arctan2(
+            rest[:, 0] * chord[:, 1] - rest[:, 1] * chord[:, 0], (rest * chord).sum(axis=1)
+        )
+        ends = [each.u[:, 2] - turn for each in (start, end)]
+        one, two = ((angle + np.pi) % (2.0 * np.pi) - np.pi for angle in ends)
+        return np.stack([elongation + _bowing(bow, one, two), one, two], axis=1)
+    axes = [_turned(each.q, frame.rest[beams, 1:]) for each in (start, end)]
+    (_, a1, a2), (_, b1, b2) = (np.moveaxis(each, 1, 0) for each in axes)
+    twist = np.arctan2(
+        (a2 * b1).sum(axis=1) - (a1 * b2).sum(axis=1), (a1 * b1).sum(axis=1) + (a2 * b2).sum(axis=1)
+    )
+    a, b, c, d = (each for one in axes for each in _end_rotations(one, chord))
+    elongation = elongation + _bowing(bow, a, c) + _bowing(bow, b, d)
+    return np.stack([elongation, twist, a, b, c, d], axis=1)
+
+
+def _bowing(bow: Floats, one: Floats, two: Floats) -> Floats:
+    """Return (m,) the elongation by end rotations, if the frame includes it."""
+    elongation: Floats = bow * (2.0 * (one * one + two * two) - one * two)
+    return elongation
+
+
+def _turned(rotation: Floats, triads: Floats) -> Floats:
+    """Return triads (m, 3, 3), one vector a row, turned by unit quaternions, scalar first."""
+    scalar, vector = rotation[:, None, :1], rotation[:, None, 1:]
+    across = np.cross(vector, triads)
+    turned: Floats = triads + 2.0 * (scalar * across + np.cross(vector, across))
+    return turned
+
+
+def _end_rotations(axes: Floats, chord: Floats) -> tuple[Floats, Floats]:
+    """Return the rotations of an end relative to the chord, about its third and second axis."""
+    x, y, z = np.einsum("mij,mj->im", axes, chord)
+    q = np.hypot(y, z)
+    angle = np.divide(np.arctan2(q, x), q, out=1.0 / np.abs(x), where=q > 0.0)
+    return -y * angle, z * angle
+
+
+def stress_resultants(frame: Frame, beams: Ints, deformation: Floats) -> Floats:
+    """Return forces and moments conjugate to the deformations, of the same shape."""
+    section = frame.section[beams]
+    result = section[:, :1] * deformation
+    if len(frame.unit) == 3:
+        pairs = [(1, 2, 1)]
+    else:
+        result[:, 1] = section[:, 1] * deformation[:, 1]
+        pairs = [(2, 4, 2), (3, 5, 4)]
+    for one, other, column in pairs:
+        own, carried = section[:, column], section[:, column + 1]
+        a, b = deformation[:, one], deformation[:, other]
+        result[:, one], result[:, other] = own * a + carried * b, carried * a + own * b
+    return result
+
+
+def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats) -> Floats:
+    """Return (m,) the largest principal strain in beams.
+
+    Axial strain and bending strain of the outermost fibre, in space with the shear strain of
+    torsion of a round section. Compression in one direction is extension across it.
+
+    Parameters
+    ----------
+    beams : (m,)
+        Indices of beams of the frame.
+    resultants : (m, 3) or (m, 6)
+        Their forces and moments; see `stress_resultants`.
+    """
+    assert problem.section is not None
+    assert problem.material is not None
+    radius, nu = 0.5 * problem.section.width, problem.material.poisson
+    section, length = frame.section[beams], frame.rest_length[beams]
+    axial = resultants[:, 0] / (section[:, 0] * length)
+    shear = np.zeros(len(beams))
+    if resultants.shape[1] == 3:
+        own, carried, moment = section[:, 1], section[:, 2], np.abs(resultants[:, 1:])
+    else:
+        own, carried = section[:, 2], section[:, 3]
+        moment = np.hypot(resultants[:, [2, 4]], resultants[:, [3, 5]])
+        shear = np.abs(resultants[:, 1]) / (section[:, 1] * length) * radius
+    # Both stiffnesses differ by 2 E I / L, also with shear deformation.
+    bending = moment.max(axis=1, initial=0.0) * radius / (0.5 * length * (own - carried))
+    strains = [
+        0.5 * (1.0 - nu) * normal + np.hypot(0.5 * (1.0 + nu) * normal, 0.5 * shear)
+        for normal in (axial + bending, axial - bending)
+    ]
+    largest: Floats = np.maximum(*strains)
+    return largest
+
+
+def strain_of_frame(evaluator: ComputedFrame) -> Strain:
+    """Return the energy of each beam and the input forces in the response computed last."""
+    frame, end = evaluator.frame, evaluator.end
+    beams = np.arange(len(frame.beams))
+    d = deformations(frame, beams, *end.ends(beams))
+    energy = 0.5 * (stress_resultants(frame, beams, d) * d).sum(axis=1)
+    energy *= evaluator.structure.present != 0
+    of_beam = np.zeros(evaluator.problem.lattice.beam_count)
+    of_beam[evaluator.beams] = energy.reshape(-1, evaluator.divisions).sum(axis=1)
+    forces = input_forces(end)
+    along = float((forces * evaluator.problem.input.direction).sum())
+    return Strain(of_beam, forces, along)
+
+
+def input_forces(equilibrium: Equilibrium) -> Floats:
+    """Return (i, d) the external force on each input node."""
+    given = equilibrium.problem.input
+    if given.drive == "force":
+        return np.array(equilibrium.fraction * given.amount * given.direction)
+    reactions: Floats = equilibrium.residual()[given.nodes, : given.direction.shape[1]]
+    return reactions
+
+
+def orientation(state: State, node: int) -> Floats:
+    """Return (d, d) the rotation matrix of a node."""
+    if not len(state.q):
+        c, s = math.cos(state.u[node, 2]), math.sin(state.u[node, 2])
+        return np.array([[c, -s], [s, c]])
+    turned: Floats = _turned(state.q[node][None], np.eye(3)[None])[0].T
+    return turned
+
+
+def centre_lines(evaluator: ComputedFrame) -> tuple[Floats, Floats]:
+    """Return (s, k, d) the ends of the elements along each beam of the frame.
+
+    Returns
+    -------
+    rest, displaced
+        For the beams ``evaluator.beams`` in order, at rest and in the response computed last.
+    """
+    count, dimension = evaluator.problem.lattice.positions.shape
+    ends = evaluator.problem.lattice.beams[evaluator.beams]
+    inner = count + np.arange(len(ends) * (evaluator.divisions - 1)).reshape(len(ends), -1)
+    along = np.column_stack([ends[:, 0], inner, ends[:, 1]])
+    rest = evaluator.frame.positions[:, :dimension]
+    return rest[along], (rest + evaluator.state.u[:, :dimension])[along]

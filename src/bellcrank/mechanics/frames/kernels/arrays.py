@@ -1,0 +1,232 @@
+"""Bundles of arrays that the kernels of frames work on.
+
+N nodes, M beams, b unknowns of a node: 3 in the plane (displacement and rotation), 6 in space
+(displacement and spin). n free nodes, with at least one free unknown; each is a b x b *block* of
+the stiffness, and blocks are numbered in elimination order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from bellcrank.mechanics.kernels.bundle import Bundle
+
+if TYPE_CHECKING:
+    from bellcrank.mechanics.kernels.arrays import BitSets, Bytes, Floats, Ints
+
+
+class State(NamedTuple):
+    """A configuration of the nodes."""
+
+    u: Floats
+    """(N, 3) displacement and rotation in the plane; displacement in space."""
+    q: Floats
+    """(N, 4) orientation in space, unit quaternions (scalar first); (0, 4) in the plane."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame(Bundle):
+    """A problem as arrays. Lengths in lattice units."""
+
+    unit: tuple[float, ...]
+    """b zeros: the size of a block, known when the kernels are compiled."""
+    positions: Floats
+    """(N, 3) nodes at rest; the third coordinate is 0 in the plane."""
+    beams: Ints
+    """(M, 2) end nodes."""
+    rest: Floats
+    """(M, 4, 3) vector along each beam at rest, then the triad of its ends, one vector a row."""
+    rest_length: Floats
+    """(M,)"""
+    section: Floats
+    """(M, 6) stiffness of the beams; columns as in `plane_beam` or `space_beam`."""
+    bow: Floats
+    """(M,) L / 30 where the shortening of bent beams is included, else 0."""
+    incident_start: Ints
+    """(N + 1,) index in `incident_beam` at which the beams of each node begin."""
+    incident_beam: Ints
+    """(2 M,) beams incident to each node."""
+    held: Bytes
+    """(N, b) unknowns prescribed by a support or the drive."""
+    protected: Bytes
+    """(N,) 1 for nodes at which a single beam is not a dead end."""
+    grounded: Bytes
+    """(N,) 1 for nodes of which all unknowns are held at rest."""
+    prescribed: Bytes
+    """(N,) 1 for nodes that the drive moves."""
+    partly: Bytes
+    """(N,) 1 for nodes of which some unknowns are held and others free."""
+    block: Ints
+    """(N,) elimination index of a free node, -1 for a fully held one."""
+    drive: Floats
+    """(N, b) prescribed motion at full load."""
+    load: Floats
+    """(N, b) force and moment at full load."""
+    weight: Floats
+    """(M, 3) force on each beam at full load, one half on either end."""
+    has_weight: bool
+    ground: Floats
+    """(N, 3, 3) stiffness of the output springs."""
+    input_nodes: Ints
+    input_direction: Floats
+    """(i, 3)"""
+    output_nodes: Ints
+    output_direction: Floats
+    """(o, 3)"""
+    numerator_scale: float
+    """Efficiency = scale * sum over output nodes of |u| f(gamma) / denominator."""
+    exponent: float
+    """n in f = 2 cos(gamma/2)^n - 1."""
+    denominator: float
+    """Constant denominator, or nan: scaled sum of t_in . u over the input nodes."""
+    denominator_scale: float
+    tolerance: float
+    """Displacement error that changes the efficiency by less than its tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Structure(Bundle):
+    """The load-bearing part of one design, and the pattern of its stiffness."""
+
+    present: Bytes
+    """(M,) beams of the design that carry load."""
+    loaded: Bytes
+    """(M,) memory of the search for these beams."""
+    search: Ints
+    """(N, 6) state of each node in a depth-first search."""
+    active: Bytes
+    """(N,) 1 for nodes that the drive reaches through present beams."""
+    order: Ints
+    """(N,) active nodes in the order of discovery."""
+    parent: Ints
+    """(N,) node from which each was discovered, -1 for the first of a piece."""
+    beam: Ints
+    """(M,) active beams."""
+    beam_entry: Ints
+    """(M,) index of the off-diagonal block of each beam, -1 if an end is held."""
+    column_bits: BitSets
+    """(n, W) rows below the diagonal in each column of the factor, as bits."""
+    word_start: Ints
+    """(n, W) entry at which the rows of each word begin."""
+    column_start: Ints
+    """(n + 1,)"""
+    row: Ints
+    """(capacity,) row of each entry."""
+    sizes: Ints
+    """(2,) nodes in `order`, beams in `beam`."""
+
+
+KNOTS = 3
+"""Number of quarters of the load between rest and full load. The states there are kept of a
+reference, and after them the softest one."""
+SOFTEST, FULL = KNOTS, KNOTS + 1
+"""Index of the softest state on the path, and of that at full load."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference(Bundle):
+    """Equilibrium at full load of a reference design, from which warm starts begin."""
+
+    present: Bytes
+    """(M,) as in `Structure`."""
+    active: Bytes
+    """(N,) nodes that the reference moves, dead ends included."""
+    state: State
+    knots: State
+    """((KNOTS + 1) N, ...) states at the quarters of the load, one after the other, and the
+    softest."""
+    mode: Floats
+    """(KNOTS + 2, N, b) softest motion there, and at full load."""
+    stiffness: Floats
+    """(KNOTS + 2,) lowest stiffness there, of the last design whose path was followed."""
+    softest_load: Floats
+    """(1,) fraction of the load at the softest state."""
+    departure: Floats
+    """(KNOTS + 1,) departure of that path between them from the mean of their tangents."""
+    margin: Floats
+    """(1,) lowest stiffness along that path, as a part of its values at both ends."""
+    has_knots: Bytes
+    """(1,) 1 if they are known."""
+
+
+NO_PATH, OWN_PATH, NEXT_PATH, KEPT_PATH = 0, 1, 2, 3
+"""Codes of `Memory.path`: none; followed from rest; next to that of the reference; the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Memory(Bundle):
+    """Working memory, and the factor of the stiffness computed last.
+
+    States, and fields (N, b): displacements and spins of the nodes.
+    """
+
+    tension: Floats
+    """(M,) axial force with which the stiffness is assembled."""
+    gradient: Floats
+    """(N, b) derivative of the potential energy."""
+    diagonal: Floats
+    """(n, b, b) blocks of the stiffness, then of its factor."""
+    entries: Floats
+    """(capacity, b, b) the same below the diagonal."""
+    column: Floats
+    """(n, b, b) the column being eliminated."""
+    link: Ints
+    """(n, 3) lists of columns that reach a row: head, next, position."""
+    step: Floats
+    """(n, b) right-hand side and solution."""
+    force: Floats
+    """(12,) end forces of a beam."""
+    tangent_block: Floats
+    """(12, 12) stiffness of a beam."""
+    work: Floats
+    """(9, 9, 9) memory of a beam in space."""
+    local: Floats
+    """(PLANE_WORK,) memory of a beam in the plane."""
+    axial: Floats
+    """(M,) axial force of each beam in the state assembled last."""
+    axial_slope: Floats
+    """(M, 2 b) its derivative by the motions of both ends, over EA/L."""
+    reached: Bytes
+    """(N,) nodes that are placed."""
+    path: Ints
+    """(1,) where the states in `knots` are from."""
+    queue: Ints
+    """(N,)"""
+    previous: State
+    """Equilibrium at the start of the increment, or another one to compare with."""
+    knots: State
+    """((KNOTS + 1) N, ...) as in `Reference`."""
+    difference: Floats
+    """Motion from one state to another."""
+    tangent: Floats
+    """Tangent of the path at the start of the increment."""
+    next_tangent: Floats
+    """Tangent at its end."""
+    last_tangent: Floats
+    """Tangent one increment before."""
+    mode: Floats
+    """Softest motion."""
+    knot_mode: Floats
+    """(KNOTS + 2, N, b) softest motion there, and at full load."""
+    knot_stiffness: Floats
+    """(KNOTS + 2,) lowest stiffness there."""
+    softest_load: Floats
+    """(1,) as in `Reference`."""
+    knot_tangent: Floats
+    """(KNOTS + 2, N, b) tangents of the path at rest, there, and at full load."""
+    knot_departure: Floats
+    """(KNOTS + 1,) as in `Reference`."""
+    reached_load: Floats
+    """(2,) fraction of the load up to which the path was followed last; lowest stiffness along it,
+    as a part of its values at both ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flips(Bundle):
+    """Working memory of `predict_flips`."""
+
+    coupling: Floats
+    """(2 b, 2 b) G."""
+    matrix: Floats
+    """(2 b, 2 b + 1 + m) 1 + s k G and s f; for m linear motions s k z."""

@@ -1,0 +1,122 @@
+"""Definition of a quantity, and their registry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+from bellcrank.registry import Registry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics.frames.equilibria import Equilibrium
+    from bellcrank.mechanics.kernels.arrays import Floats, Ints
+
+    Values = NDArray[np.float64]
+
+Load = Literal["input", "held output", "weight"]
+"""Load of an equilibrium: the input; the input with the output held along the wanted direction; the
+own weight alone, at rest."""
+
+
+class Measures(NamedTuple):
+    """Measures of an equilibrium."""
+
+    value: Floats
+    """(k,)"""
+    motion: Floats | None = None
+    """(N, b) linear motion K^-1 w on which they depend besides the equilibrium."""
+    beams: Ints | None = None
+    """(k,) beams that they belong to."""
+
+
+class Slopes(NamedTuple):
+    """Derivatives of measures."""
+
+    fields: NDArray[np.float64]
+    """(k, N, b) by the unknowns of the equilibrium."""
+    on_held: NDArray[np.float64] | None = None
+    """(k, N, b) adjoints on held unknowns; zero by default."""
+    by_motion: NDArray[np.float64] | None = None
+    """(k, N, b) by the unknowns of the linear motion."""
+
+
+def single(values: Values) -> Values:
+    """Return the only measure."""
+    only: NDArray[np.float64] = values[..., 0]
+    return only
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A quantity of a design as a frame.
+
+    Parameters
+    ----------
+    measure
+        Function from an equilibrium to its measures.
+    slopes
+        Function from an equilibrium and its measures to their derivatives.
+    combine
+        Function from measures (..., k) to the quantity (...).
+    gradient
+        Function from measures (k,) to the derivatives (k,) of the quantity.
+    load
+        Load of the equilibrium.
+    after_flips
+        Function from an equilibrium, its measures, flipped beams (n,), the forces (n, 2 b) on
+        their ends and predicted measures (n, k) to the measures to combine; None to combine the
+        predicted ones.
+    """
+
+    measure: Callable[[Equilibrium], Measures]
+    slopes: Callable[[Equilibrium, Measures], Slopes]
+    combine: Callable[[Values], Values] = single
+    gradient: Callable[[Floats], Floats] = np.ones_like
+    load: Load = "input"
+    after_flips: Callable[[Equilibrium, Measures, Ints, Values, Values], Values] | None = None
+
+    def value(self, equilibrium: Equilibrium) -> float:
+        """Return the quantity at an equilibrium of its load."""
+        return float(self.combine(self.measure(equilibrium).value))
+
+
+quantities: Registry[Quantity] = Registry("quantity")
+"""Quantities of frames by name."""
+
+
+def linear(
+    fields: Callable[[Equilibrium], NDArray[np.float64]],
+) -> tuple[
+    Callable[[Equilibrium], Measures],
+    Callable[[Equilibrium, Measures], Slopes],
+]:
+    """Return `Quantity.measure` and `Quantity.slopes` of sums of displacements.
+
+    Parameters
+    ----------
+    fields
+        Function from an equilibrium to the weights (k, N, b) of the displacements; those of
+        rotations are zero.
+    """
+
+    def measure(equilibrium: Equilibrium) -> Measures:
+        dimension = equilibrium.problem.lattice.dimension
+        weights = fields(equilibrium)[..., :dimension]
+        return Measures(np.einsum("kna,na->k", weights, equilibrium.state.u[:, :dimension]))
+
+    def slopes(equilibrium: Equilibrium, _measures: Measures) -> Slopes:
+        return Slopes(fields(equilibrium))
+
+    return measure, slopes
+
+
+def ratio(numerator: Values, denominator: Values) -> Values:
+    """Return a quotient; nan where the denominator is zero."""
+    nowhere = np.full(np.shape(numerator), np.nan)
+    return np.asarray(np.divide(numerator, denominator, out=nowhere, where=denominator != 0.0))

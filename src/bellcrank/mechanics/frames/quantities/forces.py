@@ -1,0 +1,146 @@
+"""Forces and stiffness: input force, output stiffness, blocked force, sag under own weight."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics.frames.analysis import input_forces
+from bellcrank.mechanics.frames.quantities.definition import (
+    Measures,
+    Quantity,
+    Slopes,
+    linear,
+    quantities,
+)
+from bellcrank.mechanics.frames.quantities.motion import along_field
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics.frames.equilibria import Equilibrium
+    from bellcrank.mechanics.kernels.arrays import Floats
+
+    Values = NDArray[np.float64]
+
+STEP = 1e-5
+"""Largest motion of a node in the central difference of the stiffness."""
+
+
+def _input_force(equilibrium: Equilibrium) -> Measures:
+    along = (input_forces(equilibrium) * equilibrium.problem.input.direction).sum()
+    return Measures(np.array([along]))
+
+
+def _input_force_slopes(equilibrium: Equilibrium, _measures: Measures) -> Slopes:
+    """Return the stiffness times the unit motion of the input; a given force is constant."""
+    given, unit = equilibrium.problem.input, equilibrium.fields(1)
+    if given.drive == "force":
+        return Slopes(unit)
+    unit[0, given.nodes, : given.direction.shape[1]] = given.direction
+    return Slopes(equilibrium.forces_of(unit[0])[None], on_held=-unit)
+
+
+quantities.register("input_force")(Quantity(_input_force, _input_force_slopes))
+
+
+def _unit_force(equilibrium: Equilibrium) -> Floats:
+    """Return (N, b) a unit force on the output along the wanted direction.
+
+    It is shared equally by the output nodes that the structure holds.
+    """
+    output, force = equilibrium.problem.output, np.asarray(equilibrium.fields(1)[0])
+    held = equilibrium.structure.active[output.nodes] != 0
+    if held.any():
+        force[output.nodes[held], : output.direction.shape[1]] = output.direction[held] / held.sum()
+    return force
+
+
+def _compliance(equilibrium: Equilibrium) -> Measures:
+    """Measure the motion of the output by a unit force; infinite where nothing holds it."""
+    force = _unit_force(equilibrium)
+    motion = equilibrium.solve(force) if force.any() else None
+    if motion is None:
+        return Measures(np.array([math.inf]))
+    return Measures(np.array([(motion * force).sum()]), motion)
+
+
+def _compliance_slopes(equilibrium: Equilibrium, measures: Measures) -> Slopes:
+    """Return the derivatives of w.z, where K z = w is the unit force.
+
+    By the unknowns, -z.K'z with K' the derivative of the stiffness: the central difference of K z
+    along z. Its error is of the order of 1e-10.
+    """
+    motion = measures.motion
+    if motion is None:
+        return Slopes(equilibrium.fields(1))
+    step = STEP / np.abs(motion).max()
+    ahead, behind = (
+        equilibrium.moved(sign * step * motion).forces_of(motion) for sign in (1.0, -1.0)
+    )
+    slope = (behind - ahead) / (2.0 * step)
+    return Slopes(slope[None], by_motion=_unit_force(equilibrium)[None])
+
+
+def _inverse(compliance: Values) -> Values:
+    """Return the stiffness; 0 where nothing holds the output, or not stably."""
+    (value,) = np.moveaxis(compliance, -1, 0)
+    return np.asarray(np.divide(1.0, value, out=np.zeros(value.shape), where=value > 0.0))
+
+
+def _inverse_gradient(compliance: Floats) -> Floats:
+    return -1.0 / compliance**2
+
+
+quantities.register("output_stiffness")(
+    Quantity(_compliance, _compliance_slopes, combine=_inverse, gradient=_inverse_gradient)
+)
+
+
+def _force_on_stop(equilibrium: Equilibrium) -> Values:
+    """Return (1, N, b) the weights of the forces of the output on the springs that hold it."""
+    output = equilibrium.problem.output
+    assert output.spring is not None
+    return output.spring * len(output.nodes) * along_field(equilibrium)
+
+
+quantities.register("blocked_force")(Quantity(*linear(_force_on_stop), load="held output"))
+
+
+def _mean_displacement(equilibrium: Equilibrium) -> Values:
+    """Return (d, N, b) the weights of the mean displacement of the output nodes."""
+    nodes, dimension = equilibrium.problem.output.nodes, equilibrium.problem.lattice.dimension
+    fields = equilibrium.fields(dimension)
+    for axis in range(dimension):
+        fields[axis, nodes, axis] = 1.0 / len(nodes)
+    return fields
+
+
+def _sag(equilibrium: Equilibrium) -> Measures:
+    """Measure the linear motion of the output by the own weight alone."""
+    load = equilibrium.fraction * equilibrium.frame.load
+    motion = equilibrium.solve(-equilibrium.residual() - load)
+    if motion is None:
+        return Measures(np.full(equilibrium.problem.lattice.dimension, math.nan))
+    return Measures(np.einsum("kna,na->k", _mean_displacement(equilibrium), motion), motion)
+
+
+def _sag_slopes(equilibrium: Equilibrium, measures: Measures) -> Slopes:
+    fields = _mean_displacement(equilibrium)
+    return Slopes(fields, by_motion=None if measures.motion is None else fields)
+
+
+def _size(vectors: Values) -> Values:
+    size: Values = np.linalg.norm(vectors, axis=-1)
+    return size
+
+
+def _size_gradient(vector: Floats) -> Floats:
+    return vector / max(float(np.linalg.norm(vector)), 1e-300)
+
+
+quantities.register("sag")(
+    Quantity(_sag, _sag_slopes, combine=_size, gradient=_size_gradient, load="weight")
+)

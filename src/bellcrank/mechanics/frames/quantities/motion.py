@@ -1,0 +1,179 @@
+"""Motion of the output: travel, gain, off-axis motion, rotation, efficiency."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics.frames.analysis import orientation
+from bellcrank.mechanics.frames.quantities.definition import (
+    Measures,
+    Quantity,
+    Slopes,
+    linear,
+    quantities,
+    ratio,
+)
+from bellcrank.mechanics.output import motion_weights, off_axis_of, rotation_of, turned_positions
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics.frames.equilibria import Equilibrium
+    from bellcrank.mechanics.kernels.arrays import Floats
+
+    Values = NDArray[np.float64]
+
+
+def output_fields(equilibrium: Equilibrium) -> Values:
+    """Return (1 + d, N, b) the weights of `bellcrank.mechanics.output.motion_weights`."""
+    weights = motion_weights(equilibrium.problem)
+    fields = equilibrium.fields(len(weights))
+    fields[:, equilibrium.problem.output.nodes, : weights.shape[2]] = weights
+    return fields
+
+
+def along_field(equilibrium: Equilibrium) -> Values:
+    """Return (1, N, b) the weights of the mean displacement along the wanted direction."""
+    return output_fields(equilibrium)[:1]
+
+
+def _along_and_input(equilibrium: Equilibrium) -> Values:
+    """Return (2, N, b) weights of the mean displacements of output and input."""
+    given, fields = equilibrium.problem.input, equilibrium.fields(2)
+    fields[0] = along_field(equilibrium)[0]
+    fields[1, given.nodes, : given.direction.shape[1]] = given.direction / len(given.nodes)
+    return fields
+
+
+def _gain(means: Values) -> Values:
+    return ratio(means[..., 0], means[..., 1])
+
+
+def _gain_gradient(means: Floats) -> Floats:
+    return np.array([1.0 / means[1], -means[0] / means[1] ** 2])
+
+
+def _off_axis_gradient(means: Floats) -> Floats:
+    """Return the derivative of the size of the normal motion over that along the direction."""
+    along, size = means[0], np.linalg.norm(means[1:])
+    slope = np.zeros_like(means)
+    slope[0] = -size / (along * abs(along))
+    if size > 0.0:
+        slope[1:] = means[1:] / (size * abs(along))
+    return slope
+
+
+quantities.register("travel")(Quantity(*linear(along_field)))
+quantities.register("gain")(
+    Quantity(*linear(_along_and_input), combine=_gain, gradient=_gain_gradient)
+)
+quantities.register("off_axis")(
+    Quantity(*linear(output_fields), combine=off_axis_of, gradient=_off_axis_gradient)
+)
+
+
+def _basis(dimension: int) -> Values:
+    """Return (k, d, d) matrices; products of a rotation with them are its measures.
+
+    In the plane cosine and sine, in space the components of the matrix.
+    """
+    if dimension == 2:
+        return np.array([[[1.0, 0.0], [0.0, 1.0]], [[0.0, -1.0], [1.0, 0.0]]])
+    return np.eye(9).reshape(9, 3, 3)
+
+
+def _generators(dimension: int) -> Values:
+    """Return (s, d, d) the derivatives of a rotation by spins about the axes."""
+    if dimension == 2:
+        return _basis(2)[1:]
+    axes = np.eye(3)
+    crossed: Values = np.cross(axes[:, None], axes).transpose(0, 2, 1)
+    return crossed
+
+
+def _rotation_measures(equilibrium: Equilibrium) -> Measures:
+    """Measure the sum of products of the positions of output nodes after and before.
+
+    For a single output node, its orientation.
+    """
+    lattice, nodes = equilibrium.problem.lattice, equilibrium.problem.output.nodes
+    if len(nodes) == 1:
+        matrix = orientation(equilibrium.state, nodes[0])
+    else:
+        displacement = equilibrium.state.u[nodes, : lattice.dimension]
+        matrix = turned_positions(lattice.positions[nodes], displacement)
+    return Measures((_basis(lattice.dimension) * matrix).sum(axis=(1, 2)))
+
+
+def _rotation_slopes(equilibrium: Equilibrium, _measures: Measures) -> Slopes:
+    lattice, nodes = equilibrium.problem.lattice, equilibrium.problem.output.nodes
+    dimension = lattice.dimension
+    basis = _basis(dimension)
+    fields = equilibrium.fields(len(basis))
+    if len(nodes) == 1:
+        turned = _generators(dimension) @ orientation(equilibrium.state, nodes[0])
+        fields[:, nodes[0], dimension:] = np.einsum("kij,sij->ks", basis, turned)
+    else:
+        before = lattice.positions[nodes] - lattice.positions[nodes].mean(axis=0)
+        fields[:, nodes, :dimension] = np.einsum("kij,nj->kni", basis, before)
+    return Slopes(fields)
+
+
+def _angle(measures: Values) -> Values:
+    """Return the angle in the plane, the size of the rotation vector in space, degrees."""
+    dimension = 2 if measures.shape[-1] == 2 else 3
+    turn = rotation_of(np.einsum("...k,kij->...ij", measures, _basis(dimension)))
+    return turn if dimension == 2 else np.asarray(np.linalg.norm(turn, axis=-1))
+
+
+def _angle_gradient(measures: Floats) -> Floats:
+    """Return the derivative of the angle.
+
+    In space, with H = P R the sum of products, R the rotation and n its axis, it is that of n.w
+    for a spin w with (tr P - P) w = v, where v is the vector of dH R' - R dH'.
+    """
+    if len(measures) == 2:
+        return np.degrees(np.array([-measures[1], measures[0]]) / (measures @ measures))
+    from scipy.spatial.transform import Rotation
+
+    matrix = measures.reshape(3, 3)
+    turn = Rotation.from_rotvec(rotation_of(matrix), degrees=True)
+    angle = turn.magnitude()
+    if angle == 0.0:
+        return np.zeros(9)
+    stretch = matrix @ turn.as_matrix().T
+    resistance = np.trace(stretch) * np.eye(3) - 0.5 * (stretch + stretch.T)
+    spin = np.linalg.pinv(resistance, hermitian=True) @ (turn.as_rotvec() / angle)
+    slope = np.einsum("s,sij->ij", spin, _generators(3)) @ turn.as_matrix()
+    return np.asarray(np.degrees(slope).ravel())
+
+
+quantities.register("rotation")(
+    Quantity(_rotation_measures, _rotation_slopes, combine=_angle, gradient=_angle_gradient)
+)
+
+
+def _load_share(equilibrium: Equilibrium) -> float:
+    """Return the fraction of the load, by which a constant denominator is multiplied."""
+    return 1.0 if math.isnan(equilibrium.frame.denominator) else equilibrium.fraction
+
+
+def _efficiency(equilibrium: Equilibrium) -> Measures:
+    from bellcrank.mechanics.frames.kernels.flips import efficiency_at
+
+    efficiency = efficiency_at(equilibrium.frame, equilibrium.state.u)
+    return Measures(np.array([efficiency / _load_share(equilibrium)]))
+
+
+def _efficiency_slopes(equilibrium: Equilibrium, _measures: Measures) -> Slopes:
+    from bellcrank.mechanics.frames.kernels.flips import efficiency_gradient
+
+    fields = equilibrium.fields(1)
+    efficiency_gradient(equilibrium.frame, equilibrium.state.u, fields[0])
+    return Slopes(fields / _load_share(equilibrium))
+
+
+quantities.register("efficiency")(Quantity(_efficiency, _efficiency_slopes))

@@ -1,0 +1,327 @@
+"""Arrays of a frame for the kernels."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.errors import InvalidProblem
+from bellcrank.mechanics.frames.kernels.arrays import (
+    KNOTS,
+    Frame,
+    Memory,
+    Reference,
+    State,
+    Structure,
+)
+from bellcrank.mechanics.frames.kernels.plane import PLANE_WORK
+from bellcrank.mechanics.ordering import elimination_order, factor_capacity
+from bellcrank.mechanics.system import EFFICIENCY_TOLERANCE, incident_beams
+from bellcrank.registry import Registry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics.kernels.arrays import Floats, Ints
+    from bellcrank.mechanics.objectives import Objective
+    from bellcrank.model import Elasticity, Problem, Section
+
+
+def allocate_state(nodes: int, size: int) -> State:
+    """Allocate a state at rest of nodes with `size` unknowns each."""
+    q = np.zeros((nodes if size == 6 else 0, 4))
+    q[:, 0] = 1.0
+    return State(np.zeros((nodes, 3)), q)
+
+
+def allocate_structure(frame: Frame) -> Structure:
+    """Allocate the load-bearing part of any design of a frame."""
+    nodes, beams = len(frame.positions), len(frame.beams)
+    blocks = int(frame.block.max(initial=-1)) + 1
+    width = blocks // 64 + 1
+    return Structure(
+        present=np.zeros(beams, np.uint8),
+        loaded=np.zeros(beams, np.uint8),
+        search=np.zeros((nodes, 6), np.int64),
+        active=np.zeros(nodes, np.uint8),
+        order=np.zeros(nodes, np.int64),
+        parent=np.full(nodes, -1),
+        beam=np.zeros(beams, np.int64),
+        beam_entry=np.full(beams, -1),
+        column_bits=np.zeros((blocks, width), np.uint64),
+        word_start=np.zeros((blocks, width), np.int64),
+        column_start=np.zeros(blocks + 1, np.int64),
+        row=np.zeros(factor_capacity(frame.beams, frame.block, springs=False), np.int64),
+        sizes=np.zeros(2, np.int64),
+    )
+
+
+def allocate_reference(frame: Frame) -> Reference:
+    """Allocate a reference equilibrium."""
+    nodes = len(frame.positions)
+    return Reference(
+        present=np.zeros(len(frame.beams), np.uint8),
+        active=np.zeros(nodes, np.uint8),
+        state=allocate_state(nodes, len(frame.unit)),
+        knots=allocate_state((KNOTS + 1) * nodes, len(frame.unit)),
+        mode=np.zeros((KNOTS + 2, nodes, len(frame.unit))),
+        stiffness=np.zeros(KNOTS + 2),
+        softest_load=np.zeros(1),
+        departure=np.zeros(KNOTS + 1),
+        margin=np.ones(1),
+        has_knots=np.zeros(1, np.uint8),
+    )
+
+
+def allocate_memory(frame: Frame, structure: Structure) -> Memory:
+    """Allocate working memory for one thread."""
+    nodes, beams, size = len(frame.positions), len(frame.beams), len(frame.unit)
+    blocks, entries = len(structure.column_bits), len(structure.row)
+    states: dict[str, Any] = {name: allocate_state(nodes, size) for name in ("previous",)}
+    motions: dict[str, Any] = {
+        name: np.zeros((nodes, size))
+        for name in (
+            "gradient", "difference", "tangent", "next_tangent", "last_tangent", "mode",
+        )
+    }  # fmt: skip
+    return Memory(
+        tension=np.zeros(beams),
+        diagonal=np.zeros((blocks, size, size)),
+        entries=np.zeros((entries, size, size)),
+        column=np.zeros((blocks, size, size)),
+        link=np.zeros((blocks, 3), np.int64),
+        step=np.zeros((blocks, size)),
+        force=np.zeros(12),
+        tangent_block=np.zeros((12, 12)),
+        work=np.zeros((9, 9, 9)),
+        local=np.zeros(PLANE_WORK),
+        axial=np.zeros(beams),
+        axial_slope=np.zeros((beams, 2 * size)),
+        reached=np.zeros(nodes, np.uint8),
+        path=np.zeros(1, np.int64),
+        queue=np.zeros(nodes, np.int64),
+        knots=allocate_state((KNOTS + 1) * nodes, size),
+        knot_mode=np.zeros((KNOTS + 2, nodes, size)),
+        knot_stiffness=np.zeros(KNOTS + 2),
+        softest_load=np.zeros(1),
+        knot_tangent=np.zeros((KNOTS + 2, nodes, size)),
+        knot_departure=np.zeros(KNOTS + 1),
+        reached_load=np.ones(2),
+        **states,
+        **motions,
+    )
+
+
+def triads(chord: Floats) -> Floats:
+    """Return (M, 4, 3) the vectors along beams and a triad of each, one vector a row."""
+    axis = chord / np.linalg.norm(chord, axis=1)[:, None]
+    # Any normal serves a round section; that of the plane is kept for beams in the plane.
+    up = np.where((np.abs(axis[:, 2]) < 0.9)[:, None], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
+    side = np.cross(up, axis)
+    side /= np.linalg.norm(side, axis=1)[:, None]
+    return np.stack([chord, axis, side, np.cross(axis, side)], axis=1)
+
+
+def in_space(vectors: NDArray[np.float64]) -> Floats:
+    """Return vectors (n, 2) or (n, 3) with three components."""
+    out = np.zeros((len(vectors), 3))
+    out[:, : vectors.shape[1]] = vectors
+    return out
+
+
+def subdivided(positions: Floats, beams: Ints, elements: int) -> tuple[Floats, Ints]:
+    """Divide every beam into equal elements.
+
+    Returns
+    -------
+    positions : (N + M (elements - 1), d)
+        The nodes, then the inner nodes of each beam in order.
+    beams : (M elements, 2) int64
+        The elements of each beam in order.
+    """
+    count, inner = len(positions), elements - 1
+    fraction = np.arange(1, elements) / elements
+    start, end = positions[beams[:, 0]], positions[beams[:, 1]]
+    between = start[:, None] + fraction[:, None] * (end - start)[:, None]
+    numbers = count + np.arange(len(beams) * inner).reshape(len(beams), inner)
+    along = np.column_stack([beams[:, 0], numbers, beams[:, 1]])
+    ends = np.stack([along[:, :-1], along[:, 1:]], axis=-1).reshape(-1, 2)
+    return np.concatenate([positions, between.reshape(-1, positions.shape[1])]), ends
+
+
+theories: Registry[Callable[[Section, Elasticity], float]] = Registry("theory")
+"""Beam theories: functions of a section and a material that return the flexibility of a beam of
+unit length in shear, 1 / (kappa G A)."""
+
+
+@theories.register("euler-bernoulli")
+def euler_bernoulli(_section: Section, _material: Elasticity) -> float:
+    """Return 0: cross-sections stay normal to the axis."""
+    return 0.0
+
+
+@theories.register("timoshenko")
+def timoshenko(section: Section, material: Elasticity) -> float:
+    """Return the flexibility of cross-sections that stay plane but not normal to the axis."""
+    return 1.0 / (section.shear_coefficient * material.shear_modulus * section.area)
+
+
+def beam_stiffness(
+    section: Section, material: Elasticity, length: Floats, theory: str, dimension: int
+) -> Floats:
+    """Return (m, 6) the stiffness of beams of given lengths, as the kernels expect it.
+
+    Raises
+    ------
+    UnknownName
+        If there is no such theory.
+    """
+    flexibility = theories[theory](section, material)
+    out = np.zeros((len(length), 6))
+    out[:, 0] = material.young * section.area / length
+    bending = [section.inertia]
+    first = 1
+    if dimension == 3:
+        out[:, 1] = material.shear_modulus * section.torsion_constant / length
+        bending, first = [section.inertia, section.inertia_out_of_plane], 2
+    for k, inertia in enumerate(bending):
+        rigidity = material.young * inertia
+        ratio = 12.0 * rigidity * flexibility / length**2
+        flexural = rigidity / (length * (1.0 + ratio))
+        out[:, first + 2 * k] = (4.0 + ratio) * flexural
+        out[:, first + 1 + 2 * k] = (2.0 - ratio) * flexural
+    return out
+
+
+def held_unknowns(problem: Problem, nodes: int, size: int) -> NDArray[np.bool_]:
+    """Return (nodes, size) the unknowns that supports and the drive prescribe.
+
+    Supports that hold all displacements hold rotations too; the nodes of a displacement drive
+    rotate freely.
+    """
+    supports, dimension = problem.supports, problem.lattice.dimension
+    held = np.zeros((nodes, size), dtype=bool)
+    held[supports.fixed] = True
+    for axis, name in enumerate(("fixed_x", "fixed_y", "fixed_z")[:dimension]):
+        held[getattr(supports, name), axis] = True
+    if problem.input.drive == "displacement":
+        held[problem.input.nodes, :dimension] = True
+    return held
+
+
+def drive_and_load(problem: Problem, nodes: int, size: int) -> tuple[Floats, Floats]:
+    """Return (nodes, size) the prescribed motion and the forces at full load."""
+    drive, load = np.zeros((nodes, size)), np.zeros((nodes, size))
+    given = problem.input
+    target = drive if given.drive == "displacement" else load
+    target[given.nodes, : problem.lattice.dimension] = given.amount * given.direction
+    return drive, load
+
+
+def output_springs(problem: Problem, nodes: int) -> Floats:
+    """Return (nodes, 3, 3) the stiffness of the springs at the output."""
+    ground, output = np.zeros((nodes, 3, 3)), problem.output
+    if output.spring:
+        direction = in_space(output.direction)
+        each = direction[:, :, None] * direction[:, None, :]
+        if output.spring_kind == "isotropic":
+            each = np.zeros_like(each)
+            axes = np.arange(problem.lattice.dimension)
+            each[:, axes, axes] = 1.0
+        ground[output.nodes] = output.spring * each
+    return ground
+
+
+def build_frame(
+    problem: Problem,
+    objective: Objective,
+    elements: int | None = None,
+    theory: str = "euler-bernoulli",
+    mask: NDArray[np.bool_] | None = None,
+    weight: Floats | None = None,
+) -> Frame:
+    """Convert a problem with a section to the arrays of a frame.
+
+    Parameters
+    ----------
+    elements : int, optional
+        None for one element of each beam that is shorter when it is bent, so that its axial force
+        acts on its bending; a number for that many linear elements.
+    theory
+        Name in the registry of theories.
+    mask : (M,) bool, optional
+        Beams of the lattice that the frame has; all by default.
+    weight : (d,), optional
+        Force on a unit of volume.
+
+    Raises
+    ------
+    InvalidProblem
+        If the problem has no section.
+    """
+    if problem.section is None or problem.material is None:
+        raise InvalidProblem(
+            f"problem {problem.name!r}: the beams of a frame need a section, such as "
+            "section = {shape = 'rectangle', width = 0.2, thickness = 0.5}"
+        )
+    lattice, dimension = problem.lattice, problem.lattice.dimension
+    size = 3 * (dimension - 1)
+    chosen = lattice.beams if mask is None else lattice.beams[mask]
+    positions, beams = subdivided(
+        np.array(lattice.positions), chosen.astype(np.int64), elements or 1
+    )
+    nodes = len(positions)
+    held = held_unknowns(problem, nodes, size)
+    any_held, all_held = np.asarray(held.any(axis=1)), np.asarray(held.all(axis=1))
+    drive, load = drive_and_load(problem, nodes, size)
+    protected = any_held.astype(np.uint8)
+    protected[problem.input.nodes] = 1
+    protected[problem.output.nodes] = 1
+    grounded, prescribed = np.zeros(nodes, np.uint8), np.zeros(nodes, np.uint8)
+    grounded[problem.supports.fixed] = 1
+    prescribed[problem.input.nodes] = problem.input.drive == "displacement"
+    space = in_space(positions)
+    rest = triads(space[beams[:, 1]] - space[beams[:, 0]])
+    length = np.linalg.norm(rest[:, 0], axis=1)
+    section = beam_stiffness(problem.section, problem.material, length, theory, dimension)
+    incident_start, incident_beam = incident_beams(positions[:, :2], beams)
+    scale = objective.numerator_scale / (objective.denominator or problem.input.amount)
+    sensitivity = abs(scale) * len(problem.output.nodes) * max(1.0, objective.exponent - 1.0)
+    of_beam = np.zeros((len(beams), 3))
+    if weight is not None:
+        of_beam[:, :dimension] = problem.section.area * length[:, None] * np.asarray(weight)
+    return Frame(
+        unit=(0.0,) * size,
+        positions=space,
+        beams=beams,
+        rest=rest,
+        rest_length=length,
+        section=section,
+        bow=length / 30.0 if elements is None else np.zeros_like(length),
+        incident_start=incident_start,
+        incident_beam=incident_beam,
+        held=held.astype(np.uint8),
+        protected=protected,
+        grounded=grounded,
+        prescribed=prescribed,
+        partly=(any_held & ~all_held).astype(np.uint8),
+        block=elimination_order(beams, all_held, springs=False),
+        drive=drive,
+        load=load,
+        weight=of_beam,
+        has_weight=weight is not None,
+        ground=output_springs(problem, nodes),
+        input_nodes=np.array(problem.input.nodes),
+        input_direction=in_space(problem.input.direction),
+        output_nodes=np.array(problem.output.nodes),
+        output_direction=in_space(problem.output.direction),
+        numerator_scale=float(objective.numerator_scale),
+        exponent=float(objective.exponent),
+        denominator=math.nan if objective.denominator is None else float(objective.denominator),
+        denominator_scale=float(objective.denominator_scale),
+        tolerance=float(np.clip(EFFICIENCY_TOLERANCE / sensitivity, 1e-12, 1e-8)),
+    )

@@ -1,0 +1,108 @@
+"""Checks of the parts of a problem against each other; they raise `InvalidProblem`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
+
+from bellcrank.errors import InvalidProblem
+from bellcrank.model.arrays import check_ids
+from bellcrank.model.conditions import ROLLERS, Aggregate
+from bellcrank.model.section import Elasticity, Section
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model.conditions import Input, Output, Supports
+    from bellcrank.model.lattice import Lattice
+
+
+def check_texts(name: object, aggregate: object, objective: object) -> None:
+    """Check name, aggregate and objective."""
+    if not isinstance(name, str) or not name.strip():
+        raise InvalidProblem(f"name: expected some text, got {name!r}")
+    if aggregate not in get_args(Aggregate):
+        raise InvalidProblem(f"aggregate: expected 'mean' or 'sum', got {aggregate!r}")
+    if objective is not None and (not isinstance(objective, str) or not objective.strip()):
+        raise InvalidProblem(f"objective: expected a name, got {objective!r}")
+
+
+def check_section(lattice: Lattice, section: object, material: object) -> None:
+    """Check that section and material belong together, and that the section fits the space."""
+    if section is None:
+        if material is not None:
+            raise InvalidProblem("material: given without section; expected both, or the section")
+        if lattice.dimension == 3:
+            raise InvalidProblem(
+                "positions: positions in space need a section, because the spring model is "
+                f"planar; got shape {lattice.positions.shape}; give a round section"
+            )
+        return
+    if not isinstance(section, Section):
+        raise InvalidProblem(f"section: expected a Section, got {section!r}")
+    if material is not None and not isinstance(material, Elasticity):
+        raise InvalidProblem(f"material: expected an Elasticity, got {material!r}")
+    if lattice.dimension == 3 and section.shape != "round":
+        raise InvalidProblem(
+            f"section.shape: expected 'round' for positions in space, got {section.shape!r}, "
+            "whose orientation is unknown"
+        )
+
+
+def check_slender(lattice: Lattice, section: Section, possible: NDArray[np.bool_]) -> None:
+    """Check that no beam that may be present, `possible` (M,), is shorter than wide."""
+    lengths = np.where(possible, lattice.rest_length, np.inf)
+    shortest = int(lengths.argmin())
+    name = "diameter" if section.shape == "round" else "width"
+    if section.width >= lengths[shortest]:
+        raise InvalidProblem(
+            f"section.{name}: beams {section.width:g} wide are not slender where "
+            f"beams[{shortest}] is {lengths[shortest]:g} long; expected a smaller {name}"
+        )
+
+
+def check_coordinates(lattice: Lattice, supports: Supports, inputs: Input, outputs: Output) -> None:
+    """Check that directions and supports have the coordinates of the positions."""
+    dimension = lattice.dimension
+    for name, region in (("input", inputs), ("output", outputs)):
+        if region.direction.shape[1] != dimension:
+            raise InvalidProblem(
+                f"{name}.direction: expected vectors of {dimension} coordinates like the "
+                f"positions, got {region.direction[0].tolist()}"
+            )
+    if dimension == 2 and len(supports.fixed_z):
+        raise InvalidProblem(
+            f"supports.fixed_z: expected no nodes in the plane, got {supports.fixed_z[0]}"
+        )
+
+
+def check_regions(lattice: Lattice, supports: Supports, inputs: Input, outputs: Output) -> None:
+    """Check that supports, input and output name existing nodes and do not overlap.
+
+    In space a node may be fixed in two coordinates.
+    """
+    names = [f"supports.{name}" for name in ("fixed", *ROLLERS)]
+    regions = dict(zip(names, [supports.fixed, *supports.rollers(3)], strict=True))
+    regions |= {"input.nodes": inputs.nodes, "output.nodes": outputs.nodes}
+    owner: dict[int, str] = {}
+    for name, nodes in regions.items():
+        check_ids(name, nodes, lattice.node_count, "node")
+        for node in nodes.tolist():
+            if node in owner and not name.startswith("supports."):
+                raise InvalidProblem(
+                    f"{name}: node {node} is also in {owner[node]}; regions must not overlap"
+                )
+            owner[node] = name
+
+
+def check_connection(lattice: Lattice, inputs: Input, outputs: Output) -> None:
+    """Check that a path of beams connects input and output."""
+    # One connected node is sufficient: regions of a jammed packing may contain discs without
+    # contacts.
+    reached = lattice.reachable(inputs.nodes)
+    if not reached[outputs.nodes].any():
+        raise InvalidProblem(
+            f"output.nodes: node {outputs.nodes[0]} and all other output nodes are not "
+            "connected to the input by beams, even in the full lattice"
+        )

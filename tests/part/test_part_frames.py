@@ -1,0 +1,161 @@
+"""Frames that represent parts, and work that is only defined in the plane."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bellcrank.errors import BellcrankError, InvalidProblem, InvalidSettings, UnknownName
+from bellcrank.machines.characterisation import characterise
+from bellcrank.machines.placement import place_parts
+from bellcrank.machines.plan import MachineTable, plan_of
+from bellcrank.model import (
+    Elasticity,
+    Input,
+    Lattice,
+    Output,
+    Problem,
+    Section,
+    Supports,
+    find_problem,
+    problem_to_dict,
+    write_design,
+)
+from bellcrank.part import Material, Part, PartSpec, frame_problem, materials, spring_problem
+from bellcrank.plots import Motion
+from bellcrank.web.task_files import problem_of, read_task
+
+
+def in_space() -> Problem:
+    """A tower of two tetrahedra."""
+    return Problem(
+        name="tower",
+        lattice=Lattice(
+            [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.9, 0.9, 1.0]],
+            [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3], [1, 4], [2, 4], [3, 4]],
+        ),
+        supports=Supports(fixed=[0, 1, 2]),
+        input=Input([3], [0, 0, -1], "displacement", 0.1),
+        output=Output([4], [0, 0, 1]),
+        designable=[8],
+        section=Section.round(0.1),
+    )
+
+
+@pytest.mark.parametrize("name", ["crane", "pliers", "discs"])
+def test_beams_of_a_frame_have_the_stiffness_of_the_springs(name: str) -> None:
+    problem = find_problem(name)
+    frame = frame_problem(problem, PartSpec(width=1.6, thickness=4.0, scale=8.0, material="pla"))
+    assert frame.section is not None
+    assert frame.material is not None
+    assert frame.section == Section(0.2, 0.5)
+    assert frame.material.poisson == materials["pla"].poisson
+    mean = float(problem.lattice.rest_length.mean())
+    assert frame.material.young * frame.section.area / mean == pytest.approx(
+        2.0 * problem.stiffness.bond
+    )
+
+
+@given(st.floats(0.1, 0.9), st.floats(0.1, 3.0), st.floats(2.0, 50.0))
+def test_forces_of_a_problem_are_the_same_newtons_for_springs_and_frames(
+    width: float, thickness: float, scale: float
+) -> None:
+    crane = find_problem("crane")
+    spec = PartSpec(width=width * scale, thickness=thickness * scale, scale=scale)
+    part = spec.of(crane.full_design())
+    expected = part.material.young * part.section.area / scale / (2.0 * crane.stiffness.bond)
+    assert part.stiffness_unit == pytest.approx(expected)
+    frame = frame_problem(crane, spec)
+    assert spec.of(frame.full_design()).stiffness_unit == pytest.approx(expected)
+    assert frame.section is not None
+    assert frame.section.scaled(scale).area == pytest.approx(part.section.area)
+
+
+def test_forces_of_a_frame_problem_are_relative_to_its_own_material() -> None:
+    spec = PartSpec()
+    frame = frame_problem(find_problem("crane"), spec)
+    assert frame.material is not None
+    stiff = replace(frame, material=Elasticity(2.0 * frame.material.young, 0.48))
+    unit = spec.of(frame.full_design()).stiffness_unit
+    assert spec.of(stiff.full_design()).stiffness_unit == pytest.approx(unit / 2.0)
+
+
+def test_springs_come_back_from_a_frame() -> None:
+    for name in ("crane", "pliers"):
+        problem = find_problem(name)
+        assert spring_problem(frame_problem(problem, PartSpec())).hash == problem.hash
+        assert spring_problem(problem).hash == problem.hash
+
+
+def test_a_frame_is_made_anew_from_a_frame() -> None:
+    crane = find_problem("crane")
+    thin = frame_problem(crane, PartSpec(width=1.0))
+    assert frame_problem(thin, PartSpec(width=2.0)).hash == (
+        frame_problem(crane, PartSpec(width=2.0)).hash
+    )
+
+
+def test_struts_of_a_frame_in_space_are_round() -> None:
+    tower = frame_problem(in_space(), PartSpec(width=2.0, thickness=5.0))
+    assert tower.section == Section.round(0.2)
+    assert tower.material is not None
+    assert tower.material.poisson == 0.48
+
+
+def test_a_frame_uses_a_material_that_is_not_registered() -> None:
+    rubber = Material(name="rubber", young=12.0, poisson=0.4)
+    frame = frame_problem(find_problem("crane"), PartSpec(material=rubber))
+    assert frame.material is not None
+    assert frame.material.poisson == 0.4
+
+
+@pytest.mark.parametrize(
+    ("spec", "error", "message"),
+    [
+        (PartSpec(width=12.0), InvalidSettings, r"width: struts 12 mm wide are not slender"),
+        (PartSpec(width=-1.0), InvalidProblem, r"section.width: expected a number greater than 0"),
+        (PartSpec(width=float("nan")), InvalidProblem, r"section.width: expected a finite number"),
+        (PartSpec(thickness=0.0), InvalidProblem, r"section.thickness: expected a number greater"),
+        (PartSpec(material="jelly"), UnknownName, r"unknown material 'jelly'"),
+    ],
+)
+def test_parts_that_cannot_be_frames_are_refused(
+    spec: PartSpec, error: type[BellcrankError], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        frame_problem(find_problem("crane"), spec)
+
+
+def test_a_part_in_the_plane_has_no_round_struts() -> None:
+    crane = find_problem("crane").full_design()
+    with pytest.raises(InvalidSettings, match=r"^section: expected a rectangle .* got 'round'"):
+        Part(crane, materials["ninjaflex"], Section.round(2.0))
+
+
+def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses(tmp_path) -> None:
+    design = in_space().full_design()
+    message = "problem 'tower' is in space; only problems in the plane are accepted here"
+    data = problem_to_dict(design.problem)
+    write_design(design, tmp_path / "tower.json")
+    table = {
+        "name": "towers",
+        "parts": {"a": {"entry": "tower", "at": [0.0, 0.0]}},
+        "input": {"ports": ["a.input"]},
+        "output": {"ports": ["a.output"]},
+    }
+    plan = plan_of(MachineTable.model_validate(table), "towers.toml")
+    for work in (
+        lambda: spring_problem(design.problem),
+        lambda: PartSpec().of(design),
+        lambda: Motion(design, np.zeros((5, 3))),
+        lambda: characterise(design),
+        lambda: place_parts(plan, lambda _: design),
+        lambda: problem_of(data),
+        lambda: read_task((tmp_path / "tower.json").read_text(), ".json"),
+    ):
+        with pytest.raises(BellcrankError, match=message):
+            work()
