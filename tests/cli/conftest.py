@@ -60,11 +60,10 @@ def copy(whole: Path, tmp_path: Path) -> Path:
     return shutil.copytree(whole, tmp_path / "copy")
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty current folder."""
-    place = tmp_path / "here"
-    place.mkdir()
+@pytest.fixture(autouse=True)
+def here(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty current folder, in which no other test writes."""
+    place = tmp_path_factory.mktemp("here")
     monkeypatch.chdir(place)
     return place
 

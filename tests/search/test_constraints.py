@@ -18,7 +18,6 @@ from bellcrank.mechanics import (
     predict_output_stiffness,
 )
 from bellcrank.model import Input, Lattice, Output, Problem, Supports, find_problem
-from bellcrank.model.geometry import segment_distances
 from bellcrank.search.constraints import (
     ConstrainedEvaluator,
     DeformedDesign,
@@ -313,16 +312,32 @@ def test_strain_is_that_of_the_most_stretched_beam() -> None:
 def sampled_distance(first: np.ndarray, second: np.ndarray, count: int = 400) -> float:
     part = np.linspace(0.0, 1.0, count)[:, None]
     a, b = (s[0] + part * (s[1] - s[0]) for s in (first, second))
-    return float(np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1)).min())
+    return float(np.linalg.norm(a[:, None] - b[None], axis=2).min())
 
 
-def test_distances_of_segments_match_points_sampled_along_them() -> None:
+def distance_of(first: np.ndarray, second: np.ndarray) -> float:
+    """Return the distance of two segments (2, d), by the search for near struts."""
+    _, (distance,) = near_pairs(np.vstack([first, second]), np.array([[0, 1], [2, 3]]), 1e9)
+    return float(distance)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_distances_of_segments_match_points_sampled_along_them(dimension: int) -> None:
     rng = np.random.default_rng(2)
-    first, second = rng.random((2, 300, 2, 2))
-    distance = segment_distances(first, second)
-    assert (distance == 0.0).sum() > 30
+    first, second = rng.random((2, 300, 2, dimension))
+    distance = np.array([distance_of(a, b) for a, b in zip(first, second, strict=True)])
+    assert ((distance == 0.0).sum() > 30) == (dimension == 2)
     for a, b, d in zip(first, second, distance, strict=True):
-        assert sampled_distance(a, b) == pytest.approx(d, abs=5e-3)
+        assert sampled_distance(a, b) == pytest.approx(d, abs=1e-2)
+
+
+def test_distances_of_parallel_and_touching_segments() -> None:
+    bar = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    assert distance_of(bar, bar + np.array([0.5, 0.3, 0.4])) == pytest.approx(0.5)
+    assert distance_of(bar, bar[::-1] + np.array([5.0, 0.0, 4.0])) == pytest.approx(5.0)
+    assert distance_of(bar, np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]])) == 0.0
+    assert distance_of(bar, np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])) == 0.0
+    assert distance_of(bar, np.array([[3.0, 0.0, 1.0], [3.0, 0.0, -1.0]])) == pytest.approx(1.0)
 
 
 SLOW = pytest.mark.slow
@@ -341,13 +356,13 @@ def test_near_struts_are_those_that_a_search_over_all_pairs_finds(width: float) 
     for i in range(len(beams)):
         for j in range(i):
             if not set(beams[i].tolist()) & set(beams[j].tolist()):
-                distance = segment_distances(ends[i : i + 1], ends[j : j + 1])[0]
+                distance = distance_of(ends[i], ends[j])
                 if distance < width or distance == 0.0:
                     expected[frozenset((i, j))] = distance
     pairs, distance = near_pairs(position, beams, width)
     found = {frozenset(p): d for p, d in zip(pairs.tolist(), distance, strict=True)}
     assert len(expected) > 10
-    assert found == expected
+    assert found == pytest.approx(expected)
 
 
 def test_contact_counts_crossings_and_what_is_missing_of_the_width() -> None:

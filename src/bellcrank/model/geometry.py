@@ -65,32 +65,3 @@ def inner_distances(
     between = np.linalg.norm(one[:, None] * along - apart - two[:, None] * other, axis=1)
     between[between < 1e-12 * np.sqrt(aa + bb)] = 0.0
     return np.where(inside, between, np.inf), np.clip(one, 0.0, 1.0)
-
-
-def segment_distances(
-    first: NDArray[np.float64], second: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return (n,) the distances of pairs of segments, zero where they cross.
-
-    Parameters
-    ----------
-    first, second : (n, 2, d)
-        End points of the segments.
-
-    Examples
-    --------
-    >>> bar = np.array([[[0.0, 0.0], [2.0, 0.0]]])
-    >>> segment_distances(bar, bar + [0.0, 0.5]), segment_distances(bar, bar[:, :, ::-1] + [1, -1])
-    (array([0.5]), array([0.]))
-    """
-    a, b, c, d = first[:, 0], first[:, 1], second[:, 0], second[:, 1]
-    distance: NDArray[np.float64] = np.minimum.reduce(
-        [
-            distances_to_segments(a, c, d),
-            distances_to_segments(b, c, d),
-            distances_to_segments(c, a, b),
-            distances_to_segments(d, a, b),
-            inner_distances(first, second)[0],
-        ]
-    )
-    return distance

@@ -227,8 +227,8 @@ def _build(table: ProblemTable) -> Problem:
         designable=table.designable,  # type: ignore[arg-type]  # checked there
         aggregate=table.aggregate,
         objective=table.objective,
-        section=_section(table.section),
-        material=Elasticity(**table.material.model_dump()) if table.material else None,
+        section=section_of(table.section),
+        material=elasticity_of(table.material),
     )
     return _freeze(problem, table)
 
@@ -313,7 +313,19 @@ SECTION_KEYS: dict[Shape, tuple[str, ...]] = {
 """Lengths of each shape."""
 
 
-def _section(table: SectionTable | None) -> Section | None:
+def elasticity_of(table: ElasticityTable | None) -> Elasticity | None:
+    """Return the elastic constants that ``[material]`` describes."""
+    return None if table is None else Elasticity(**table.model_dump())
+
+
+def section_of(table: SectionTable | None) -> Section | None:
+    """Return the cross-section that ``[section]`` describes.
+
+    Raises
+    ------
+    InvalidFile
+        If a length is missing, or is not one of its shape.
+    """
     if table is None:
         return None
     known = SECTION_KEYS[table.shape]

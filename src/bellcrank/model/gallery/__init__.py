@@ -7,9 +7,12 @@ bundled problem::
      "origin": "how it works or was found, in a few sentences", "mask": "ffe0..."}
 
 The file refers to the problem by name, so that the mask uses the beam numbers of the bundled
-problem. A design for a part has the size of the part and the stiffness of its springs as well::
+problem. A design found for a part has its cross-section and material, as in files of problems, and
+its size in mm::
 
-     "stiffness": {"bond": 5.0, "angle": 0.018}, "part": {"width": 2.0}
+     "section": {"shape": "rectangle", "width": 0.2, "thickness": 0.5},
+     "material": {"young": 100.0, "poisson": 0.48},
+     "part": {"width": 2.0, "thickness": 5.0, "scale": 10.0, "material": "ninjaflex"}
 """
 
 from __future__ import annotations
@@ -22,21 +25,14 @@ from pydantic import Field
 
 from bellcrank.errors import InvalidFile
 from bellcrank.model.builtin import builtin
-from bellcrank.model.conditions import Stiffness
 from bellcrank.model.masks import unpack_mask
 from bellcrank.model.parsing import Table, parse, read_json
 from bellcrank.model.problem import Design, Problem, problem_to_dict
+from bellcrank.model.schema import ElasticityTable, SectionTable, elasticity_of, section_of
 
 FOLDER = Path(__file__).parent
 
 Kind = Literal["human", "machine"]
-
-
-class StiffnessTable(Table):
-    """Stiffness of the springs that model the struts."""
-
-    bond: float
-    angle: float
 
 
 class GalleryTable(Table):
@@ -46,7 +42,8 @@ class GalleryTable(Table):
     problem: str
     origin: str
     mask: str
-    stiffness: StiffnessTable | None = None
+    section: SectionTable | None = None
+    material: ElasticityTable | None = None
     part: dict[str, Any] | None = None
 
 
@@ -82,10 +79,9 @@ def gallery_design(kind: Kind, name: str) -> Design | None:
     table = parse(GalleryTable, read_json(path), path.name)
     if table.problem != name:
         raise InvalidFile(f"{path.name}: problem: expected {name!r}, got {table.problem!r}")
-    problem = builtin[name]()
-    if table.stiffness is not None:
-        stiffness = Stiffness(table.stiffness.bond, table.stiffness.angle)
-        problem = replace(problem, stiffness=stiffness)
+    problem = replace(
+        builtin[name](), section=section_of(table.section), material=elasticity_of(table.material)
+    )
     provenance: dict[str, Any] = {"kind": kind, "origin": table.origin}
     if table.part is not None:
         provenance["part"] = table.part
@@ -107,7 +103,8 @@ def human_design(name: str) -> Design | None:
 def human_counterpart(problem: Problem) -> Design | None:
     """Return the human design for the same lattice, supports, input and output, if there is one.
 
-    The name of the problem does not matter, nor do its stiffness and its initial design.
+    The name of the problem does not matter, nor do its section, its stiffness and its initial
+    design.
 
     Examples
     --------

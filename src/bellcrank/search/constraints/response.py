@@ -12,7 +12,6 @@ from bellcrank.mechanics import (
     StrokeEvaluator,
     predict_output_stiffness,
 )
-from bellcrank.model.geometry import segment_distances
 from bellcrank.search.constraints.constraint import (
     Constraint,
     ConstraintType,
@@ -173,18 +172,18 @@ def near_pairs(
         Indices into `beams`.
     distance : (p,)
     """
-    from scipy.spatial import cKDTree
+    from bellcrank.search.kernels.contact import find_near_pairs
 
-    if len(beams) < 2:
-        return np.empty((0, 2), np.int64), np.empty(0)
     ends = positions[beams]
-    longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
-    pairs = cKDTree(ends.mean(axis=1)).query_pairs(longest + width, output_type="ndarray")
-    one, other = beams[pairs[:, 0]], beams[pairs[:, 1]]
-    pairs = pairs[~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2))]
-    distance = segment_distances(ends[pairs[:, 0]], ends[pairs[:, 1]])
-    near = (distance < width) | (distance == 0.0)
-    return np.asarray(pairs[near], dtype=np.int64), distance[near]
+    left, right = ends.min(axis=1), ends.max(axis=1)
+    order = np.argsort(left[:, 0])
+    count = len(beams)
+    while True:
+        pairs, distance = np.empty((count, 2), np.int64), np.empty(count)
+        found = find_near_pairs(positions, beams, order, left, right, width, pairs, distance)
+        if found <= count:
+            return pairs[:found], distance[:found]
+        count = found
 
 
 for _name, _usage, _parse, _make in (
