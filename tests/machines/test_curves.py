@@ -19,7 +19,7 @@ from bellcrank.machines import (
     trace,
     two_port_at,
 )
-from bellcrank.mechanics import Conditions, SpringEvaluator, Status, follow, strain_of
+from bellcrank.mechanics import Conditions, SpringEvaluator, Status, follow, model_evaluator
 from bellcrank.model import Design
 
 from .test_two_port import actuator
@@ -35,11 +35,11 @@ def test_a_free_curve_is_that_of_the_responses(name: str) -> None:
     assert curve.reached == 1.0
     for number, motion in enumerate(curve.motion[1:], start=1):
         stroke = replace(design.problem, input=replace(design.problem.input, amount=motion))
-        evaluator = SpringEvaluator(stroke)
+        evaluator = model_evaluator(stroke)
         response = evaluator.evaluate(design.mask)
         assert curve.efficiency[number] == pytest.approx(response.efficiency, abs=1e-8)
         assert curve.energy[number] == pytest.approx(response.energy, abs=1e-10)
-        force = strain_of(evaluator).input_force
+        force = evaluator.strain().input_force
         assert curve.input_force[number] == pytest.approx(force, abs=1e-8)
 
 

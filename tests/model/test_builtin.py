@@ -13,6 +13,7 @@ from bellcrank.model import (
     read_problem,
     write_problem,
 )
+from bellcrank.part import PartSpec, frame_problem
 
 # Committed designs rely on this numbering.
 INPUT = [106, 107, 108, 117, 118, 119, 120, 130, 131, 132]
@@ -136,16 +137,15 @@ def test_a_file_is_found_by_its_path(tmp_path):
     assert find_problem(str(path)).hash == builtin["scaling-8"]().hash
 
 
-def test_machine_designs_are_for_struts_that_exist():
+def test_machine_designs_are_frames_of_their_parts():
     found = [gallery_design("machine", name) for name in builtin]
     assert any(found)
     for design in filter(None, found):
         assert design.provenance["kind"] == "machine"
-        part = design.provenance["part"]
-        # Springs of the stiffness of the struts, lambda = 0.55 E I / L; see `docs/validation.md`.
-        stiffness = builtin[design.problem.name]().stiffness.bond * 0.55
-        expected = stiffness * (part["width"] / part["scale"]) ** 2 / 6.0
-        assert design.problem.stiffness.angle == pytest.approx(expected)
+        part = PartSpec(**design.provenance["part"])
+        expected = frame_problem(builtin[design.problem.name](), part)
+        assert design.problem.section == expected.section
+        assert design.problem.material == expected.material
 
 
 def test_human_designs_leave_alone_what_is_not_designable():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.mechanics.frames.kernels.arrays import KNOTS, State
+from bellcrank.mechanics.frames.kernels.arrays import State
 from bellcrank.mechanics.frames.system import allocate_state
 from bellcrank.mechanics.status import Status
 
@@ -94,24 +94,29 @@ def moved_state(state: State, motion: Floats) -> State:
     return moved
 
 
-def stored_states(end: Equilibrium, knots: State) -> list[tuple[float, State]]:
+def stored_states(
+    end: Equilibrium, count: int, loads: Floats, points: State
+) -> list[tuple[float, State]]:
     """Return states of a path with the fractions of the load, in ascending order.
 
     Parameters
     ----------
     end
         The last state of the path.
-    knots
-        States at the quarters of the load, one after the other, and others after them.
+    count
+        Number of states between rest and the end.
+    loads
+        Fractions of the load there.
+    points
+        The states, one after the other, and others after them.
     """
     nodes = len(end.frame.positions)
-    turned = nodes if len(knots.q) else 0
+    turned = nodes if len(points.q) else 0
     found = [(0.0, allocate_state(nodes, len(end.frame.unit)))]
-    for knot in range(KNOTS):
-        load = (knot + 1) / (KNOTS + 1)
+    for index, load in enumerate(loads[:count].tolist()):
         if load < end.fraction:
-            u = knots.u[knot * nodes : (knot + 1) * nodes]
-            found.append((load, State(u, knots.q[knot * turned : (knot + 1) * turned])))
+            u = points.u[index * nodes : (index + 1) * nodes]
+            found.append((load, State(u, points.q[index * turned : (index + 1) * turned])))
     return [*found, (end.fraction, end.state)]
 
 

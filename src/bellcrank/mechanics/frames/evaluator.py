@@ -209,8 +209,8 @@ class FrameEvaluator:
     def equilibrium(self, fraction: float = 1.0) -> Equilibrium | None:
         """Return the equilibrium at a fraction of the load, from the response computed last.
 
-        Newton's method begins between the two stored states next to it: at rest, at the quarters
-        of the load, and at full load.
+        Newton's method begins between the two stored states next to it: those at which the path was
+        followed, the quarters of the load among them.
 
         Returns
         -------
@@ -225,8 +225,9 @@ class FrameEvaluator:
         if fraction >= response.reached:
             return self.end if fraction == response.reached else None
         unchanged = self.memory.path[0] == KEPT_PATH
-        knots = self.reference.knots if unchanged else self.memory.knots
-        return equilibrium_between(self.end, stored_states(self.end, knots), fraction, self._given)
+        path = self.reference if unchanged else self.memory
+        stored = stored_states(self.end, int(path.count[0]), path.load, path.points)
+        return equilibrium_between(self.end, stored, fraction, self._given)
 
     def at_rest(self, mask: ArrayLike) -> Equilibrium | None:
         """Return a design at rest, for linear motions; None for a mechanism.

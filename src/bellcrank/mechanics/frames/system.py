@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidProblem
 from bellcrank.mechanics.frames.kernels.arrays import (
-    KNOTS,
+    POINTS,
     Frame,
     Memory,
     Reference,
@@ -67,13 +67,11 @@ def allocate_reference(frame: Frame) -> Reference:
         present=np.zeros(len(frame.beams), np.uint8),
         active=np.zeros(nodes, np.uint8),
         state=allocate_state(nodes, len(frame.unit)),
-        knots=allocate_state((KNOTS + 1) * nodes, len(frame.unit)),
-        mode=np.zeros((KNOTS + 2, nodes, len(frame.unit))),
-        stiffness=np.zeros(KNOTS + 2),
-        softest_load=np.zeros(1),
-        departure=np.zeros(KNOTS + 1),
-        margin=np.ones(1),
-        has_knots=np.zeros(1, np.uint8),
+        count=np.array([0, 1]),
+        load=np.zeros(POINTS),
+        points=allocate_state(POINTS * nodes, len(frame.unit)),
+        mode=np.zeros((POINTS + 2, nodes, len(frame.unit))),
+        stiffness=np.zeros(POINTS + 2),
     )
 
 
@@ -104,12 +102,11 @@ def allocate_memory(frame: Frame, structure: Structure) -> Memory:
         reached=np.zeros(nodes, np.uint8),
         path=np.zeros(1, np.int64),
         queue=np.zeros(nodes, np.int64),
-        knots=allocate_state((KNOTS + 1) * nodes, size),
-        knot_mode=np.zeros((KNOTS + 2, nodes, size)),
-        knot_stiffness=np.zeros(KNOTS + 2),
-        softest_load=np.zeros(1),
-        knot_tangent=np.zeros((KNOTS + 2, nodes, size)),
-        knot_departure=np.zeros(KNOTS + 1),
+        count=np.array([0, 1]),
+        load=np.zeros(POINTS),
+        points=allocate_state(POINTS * nodes, size),
+        point_mode=np.zeros((POINTS + 2, nodes, size)),
+        point_stiffness=np.zeros(POINTS + 2),
         reached_load=np.ones(2),
         **states,
         **motions,

@@ -81,3 +81,14 @@ def evaluated_design(
     response = evaluator.evaluate(bits)
     evaluator.set_reference()
     return EvaluatedDesign(evaluator, costs[cost], temperature, bits, response)
+
+
+def reached_from(current: EvaluatedDesign, first: EvaluatedDesign) -> EvaluatedDesign:
+    """Return the design at which some steps ended; the first one if it has no response from rest.
+
+    Warm starts may lead to equilibria that the path from rest does not lead to. They would stop a
+    chain, whose next steps begin with a response from rest.
+    """
+    if current is first or current.evaluator.evaluate(current.mask).is_admissible:
+        return current
+    return first

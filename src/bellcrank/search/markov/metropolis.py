@@ -23,7 +23,7 @@ from bellcrank.search.blocks import (
     steps_in_block,
 )
 from bellcrank.search.markov.costs import costs, schedules
-from bellcrank.search.markov.evaluated_design import evaluated_design
+from bellcrank.search.markov.evaluated_design import evaluated_design, reached_from
 from bellcrank.search.markov.moves import moves
 from bellcrank.search.markov.steps import metropolis_step
 from bellcrank.search.registry import Search, searches
@@ -228,8 +228,8 @@ def advance_in_python(
     """
     chosen = [moves[name] for name in settings.moves]
     temperatures = settings.temperatures
-    current = evaluated_design(evaluator, settings.cost, temperatures[0], state.mask)
-    rows = ProposalRows()
+    current = first = evaluated_design(evaluator, settings.cost, temperatures[0], state.mask)
+    begun, rows = state, ProposalRows()
     for _ in range(count):
         current.temperature = float(temperatures[min(state.accepted, len(temperatures) - 1)])
         move = chosen[0] if len(chosen) == 1 else chosen[int(rng.random() * len(chosen))]
@@ -241,8 +241,12 @@ def advance_in_python(
                 accepted=state.accepted + 1,
             )  # fmt: skip
         current = after
-    state = replace(state, step=state.step + count, mask=pack_mask(current.mask))
-    return state, rows.proposals(evaluator.problem)
+    if reached_from(current, first) is not current:
+        unchanged = {name: getattr(begun, name) for name in ("mask", "efficiency", "cost", "best")}
+        state = replace(state, **unchanged)
+    else:
+        state = replace(state, mask=pack_mask(current.mask))
+    return replace(state, step=state.step + count), rows.proposals(evaluator.problem)
 
 
 searches.register("paper")(

@@ -24,7 +24,7 @@ from bellcrank.search.blocks import (
 )
 from bellcrank.search.kernels.acceptance import metropolis_accepts
 from bellcrank.search.markov.costs import costs
-from bellcrank.search.markov.evaluated_design import evaluated_design
+from bellcrank.search.markov.evaluated_design import evaluated_design, reached_from
 from bellcrank.search.markov.moves import moves
 from bellcrank.search.markov.steps import metropolis_step
 from bellcrank.search.registry import Search, searches
@@ -167,7 +167,7 @@ def _take_turn(
     rows: ProposalRows,
 ) -> TemperingState:
     temperature = float(settings.temperatures[replica])
-    current = evaluated_design(evaluator, settings.cost, temperature, state.mask[replica])
+    current = first = evaluated_design(evaluator, settings.cost, temperature, state.mask[replica])
     accepted, best = state.accepted, state.best
     for _ in range(count):
         name = settings.moves[int(rng.random() * len(settings.moves))]
@@ -175,6 +175,7 @@ def _take_turn(
         accepted += after is not current
         best = max(best, after.response.score)
         current = after
+    current = reached_from(current, first)
     return replace(
         state,
         step=state.step + count,

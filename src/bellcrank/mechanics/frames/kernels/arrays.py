@@ -117,11 +117,8 @@ class Structure(Bundle):
     """(2,) nodes in `order`, beams in `beam`."""
 
 
-KNOTS = 3
-"""Number of quarters of the load between rest and full load. The states there are kept of a
-reference, and after them the softest one."""
-SOFTEST, FULL = KNOTS, KNOTS + 1
-"""Index of the softest state on the path, and of that at full load."""
+POINTS = 32
+"""Largest number of states that are kept of a path, between rest and full load."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,21 +130,16 @@ class Reference(Bundle):
     active: Bytes
     """(N,) nodes that the reference moves, dead ends included."""
     state: State
-    knots: State
-    """((KNOTS + 1) N, ...) states at the quarters of the load, one after the other, and the
-    softest."""
+    count: Ints
+    """(2,) number of states of its path that are kept; 1 if there are others, which are not."""
+    load: Floats
+    """(POINTS,) fraction of the load at these states."""
+    points: State
+    """(POINTS N, ...) these states, one after the other."""
     mode: Floats
-    """(KNOTS + 2, N, b) softest motion there, and at full load."""
+    """(POINTS + 2, N, b) softest motion at rest, at these states, and at full load."""
     stiffness: Floats
-    """(KNOTS + 2,) lowest stiffness there, of the last design whose path was followed."""
-    softest_load: Floats
-    """(1,) fraction of the load at the softest state."""
-    departure: Floats
-    """(KNOTS + 1,) departure of that path between them from the mean of their tangents."""
-    margin: Floats
-    """(1,) lowest stiffness along that path, as a part of its values at both ends."""
-    has_knots: Bytes
-    """(1,) 1 if they are known."""
+    """(POINTS + 2,) lowest stiffness there, of the last design whose path was followed."""
 
 
 NO_PATH, OWN_PATH, NEXT_PATH, KEPT_PATH = 0, 1, 2, 3
@@ -190,13 +182,21 @@ class Memory(Bundle):
     reached: Bytes
     """(N,) nodes that are placed."""
     path: Ints
-    """(1,) where the states in `knots` are from."""
+    """(1,) where the states in `points` are from."""
     queue: Ints
     """(N,)"""
     previous: State
     """Equilibrium at the start of the increment, or another one to compare with."""
-    knots: State
-    """((KNOTS + 1) N, ...) as in `Reference`."""
+    count: Ints
+    """(2,) as in `Reference`, of the path followed last."""
+    load: Floats
+    """(POINTS,) as in `Reference`."""
+    points: State
+    """(POINTS N, ...) as in `Reference`."""
+    point_mode: Floats
+    """(POINTS + 2, N, b) softest motion at rest, there, and at full load."""
+    point_stiffness: Floats
+    """(POINTS + 2,) lowest stiffness there."""
     difference: Floats
     """Motion from one state to another."""
     tangent: Floats
@@ -207,16 +207,6 @@ class Memory(Bundle):
     """Tangent one increment before."""
     mode: Floats
     """Softest motion."""
-    knot_mode: Floats
-    """(KNOTS + 2, N, b) softest motion there, and at full load."""
-    knot_stiffness: Floats
-    """(KNOTS + 2,) lowest stiffness there."""
-    softest_load: Floats
-    """(1,) as in `Reference`."""
-    knot_tangent: Floats
-    """(KNOTS + 2, N, b) tangents of the path at rest, there, and at full load."""
-    knot_departure: Floats
-    """(KNOTS + 1,) as in `Reference`."""
     reached_load: Floats
     """(2,) fraction of the load up to which the path was followed last; lowest stiffness along it,
     as a part of its values at both ends."""

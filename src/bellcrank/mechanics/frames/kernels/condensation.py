@@ -152,7 +152,7 @@ def condense(
     add_forces_of_motions(frame, structure, state, softening, motions, forcing, memory)
     if not factorise_stiffness(frame, structure, memory):
         return -1.0
-    lowest = lowest_stiffness(frame, structure, mode, SWEEPS, memory)
+    lowest = lowest_stiffness(frame, structure, mode, 2 * SWEEPS, memory)
     for number in range(len(motions)):
         set_right_side(frame, structure, forcing[number], -1.0, memory)
         solve_step(structure, frame, memory)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from bellcrank.mechanics.frames.kernels.arrays import FULL, KNOTS, SOFTEST, State
+from bellcrank.mechanics.frames.kernels.arrays import POINTS, State
 from bellcrank.mechanics.frames.kernels.assembly import (
     add_tension_at,
     clear_tension,
@@ -24,9 +24,9 @@ from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.state import (
     copy_state,
     difference,
-    knot_state,
     move,
     move_held_nodes,
+    point_state,
     set_to_rest,
 )
 from bellcrank.mechanics.kernels._compile import inlined, kernel
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, Structure
     from bellcrank.mechanics.kernels.arrays import Floats
 
+QUARTERS = 4
+"""Increments end at the multiples of this part of the load, among others."""
 LARGEST_INCREMENT = 0.5
 """Largest increment of the load between two points that count as connected."""
 FINE_INCREMENT = 1.0 / 128.0
@@ -65,7 +67,7 @@ design counts as snapping."""
 PATH_TOLERANCE = 1e-6
 """Displacement error of equilibria between rest and full load."""
 LONGEST_STEP = 0.5
-SWEEPS = 4
+SWEEPS = 2
 """Number of steps of inverse iteration in each estimate of the lowest stiffness."""
 
 
@@ -151,29 +153,6 @@ def is_joined(
     return departure <= LARGEST_DEPARTURE and (followed or increment <= FINE_INCREMENT)
 
 
-@kernel
-def departure_at(
-    frame: Frame, structure: Structure, index: int, state: State, memory: Memory
-) -> float:
-    """Return the departure of the path between two successive quarters of the load.
-
-    `state` is that at full load; the others are in `memory.knots`.
-    """
-    start, end = memory.previous, state
-    set_to_rest(start)
-    if index > 0:
-        u, q = knot_state(frame, memory.knots, index - 1)
-        copy_state(State(u, q), start)
-    if index < KNOTS:
-        u, q = knot_state(frame, memory.knots, index)
-        end = State(u, q)
-    difference(start, end, memory.difference)
-    return departure_of(
-        structure, memory.difference, memory.knot_tangent[index], memory.knot_tangent[index + 1],
-        1.0 / (KNOTS + 1.0),
-    )  # fmt: skip
-
-
 @inlined
 def next_increment(
     increment: float, departure: float, before: float, after: float, softening: float
@@ -249,13 +228,32 @@ def correct(
 
 
 @kernel
-def keep_knot(frame: Frame, knot: int, stiffness: float, state: State, memory: Memory) -> None:
-    """Store a state of the path, its lowest stiffness, and the softest motion."""
-    memory.knot_stiffness[knot] = stiffness
-    copy(memory.mode, memory.knot_mode[knot])
-    if knot != FULL:
-        u, q = knot_state(frame, memory.knots, knot)
-        copy_state(state, State(u, q))
+def keep_point(frame: Frame, load: float, stiffness: float, state: State, memory: Memory) -> None:
+    """Store a state of the path, its lowest stiffness, and the softest motion.
+
+    Every second state gives way when there are too many.
+    """
+    if memory.count[0] == POINTS:
+        for index in range(POINTS // 2):
+            memory.load[index] = memory.load[2 * index + 1]
+            u, q = point_state(frame, memory.points, 2 * index + 1)
+            v, r = point_state(frame, memory.points, index)
+            copy_state(State(u, q), State(v, r))
+        memory.count[0] = POINTS // 2
+        memory.count[1] = 1
+    index = memory.count[0]
+    memory.load[index] = load
+    u, q = point_state(frame, memory.points, index)
+    copy_state(state, State(u, q))
+    memory.count[0] += 1
+    keep_mode(memory.count[0], stiffness, memory)
+
+
+@kernel
+def keep_mode(index: int, stiffness: float, memory: Memory) -> None:
+    """Store the lowest stiffness and the softest motion of a state."""
+    memory.point_stiffness[index] = stiffness
+    copy(memory.mode, memory.point_mode[index])
 
 
 @kernel
@@ -281,17 +279,18 @@ def follow_path(
             mode[node, axis] = math.cos(1.0 + 3.0 * node + axis)
     if not stiffness_is_definite(frame, structure, 0.0, state, memory):
         return UNCONVERGED
-    at_rest = softest = stiffness = lowest_stiffness(frame, structure, mode, 2 * SWEEPS, memory)
+    at_rest = softest = stiffness = lowest_stiffness(frame, structure, mode, 4 * SWEEPS, memory)
     find_tangent(frame, structure, state, memory.tangent, memory)
     copy(memory.tangent, memory.last_tangent)
-    copy(memory.tangent, memory.knot_tangent[0])
+    memory.count[0] = memory.count[1] = 0
+    keep_mode(0, stiffness, memory)
     fraction = 0.0
-    knot = 0
+    quarter = 1
     increment = last_increment = min(LARGEST_INCREMENT, largest)
     smallest = SMALLEST_INCREMENT * (0.25 if largest <= FINE_VERIFICATION else 1.0)
     while fraction < 1.0 and increment >= smallest:
         # Equal increments lead to the next quarter of the load.
-        target = (knot + 1) / (KNOTS + 1.0)
+        target = quarter / QUARTERS
         parts = math.ceil((target - fraction) / increment - REMAINDER)
         end = target if parts <= 1 else fraction + (target - fraction) / parts
         increment = end - fraction
@@ -305,20 +304,17 @@ def follow_path(
             fraction, stiffness, last_increment = end, now, increment
             copy(memory.tangent, memory.last_tangent)
             copy(memory.next_tangent, memory.tangent)
-            if now < softest:
-                softest = now
-                memory.softest_load[0] = end
-                keep_knot(frame, SOFTEST, now, state, memory)
+            softest = min(softest, now)
             if end == target:
-                copy(memory.tangent, memory.knot_tangent[knot + 1])
-                keep_knot(frame, knot if knot < KNOTS else FULL, now, state, memory)
-                knot += 1
+                quarter += 1
+            if end < 1.0:
+                keep_point(frame, end, now, state, memory)
+            else:
+                keep_mode(memory.count[0] + 1, now, memory)
             increment = min(following, LARGEST_INCREMENT, largest)
         else:
             copy_state(previous, state)
             increment = following
-    for index in range(KNOTS + 1):
-        memory.knot_departure[index] = departure_at(frame, structure, index, state, memory)
     memory.reached_load[0] = fraction
     memory.reached_load[1] = softest / min(at_rest, stiffness)
     if fraction == 1.0 and memory.reached_load[1] > DIP:

@@ -1,16 +1,16 @@
 """Whether the path of a design is next to that of a reference design, without following it.
 
-An equilibrium found from that of a similar design counts if equilibria at the quarters of the load,
-and at the softest state, lie next to those of that design, whose path was followed. Otherwise the
-path is followed from rest: an equilibrium on another branch would pass on to all designs that
-follow.
+An equilibrium found from that of a similar design counts if equilibria lie next to those at which
+the path of that design was followed. Otherwise the path is followed from rest: an equilibrium on
+another branch would pass on to all designs that follow.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-from bellcrank.mechanics.frames.kernels.arrays import FULL, KNOTS, SOFTEST, State
+from bellcrank.mechanics.frames.kernels.arrays import State
 from bellcrank.mechanics.frames.kernels.assembly import (
     add_tension_at,
     clear_tension,
@@ -18,19 +18,18 @@ from bellcrank.mechanics.frames.kernels.assembly import (
 )
 from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.path import (
-    DIP,
     FEW_SWEEPS,
-    LARGEST_DEPARTURE,
+    FINE_INCREMENT,
     LONGEST_STEP,
-    departure_at,
+    departure_of,
     find_tangent,
     lowest_stiffness,
 )
 from bellcrank.mechanics.frames.kernels.state import (
     copy_state,
     difference,
-    knot_state,
     move_held_nodes,
+    point_state,
     set_to_rest,
 )
 from bellcrank.mechanics.frames.kernels.structure import place_followers
@@ -50,21 +49,17 @@ RELATIVE_JUMP = 0.15
 LEAST_KEPT = 0.5
 """Least lowest stiffness of such a design, as a part of that of the last design whose path was
 followed."""
-LEAST_MARGIN = 0.35
-"""Lowest stiffness along the path of a reference, as a part of its values at both ends, below which
-the paths of designs next to it are followed."""
-CLEAR_MARGIN = 0.95
-"""The same above which the softest state is not checked."""
-DEPARTURE_GROWTH = 1.25
-"""Largest departure between two quarters of the load, as a multiple of that along the path that was
-followed, where this is more than `LARGEST_DEPARTURE`."""
-UNCLEAR_DEPARTURE = 0.6
-"""Departure above which a jump between two quarters would not be noticed."""
-KNOT_TOLERANCE = 1e-4
+CLEAR_DIP = 0.25
+"""Lowest stiffness along its path, as a part of its values at both ends, below which that path is
+followed."""
+CLEAR_KINK = 0.2
+"""The same between its states, where it is estimated."""
+DEPARTURE = 0.3
+"""Largest departure between two successive states; along a path that is followed it is less."""
+SOFTENING = 0.4
+"""Least ratio of the lowest stiffness of two successive states, in either direction."""
+POINT_TOLERANCE = 1e-4
 """Displacement error of the states compared."""
-CLEAR_DIP = 1.25
-"""Lowest stiffness next to the softest state of a reference, as a multiple of that at which a
-design counts as snapping, below which its path is followed."""
 
 
 @kernel
@@ -78,70 +73,131 @@ def follows_reference(  # noqa: PLR0911 - one test after the other
 ) -> bool:
     """Whether an equilibrium at full load is on a stable path next to that of the reference.
 
-    The path of the reference was followed from rest, and its states at the quarters of the load and
-    its softest state are known. True if the design has equilibria near all of them, is not much
-    softer there than a design whose path was followed, and its motion between them follows from the
-    tangents. The current factor must be that of `state`. The states found are left in
-    `memory.knots`.
+    The path of the reference, or of a design before it, was followed from rest. True if the design
+    has equilibria near all its states, is not much softer there, and moves and softens between
+    them as a path may. The current factor must be that of `state`. The states found are left in
+    `memory.points`.
     """
-    if not reference.has_knots[0] or reference.margin[0] < LEAST_MARGIN:
+    if reference.count[1]:
         return False
-    if not is_near(frame, structure, reference, FULL, reference.state, state, memory):
+    last = reference.count[0] + 1
+    memory.count[0], memory.count[1] = reference.count[0], 0
+    if not is_near(frame, structure, reference, last, reference.state, state, memory):
         return False
-    find_tangent(frame, structure, state, memory.knot_tangent[KNOTS + 1], memory)
-    for index in range(KNOTS):
-        fraction = (index + 1) / (KNOTS + 1.0)
-        if not follow_knot(frame, mask, structure, reference, index, fraction, memory):
-            return False
-        u, q = knot_state(frame, memory.knots, index)
-        find_tangent(frame, structure, State(u, q), memory.knot_tangent[index + 1], memory)
-    memory.softest_load[0] = reference.softest_load[0]
-    if reference.margin[0] < CLEAR_MARGIN and not follow_knot(
-        frame, mask, structure, reference, SOFTEST, reference.softest_load[0], memory
-    ):
-        return False
+    find_tangent(frame, structure, state, memory.last_tangent, memory)
     rest = memory.previous
     set_to_rest(rest)
     if not stiffness_is_definite(frame, structure, 0.0, rest, memory):
         return False
-    find_tangent(frame, structure, rest, memory.knot_tangent[0], memory)
-    for index in range(KNOTS + 1):
-        allowed = max(LARGEST_DEPARTURE, DEPARTURE_GROWTH * reference.departure[index])
-        found = departure_at(frame, structure, index, state, memory)
-        if allowed > UNCLEAR_DEPARTURE or found > allowed:
+    find_softest(frame, structure, reference, 0, memory)
+    find_tangent(frame, structure, rest, memory.tangent, memory)
+    least = CLEAR_DIP * min(memory.point_stiffness[0], memory.point_stiffness[last])
+    before = 0.0
+    for index in range(1, last + 1):
+        load = 1.0
+        if index < last:
+            load = memory.load[index - 1] = reference.load[index - 1]
+            if not follow_point(frame, mask, structure, reference, index, load, memory):
+                return False
+        if memory.point_stiffness[index] < least:
             return False
-    return True
+        if not is_next(frame, structure, index, load - before, state, memory):
+            return False
+        copy(memory.next_tangent, memory.tangent)
+        before = load
+    return lowest_between(memory) > CLEAR_KINK / CLEAR_DIP * least
 
 
 @kernel
-def follow_knot(
+def lowest_between(memory: Memory) -> float:
+    """Estimate the lowest stiffness between the states in `memory.points`.
+
+    In each interval, the straight lines through the two states before and the two after it are
+    extrapolated to where they meet. At rest and at full load, both are equally steep.
+    """
+    value, load, last = memory.point_stiffness, memory.load, memory.count[0]
+    lowest = math.inf
+    for index in range(last + 1):
+        left = load[index - 1] if index > 0 else 0.0
+        right = load[index] if index < last else 1.0
+        falling, rising = -math.inf, math.inf
+        if index > 0:
+            falling = (value[index] - value[index - 1]) / (
+                left - (load[index - 2] if index > 1 else 0.0)
+            )
+        if index < last:
+            rising = (value[index + 2] - value[index + 1]) / (
+                (load[index + 1] if index + 1 < last else 1.0) - right
+            )
+        if index == 0:
+            falling = -rising
+        if index == last:
+            rising = -falling
+        if falling < 0.0 < rising < math.inf:
+            gap = value[index + 1] - rising * (right - left) - value[index]
+            part = min(right - left, max(0.0, gap / (falling - rising)))
+            lowest = min(lowest, value[index] + falling * part)
+    return lowest
+
+
+@kernel
+def is_next(
+    frame: Frame, structure: Structure, index: int, increment: float, state: State, memory: Memory
+) -> bool:
+    """Whether a state follows from the one before; computes its tangent in `memory.next_tangent`.
+
+    `state` is that at full load. The current factor must be that of the state otherwise.
+    """
+    start = memory.previous
+    set_to_rest(start)
+    if index > 1:
+        u, q = point_state(frame, memory.points, index - 2)
+        copy_state(State(u, q), start)
+    if index > memory.count[0]:
+        difference(start, state, memory.difference)
+        copy(memory.last_tangent, memory.next_tangent)
+    else:
+        u, q = point_state(frame, memory.points, index - 1)
+        here = State(u, q)
+        difference(start, here, memory.difference)
+        find_tangent(frame, structure, here, memory.next_tangent, memory)
+    departure = departure_of(
+        structure, memory.difference, memory.tangent, memory.next_tangent, increment
+    )
+    before, after = memory.point_stiffness[index - 1], memory.point_stiffness[index]
+    followed = after > SOFTENING * before and before > SOFTENING * after
+    return departure <= DEPARTURE and (followed or increment <= FINE_INCREMENT)
+
+
+@kernel
+def follow_point(
     frame: Frame,
     mask: Bytes,
     structure: Structure,
     reference: Reference,
-    knot: int,
-    fraction: float,
+    index: int,
+    load: float,
     memory: Memory,
 ) -> bool:
-    """Find the equilibrium next to a state of the reference; whether there is one.
+    """Find the equilibrium next to a state of the path of the reference; whether there is one.
 
-    It is left in `memory.knots`, and its factor is the current one.
+    It is left in `memory.points`, and its factor is the current one.
     """
-    u, q = knot_state(frame, reference.knots, knot)
-    v, r = knot_state(frame, memory.knots, knot)
+    u, q = point_state(frame, reference.points, index - 1)
+    v, r = point_state(frame, memory.points, index - 1)
     before, here = State(u, q), State(v, r)
     copy_state(before, here)
     place_new_nodes(frame, mask, structure, reference, here, memory)
-    move_held_nodes(frame, fraction, here)
+    move_held_nodes(frame, load, here)
     clear_tension(memory)
     add_tension_at(frame, structure, before, 1.0, memory)
     for beam in range(len(memory.tension)):
         if not reference.present[beam]:
             memory.tension[beam] = 0.0
-    status = newton(frame, structure, fraction, here, memory, KNOT_TOLERANCE, LONGEST_STEP)
+    status = newton(frame, structure, load, here, memory, POINT_TOLERANCE, LONGEST_STEP)
     if status != CONVERGED:
         return False
-    return is_near(frame, structure, reference, knot, before, here, memory)
+    return is_near(frame, structure, reference, index, before, here, memory)
 
 
 @kernel
@@ -149,7 +205,7 @@ def is_near(
     frame: Frame,
     structure: Structure,
     reference: Reference,
-    knot: int,
+    index: int,
     before: State,
     here: State,
     memory: Memory,
@@ -161,12 +217,19 @@ def is_near(
     difference(memory.previous, here, memory.difference)
     if jump > max(JUMP, RELATIVE_JUMP * largest_motion(structure, reference, memory.difference)):
         return False
-    copy(reference.mode[knot], memory.knot_mode[knot])
-    lowest = lowest_stiffness(frame, structure, memory.knot_mode[knot], FEW_SWEEPS, memory)
-    least = (
-        LEAST_KEPT if knot != SOFTEST else max(LEAST_KEPT, CLEAR_DIP * DIP / reference.margin[0])
-    )
-    return lowest > least * reference.stiffness[knot]
+    lowest = find_softest(frame, structure, reference, index, memory)
+    return lowest > LEAST_KEPT * reference.stiffness[index]
+
+
+@kernel
+def find_softest(
+    frame: Frame, structure: Structure, reference: Reference, index: int, memory: Memory
+) -> float:
+    """Store the softest motion of a state, whose factor is current; return its stiffness."""
+    copy(reference.mode[index], memory.point_mode[index])
+    lowest = lowest_stiffness(frame, structure, memory.point_mode[index], FEW_SWEEPS, memory)
+    memory.point_stiffness[index] = lowest
+    return lowest
 
 
 @kernel

@@ -42,12 +42,12 @@ def copy_state(source: State, target: State) -> None:
 
 
 @kernel
-def knot_state(frame: Frame, knots: State, index: int) -> tuple[Floats, Floats]:
+def point_state(frame: Frame, points: State, index: int) -> tuple[Floats, Floats]:
     """Return the arrays of one of several states that lie one after the other."""
-    nodes, turned = len(frame.positions), len(knots.q) // (len(knots.u) // len(frame.positions))
+    nodes, turned = len(frame.positions), len(points.q) // (len(points.u) // len(frame.positions))
     return (
-        knots.u[index * nodes : (index + 1) * nodes],
-        knots.q[index * turned : (index + 1) * turned],
+        points.u[index * nodes : (index + 1) * nodes],
+        points.q[index * turned : (index + 1) * turned],
     )
 
 

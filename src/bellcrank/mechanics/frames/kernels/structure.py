@@ -9,17 +9,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from bellcrank.mechanics.frames.kernels.arrays import KEPT_PATH, KNOTS, NO_PATH, OWN_PATH
+from bellcrank.mechanics.frames.kernels.arrays import KEPT_PATH, NO_PATH, OWN_PATH, State
 from bellcrank.mechanics.frames.kernels.beams import dimension
 from bellcrank.mechanics.frames.kernels.factor import couple, entry_of, fill_in
-from bellcrank.mechanics.frames.kernels.state import copy_state, matrix_of
+from bellcrank.mechanics.frames.kernels.state import copy_state, matrix_of, point_state
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import CONVERGED, KEEP, MECHANISM, PRUNE_ALL
 from bellcrank.mechanics.kernels.core import keep_core, other_end
 from bellcrank.mechanics.kernels.fields import clear, copy
 
 if TYPE_CHECKING:
-    from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, Reference, State, Structure
+    from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, Reference, Structure
     from bellcrank.mechanics.kernels.arrays import Bytes, Floats
 
 SMALLEST_PIVOT = 1e-9
@@ -336,18 +336,17 @@ def set_reference(
         reference.active[node] = memory.reached[node]
     if memory.path[0] == KEPT_PATH:
         return
-    reference.has_knots[0] = memory.path[0] != NO_PATH
-    if memory.path[0] == OWN_PATH:
-        reference.margin[0] = memory.reached_load[1]
-    copy_state(memory.knots, reference.knots)
-    reference.softest_load[0] = memory.softest_load[0]
-    for knot in range(KNOTS + 2):
-        copy(memory.knot_mode[knot], reference.mode[knot])
-    if memory.path[0] == OWN_PATH:
-        for knot in range(KNOTS + 2):
-            reference.stiffness[knot] = memory.knot_stiffness[knot]
-        for index in range(KNOTS + 1):
-            reference.departure[index] = memory.knot_departure[index]
+    reference.count[0] = memory.count[0]
+    reference.count[1] = memory.count[1] if memory.path[0] != NO_PATH else 1
+    for index in range(memory.count[0]):
+        reference.load[index] = memory.load[index]
+        u, q = point_state(frame, memory.points, index)
+        v, r = point_state(frame, reference.points, index)
+        copy_state(State(u, q), State(v, r))
+    for index in range(memory.count[0] + 2):
+        copy(memory.point_mode[index], reference.mode[index])
+        if memory.path[0] == OWN_PATH:
+            reference.stiffness[index] = memory.point_stiffness[index]
 
 
 @kernel
