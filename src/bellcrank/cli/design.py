@@ -34,7 +34,7 @@ def design(
     steps: Annotated[
         int | None, typer.Option(help="Number of proposals per chain. [20000]")
     ] = None,
-    chains: Annotated[int | None, typer.Option(help="Number of independent chains. [4]")] = None,
+    chains: Annotated[int | None, typer.Option(help="Number of independent chains. [2]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers. [0]")] = None,
     objective: Annotated[
         str | None,

@@ -52,7 +52,7 @@ class SearchSettings:
     """Whether the search predicts all flips, which needs a dense inverse of the stiffness."""
 
     steps: int = 20_000
-    chains: int = 4
+    chains: int = 2
     seed: int = 0
     objective: str | None = None
     unloaded_beams: UnloadedBeams = "prune_all"

@@ -53,9 +53,9 @@ class _Point:
 class Quantities:
     """Quantities of designs at fractions of the stroke.
 
-    They are computed from the response of an evaluator: the states at the quarters of the load,
-    which it stores, and that at full load. The equilibria of other fractions are found from the
-    two stored states next to them. Blocked forces need a second response, with a held output;
+    They are computed from the response of an evaluator, which stores the states at which the path
+    was followed, the quarters of the load among them. The equilibria of other fractions are found
+    from the two stored states next to them. Blocked forces need a second response, with a held output;
     the sag needs none.
 
     Parameters
