@@ -174,10 +174,10 @@ METHODS = {"paper": "springs of the paper", "frames": "frames"}
 
 
 def run_search(job: tuple[str, str, int]) -> dict[str, object]:
-    """Run one search and analyse its best design as a frame."""
+    """Run one search with default settings and analyse its best design as a frame."""
     name, method, seed = job
     goals = [f"no-contact {WIDTH / 10.0}"]
-    settings = read_settings({"steps": 20_000, "seed": seed, "chains": 1, "goals": goals})
+    settings = read_settings({"seed": seed, "goals": goals})
     part = PartSpec(width=WIDTH) if method == "frames" else None
     with TemporaryDirectory() as temporary:
         folder = start_design(find_problem(name), settings, Path(temporary) / "run", part)

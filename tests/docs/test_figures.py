@@ -108,6 +108,18 @@ def correlation() -> Rows:
             )  # fmt: skip
 
 
+def searched() -> Rows:
+    for name in ("crane", "anti-parallel"):
+        for kind, words in (("paper", "springs of the paper"), ("frames", "frames")):
+            told = read("validation/search")[f"{name}, {kind}"]
+            count = len(told["rows"])
+            yield row(
+                name, words, f"{told['model']:.2f}", f"{told['frame']:.2f}",
+                f"{told['median_deviation']:.1%}".replace("%", " %"),
+                f"{told['touching_as_frames']} of {count}",
+            )  # fmt: skip
+
+
 def bundled() -> Rows:
     for each in read("machines/bundled")["rows"]:
         yield row(
@@ -239,7 +251,7 @@ def independent_simulation() -> Rows:
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (search_comparison, move_comparison),
     "goals": (goals,),
-    "validation": (levels, meshes, correlation),
+    "validation": (levels, meshes, correlation, searched),
     "machines": (bundled, contact, entries, lengths, two_ports),
     "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }

@@ -181,7 +181,8 @@ def write_results(
     """Write the best design of each task to a file, as far as its runs have advanced.
 
     The best proposals of all runs are cleaned and evaluated from rest in small increments; the
-    best one that stays in one stable piece is the result.
+    best one that stays in one stable piece is the result. Those of a frame are verified with
+    several elements in each beam as in `bellcrank design`, their strain excepted.
 
     Parameters
     ----------
@@ -249,13 +250,8 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
     CorruptRun
         If a file that has to be read is damaged.
     """
-    from bellcrank.search import (
-        candidates_of,
-        read_settings,
-        searches,
-        select,
-        verification_evaluator,
-    )
+    from bellcrank.search import candidates_of, read_settings, searches
+    from bellcrank.search.choice import select_design
 
     settings = read_settings(task.settings)
     problem = problem_from_dict(task.problem, f"task {task.name!r}")
@@ -271,9 +267,7 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
     chosen = heapq.nlargest(PER_TASK, candidates, key=lambda candidate: candidate.efficiency)
     if not chosen:
         raise InvalidSettings(f"task {task.name!r}: no accepted design is stored yet")
-    selection = select(
-        problem, chosen, settings.objective, verification_evaluator(problem, settings)
-    )
+    selection = select_design(problem, chosen, settings)
     found = selection.found
     origin = provenance(
         kind="machine",

@@ -55,8 +55,8 @@ class Quantities:
 
     They are computed from the response of an evaluator, which stores the states at which the path
     was followed, the quarters of the load among them. The equilibria of other fractions are found
-    from the two stored states next to them. Blocked forces need a second response, with a held output;
-    the sag needs none.
+    from the two stored states next to them. Blocked forces need a second response, with a held
+    output; the sag needs none.
 
     Parameters
     ----------

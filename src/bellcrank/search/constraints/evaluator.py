@@ -108,6 +108,9 @@ class ConstrainedEvaluator:
         self._constraints: list[tuple[str, list[Constraint]]] = sorted(
             made, key=lambda pair: pair[1][0].evaluation_cost
         )
+        self._limits_structure = any(
+            each.structure_violation is not None for _, made in self._constraints for each in made
+        )
         axes = [goal.value for goal in parsed if goal.name == "mirror"]
         self._members = original.designable
         self._orbits = mirror_orbits(original, axes) if axes else original.designable
@@ -163,11 +166,10 @@ class ConstrainedEvaluator:
             With a warm start, a design of no higher score has the status UNVERIFIED.
         """
         design = self.expand(mask)
-        core = self._core(design)
-        violation = self._structure_violation(design, core)
+        violation = self._structure_violation(design)
         if not warm_start:
             return self._evaluate_cases(
-                design, core, violation,
+                design, violation,
                 lambda evaluator: evaluator.evaluate(design, largest_increment),
                 verified=largest_increment <= VERIFICATION_INCREMENT,
             )  # fmt: skip
@@ -177,7 +179,7 @@ class ConstrainedEvaluator:
         single = len(self.cases) == 1 and self.cases[0].target is None
         bound = lower_bound + penalty_of(violation) if single else -math.inf
         return self._evaluate_cases(
-            design, core, violation,
+            design, violation,
             lambda evaluator: evaluator.evaluate(design, warm_start=True, lower_bound=bound),
             self._reference_violation,
             lower_bound,
@@ -217,7 +219,7 @@ class ConstrainedEvaluator:
         design = self.expand(mask)
         core = self._core(design)
         responses = [e.evaluate(design, VERIFICATION_INCREMENT) for e in self.evaluators]
-        deformed = self._deformed_by(design, core, responses, verified=True)
+        deformed = self._deformed_by(design, responses, verified=True)
         return [
             text
             for text, made in self._constraints
@@ -231,17 +233,21 @@ class ConstrainedEvaluator:
             core |= other(design)
         return core
 
-    def _structure_violation(self, design: NDArray[np.bool_], core: NDArray[np.bool_]) -> float:
+    def _structure_violation(self, design: NDArray[np.bool_]) -> float:
+        """Return the violation that follows from the beams alone."""
+        if not self._limits_structure:
+            return 0.0
+        core = self._core(design)
         return sum(_structure_violation(made, design, core) for _, made in self._constraints)
 
     def _deformed_by(
         self,
         design: NDArray[np.bool_],
-        core: NDArray[np.bool_],
         responses: list[Response],
         *,
         verified: bool,
     ) -> list[DeformedDesign]:
+        core = self._core(design)
         return [
             DeformedDesign(evaluator, design, core, response, verified)
             for evaluator, response in zip(self.evaluators, responses, strict=True)
@@ -250,7 +256,6 @@ class ConstrainedEvaluator:
     def _evaluate_cases(
         self,
         design: NDArray[np.bool_],
-        core: NDArray[np.bool_],
         violation: float,
         respond: Callable[[ModelEvaluator], Response],
         largest_violation: float = math.inf,
@@ -273,7 +278,7 @@ class ConstrainedEvaluator:
             )
         )
         response = replace(responses[0], efficiency=efficiency)
-        deformed = self._deformed_by(design, core, responses, verified=verified)
+        deformed = self._deformed_by(design, responses, verified=verified)
         self._deformed = deformed
         for _, made in self._constraints:
             if efficiency - penalty_of(violation) <= lower_bound:

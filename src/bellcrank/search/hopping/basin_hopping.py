@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from bellcrank.search.evaluator import Evaluator
     from bellcrank.storage import Proposals
 
+SPRING_FAILURES, FRAME_FAILURES = 12, 24
+"""Consecutive failed flips that end a local search, by default."""
 PROGRESS = 1e-3
 """Relative gain of efficiency that counts as progress."""
 
@@ -58,7 +60,8 @@ class HoppingSettings(SearchSettings):
         Least value of the probability, drawn anew for each perturbation, with which a beam in the
         disc is present.
     max_failures
-        Consecutive failed flips that end a local search.
+        Consecutive failed flips that end a local search; by default 12 in the spring model and 24
+        for frames, whose predictions are less accurate.
     max_predicted_loss
         Largest predicted loss, as a fraction of the efficiency, with which a flip is evaluated.
     phase_steps
@@ -82,7 +85,7 @@ class HoppingSettings(SearchSettings):
 
     radius: float = 2.5
     min_density: float = 0.95
-    max_failures: int = 12
+    max_failures: int | None = None
     max_predicted_loss: float = 0.01
     phase_steps: int = 1000
     temperature_factor: float = 0.01
@@ -92,7 +95,8 @@ class HoppingSettings(SearchSettings):
 
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
-        check_whole("max_failures", self.max_failures, 1)
+        if self.max_failures is not None:
+            check_whole("max_failures", self.max_failures, 1)
         for name in ("phase_steps", "min_stall"):
             check_whole(name, getattr(self, name), 0)
         for name in ("radius", "temperature_factor", "phase_share"):
@@ -223,6 +227,12 @@ class BasinHopping:
     local: LocalSearch | None = None
     rows: ProposalRows = field(default_factory=ProposalRows)
 
+    @property
+    def max_failures(self) -> int:
+        """Consecutive failed flips that end a local search."""
+        by_default = SPRING_FAILURES if self.evaluator.problem.section is None else FRAME_FAILURES
+        return self.settings.max_failures or by_default
+
     def advance(self) -> None:
         """Make a perturbation, a flip, the verification of a local search, or a phase."""
         if self.state.phase_steps_left:
@@ -259,7 +269,7 @@ class BasinHopping:
             self.evaluator.set_reference()
             self.local = LocalSearch(
                 self.evaluator, mask, response.score,
-                self.settings.max_failures, self.settings.max_predicted_loss, [],
+                self.max_failures, self.settings.max_predicted_loss, [],
             )  # fmt: skip
 
     def finish_local_search(self, local: LocalSearch) -> None:
@@ -320,7 +330,7 @@ class BasinHopping:
         """Start a local search from a packed design, if its response is stable."""
         self.local = start_local_search(
             self.evaluator, self._bits(mask),
-            self.settings.max_failures, self.settings.max_predicted_loss, failed,
+            self.max_failures, self.settings.max_predicted_loss, failed,
         )  # fmt: skip
 
     def _record(self, mask: NDArray[np.bool_], response: Response, accepted: bool) -> None:
