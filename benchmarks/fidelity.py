@@ -4,8 +4,8 @@ Four studies, selected by ``--only correlate,search,levels,meshes``:
 
 - correlate: compare the efficiencies of several hundred designs in the spring model, and as frames
   with one element in each beam as searches use them, with frames of 8 elements,
-- search: compare the efficiency of the best design of a search, in the spring model and as frames,
-  with that of frames of 8 elements,
+- search: run `bellcrank design` with several seeds, and compare the efficiencies of its designs in
+  the model of the search with those of frames of 8 elements,
 - levels: compute the efficiencies of the bundled designs at all levels of analysis,
 - meshes: compute the efficiency of the full crane in plane stress for several mesh sizes.
 
@@ -71,7 +71,7 @@ STEPS = 5_000
 CHAINS = {"paper": 8, "basin-hopping": 4}
 """Numbers of chains that sample designs, for each search."""
 SEEDS = 8
-"""Number of searches of each kind in `search_study`."""
+"""Number of searches of each problem in `search_study`."""
 
 
 def sample_designs(name: str) -> list[str]:
@@ -169,48 +169,47 @@ def correlation_study(pool: ProcessPoolExecutor) -> None:
     _scatter(columns)
 
 
-METHODS = {"paper": "springs of the paper", "frames": "frames"}
-"""Models of a search for a part; the last is that of ``bellcrank design``."""
-
-
-def run_search(job: tuple[str, str, int]) -> dict[str, object]:
-    """Run one search with default settings and analyse its best design as a frame."""
-    name, method, seed = job
-    goals = [f"no-contact {WIDTH / 10.0}"]
-    settings = read_settings({"seed": seed, "goals": goals})
-    part = PartSpec(width=WIDTH) if method == "frames" else None
+def run_search(job: tuple[str, int]) -> dict[str, object]:
+    """Run the search of `bellcrank design` for a part, and analyse its design with 8 elements."""
+    name, seed = job
     with TemporaryDirectory() as temporary:
-        folder = start_design(find_problem(name), settings, Path(temporary) / "run", part)
+        folder = start_design(
+            find_problem(name), read_settings({"seed": seed}), Path(temporary) / "run",
+            PartSpec(width=WIDTH),
+        )  # fmt: skip
         report = complete_design(folder, workers=1)
     assert report is not None
     selection = report.selection
     mask = selection.design.mask_hex
     return {
-        "seed": seed, "model": selection.efficiency_after, **analyse_frame((name, mask, WIDTH))
-    }  # fmt: skip
+        "seed": seed,
+        "proposals": report.proposals,
+        "search": selection.efficiency_after,
+        **analyse_frame((name, mask, WIDTH)),
+    }
 
 
 def search_study(pool: ProcessPoolExecutor) -> None:
-    """Compare the efficiencies of searches in both models with those of frame analyses."""
+    """Compare the efficiencies of designs in the model of their search and by 8 elements."""
     record: dict[str, object] = {"width": WIDTH, "provenance": provenance()}
     for name in PROBLEMS:
-        for method, description in METHODS.items():
-            rows = list(pool.map(run_search, [(name, method, seed) for seed in range(SEEDS)]))
-            stable = [row for row in rows if row["status"] == "converged"]
-            model = float(np.median([row["model"] for row in stable]))
-            frame = float(np.median([row["frame"] for row in stable]))
-            deviations = [abs(row["frame"] / row["model"] - 1.0) for row in stable]  # type: ignore[operator]
-            deviation = float(np.median(deviations))
-            touching = sum(bool(row["contacts"]) for row in stable)
-            record[f"{name}, {method}"] = {
-                "model": model, "frame": frame, "median_deviation": deviation,
-                "not_stable_as_frames": len(rows) - len(stable), "touching_as_frames": touching,
-                "rows": [_plain(row) for row in rows],
-            }  # fmt: skip
-            print(
-                f"| {name} | {description} | {model:.2f} | {frame:.2f} | {deviation:.0%} | "
-                f"{len(rows) - len(stable)} of {len(rows)} | {touching} of {len(rows)} |"
-            )
+        rows = list(pool.map(run_search, [(name, seed) for seed in range(SEEDS)]))
+        stable = [row for row in rows if row["status"] == "converged"]
+        model = float(np.median([row["search"] for row in stable]))
+        frame = float(np.median([row["frame"] for row in stable]))
+        deviations = [abs(row["frame"] / row["search"] - 1.0) for row in stable]  # type: ignore[operator]
+        deviation = float(np.median(deviations))
+        touching = sum(bool(row["contacts"]) for row in stable)
+        record[name] = {
+            "search": model, "frame": frame, "median_deviation": deviation,
+            "not_stable_as_frames": len(rows) - len(stable), "touching_as_frames": touching,
+            "rows": [_plain(row) for row in rows],
+        }  # fmt: skip
+        print(
+            f"| {name} | {model:.2f} | {frame:.2f} | {deviation:.1%} | "
+            f"{len(rows) - len(stable)} of {len(rows)} | {touching} of {len(rows)} |",
+            flush=True,
+        )
     _write("search", record)
 
 
