@@ -7,13 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bellcrank.mechanics.evaluator import VERIFICATION_INCREMENT
+from bellcrank.mechanics.frames.evaluator import FrameEvaluator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
-    from bellcrank.mechanics.evaluator import Response
     from bellcrank.mechanics.models import ModelEvaluator
     from bellcrank.model import Problem
 
@@ -47,12 +48,16 @@ def increment_at(fraction: float) -> float:
 
 
 class StrokeEvaluator:
-    """Responses of designs at equal fractions of the full input, each computed from rest.
+    """Displacements of designs at equal fractions of the full input.
+
+    Those of frames are equilibria of the path of one response, those of springs are computed from
+    rest.
 
     Parameters
     ----------
     evaluator
-        Evaluator of the problem with the full input. Its own response is left as it is.
+        Evaluator of the problem with the full input. Its own response is left as it is if it is
+        that of the design.
     states
         Number of states, the full input included.
 
@@ -62,18 +67,33 @@ class StrokeEvaluator:
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
     >>> stroke = StrokeEvaluator(SpringEvaluator(crane), states=4)
-    >>> [load for load, _ in stroke.evaluate(crane.initial)]
+    >>> [load for load, _ in stroke.displacements(crane.initial)]
     [0.25, 0.5, 0.75, 1.0]
     """
 
     def __init__(self, evaluator: ModelEvaluator, states: int = STATES) -> None:
-        problem = evaluator.problem
-        loads = [state / states for state in range(1, states + 1)]
-        self._evaluators = [
-            (load, evaluator.for_problem(at_fraction(problem, load))) for load in loads
-        ]
+        self._evaluator = evaluator
+        self._loads = [state / states for state in range(1, states + 1)]
+        self._springs: list[ModelEvaluator] = []
+        if not isinstance(evaluator, FrameEvaluator):
+            problem = evaluator.problem
+            self._springs = [
+                evaluator.for_problem(at_fraction(problem, load)) for load in self._loads
+            ]
 
-    def evaluate(self, mask: ArrayLike) -> Iterator[tuple[float, Response]]:
-        """Yield the fraction of the full input and the response there, in ascending order."""
-        for load, evaluator in self._evaluators:
-            yield load, evaluator.evaluate(mask, increment_at(load))
+    def displacements(self, mask: ArrayLike) -> Iterator[tuple[float, NDArray[np.float64]]]:
+        """Yield fractions of the full input and (N, d) displacements, in ascending order.
+
+        A frame that loses stability has none beyond.
+        """
+        frame = self._evaluator
+        if not isinstance(frame, FrameEvaluator):
+            for load, evaluator in zip(self._loads, self._springs, strict=True):
+                yield load, evaluator.evaluate(mask, increment_at(load)).displacement
+            return
+        if frame.response_of(mask) is None:
+            frame.evaluate(mask, VERIFICATION_INCREMENT)
+        nodes, dimension = frame.problem.lattice.positions.shape
+        for load in self._loads:
+            if (found := frame.equilibrium(load)) is not None:
+                yield load, found.state.u[:nodes, :dimension]

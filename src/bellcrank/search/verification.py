@@ -18,8 +18,6 @@ from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     FrameEvaluator,
     Status,
-    at_fraction,
-    increment_at,
     output_motion,
 )
 from bellcrank.mechanics.frames.analysis import centre_lines
@@ -122,7 +120,7 @@ class Verifier:
         )
         if (fault := self._fault(mask, found, moved)) is not None:
             return replace(found, fault=fault)
-        contacts = self._contacts(mask)
+        contacts = self._contacts()
         fault = "beams touch along the stroke" if len(contacts.pairs) else None
         return replace(found, contacts=contacts, fault=fault)
 
@@ -144,17 +142,14 @@ class Verifier:
             return "strain above the limit of the material"
         return None
 
-    def _contacts(self, mask: NDArray[np.bool_]) -> Contacts:
-        """Return the beams that touch, at full load or else at equal fractions of it."""
+    def _contacts(self) -> Contacts:
+        """Return the beams that touch in states along the stroke."""
         section = self.problem.section
         assert section is not None
-        rest, moved = centre_lines(self._frame)
-        at_end = find_contacts(self._frame.beams, rest, [(1.0, moved)], section.width)
-        if len(at_end.pairs):
-            return at_end
-        stroke = []
-        for fraction in np.arange(1, STATES) / STATES:
-            frame = self._frame.for_problem(at_fraction(self.problem, float(fraction)))
-            frame.evaluate(mask, increment_at(float(fraction)))
-            stroke.append((float(fraction), centre_lines(frame)[1]))
+        rest, _ = centre_lines(self._frame, self._frame.state)
+        stroke = [
+            (fraction, centre_lines(self._frame, found.state)[1])
+            for fraction in (np.arange(1, STATES + 1) / STATES).tolist()
+            if (found := self._frame.equilibrium(fraction)) is not None
+        ]
         return find_contacts(self._frame.beams, rest, stroke, section.width)

@@ -153,10 +153,10 @@ def print_warnings(bundle: Export, profile: PrintProfile) -> list[str]:
     part = bundle.part
     sentences = [warning.sentence for warning in check_print(bundle, profile.rules)]
     sentences += connection_warnings(part.design)
-    states = StrokeEvaluator(model_evaluator(part.design.problem)).evaluate(part.design.mask)
+    evaluator = StrokeEvaluator(model_evaluator(part.design.problem))
     stroke = (
-        (load, centre_lines((part.positions + part.scale * response.displacement)[part.struts]))
-        for load, response in states
+        (load, centre_lines((part.positions + part.scale * displacement)[part.struts]))
+        for load, displacement in evaluator.displacements(part.design.mask)
     )
     beams, rest = np.flatnonzero(part.design.mask), centre_lines(part.positions[part.struts])
     contacts = find_contacts(beams, rest, stroke, part.section.width)

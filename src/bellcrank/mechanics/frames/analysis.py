@@ -183,17 +183,17 @@ def orientation(state: State, node: int) -> Floats:
     return turned
 
 
-def centre_lines(evaluator: ComputedFrame) -> tuple[Floats, Floats]:
+def centre_lines(evaluator: ComputedFrame, state: State) -> tuple[Floats, Floats]:
     """Return (s, k, d) the ends of the elements along each beam of the frame.
 
     Returns
     -------
     rest, displaced
-        For the beams ``evaluator.beams`` in order, at rest and in the response computed last.
+        For the beams ``evaluator.beams`` in order, at rest and in a state.
     """
     count, dimension = evaluator.problem.lattice.positions.shape
     ends = evaluator.problem.lattice.beams[evaluator.beams]
     inner = count + np.arange(len(ends) * (evaluator.divisions - 1)).reshape(len(ends), -1)
     along = np.column_stack([ends[:, 0], inner, ends[:, 1]])
     rest = evaluator.frame.positions[:, :dimension]
-    return rest[along], (rest + evaluator.state.u[:, :dimension])[along]
+    return rest[along], (rest + state.u[:, :dimension])[along]

@@ -135,8 +135,8 @@ def no_contact(_problem: Problem, width: float) -> Constraint:
             if evaluator not in strokes:
                 strokes[evaluator] = StrokeEvaluator(evaluator)
             rest = evaluator.problem.lattice.positions
-            for _, response in strokes[evaluator].evaluate(deformed.mask):
-                worst = max(worst, faults(rest + response.displacement, struts))
+            for _, displacement in strokes[evaluator].displacements(deformed.mask):
+                worst = max(worst, faults(rest + displacement, struts))
         return counted(worst)
 
     return Constraint(response_violation=violation, evaluation_cost=3)
