@@ -137,6 +137,12 @@ def departure_of(
 
 
 @kernel
+def is_fine(increment: float) -> bool:
+    """Whether an increment is fine enough, one with a remainder included."""
+    return increment <= (1.0 + 2.0 * REMAINDER) * FINE_INCREMENT
+
+
+@kernel
 def is_joined(
     departure: float, before: float, after: float, softening: float, increment: float
 ) -> bool:
@@ -150,7 +156,7 @@ def is_joined(
         Least ratio of the two.
     """
     followed = after > softening * before and before > softening * after
-    return departure <= LARGEST_DEPARTURE and (followed or increment <= FINE_INCREMENT)
+    return departure <= LARGEST_DEPARTURE and (followed or is_fine(increment))
 
 
 @inlined

@@ -19,10 +19,10 @@ from bellcrank.mechanics.frames.kernels.assembly import (
 from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.path import (
     FEW_SWEEPS,
-    FINE_INCREMENT,
     LONGEST_STEP,
     departure_of,
     find_tangent,
+    is_fine,
     lowest_stiffness,
 )
 from bellcrank.mechanics.frames.kernels.state import (
@@ -166,7 +166,7 @@ def is_next(
     )
     before, after = memory.point_stiffness[index - 1], memory.point_stiffness[index]
     followed = after > SOFTENING * before and before > SOFTENING * after
-    return departure <= DEPARTURE and (followed or increment <= FINE_INCREMENT)
+    return departure <= DEPARTURE and (followed or is_fine(increment))
 
 
 @kernel
