@@ -22,7 +22,7 @@ from bellcrank.machines import (
 from bellcrank.mechanics import Conditions, SpringEvaluator, Status, follow, model_evaluator
 from bellcrank.model import Design
 
-from .test_two_port import actuator
+from .test_two_port import actuator, unstable_actuator
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_a_dead_force_is_put_on_before_the_stroke() -> None:
 
 
 def test_a_loss_of_stability_ends_the_curve_and_is_said() -> None:
-    design = actuator("machine:anti-parallel")
+    design = unstable_actuator()
     found = characterise(design, [Load("blocked")], 10)
     curve = found.curves[0]
     assert curve.status is Status.SNAPPED
@@ -112,7 +112,7 @@ def test_a_loss_of_stability_ends_the_curve_and_is_said() -> None:
 
 
 def test_finer_increments_lose_stability_at_the_same_place() -> None:
-    element = mean_ports(actuator("machine:anti-parallel"))
+    element = mean_ports(unstable_actuator())
     coarse, fine = (trace(element, Load("blocked"), points) for points in (5, 60))
     assert coarse.reached == pytest.approx(fine.reached, abs=2e-3)
 

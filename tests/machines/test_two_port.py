@@ -19,8 +19,19 @@ from bellcrank.machines import (
     trace,
     two_port_at,
 )
-from bellcrank.mechanics import Conditions, SpringEvaluator, follow
-from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports, gallery_design
+from bellcrank.mechanics import Conditions, SpringEvaluator, follow, model_evaluator
+from bellcrank.model import (
+    Design,
+    Input,
+    Lattice,
+    Output,
+    Problem,
+    Stiffness,
+    Supports,
+    find_problem,
+    gallery_design,
+    unpack_mask,
+)
 
 NAMES = ("human:crane", "machine:crane", "human:anti-parallel", "human:pliers", "machine:discs")
 
@@ -30,6 +41,17 @@ def actuator(name: str) -> Design:
     design = gallery_design(kind, problem)
     assert design is not None
     return design
+
+
+def unstable_actuator() -> Design:
+    """An actuator of the spring model that loses stability where its output is blocked."""
+    problem = replace(
+        find_problem("anti-parallel"), stiffness=Stiffness(bond=5.0, angle=0.11 / 6.0)
+    )
+    mask = (
+        "ffffffffffffffffdfffffff2e92dfe80004e4e017d6498039fedc021909b7db2017fff688fffffff9fffff7"
+    )
+    return Design(problem, unpack_mask(mask, problem.lattice.beam_count))
 
 
 def column(length: int, *, supports: list[int], watched: int) -> Design:
@@ -77,7 +99,7 @@ def test_free_efficiency_is_that_of_the_response_in_the_limit_of_small_strokes(n
         output=replace(problem.output, spring=None, spring_kind=None),
         aggregate="mean",
     )
-    response = SpringEvaluator(small, "displacement").evaluate(design.mask)
+    response = model_evaluator(small, "displacement").evaluate(design.mask)
     # The efficiency is linear in so small a stroke up to the stroke itself.
     assert port.efficiency == pytest.approx(response.efficiency, rel=1e-4)
 

@@ -143,7 +143,7 @@ def test_force_is_the_derivative_of_the_energy_and_stiffness_that_of_the_force(i
 
 
 @pytest.mark.parametrize(
-    "name", ["human:crane", "human:pliers", "human:anti-parallel", "full:scaling-8"]
+    "name", ["human:crane", "human:anti-parallel", "full:discs", "full:scaling-8"]
 )
 def test_a_free_output_moves_as_in_the_response_along_the_whole_stroke(name: str) -> None:
     kind, _, problem_name = name.partition(":")

@@ -151,7 +151,7 @@ def test_the_first_frame_is_rest_and_the_middle_one_the_full_stroke(movie):
 
 
 def test_each_frame_shows_the_response_to_a_part_of_the_stroke():
-    design = find_design("machine:discs")
+    design = find_design("scaling-8")
     way = loading_path(design, np.array([0.0, 0.3, 1.0]))
     given = replace(design.problem.input, amount=0.3 * design.problem.input.amount)
     response = SpringEvaluator(replace(design.problem, input=given)).evaluate(design.mask)

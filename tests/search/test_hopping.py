@@ -146,7 +146,7 @@ def test_a_phase_continues_from_the_last_one_until_there_is_progress(small: Prob
     evaluator = make_evaluator(small, settings)
     state = replace(start_chain(evaluator, settings, 0), step=1000, local_searches=1)
     rng = np.random.default_rng(1)
-    hopping = BasinHopping(evaluator, settings, state, rng, 2000)
+    hopping = BasinHopping(evaluator, settings, settings.patience(small), state, rng, 2000)
     reached = state.mask
     for _ in range(2):
         hopping.leave()

@@ -115,8 +115,8 @@ def load_predictor(
     path
         File of a trained network, or the folder of its training; the bundled network by default.
     any_stiffness
-        Accept a problem with another stiffness than the network was trained on, such as that of
-        a design for a part. The predictor's problem then has the stiffness of the network.
+        Accept a problem with another stiffness or section than the network was trained on, such as
+        that of a design for a part. The predictor's problem then has those of the training.
 
     Raises
     ------
@@ -128,8 +128,16 @@ def load_predictor(
         If PyTorch is not installed.
     """
     model = load_model(problem, path, any_stiffness=any_stiffness)
-    given = replace(problem, stiffness=model.problem.stiffness) if any_stiffness else problem
+    given = as_trained(problem, model) if any_stiffness else problem
     return Predictor(given, model, device=device)
+
+
+def as_trained(problem: Problem, model: TrainedModel) -> Problem:
+    """Return a problem with the mechanical model and the stiffness of the training."""
+    known = model.problem
+    return replace(
+        problem, stiffness=known.stiffness, section=known.section, material=known.material
+    )
 
 
 def load_model(
@@ -146,7 +154,7 @@ def load_model(
             if not file.exists():
                 raise InvalidFile(f"{path}: no trained model in this folder; expected {MODEL}")
         model = read_model(file)
-    given = replace(problem, stiffness=model.problem.stiffness) if any_stiffness else problem
+    given = as_trained(problem, model) if any_stiffness else problem
     try:
         require_same_problem(model.problem, given)
     except InvalidModel as error:

@@ -79,10 +79,10 @@ def find_near_pairs(
         Number of pairs, which may exceed m.
     """
     count = 0
-    for place in range(len(order)):
-        i = order[place]
-        for following in range(place + 1, len(order)):
-            j = order[following]
+    for first in range(len(order)):
+        i = order[first]
+        for second in range(first + 1, len(order)):
+            j = order[second]
             if left[j, 0] > right[i, 0] + width:
                 break
             apart = False
