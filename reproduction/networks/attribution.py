@@ -23,7 +23,7 @@ True
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,7 +35,7 @@ from bellcrank.surrogate.backend import find_device
 from bellcrank.surrogate.evaluator import NetworkEvaluator
 from bellcrank.surrogate.matching import require_same_problem
 from bellcrank.surrogate.metrics import correlation, finite
-from bellcrank.surrogate.predictor import Predictor
+from bellcrank.surrogate.predictor import Predictor, as_trained
 from bellcrank.surrogate.trained_model import run_network
 from bellcrank.surrogate.views import PictureView
 
@@ -152,7 +152,7 @@ def attribute(
     """
     if stride < 1:
         raise InvalidSettings(f"stride: expected at least 1 pixel, got {stride}")
-    design = Design(replace(design.problem, stiffness=model.problem.stiffness), design.mask)
+    design = Design(as_trained(design.problem, model), design.mask)
     problem, mask = design.problem, design.mask
     require_same_problem(model.problem, problem)
     if not len(problem.designable):

@@ -36,9 +36,14 @@ def warn_of_another_version(started: Mapping[str, Any], what: str) -> None:
 
 
 def warn_of_other_stiffness(own: Problem, trained: Problem, done: str) -> None:
-    """Print a note if a network was trained with another stiffness than that of a design."""
+    """Print a note if a network was trained with another model or stiffness than a design's."""
     there, here = trained.stiffness, own.stiffness
-    if (here.bond, here.angle) != (there.bond, there.angle):
+    if own.section != trained.section:
+        notes.print(
+            f"[yellow]note:[/] the design is a frame; it is {done} with springs of stiffness "
+            f"{there.bond:g} and {there.angle:g}, the model of the training set."
+        )
+    elif (here.bond, here.angle) != (there.bond, there.angle):
         notes.print(
             f"[yellow]note:[/] the springs of the design have stiffness {here.bond:g} and "
             f"{here.angle:g}; it is {done} with {there.bond:g} and {there.angle:g}, those of the "
