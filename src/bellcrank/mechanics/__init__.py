@@ -18,6 +18,7 @@ from bellcrank.mechanics.analysis import (
     strain_of,
 )
 from bellcrank.mechanics.conditions import Conditions, LinearEquations
+from bellcrank.mechanics.coupling import Coupling, free_nodes, uniform_motion
 from bellcrank.mechanics.evaluator import (
     VERIFICATION_INCREMENT,
     FlipPrediction,
@@ -46,15 +47,7 @@ from bellcrank.mechanics.objectives import (
 from bellcrank.mechanics.output import OutputMotion, output_motion
 from bellcrank.mechanics.status import Outcome, Status
 from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction, increment_at
-from bellcrank.mechanics.superelement import (
-    Condensed,
-    Coupling,
-    State,
-    Superelement,
-    free_nodes,
-    state_of,
-    uniform_motion,
-)
+from bellcrank.mechanics.superelement import Condensed, State, Superelement, state_of
 
 __all__ = [
     "VERIFICATION_INCREMENT",

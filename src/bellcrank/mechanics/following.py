@@ -127,7 +127,7 @@ def follow(element: Movable, state: State, conditions: Conditions) -> PathEnd:
     --------
     The full crane, pushed by its whole stroke:
 
-    >>> from bellcrank.mechanics.superelement import Superelement, uniform_motion
+    >>> from bellcrank.mechanics import Superelement, uniform_motion
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
     >>> push = uniform_motion(crane.input.nodes, crane.input.direction)

@@ -234,13 +234,11 @@ class FrameEquations:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return (e, 6) the end forces and (e, 6, 6) the tangent stiffness of the elements."""
         from bellcrank.mechanics.frames.kernels.beams import plane_beams
-        from bellcrank.mechanics.frames.kernels.plane import PLANE_WORK
 
         count = len(self._rest)
         force, tangent = np.empty((count, 6)), np.empty((count, 6, 6))
         plane_beams(
-            self.frame.elements, self._rest, self.frame.stiffness, displacement,
-            np.empty(PLANE_WORK), force, tangent,
+            self.frame.elements, self._rest, self.frame.stiffness, displacement, force, tangent
         )  # fmt: skip
         return force, tangent
 

@@ -16,7 +16,6 @@ from bellcrank.mechanics.frames.kernels.arrays import (
     State,
     Structure,
 )
-from bellcrank.mechanics.frames.kernels.plane import PLANE_WORK
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
 from bellcrank.mechanics.system import EFFICIENCY_TOLERANCE, incident_beams
 from bellcrank.registry import Registry
@@ -70,6 +69,7 @@ def allocate_reference(frame: Frame) -> Reference:
         count=np.array([0, 1]),
         load=np.zeros(POINTS),
         points=allocate_state(POINTS * nodes, len(frame.unit)),
+        tension=np.zeros((POINTS + 1, len(frame.beams))),
         mode=np.zeros((POINTS + 2, nodes, len(frame.unit))),
         stiffness=np.zeros(POINTS + 2),
     )
@@ -83,11 +83,14 @@ def allocate_memory(frame: Frame, structure: Structure) -> Memory:
     motions: dict[str, Any] = {
         name: np.zeros((nodes, size))
         for name in (
-            "gradient", "difference", "tangent", "next_tangent", "last_tangent", "mode",
+            "gradient", "difference", "change", "full_change", "tangent", "next_tangent",
+            "last_tangent", "mode",
         )
     }  # fmt: skip
     return Memory(
         tension=np.zeros(beams),
+        path_tension=np.zeros((2, beams)),
+        tension_change=np.zeros((2, beams)),
         diagonal=np.zeros((blocks, size, size)),
         entries=np.zeros((entries, size, size)),
         column=np.zeros((blocks, size, size)),
@@ -96,7 +99,6 @@ def allocate_memory(frame: Frame, structure: Structure) -> Memory:
         force=np.zeros(12),
         tangent_block=np.zeros((12, 12)),
         work=np.zeros((9, 9, 9)),
-        local=np.zeros(PLANE_WORK),
         axial=np.zeros(beams),
         axial_slope=np.zeros((beams, 2 * size)),
         reached=np.zeros(nodes, np.uint8),
@@ -105,6 +107,7 @@ def allocate_memory(frame: Frame, structure: Structure) -> Memory:
         count=np.array([0, 1]),
         load=np.zeros(POINTS),
         points=allocate_state(POINTS * nodes, size),
+        point_tension=np.zeros((POINTS + 1, beams)),
         point_mode=np.zeros((POINTS + 2, nodes, size)),
         point_stiffness=np.zeros(POINTS + 2),
         reached_load=np.ones(2),

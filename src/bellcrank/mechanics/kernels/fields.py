@@ -45,6 +45,13 @@ def copy(source: Floats, target: Floats) -> None:
 
 
 @kernel
+def copy_row(source: Floats, target: Floats) -> None:
+    """Copy one one-dimensional array onto another."""
+    for index in range(len(source)):
+        target[index] = source[index]
+
+
+@kernel
 def largest_difference(a: Floats, b: Floats) -> float:
     """Largest difference between the components of two fields."""
     largest = 0.0

@@ -15,7 +15,7 @@ progress. A local search from the design that the phase has reached follows each
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -29,10 +29,10 @@ from bellcrank.search.blocks import (
     steps_in_block,
 )
 from bellcrank.search.hopping.local_search import LocalSearch, start_local_search
+from bellcrank.search.hopping.settings import HoppingSettings
 from bellcrank.search.markov.metropolis import ChainState, MetropolisSettings, metropolis_phase
 from bellcrank.search.registry import Search, searches
 from bellcrank.search.selection import confirmed
-from bellcrank.search.settings import SearchSettings, check_fraction, check_positive, check_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,88 +40,11 @@ if TYPE_CHECKING:
     from bellcrank.mechanics import Response
     from bellcrank.model import Problem
     from bellcrank.search.evaluator import Evaluator
+    from bellcrank.search.hopping.settings import Patience
     from bellcrank.storage import Proposals
 
 PROGRESS = 1e-3
 """Relative gain of efficiency that counts as progress."""
-
-
-class Patience(NamedTuple):
-    """When a local search ends, and when Metropolis phases begin; see `HoppingSettings`."""
-
-    max_failures: int
-    min_stall: int
-    stall: float
-
-
-SPRINGS = Patience(max_failures=12, min_stall=2000, stall=0.4)
-FRAMES = Patience(max_failures=24, min_stall=1000, stall=0.15)
-"""Predictions are less accurate for frames, and Metropolis phases gain more: 8 chains of 20,000
-designs of the crane as a part ended at 9.9 in the mean, and at 8.6 with the settings for springs.
-"""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HoppingSettings(SearchSettings):
-    """Settings of basin hopping.
-
-    Parameters
-    ----------
-    radius
-        Mean radius of a perturbation, in mean beam lengths.
-    min_density
-        Least value of the probability, drawn anew for each perturbation, with which a beam in the
-        disc is present.
-    max_failures
-        Consecutive failed flips that end a local search. If it is not given, it depends on the
-        model (`SPRINGS`, `FRAMES`).
-    max_predicted_loss
-        Largest predicted loss, as a fraction of the efficiency, with which a flip is evaluated.
-    phase_steps
-        Steps of a Metropolis phase; 0 for no such phases.
-    temperature_factor
-        Temperature of a Metropolis phase, as a fraction of the best efficiency.
-    phase_share
-        Largest fraction of the steps that go to Metropolis phases while progress stalls; a phase
-        begins between two local searches.
-    min_stall, stall
-        Steps without progress after which Metropolis phases begin: at least this number, and at
-        least this fraction of all steps so far. They may depend on the model, too.
-
-    Raises
-    ------
-    InvalidSettings, UnknownName
-    """
-
-    name: ClassVar[str] = "basin-hopping"
-    predicts_flips: ClassVar[bool] = True
-
-    radius: float = 2.5
-    min_density: float = 0.95
-    max_failures: int | None = None
-    max_predicted_loss: float = 0.01
-    phase_steps: int = 1000
-    temperature_factor: float = 0.01
-    phase_share: float = 0.7
-    min_stall: int | None = None
-    stall: float | None = None
-
-    def __post_init__(self) -> None:
-        SearchSettings.__post_init__(self)
-        for name, least in (("max_failures", 1), ("phase_steps", 0), ("min_stall", 0)):
-            if getattr(self, name) is not None:
-                check_whole(name, getattr(self, name), least)
-        for name in ("radius", "temperature_factor", "phase_share"):
-            check_positive(name, getattr(self, name))
-        for name in ("min_density", "max_predicted_loss", "stall", "phase_share"):
-            if getattr(self, name) is not None:
-                check_fraction(name, getattr(self, name))
-
-    def patience(self, problem: Problem) -> Patience:
-        """Return the settings that may depend on the model of a problem."""
-        default = SPRINGS if problem.section is None else FRAMES
-        given = {name: getattr(self, name) for name in Patience._fields}
-        return default._replace(**{key: value for key, value in given.items() if value is not None})
 
 
 @dataclass(frozen=True, slots=True)

@@ -136,6 +136,8 @@ class Reference(Bundle):
     """(POINTS,) fraction of the load at these states."""
     points: State
     """(POINTS N, ...) these states, one after the other."""
+    tension: Floats
+    """(POINTS + 1, M) axial forces at these states; those at full load last."""
     mode: Floats
     """(POINTS + 2, N, b) softest motion at rest, at these states, and at full load."""
     stiffness: Floats
@@ -155,6 +157,8 @@ class Memory(Bundle):
 
     tension: Floats
     """(M,) axial force with which the stiffness is assembled."""
+    path_tension: Floats
+    """(2, M) axial force at the start of an increment, and its change per unit of load."""
     gradient: Floats
     """(N, b) derivative of the potential energy."""
     diagonal: Floats
@@ -173,8 +177,6 @@ class Memory(Bundle):
     """(12, 12) stiffness of a beam."""
     work: Floats
     """(9, 9, 9) memory of a beam in space."""
-    local: Floats
-    """(PLANE_WORK,) memory of a beam in the plane."""
     axial: Floats
     """(M,) axial force of each beam in the state assembled last."""
     axial_slope: Floats
@@ -193,12 +195,20 @@ class Memory(Bundle):
     """(POINTS,) as in `Reference`."""
     points: State
     """(POINTS N, ...) as in `Reference`."""
+    point_tension: Floats
+    """(POINTS + 1, M) as `Reference.tension`."""
     point_mode: Floats
     """(POINTS + 2, N, b) softest motion at rest, there, and at full load."""
     point_stiffness: Floats
     """(POINTS + 2,) lowest stiffness there."""
     difference: Floats
     """Motion from one state to another."""
+    change: Floats
+    """Motion from a state of the reference to that of the design at the same load."""
+    full_change: Floats
+    """The same at full load."""
+    tension_change: Floats
+    """(2, M) changes of the axial forces with these motions."""
     tangent: Floats
     """Tangent of the path at the start of the increment."""
     next_tangent: Floats

@@ -10,12 +10,18 @@ from bellcrank.mechanics.frames.kernels.beams import (
     beam_tangent,
     dimension,
     elongation,
-    keep_axial,
+    keep_plane_axial,
     measure,
+    plane_beam_of,
 )
 from bellcrank.mechanics.frames.kernels.factor import factorise, solve
+from bellcrank.mechanics.frames.kernels.plane import (
+    add_plane_force,
+    add_plane_stiffness,
+    plane_stiffness,
+)
 from bellcrank.mechanics.frames.kernels.state import move_node
-from bellcrank.mechanics.kernels._compile import kernel
+from bellcrank.mechanics.kernels._compile import inlined, kernel
 
 if TYPE_CHECKING:
     from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, State, Structure
@@ -106,9 +112,13 @@ def find_residual(
             gradient[node, axis] = 0.0
     for index in range(structure.sizes[1]):
         beam = structure.beam[index]
-        axial = beam_force(frame.unit, frame, state, beam, memory)
-        keep_axial(frame, beam, axial, memory)
         first, second = frame.beams[beam, 0], frame.beams[beam, 1]
+        if size == 3:
+            result = plane_beam_of(frame, state, beam)
+            keep_plane_axial(result, beam, memory)
+            add_plane_force(result, gradient[first], gradient[second])
+            continue
+        beam_force(frame.unit, frame, state, beam, memory)
         for axis in range(size):
             gradient[first, axis] += force[axis]
             gradient[second, axis] += force[size + axis]
@@ -190,17 +200,35 @@ def assemble(
     clear_stiffness(structure, memory)
     for index in range(structure.sizes[1]):
         beam = structure.beam[index]
-        axial = beam_tangent(
-            frame.unit, frame, state, beam, memory.tension[beam], softening, memory
-        )
-        keep_axial(frame, beam, axial, memory)
         first, second = frame.beams[beam, 0], frame.beams[beam, 1]
+        if size == 3 and not (frame.partly[first] or frame.partly[second]):
+            add_plane_beam(frame, structure, state, beam, softening, memory)
+            continue
+        beam_tangent(frame.unit, frame, state, beam, memory.tension[beam], softening, memory)
         for axis in range(size):
             gradient[first, axis] += force[axis]
             gradient[second, axis] += force[size + axis]
         scatter(frame, structure, beam, memory)
     complete_diagonal(frame, structure, memory)
     add_loads(frame, structure, fraction, state, gradient)
+
+
+@inlined
+def add_plane_beam(
+    frame: Frame, structure: Structure, state: State, beam: int, softening: float, memory: Memory
+) -> None:
+    """Add force and stiffness of a beam in the plane, without memory for its matrix."""
+    first, second = frame.beams[beam, 0], frame.beams[beam, 1]
+    result = plane_beam_of(frame, state, beam)
+    stiffness = plane_stiffness(
+        result, frame.section[beam], frame.bow[beam], memory.tension[beam], softening
+    )
+    keep_plane_axial(result, beam, memory)
+    add_plane_force(result, memory.gradient[first], memory.gradient[second])
+    add_plane_stiffness(
+        stiffness, frame.block[first], frame.block[second], structure.beam_entry[beam],
+        memory.diagonal, memory.entries,
+    )  # fmt: skip
 
 
 @kernel

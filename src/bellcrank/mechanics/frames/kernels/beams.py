@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-from bellcrank.mechanics.frames.kernels.plane import plane_beam, plane_deformations, plane_force
+from bellcrank.mechanics.frames.kernels.plane import (
+    add_plane_force,
+    fill_plane_tangent,
+    plane_beam,
+    plane_deformations,
+    plane_stiffness,
+)
 from bellcrank.mechanics.frames.kernels.space import space_deformations, space_force, space_tangent
 from bellcrank.mechanics.frames.kernels.state import matrix_of
 from bellcrank.mechanics.kernels._compile import entry, kernel
 
 if TYPE_CHECKING:
     from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, State
+    from bellcrank.mechanics.frames.kernels.plane import PlaneBeam
     from bellcrank.mechanics.kernels.arrays import Floats, Ints
 
 
@@ -21,13 +29,26 @@ def dimension(frame: Frame) -> int:
 
 
 @kernel
+def plane_beam_of(frame: Frame, state: State, beam: int) -> PlaneBeam:
+    """Compute the forces of a beam in the plane."""
+    first, second = frame.beams[beam, 0], frame.beams[beam, 1]
+    return plane_beam(
+        frame.rest[beam, 0], frame.rest_length[beam], frame.section[beam], frame.bow[beam],
+        state.u[first], state.u[second],
+    )  # fmt: skip
+
+
+@kernel
 def measure(
     unit: tuple[float, ...], frame: Frame, state: State, beam: int, memory: Memory, out: Floats
 ) -> None:
     """Compute the deformations of a beam: 3 in the plane, 6 in space; the first is elongation."""
     first, second = frame.beams[beam, 0], frame.beams[beam, 1]
     if len(unit) == 3:
-        plane_deformations(frame.rest[beam, 0], state.u[first], state.u[second], out)
+        stretched, one, two, _, _, _ = plane_deformations(
+            frame.rest[beam, 0], frame.rest_length[beam], state.u[first], state.u[second]
+        )
+        out[0], out[1], out[2] = stretched, one, two
     else:
         shift, turn = memory.work[8, 4], memory.work[3]
         for axis in range(3):
@@ -45,11 +66,10 @@ def beam_force(
     first, second = frame.beams[beam, 0], frame.beams[beam, 1]
     work = memory.work
     if len(unit) == 3:
-        plane_force(
-            frame.rest[beam, 0], frame.section[beam], frame.bow[beam], state.u[first],
-            state.u[second], memory.local, memory.force,
-        )  # fmt: skip
-        return memory.local[6]
+        result = plane_beam_of(frame, state, beam)
+        fill_plane_force(result, memory.force)
+        keep_plane_axial(result, beam, memory)
+        return result.axial
     shift, turn = work[8, 4], work[3]
     for axis in range(3):
         shift[axis] = state.u[second, axis] - state.u[first, axis]
@@ -65,6 +85,7 @@ def beam_force(
         work,
         memory.force,
     )
+    keep_space_axial(beam, memory)
     return work[8, 1, 0]
 
 
@@ -80,12 +101,14 @@ def beam_tangent(
 ) -> float:
     """Compute the end forces and the tangent stiffness of a beam; return its axial force."""
     if len(unit) == 3:
-        first, second = frame.beams[beam, 0], frame.beams[beam, 1]
-        plane_beam(
-            frame.rest[beam, 0], frame.section[beam], frame.bow[beam], state.u[first],
-            state.u[second], tension, softening, memory.local, memory.force, memory.tangent_block,
-        )  # fmt: skip
-        return memory.local[6]
+        result = plane_beam_of(frame, state, beam)
+        stiffness = plane_stiffness(
+            result, frame.section[beam], frame.bow[beam], tension, softening
+        )
+        fill_plane_force(result, memory.force)
+        fill_plane_tangent(stiffness, memory.tangent_block)
+        keep_plane_axial(result, beam, memory)
+        return result.axial
     axial = beam_force(unit, frame, state, beam, memory)
     space_tangent(
         frame.section[beam], frame.bow[beam], tension, softening, memory.work,
@@ -115,46 +138,46 @@ def axial_force(frame: Frame, state: State, beam: int, memory: Memory) -> float:
 
 
 @kernel
-def keep_axial(frame: Frame, beam: int, axial: float, memory: Memory) -> None:
+def fill_plane_force(result: PlaneBeam, force: Floats) -> None:
+    """Store (6,) the forces and moments on both ends."""
+    for k in range(6):
+        force[k] = 0.0
+    add_plane_force(result, force[0:3], force[3:6])
+
+
+@kernel
+def keep_plane_axial(result: PlaneBeam, beam: int, memory: Memory) -> None:
     """Store the axial force of a beam and its derivative by the motions of both ends."""
-    size, slope = len(frame.unit), memory.axial_slope
-    memory.axial[beam] = axial
-    for k in range(2 * size):
-        if size == 3:
-            slope[beam, k] = memory.local[8 + k]
-        elif k % 6 < 3:
-            slope[beam, k] = (1.0 if k >= 6 else -1.0) * memory.work[0, 6, k % 6]
+    slope = memory.axial_slope[beam]
+    memory.axial[beam] = result.axial
+    slope[0], slope[1], slope[2] = result.slope_x, result.slope_y, result.bow1
+    slope[3], slope[4], slope[5] = -result.slope_x, -result.slope_y, result.bow2
+
+
+@kernel
+def keep_space_axial(beam: int, memory: Memory) -> None:
+    """As `keep_plane_axial`, in space."""
+    slope = memory.axial_slope[beam]
+    memory.axial[beam] = memory.work[8, 1, 0]
+    for k in range(12):
+        if k % 6 < 3:
+            slope[k] = (1.0 if k >= 6 else -1.0) * memory.work[0, 6, k % 6]
         else:
-            slope[beam, k] = memory.work[0, 6, k if k < 6 else k - 3]
+            slope[k] = memory.work[0, 6, k if k < 6 else k - 3]
 
 
 @entry
 def plane_beams(
-    ends: Ints,
-    rest: Floats,
-    section: Floats,
-    u: Floats,
-    work: Floats,
-    force: Floats,
-    tangent: Floats,
+    ends: Ints, rest: Floats, section: Floats, u: Floats, force: Floats, tangent: Floats
 ) -> None:
     """Compute the forces (m, 6) and the stiffness (m, 6, 6) of beams in the plane."""
     for beam in range(len(ends)):
         first, second = u[ends[beam, 0]], u[ends[beam, 1]]
-        plane_deformations(rest[beam], first, second, work)
-        tension = section[beam, 0] * work[0]
-        plane_beam(
-            rest[beam],
-            section[beam],
-            0.0,
-            first,
-            second,
-            tension,
-            1.0,
-            work,
-            force[beam],
-            tangent[beam],
-        )
+        length = math.sqrt(rest[beam, 0] ** 2 + rest[beam, 1] ** 2)
+        result = plane_beam(rest[beam], length, section[beam], 0.0, first, second)
+        stiffness = plane_stiffness(result, section[beam], 0.0, result.axial, 1.0)
+        fill_plane_force(result, force[beam])
+        fill_plane_tangent(stiffness, tangent[beam])
 
 
 @entry

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING
 
 from bellcrank.mechanics.frames.kernels.arrays import POINTS, State
 from bellcrank.mechanics.frames.kernels.assembly import (
-    add_tension_at,
-    clear_tension,
     find_load_rate,
     set_right_side,
     solve_step,
@@ -31,7 +29,7 @@ from bellcrank.mechanics.frames.kernels.state import (
 )
 from bellcrank.mechanics.kernels._compile import inlined, kernel
 from bellcrank.mechanics.kernels.arrays import CONVERGED, SNAPPED, UNCONVERGED
-from bellcrank.mechanics.kernels.fields import copy
+from bellcrank.mechanics.kernels.fields import copy, copy_row
 
 if TYPE_CHECKING:
     from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, Structure
@@ -58,8 +56,8 @@ SOFTENING_WHERE_SOFT = 0.7
 """The same where the lowest stiffness is below the part `SOFT` of that at rest, so that the depth
 of a minimum is resolved."""
 DOUBTFUL = 0.05
-"""Departure above which a tangent is computed again, with the stiffness at its own state."""
-FEW_SWEEPS = 2
+"""Departure above which a tangent is computed with the stiffness at its own state."""
+FEW_SWEEPS = 1
 """Number of steps of inverse iteration from a mode that is nearly known."""
 DIP = 0.2
 """Lowest stiffness on the path, as a part of its values at rest and at full load, below which a
@@ -199,6 +197,43 @@ def departure_to(
 
 
 @inlined
+def extrapolate_tension(structure: Structure, increment: float, memory: Memory) -> None:
+    """Compute the axial forces at the end of an increment to first order."""
+    stored = memory.path_tension
+    for index in range(structure.sizes[1]):
+        beam = structure.beam[index]
+        memory.tension[beam] = stored[0, beam] + increment * stored[1, beam]
+
+
+@kernel
+def keep_tension(structure: Structure, increment: float, memory: Memory) -> None:
+    """Store the axial forces of a state and their mean change per unit of load before it.
+
+    Those along the tangent would be inaccurate: where beams turn, the small error of the direction
+    of a beam times its large axial stiffness is a force.
+    """
+    stored = memory.path_tension
+    for index in range(structure.sizes[1]):
+        beam = structure.beam[index]
+        stored[1, beam] = (memory.tension[beam] - stored[0, beam]) / increment
+        stored[0, beam] = memory.tension[beam]
+
+
+@kernel
+def begin_tension(frame: Frame, structure: Structure, memory: Memory) -> None:
+    """Store the axial forces at rest, and their change per unit of load along the tangent."""
+    size, slope, tangent = len(frame.unit), memory.axial_slope, memory.tangent
+    for index in range(structure.sizes[1]):
+        beam = structure.beam[index]
+        first, second = frame.beams[beam, 0], frame.beams[beam, 1]
+        rate = 0.0
+        for k in range(size):
+            rate += slope[beam, k] * tangent[first, k] + slope[beam, size + k] * tangent[second, k]
+        memory.path_tension[0, beam] = 0.0
+        memory.path_tension[1, beam] = frame.section[beam, 0] * rate
+
+
+@inlined
 def correct(
     frame: Frame,
     structure: Structure,
@@ -212,19 +247,17 @@ def correct(
 
     Returns the lowest stiffness there, and the departure of the increment from the tangents at
     both ends; 0 and infinity if there is no stable equilibrium. Below the lowest stiffness `soft`,
-    stability is judged with the tensions of the equilibrium.
+    stability is judged with the stiffness of the equilibrium.
     """
     move_held_nodes(frame, end, state)
-    clear_tension(memory)
-    add_tension_at(frame, structure, memory.previous, 1.0, memory)
+    extrapolate_tension(structure, increment, memory)
     tolerance = frame.tolerance if end == 1.0 else PATH_TOLERANCE
     now, departure = 0.0, math.inf
     if newton(frame, structure, end, state, memory, tolerance, LONGEST_STEP) == CONVERGED:
         now = lowest_stiffness(frame, structure, memory.mode, SWEEPS, memory)
         departure = departure_to(frame, structure, increment, state, memory)
-        # The factor is that of the state before the last step, on a straight path with the tensions
-        # at the start of the increment. Slender beams turn by too much from there for an accurate
-        # tangent, and near a loss of stability the tensions decide.
+        # The factor is that of a state some steps before. Slender beams may turn by too much from
+        # there for an accurate tangent, and near a loss of stability the tensions decide.
         if departure > DOUBTFUL or now < soft:
             if not stiffness_is_definite(frame, structure, end, state, memory):
                 return 0.0, math.inf
@@ -242,6 +275,7 @@ def keep_point(frame: Frame, load: float, stiffness: float, state: State, memory
     if memory.count[0] == POINTS:
         for index in range(POINTS // 2):
             memory.load[index] = memory.load[2 * index + 1]
+            copy_row(memory.point_tension[2 * index + 1], memory.point_tension[index])
             u, q = point_state(frame, memory.points, 2 * index + 1)
             v, r = point_state(frame, memory.points, index)
             copy_state(State(u, q), State(v, r))
@@ -251,6 +285,7 @@ def keep_point(frame: Frame, load: float, stiffness: float, state: State, memory
     memory.load[index] = load
     u, q = point_state(frame, memory.points, index)
     copy_state(state, State(u, q))
+    copy_row(memory.tension, memory.point_tension[index])
     memory.count[0] += 1
     keep_mode(memory.count[0], stiffness, memory)
 
@@ -288,6 +323,7 @@ def follow_path(
     at_rest = softest = stiffness = lowest_stiffness(frame, structure, mode, 4 * SWEEPS, memory)
     find_tangent(frame, structure, state, memory.tangent, memory)
     copy(memory.tangent, memory.last_tangent)
+    begin_tension(frame, structure, memory)
     memory.count[0] = memory.count[1] = 0
     keep_mode(0, stiffness, memory)
     fraction = 0.0
@@ -310,12 +346,14 @@ def follow_path(
             fraction, stiffness, last_increment = end, now, increment
             copy(memory.tangent, memory.last_tangent)
             copy(memory.next_tangent, memory.tangent)
+            keep_tension(structure, increment, memory)
             softest = min(softest, now)
             if end == target:
                 quarter += 1
             if end < 1.0:
                 keep_point(frame, end, now, state, memory)
             else:
+                copy_row(memory.tension, memory.point_tension[POINTS])
                 keep_mode(memory.count[0] + 1, now, memory)
             increment = min(following, LARGEST_INCREMENT, largest)
         else:

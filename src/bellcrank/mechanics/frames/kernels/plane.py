@@ -19,7 +19,7 @@ linear in its deformations.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from bellcrank.mechanics.kernels._compile import kernel
 
@@ -27,8 +27,50 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.kernels.arrays import Floats
 
 TAU = 2.0 * math.pi
-PLANE_WORK = 14
-"""Numbers of memory that a beam in the plane needs."""
+
+
+class PlaneBeam(NamedTuple):
+    """Forces of a deformed beam in the plane.
+
+    Scalars, which a compiled function keeps in registers: arrays would take twice the time.
+    """
+
+    axial: float
+    shear: float
+    """Sum of the end moments over the length."""
+    moment1: float
+    moment2: float
+    inverse: float
+    """One over the length."""
+    cosine: float
+    sine: float
+    """Direction of the chord."""
+    slope_x: float
+    slope_y: float
+    """Derivative of axial force over EA/L by the displacements of the first end; the negative of
+    that by those of the second."""
+    bow1: float
+    bow2: float
+    """The same by the rotations of the ends."""
+
+
+class PlaneStiffness(NamedTuple):
+    """Entries of the stiffness of a beam in the plane."""
+
+    xx: float
+    xy: float
+    yy: float
+    """Block of the displacements of an end; the negative of that between both ends."""
+    xt: float
+    yt: float
+    """Displacements of the first end by its own rotation."""
+    xo: float
+    yo: float
+    """The same by the rotation of the other end."""
+    own1: float
+    other: float
+    own2: float
+    """Rotations."""
 
 
 @kernel
@@ -38,120 +80,161 @@ def wrapped(angle: float) -> float:
 
 
 @kernel
-def plane_deformations(rest: Floats, first: Floats, second: Floats, out: Floats) -> None:
-    """Compute the deformations of a beam.
+def plane_deformations(
+    rest: Floats, rest_length: float, first: Floats, second: Floats
+) -> tuple[float, float, float, float, float, float]:
+    """Return elongation, end rotations, one over the length, and the direction of the chord.
 
     Parameters
     ----------
-    rest
-        (2,) vector along the beam at rest.
+    rest, rest_length
+        (2,) vector along the beam at rest and its length.
     first, second
         (3,) displacements and rotation of the ends.
-    out
-        (6,) elongation, end rotations, length, direction of the chord.
     """
     dx, dy = second[0] - first[0], second[1] - first[1]
     x, y = rest[0] + dx, rest[1] + dy
     length = math.sqrt(x * x + y * y)
-    rest_length = math.sqrt(rest[0] * rest[0] + rest[1] * rest[1])
     turn = math.atan2(rest[0] * y - rest[1] * x, rest[0] * x + rest[1] * y)
     # From the difference of squares: that of the lengths loses digits.
-    out[0] = ((rest[0] + x) * dx + (rest[1] + y) * dy) / (length + rest_length)
-    out[1] = wrapped(first[2] - turn)
-    out[2] = wrapped(second[2] - turn)
-    out[3], out[4], out[5] = length, x / length, y / length
-
-
-@kernel
-def plane_force(
-    rest: Floats,
-    section: Floats,
-    bow: float,
-    first: Floats,
-    second: Floats,
-    work: Floats,
-    force: Floats,
-) -> None:
-    """Compute the end forces of a beam; see `plane_beam`.
-
-    Left in `work` are axial force (6), sum of the end moments over the length (7), and the
-    derivative of axial force over EA/L by the end displacements (8 to 13).
-    """
-    plane_deformations(rest, first, second, work)
-    length, c, s = work[3], work[4], work[5]
-    one, two = work[1], work[2]
-    axial = section[0] * (work[0] + bow * (2.0 * (one * one + two * two) - one * two))
-    bow1, bow2 = bow * (4.0 * one - two), bow * (4.0 * two - one)
-    moment1 = section[1] * one + section[2] * two + axial * bow1
-    moment2 = section[2] * one + section[1] * two + axial * bow2
-    shear = (moment1 + moment2) / length
-    force[0], force[1] = -axial * c - shear * s, -axial * s + shear * c
-    force[2], force[5] = moment1, moment2
-    force[3], force[4] = -force[0], -force[1]
-    work[6], work[7] = axial, shear
-    turn = (bow1 + bow2) / length
-    work[8], work[9], work[10] = -c - turn * s, -s + turn * c, bow1
-    work[11], work[12], work[13] = -work[8], -work[9], bow2
+    elongation = ((rest[0] + x) * dx + (rest[1] + y) * dy) / (length + rest_length)
+    inverse = 1.0 / length
+    return (
+        elongation, wrapped(first[2] - turn), wrapped(second[2] - turn), inverse, x * inverse,
+        y * inverse,
+    )  # fmt: skip
 
 
 @kernel
 def plane_beam(
-    rest: Floats,
-    section: Floats,
-    bow: float,
-    first: Floats,
-    second: Floats,
-    tension: float,
-    softening: float,
-    work: Floats,
-    force: Floats,
-    tangent: Floats,
-) -> None:
-    """Compute the end forces and the tangent stiffness of a beam.
+    rest: Floats, rest_length: float, section: Floats, bow: float, first: Floats, second: Floats
+) -> PlaneBeam:
+    """Compute the forces of a beam.
 
     Parameters
     ----------
-    rest
-        (2,) vector along the beam at rest.
+    rest, rest_length, first, second
+        As in `plane_deformations`.
     section
         (3,) stiffness: axial EA/L, bending of an end by its own and by the other rotation.
     bow
         L / 30, or 0 to leave out the shortening of a bent beam.
-    first, second
-        (3,) displacements and rotation of the ends.
+    """
+    elongation, one, two, inverse, c, s = plane_deformations(rest, rest_length, first, second)
+    axial = section[0] * (elongation + bow * (2.0 * (one * one + two * two) - one * two))
+    bow1, bow2 = bow * (4.0 * one - two), bow * (4.0 * two - one)
+    moment1 = section[1] * one + section[2] * two + axial * bow1
+    moment2 = section[2] * one + section[1] * two + axial * bow2
+    turn = (bow1 + bow2) * inverse
+    return PlaneBeam(
+        axial, (moment1 + moment2) * inverse, moment1, moment2, inverse, c, s, -c - turn * s,
+        -s + turn * c, bow1, bow2,
+    )  # fmt: skip
+
+
+@kernel
+def plane_stiffness(
+    beam: PlaneBeam, section: Floats, bow: float, tension: float, softening: float
+) -> PlaneStiffness:
+    """Compute the tangent stiffness of a beam.
+
+    Parameters
+    ----------
     tension
         Axial force in the tangent stiffness; that of the beam itself gives the exact derivative.
     softening
         Factor of the part of the tangent that depends on the forces: 1, or 0 to leave it out.
-    work
-        (PLANE_WORK,) memory.
-    force
-        (6,) result: forces and moment on the first and on the second end.
-    tangent
-        (6, 6) result: derivative of the forces by the end displacements.
     """
-    plane_force(rest, section, bow, first, second, work, force)
-    inverse, c, s = 1.0 / work[3], work[4], work[5]
-    axial, shear = softening * tension, softening * work[7]
+    inverse, c, s = beam.inverse, beam.cosine, beam.sine
+    axial = softening * tension
     own, other = section[1] + 4.0 * bow * axial, section[2] - bow * axial
-    # Blocks of displacements: b t t' + e (n t' + t n'); the axial part a g g' is added below.
+    # Displacements: b t t' + e (n t' + t n') + a g g', with the derivative g of the axial force.
     a = section[0]
-    b = 2.0 * (own + other) * inverse * inverse + axial * inverse
-    e = shear * inverse
-    xx = b * s * s - 2.0 * e * c * s
-    yy = b * c * c + 2.0 * e * c * s
-    xy = -b * c * s + e * (c * c - s * s)
     bend = (own + other) * inverse
-    for k in range(2):
-        sign_k = 1.0 if k else -1.0
-        for m in range(2):
-            sign = sign_k if m else -sign_k
-            tangent[3 * k, 3 * m] = sign * xx
-            tangent[3 * k, 3 * m + 1] = tangent[3 * k + 1, 3 * m] = sign * xy
-            tangent[3 * k + 1, 3 * m + 1] = sign * yy
-            tangent[3 * k + 2, 3 * m + 2] = own if k == m else other
-            tangent[3 * k, 3 * m + 2] = tangent[3 * m + 2, 3 * k] = sign_k * bend * s
-            tangent[3 * k + 1, 3 * m + 2] = tangent[3 * m + 2, 3 * k + 1] = -sign_k * bend * c
-    for k in range(6):
-        for m in range(6):
-            tangent[k, m] += a * work[8 + k] * work[8 + m]
+    b = (2.0 * bend + axial) * inverse
+    e = softening * beam.shear * inverse
+    gx, gy = beam.slope_x, beam.slope_y
+    xx = b * s * s - 2.0 * e * c * s + a * gx * gx
+    xy = -b * c * s + e * (c * c - s * s) + a * gx * gy
+    yy = b * c * c + 2.0 * e * c * s + a * gy * gy
+    g1, g2 = a * beam.bow1, a * beam.bow2
+    return PlaneStiffness(
+        xx, xy, yy, gx * g1 - bend * s, gy * g1 + bend * c, gx * g2 - bend * s, gy * g2 + bend * c,
+        own + g1 * beam.bow1, other + g1 * beam.bow2, own + g2 * beam.bow2,
+    )  # fmt: skip
+
+
+@kernel
+def add_plane_force(beam: PlaneBeam, first: Floats, second: Floats) -> None:
+    """Add forces and moment on the first and on the second end."""
+    x = -beam.axial * beam.cosine - beam.shear * beam.sine
+    y = -beam.axial * beam.sine + beam.shear * beam.cosine
+    first[0] += x
+    first[1] += y
+    first[2] += beam.moment1
+    second[0] -= x
+    second[1] -= y
+    second[2] += beam.moment2
+
+
+@kernel
+def fill_plane_tangent(k: PlaneStiffness, tangent: Floats) -> None:
+    """Store (6, 6) the derivative of the forces by the end displacements."""
+    for end in range(2):
+        for other in range(2):
+            sign = 1.0 if end == other else -1.0
+            i, j = 3 * end, 3 * other
+            tangent[i, j], tangent[i + 1, j + 1] = sign * k.xx, sign * k.yy
+            tangent[i, j + 1] = tangent[i + 1, j] = sign * k.xy
+        sign = -1.0 if end else 1.0
+        i = 3 * end
+        tangent[i, 2] = tangent[2, i] = sign * k.xt
+        tangent[i + 1, 2] = tangent[2, i + 1] = sign * k.yt
+        tangent[i, 5] = tangent[5, i] = sign * k.xo
+        tangent[i + 1, 5] = tangent[5, i + 1] = sign * k.yo
+    tangent[2, 2], tangent[5, 5] = k.own1, k.own2
+    tangent[2, 5] = tangent[5, 2] = k.other
+
+
+@kernel
+def add_plane_stiffness(
+    k: PlaneStiffness, i: int, j: int, entry: int, diagonal: Floats, entries: Floats
+) -> None:
+    """Add the stiffness of a beam to the lower triangles of blocks i and j, and to their coupling.
+
+    Parameters
+    ----------
+    i, j
+        Blocks of the first and of the second end; -1 for an end that is held.
+    entry
+        Coupling of both; its rows belong to the block that is eliminated last.
+    """
+    if i >= 0:
+        block = diagonal[i]
+        block[0, 0] += k.xx
+        block[1, 0] += k.xy
+        block[1, 1] += k.yy
+        block[2, 0] += k.xt
+        block[2, 1] += k.yt
+        block[2, 2] += k.own1
+    if j >= 0:
+        block = diagonal[j]
+        block[0, 0] += k.xx
+        block[1, 0] += k.xy
+        block[1, 1] += k.yy
+        block[2, 0] -= k.xo
+        block[2, 1] -= k.yo
+        block[2, 2] += k.own2
+    if entry >= 0:
+        block = entries[entry]
+        block[0, 0] -= k.xx
+        block[0, 1] -= k.xy
+        block[1, 0] -= k.xy
+        block[1, 1] -= k.yy
+        block[2, 2] += k.other
+        xt, yt, xo, yo = (k.xo, k.yo, -k.xt, -k.yt) if i < j else (-k.xt, -k.yt, k.xo, k.yo)
+        # Rotation of the row's end by displacements of the column's, and the reverse.
+        block[2, 0] += xt
+        block[2, 1] += yt
+        block[0, 2] += xo
+        block[1, 2] += yo

@@ -10,12 +10,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from bellcrank.mechanics.frames.kernels.arrays import State
-from bellcrank.mechanics.frames.kernels.assembly import (
-    add_tension_at,
-    clear_tension,
-    stiffness_is_definite,
-)
+from bellcrank.mechanics.frames.kernels.arrays import POINTS, State
+from bellcrank.mechanics.frames.kernels.assembly import stiffness_is_definite
 from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.path import (
     FEW_SWEEPS,
@@ -28,14 +24,15 @@ from bellcrank.mechanics.frames.kernels.path import (
 from bellcrank.mechanics.frames.kernels.state import (
     copy_state,
     difference,
+    move,
     move_held_nodes,
     point_state,
     set_to_rest,
 )
 from bellcrank.mechanics.frames.kernels.structure import place_followers
-from bellcrank.mechanics.kernels._compile import kernel
+from bellcrank.mechanics.kernels._compile import inlined, kernel
 from bellcrank.mechanics.kernels.arrays import CONVERGED
-from bellcrank.mechanics.kernels.fields import copy
+from bellcrank.mechanics.kernels.fields import clear, copy, copy_row
 
 if TYPE_CHECKING:
     from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, Reference, Structure
@@ -82,8 +79,10 @@ def follows_reference(  # noqa: PLR0911 - one test after the other
         return False
     last = reference.count[0] + 1
     memory.count[0], memory.count[1] = reference.count[0], 0
+    copy_row(memory.tension, memory.point_tension[POINTS])
     if not is_near(frame, structure, reference, last, reference.state, state, memory):
         return False
+    begin_changes(structure, reference, memory)
     find_tangent(frame, structure, state, memory.last_tangent, memory)
     rest = memory.previous
     set_to_rest(rest)
@@ -97,6 +96,7 @@ def follows_reference(  # noqa: PLR0911 - one test after the other
         load = 1.0
         if index < last:
             load = memory.load[index - 1] = reference.load[index - 1]
+            predict_changes(structure, (load - before) / (1.0 - before), memory)
             if not follow_point(frame, mask, structure, reference, index, load, memory):
                 return False
         if memory.point_stiffness[index] < least:
@@ -187,17 +187,57 @@ def follow_point(
     v, r = point_state(frame, memory.points, index - 1)
     before, here = State(u, q), State(v, r)
     copy_state(before, here)
+    move(here, 1.0, memory.change)
     place_new_nodes(frame, mask, structure, reference, here, memory)
     move_held_nodes(frame, load, here)
-    clear_tension(memory)
-    add_tension_at(frame, structure, before, 1.0, memory)
-    for beam in range(len(memory.tension)):
-        if not reference.present[beam]:
-            memory.tension[beam] = 0.0
+    for order in range(structure.sizes[1]):
+        beam = structure.beam[order]
+        known = known_tension(reference, index - 1, beam)
+        memory.tension[beam] = known + memory.tension_change[0, beam]
     status = newton(frame, structure, load, here, memory, POINT_TOLERANCE, LONGEST_STEP)
     if status != CONVERGED:
         return False
+    copy_row(memory.tension, memory.point_tension[index - 1])
+    find_changes(structure, reference, index - 1, memory)
     return is_near(frame, structure, reference, index, before, here, memory)
+
+
+@inlined
+def known_tension(reference: Reference, point: int, beam: int) -> float:
+    """Return the axial force of a beam in a state of the reference; 0 if it carries no load."""
+    return reference.tension[point, beam] if reference.present[beam] else 0.0
+
+
+@kernel
+def find_changes(structure: Structure, reference: Reference, point: int, memory: Memory) -> None:
+    """Compute how far the axial forces in `memory.tension` differ from those of the reference."""
+    for order in range(structure.sizes[1]):
+        beam = structure.beam[order]
+        known = known_tension(reference, point, beam)
+        memory.tension_change[0, beam] = memory.tension[beam] - known
+
+
+@kernel
+def begin_changes(structure: Structure, reference: Reference, memory: Memory) -> None:
+    """Store the changes at full load; those at rest are zero."""
+    find_changes(structure, reference, POINTS, memory)
+    copy_row(memory.tension_change[0], memory.tension_change[1])
+    copy(memory.change, memory.full_change)
+    clear(memory.tension_change, 1)
+    clear(memory.change, len(memory.change))
+
+
+@kernel
+def predict_changes(structure: Structure, part: float, memory: Memory) -> None:
+    """Interpolate the changes: advance them by a part of the way to those at full load."""
+    change, full = memory.change, memory.full_change
+    for node in range(len(change)):
+        for axis in range(change.shape[1]):
+            change[node, axis] += part * (full[node, axis] - change[node, axis])
+    for order in range(structure.sizes[1]):
+        beam = structure.beam[order]
+        now, last = memory.tension_change[0, beam], memory.tension_change[1, beam]
+        memory.tension_change[0, beam] = now + part * (last - now)
 
 
 @kernel
@@ -211,8 +251,12 @@ def is_near(
     memory: Memory,
 ) -> bool:
     """Whether a state is near one of the reference, and not much softer; the factor is its own."""
-    difference(before, here, memory.difference)
-    jump = largest_motion(structure, reference, memory.difference)
+    difference(before, here, memory.change)
+    for node in range(len(memory.change)):
+        if not (reference.active[node] and structure.active[node]):
+            for axis in range(memory.change.shape[1]):
+                memory.change[node, axis] = 0.0
+    jump = largest_motion(structure, reference, memory.change)
     set_to_rest(memory.previous)
     difference(memory.previous, here, memory.difference)
     if jump > max(JUMP, RELATIVE_JUMP * largest_motion(structure, reference, memory.difference)):

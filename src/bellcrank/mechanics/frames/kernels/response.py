@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from bellcrank.mechanics.frames.kernels.arrays import KEPT_PATH, NEXT_PATH, NO_PATH, OWN_PATH
+from bellcrank.mechanics.frames.kernels.arrays import (
+    KEPT_PATH,
+    NEXT_PATH,
+    NO_PATH,
+    OWN_PATH,
+    POINTS,
+)
 from bellcrank.mechanics.frames.kernels.assembly import (
-    add_tension_at,
-    clear_tension,
     elastic_energy,
     find_residual,
     set_right_side,
@@ -151,9 +155,8 @@ def find_response(
         copy_state(reference.state, state)
         place_new_nodes(frame, mask, structure, reference, state, memory)
         move_held_nodes(frame, 1.0, state)
-        clear_tension(memory)
-        add_tension_at(frame, structure, reference.state, 1.0, memory)
         for beam in range(len(mask)):
+            memory.tension[beam] = reference.tension[POINTS, beam]
             if not reference.present[beam]:
                 memory.tension[beam] = 0.0
         status = newton(frame, structure, 1.0, state, memory, frame.tolerance, LONGEST_STEP)

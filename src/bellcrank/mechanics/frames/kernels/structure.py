@@ -9,14 +9,20 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from bellcrank.mechanics.frames.kernels.arrays import KEPT_PATH, NO_PATH, OWN_PATH, State
+from bellcrank.mechanics.frames.kernels.arrays import (
+    KEPT_PATH,
+    NO_PATH,
+    OWN_PATH,
+    POINTS,
+    State,
+)
 from bellcrank.mechanics.frames.kernels.beams import dimension
 from bellcrank.mechanics.frames.kernels.factor import couple, entry_of, fill_in
 from bellcrank.mechanics.frames.kernels.state import copy_state, matrix_of, point_state
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import CONVERGED, KEEP, MECHANISM, PRUNE_ALL
 from bellcrank.mechanics.kernels.core import keep_core, other_end
-from bellcrank.mechanics.kernels.fields import clear, copy
+from bellcrank.mechanics.kernels.fields import clear, copy, copy_row
 
 if TYPE_CHECKING:
     from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, Reference, Structure
@@ -343,6 +349,8 @@ def set_reference(
         u, q = point_state(frame, memory.points, index)
         v, r = point_state(frame, reference.points, index)
         copy_state(State(u, q), State(v, r))
+        copy_row(memory.point_tension[index], reference.tension[index])
+    copy_row(memory.point_tension[POINTS], reference.tension[POINTS])
     for index in range(memory.count[0] + 2):
         copy(memory.point_mode[index], reference.mode[index])
         if memory.path[0] == OWN_PATH:
