@@ -38,9 +38,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-REMOVED = 0.3
-"""Part of the designable beams that is removed from a lattice whose growth is measured."""
-PROPOSALS = 200
+REMOVED = 0.55
+"""Part of the designable beams that is removed from a lattice whose growth is measured: searched
+designs have 37 to 45 % of them (crane, anti-parallel, pliers, scaling-8)."""
+DESIGNS = 4
+"""Number of such designs of each lattice."""
+PROPOSALS = 60
+"""Number of flips of each design."""
 
 
 def octet(cells: int) -> Problem:
@@ -128,19 +132,20 @@ def diluted(problem: Problem, seed: int) -> NDArray[np.bool_]:
             return mask
 
 
-def step_time(problem: Problem, mask: NDArray[np.bool_], proposals: int) -> float:
-    """Return the median time (s) of single flips of a design."""
+def step_time(problem: Problem, masks: Sequence[NDArray[np.bool_]], proposals: int) -> float:
+    """Return the mean time (s) of single flips of designs."""
     evaluator = FrameEvaluator(problem)
-    bound = evaluator.evaluate(mask).efficiency
-    evaluator.set_reference()
     rng, times = np.random.default_rng(0), []
-    for beam in rng.choice(problem.designable, proposals):
-        flipped = mask.copy()
-        flipped[beam] ^= True
-        began = time.perf_counter()
-        evaluator.evaluate(flipped, warm_start=True, lower_bound=bound)
-        times.append(time.perf_counter() - began)
-    return float(np.median(times))
+    for mask in masks:
+        bound = evaluator.evaluate(mask).efficiency
+        evaluator.set_reference()
+        for beam in rng.choice(problem.designable, proposals):
+            flipped = mask.copy()
+            flipped[beam] ^= True
+            began = time.perf_counter()
+            evaluator.evaluate(flipped, warm_start=True, lower_bound=bound)
+            times.append(time.perf_counter() - began)
+    return float(np.mean(times))
 
 
 def print_growth(title: str, problems: Sequence[Problem], proposals: int) -> None:
@@ -148,11 +153,12 @@ def print_growth(title: str, problems: Sequence[Problem], proposals: int) -> Non
     print(f"| {title} | nodes | beams | present | ms per step |\n|---|---|---|---|---|")
     beams, times = [], []
     for problem in problems:
-        mask = diluted(problem, 0)
+        masks = [diluted(problem, seed) for seed in range(DESIGNS)]
         beams.append(problem.lattice.beam_count)
-        times.append(step_time(problem, mask, proposals))
+        times.append(step_time(problem, masks, proposals))
         print(
-            f"| {problem.name} | {problem.lattice.node_count} | {beams[-1]} | {mask.sum()} "
+            f"| {problem.name} | {problem.lattice.node_count} | {beams[-1]} "
+            f"| {np.mean(masks):.0%} "
             f"| {1e3 * times[-1]:.3f} |",
             flush=True,
         )

@@ -32,7 +32,7 @@ export class Editor implements TaskEditor {
   tool: Tool = "supports";
   hold: Hold = "fixed";
   brush: Brush = "keep";
-  settings: Settings = { method: "", steps: 20000, chains: 2, seed: 0, forPart: true, width: 2, material: "" };
+  settings: Settings = { method: "", steps: 25000, chains: 2, seed: 0, forPart: true, width: 2, material: "" };
   fault: Fault | null = null;
   registries: Registries | null = null;
   response: Response | null = null;

@@ -8,7 +8,7 @@
     [[tasks]]
     problem = "crane"         # a bundled problem, or a file relative to this one
     search = "paper"          # and any other setting of the search
-    steps = 20_000
+    steps = 25_000
     seeds = 30                # 0 to 29; or [first, last]
     name = "as-published"     # optional; the default is crane-paper
 

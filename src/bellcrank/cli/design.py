@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 def design(
     problem: Annotated[str | None, typer.Argument(help="Bundled problem or problem file.")] = None,
     steps: Annotated[
-        int | None, typer.Option(help="Number of proposals per chain. [20000]")
+        int | None, typer.Option(help="Number of proposals per chain. [25000]")
     ] = None,
     chains: Annotated[int | None, typer.Option(help="Number of independent chains. [2]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers. [0]")] = None,

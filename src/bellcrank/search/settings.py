@@ -51,7 +51,7 @@ class SearchSettings:
     predicts_flips: ClassVar[bool] = False
     """Whether the search predicts all flips, which needs a dense inverse of the stiffness."""
 
-    steps: int = 20_000
+    steps: int = 25_000
     chains: int = 2
     seed: int = 0
     objective: str | None = None

@@ -124,7 +124,7 @@ class RunBody(Body):
     session: Session
     problem: dict[str, Any]
     method: Method = DEFAULT_SEARCH
-    steps: int = Field(default=20_000, ge=1, le=STEPS)
+    steps: int = Field(default=25_000, ge=1, le=STEPS)
     chains: int = Field(default=2, ge=1, le=CHAINS)
     seed: int = Field(default=0, ge=0, lt=2**53)
     goals: Goals = ()
