@@ -135,9 +135,7 @@ def test_plane_beams_equal_the_matrices_of_crisfield() -> None:
     frame, u = crane_states()
     expected_force, expected = crisfield(frame, u)
     force, tangent = np.zeros_like(expected_force), np.zeros_like(expected)
-    plane_beams(
-        frame.elements, frame.rest, frame.stiffness, u, force, tangent
-    )
+    plane_beams(frame.elements, frame.rest, frame.stiffness, u, force, tangent)
     assert np.allclose(force, expected_force, rtol=1e-12, atol=1e-12 * abs(force).max())
     assert np.allclose(tangent, expected, rtol=1e-12, atol=1e-12 * abs(tangent).max())
 

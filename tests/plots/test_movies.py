@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from bellcrank.errors import InvalidProblem, InvalidSettings, OutputExists, StorageError
-from bellcrank.mechanics import SpringEvaluator, strain_of
+from bellcrank.mechanics import FrameEvaluator, SpringEvaluator, strain_of
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Stiffness, Supports
 from bellcrank.plots.movies import (
     MovieFigure,
@@ -23,7 +23,7 @@ from bellcrank.plots.movies import (
     write_movie,
 )
 from bellcrank.workflows import find_design
-from bellcrank.workflows.animate import MotionOptions, animate_motion, motion_movie
+from bellcrank.workflows.animate import MotionOptions, animate_motion, in_one_model, motion_movie
 from bellcrank.workflows.loading import loading_path
 
 SMALL = (320, 180)
@@ -147,7 +147,22 @@ def test_the_first_frame_is_rest_and_the_middle_one_the_full_stroke(movie):
     assert np.allclose(sequence.displacement[middle], full.displacement, atol=1e-9)
     assert sequence.energy[middle].sum() == pytest.approx(full.energy, rel=1e-8)
     assert movie.graphs[0].lines[0].y[-1] == pytest.approx(full.efficiency, abs=1e-8)
-    assert sequence.notes[middle] == "198 beams · stroke 100 % · efficiency 1.010"
+    assert sequence.notes[middle] == "198 beams · springs · stroke 100 % · efficiency 1.010"
+
+
+def test_a_frame_is_compared_with_a_frame():
+    human, machine = find_design("human:crane"), find_design("machine:crane")
+    pairs = [("human:crane", human), ("machine:crane", machine)]
+    shown = motion_movie(pairs, SETTINGS)
+    assert [sequence.problem.section for sequence in shown.sequences] == [
+        machine.problem.section
+    ] * 2
+    frame = FrameEvaluator(shown.sequences[0].problem).evaluate(human.mask)
+    last = shown.graphs[0].lines[0].y[-1]
+    assert last == pytest.approx(frame.efficiency, abs=1e-8)
+    assert all(" · frame · " in sequence.notes[-1] for sequence in shown.sequences)
+    both = [pairs[0], ("crane", human)]
+    assert in_one_model(both) == both
 
 
 def test_each_frame_shows_the_response_to_a_part_of_the_stroke():
@@ -301,7 +316,7 @@ def test_magnified_motion_is_drawn_larger_and_noted():
     large = motion_movie([("pliers", design)], SETTINGS, MotionOptions(magnify=2.5)).sequences[0]
     rest = design.problem.lattice.positions
     assert np.allclose(large.moved - rest, 2.5 * large.displacement)
-    assert large.notes[-1].startswith("motion drawn × 2.5 · load 100 % · ")
+    assert large.notes[-1].startswith("motion drawn × 2.5 · springs · load 100 % · ")
 
 
 @pytest.mark.parametrize("name", ["movie.avi", "movie", "movie.mp4.txt"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,6 +115,7 @@ def motion_movie(
     def computed(done: int) -> None:
         progress("loading", len(responses) * states + done, len(designs) * states)
 
+    designs = in_one_model(designs)
     for _, design in designs:
         responses.append(loading_path(design, part, options.objective, computed))
     shown = [(name, design, way) for (name, design), way in zip(designs, responses, strict=True)]
@@ -122,10 +123,29 @@ def motion_movie(
     return Movie(sequences, _graphs(shown), order)
 
 
+def in_one_model(designs: Sequence[tuple[str, Design]]) -> list[tuple[str, Design]]:
+    """Return the designs as frames if one of them is a frame.
+
+    The others get its section and its material, because efficiencies of springs and of frames
+    cannot be compared.
+    """
+    frames = [design.problem for _, design in designs if design.problem.section is not None]
+
+    def as_frame(design: Design) -> Design:
+        problem = design.problem
+        if problem.section is not None or not frames:
+            return design
+        section, material = frames[0].section, frames[0].material
+        return replace(design, problem=replace(problem, section=section, material=material))
+
+    return [(name, as_frame(design)) for name, design in designs]
+
+
 def _sequence(name: str, design: Design, response: LoadingPath, magnify: float) -> StateSequence:
     """Return the states of a design along its stroke."""
     word = "stroke" if design.problem.input.drive == "displacement" else "load"
     size = f"{design.beam_count} beams" if magnify == 1.0 else f"motion drawn × {magnify:g}"
+    size += " · springs" if design.problem.section is None else " · frame"
     notes = tuple(
         f"{size} · {word} {_percent(fraction)} · {efficiency_note(efficiency)}"
         for efficiency, fraction in zip(response.efficiency, response.fraction, strict=True)
