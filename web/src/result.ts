@@ -103,7 +103,7 @@ export class Result {
     const { efficiency, comparison, mask } = this.subject;
     const beams = bitsOf(mask, this.subject.problem.beams.length).reduce((a, b) => a + b, 0);
     const rows: (HTMLElement | null)[] = [
-      h("tr", {}, h("th", { scope: "row" }, this.subject.problem.section ? "Frame, one element in each strut" : "Spring model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, `${beams} beams`)),
+      h("tr", {}, h("th", { scope: "row" }, this.subject.problem.section ? "As searched" : "Spring model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, `${beams} beams`)),
       comparison && h("tr", {}, h("th", { scope: "row" }, comparison.title === "yours" ? "Your design" : "Drawn by hand"), h("td", {}, figure(comparison.efficiency, 3)),
         h("td", { class: "more" }, comparison.efficiency && efficiency && comparison.efficiency > 0 && efficiency > comparison.efficiency ? `${figure(comparison.efficiency / efficiency, 2)} of the result` : "")),
       ...(this.registries?.levels ?? []).map((level) => this.femRow(level)),
