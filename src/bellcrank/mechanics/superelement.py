@@ -196,6 +196,7 @@ class Superelement:
     --------
     The input of the full crane moves along its direction, its output is free:
 
+    >>> from bellcrank.mechanics import Superelement, uniform_motion
     >>> from bellcrank.model import find_problem
     >>> crane = find_problem("crane")
     >>> push = uniform_motion(crane.input.nodes, crane.input.direction)
