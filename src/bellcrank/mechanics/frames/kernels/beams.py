@@ -62,7 +62,7 @@ def measure(
 def beam_force(
     unit: tuple[float, ...], frame: Frame, state: State, beam: int, memory: Memory
 ) -> float:
-    """Compute the end forces of a beam in `memory.force`; return its axial force."""
+    """Compute the end forces of a beam in `memory.force`; store and return its axial force."""
     first, second = frame.beams[beam, 0], frame.beams[beam, 1]
     work = memory.work
     if len(unit) == 3:
@@ -99,7 +99,7 @@ def beam_tangent(
     softening: float,
     memory: Memory,
 ) -> float:
-    """Compute the end forces and the tangent stiffness of a beam; return its axial force."""
+    """As `beam_force`, and compute the tangent stiffness in `memory.tangent_block`."""
     if len(unit) == 3:
         result = plane_beam_of(frame, state, beam)
         stiffness = plane_stiffness(
