@@ -109,9 +109,8 @@ def predictions(problem: Problem, mask: NDArray[np.bool_]) -> tuple[int, float, 
     `MIN_GAIN` count as none.
     """
     evaluator = FrameEvaluator(problem)
-    mask = mask & (
-        evaluator.load_bearing(mask) | ~np.isin(np.arange(len(mask)), problem.designable)
-    )
+    mask = mask.copy()
+    mask[problem.designable] &= evaluator.load_bearing(mask)[problem.designable]
     before = evaluator.evaluate(mask).efficiency
     evaluator.predict_flips(mask)
     began = time.perf_counter()

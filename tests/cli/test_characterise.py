@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
 
 from bellcrank.machines import read_characterisation
-from bellcrank.model import Design, Stiffness, find_problem, unpack_mask, write_design
+from bellcrank.model import write_design
+from tests.machines.test_two_port import unstable_actuator
 
 from .helpers import call, colours, files, refusal, write
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-UNSTABLE = (
-    "ffffffffffffffffdfffffff2e92dfe80004e4e017d6498039fedc021909b7db2017fff688fffffff9fffff7"
-)
-"""A design of the spring model that loses stability where its output is blocked."""
 pytestmark = pytest.mark.usefixtures("here")
 
 
@@ -72,10 +68,7 @@ def test_no_figure_of_the_table_is_cut_off() -> None:
 
 
 def test_loads_of_ones_own_and_a_loss_of_stability(here: Path) -> None:
-    stiffness = Stiffness(bond=5.0, angle=0.11 / 6.0)
-    problem = replace(find_problem("anti-parallel"), stiffness=stiffness)
-    mask = unpack_mask(UNSTABLE, problem.lattice.beam_count)
-    write_design(Design(problem, mask), here / "unstable.json")
+    write_design(unstable_actuator(), here / "unstable.json")
     words = ("--load", "blocked", "--load", "force:-1e-3", "--load", "spring:2e-3", "--points", 5)
     outcome = call("characterise", "unstable.json", *words)
     assert outcome.code == 0, outcome.err

@@ -7,7 +7,7 @@ import { sentence } from "./text";
 
 const EFFORTS: [string, string, number, number, string][] = [
   ["quick", "Quick", 4000, 2, "Seconds on a small lattice, for a first impression."],
-  ["usual", "Standard", 25000, 2, "Half a minute to a few minutes. Sufficient in most cases."],
+  ["usual", "Standard", 25000, 2, "About half a minute for the crane. Sufficient in most cases."],
   ["long", "Thorough", 100000, 4, "Minutes, for a part to be built."],
 ];
 

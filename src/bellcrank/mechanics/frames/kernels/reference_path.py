@@ -250,7 +250,10 @@ def is_near(
     here: State,
     memory: Memory,
 ) -> bool:
-    """Whether a state is near one of the reference, and not much softer; the factor is its own."""
+    """Whether a state is near one of the reference, and not much softer; the factor is its own.
+
+    `memory.change` becomes the motion between both, of the nodes that move in both designs.
+    """
     difference(before, here, memory.change)
     for node in range(len(memory.change)):
         if not (reference.active[node] and structure.active[node]):

@@ -23,7 +23,11 @@ from bellcrank.mechanics.frames.kernels.assembly import (
 from bellcrank.mechanics.frames.kernels.beams import dimension
 from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.path import LONGEST_STEP, follow_path
-from bellcrank.mechanics.frames.kernels.reference_path import follows_reference, place_new_nodes
+from bellcrank.mechanics.frames.kernels.reference_path import (
+    follows_reference,
+    known_tension,
+    place_new_nodes,
+)
 from bellcrank.mechanics.frames.kernels.state import (
     copy_state,
     move_held_nodes,
@@ -156,9 +160,7 @@ def find_response(
         place_new_nodes(frame, mask, structure, reference, state, memory)
         move_held_nodes(frame, 1.0, state)
         for beam in range(len(mask)):
-            memory.tension[beam] = reference.tension[POINTS, beam]
-            if not reference.present[beam]:
-                memory.tension[beam] = 0.0
+            memory.tension[beam] = known_tension(reference, POINTS, beam)
         status = newton(frame, structure, 1.0, state, memory, frame.tolerance, LONGEST_STEP)
         if status == CONVERGED and efficiency_of(frame, state.u) <= lower_bound:
             place_rest(frame, mask, structure, 1.0, state, memory)
