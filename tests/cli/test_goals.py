@@ -9,7 +9,8 @@ import pytest
 
 from bellcrank.mechanics import Core, SpringEvaluator
 from bellcrank.model import read_design
-from bellcrank.search.constraints import mass_of, mirror_images, near_pairs
+from bellcrank.mechanics import near_pairs
+from bellcrank.search.constraints import mass_of, mirror_images
 
 from .helpers import PROBLEM, call, colours, refusal
 

@@ -18,6 +18,7 @@ from bellcrank.mechanics.analysis import (
     strain_of,
 )
 from bellcrank.mechanics.conditions import Conditions, LinearEquations
+from bellcrank.mechanics.contact import near_pairs
 from bellcrank.mechanics.coupling import Coupling, free_nodes, uniform_motion
 from bellcrank.mechanics.evaluator import (
     VERIFICATION_INCREMENT,
@@ -27,9 +28,20 @@ from bellcrank.mechanics.evaluator import (
     UnloadedBeams,
 )
 from bellcrank.mechanics.following import Movable, PathEnd, follow
+from bellcrank.mechanics.frames.case import CaseEvaluator, Channel
 from bellcrank.mechanics.frames.evaluator import FrameEvaluator
 from bellcrank.mechanics.frames.quantities import quantities
 from bellcrank.mechanics.frames.stroke import Quantities
+from bellcrank.mechanics.items import (
+    StrokeRecord,
+    channels_of,
+    margin,
+    quantity_values,
+    reduced,
+    tightened,
+    violation,
+    worst_value,
+)
 from bellcrank.mechanics.memory import check_memory, evaluators_that_fit
 from bellcrank.mechanics.models import (
     ModelEvaluator,
@@ -51,6 +63,8 @@ from bellcrank.mechanics.superelement import Condensed, State, Superelement, sta
 
 __all__ = [
     "VERIFICATION_INCREMENT",
+    "CaseEvaluator",
+    "Channel",
     "Condensed",
     "Conditions",
     "Core",
@@ -71,9 +85,11 @@ __all__ = [
     "Status",
     "Strain",
     "StrokeEvaluator",
+    "StrokeRecord",
     "Superelement",
     "UnloadedBeams",
     "at_fraction",
+    "channels_of",
     "check_memory",
     "efficiency_of",
     "evaluators_that_fit",
@@ -82,8 +98,10 @@ __all__ = [
     "increment_at",
     "load_bearing_core",
     "loaded_beams",
+    "margin",
     "model_evaluator",
     "model_name",
+    "near_pairs",
     "objective_name",
     "objective_of",
     "objectives",
@@ -91,7 +109,12 @@ __all__ = [
     "output_stiffness",
     "predict_output_stiffness",
     "quantities",
+    "quantity_values",
+    "reduced",
     "state_of",
     "strain_of",
+    "tightened",
     "uniform_motion",
+    "violation",
+    "worst_value",
 ]

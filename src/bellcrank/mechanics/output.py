@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -83,6 +84,7 @@ def output_motion(
     )
 
 
+@lru_cache(maxsize=64)
 def motion_weights(problem: Problem) -> NDArray[np.float64]:
     """Return (1 + d, n, d) the weights of the displacements of the output nodes in means.
 
@@ -93,6 +95,7 @@ def motion_weights(problem: Problem) -> NDArray[np.float64]:
     along = wanted[:, :, None] * wanted[:, None, :]
     normal = (np.eye(wanted.shape[1]) - along).transpose(1, 0, 2)
     weights: NDArray[np.float64] = np.concatenate([wanted[None], normal]) / len(wanted)
+    weights.flags.writeable = False
     return weights
 
 

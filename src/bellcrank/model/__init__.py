@@ -38,20 +38,38 @@ from bellcrank.model.files import (
 from bellcrank.model.gallery import gallery_design, human_counterpart, human_design
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
+from bellcrank.model.loads import Loads, NodeForce, NodeSpring
 from bellcrank.model.masks import pack_mask, unpack_mask
 from bellcrank.model.problem import Design, Problem, problem_to_dict, require_plane
 from bellcrank.model.regions import regions
 from bellcrank.model.schema import problem_from_dict
 from bellcrank.model.section import Elasticity, Section
+from bellcrank.model.specification import (
+    QUANTITIES,
+    Case,
+    Item,
+    ObjectiveTerm,
+    QuantityType,
+    Specification,
+)
 
 __all__ = [
+    "QUANTITIES",
+    "Case",
     "Design",
     "Elasticity",
     "Input",
+    "Item",
     "Lattice",
+    "Loads",
+    "NodeForce",
+    "NodeSpring",
+    "ObjectiveTerm",
     "Output",
     "Problem",
+    "QuantityType",
     "Section",
+    "Specification",
     "Stiffness",
     "Supports",
     "builtin",

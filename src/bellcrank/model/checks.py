@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from bellcrank.model.conditions import Input, Output, Supports
     from bellcrank.model.lattice import Lattice
+    from bellcrank.model.loads import Loads
 
 
 def check_texts(name: object, aggregate: object, objective: object) -> None:
@@ -62,14 +63,18 @@ def check_slender(lattice: Lattice, section: Section, possible: NDArray[np.bool_
         )
 
 
-def check_coordinates(lattice: Lattice, supports: Supports, inputs: Input, outputs: Output) -> None:
-    """Check that directions and supports have the coordinates of the positions."""
+def check_coordinates(
+    lattice: Lattice, supports: Supports, inputs: Input, outputs: list[Output], loads: Loads
+) -> None:
+    """Check that directions, loads and supports have the coordinates of the positions."""
     dimension = lattice.dimension
-    for name, region in (("input", inputs), ("output", outputs)):
-        if region.direction.shape[1] != dimension:
+    vectors = [("input.direction", inputs.direction)]
+    vectors += [("output.direction", output.direction) for output in outputs]
+    for name, given in (*vectors, *loads.vectors()):
+        if given.shape[1] != dimension:
             raise InvalidProblem(
-                f"{name}.direction: expected vectors of {dimension} coordinates like the "
-                f"positions, got {region.direction[0].tolist()}"
+                f"{name}: expected vectors of {dimension} coordinates like the "
+                f"positions, got {given[0].tolist()}"
             )
     if dimension == 2 and len(supports.fixed_z):
         raise InvalidProblem(
@@ -77,23 +82,38 @@ def check_coordinates(lattice: Lattice, supports: Supports, inputs: Input, outpu
         )
 
 
-def check_regions(lattice: Lattice, supports: Supports, inputs: Input, outputs: Output) -> None:
-    """Check that supports, input and output name existing nodes and do not overlap.
+def check_regions(
+    lattice: Lattice,
+    supports: Supports,
+    inputs: Input,
+    outputs: list[Output],
+    loads: Loads,
+    *,
+    sliding: bool,
+) -> None:
+    """Check that supports, input, outputs and loads name existing nodes and do not overlap.
 
-    In space a node may be fixed in two coordinates.
+    Forces and springs may act on any node. In space a node may be fixed in two coordinates. With
+    `sliding`, an output, or an input that is driven by a force, may be on rollers.
     """
     names = [f"supports.{name}" for name in ("fixed", *ROLLERS)]
     regions = dict(zip(names, [supports.fixed, *supports.rollers(3)], strict=True))
-    regions |= {"input.nodes": inputs.nodes, "output.nodes": outputs.nodes}
-    owner: dict[int, str] = {}
-    for name, nodes in regions.items():
+    regions |= {"input.nodes": inputs.nodes}
+    regions |= {f"output{k or ''}.nodes": output.nodes for k, output in enumerate(outputs)}
+    for name, nodes in (*regions.items(), ("loads", loads.nodes)):
         check_ids(name, nodes, lattice.node_count, "node")
-        for node in nodes.tolist():
-            if node in owner and not name.startswith("supports."):
-                raise InvalidProblem(
-                    f"{name}: node {node} is also in {owner[node]}; regions must not overlap"
-                )
-            owner[node] = name
+    held = names[:1] if sliding and inputs.drive == "force" else names
+    pairs = [("input.nodes", name) for name in held]
+    pairs += [
+        (f"output{k or ''}.nodes", name)
+        for k in range(len(outputs))
+        for name in (*(names[:1] if sliding else names), "input.nodes")
+    ]
+    for name, other in pairs:
+        if len(common := np.intersect1d(regions[name], regions[other])):
+            raise InvalidProblem(
+                f"{name}: node {common[0]} is also in {other}; regions must not overlap"
+            )
 
 
 def check_connection(lattice: Lattice, inputs: Input, outputs: Output) -> None:

@@ -151,12 +151,12 @@ class Input:
     amount: float
 
     def __post_init__(self) -> None:
-        nodes = _region("input.nodes", self.nodes)
+        nodes = node_region("input.nodes", self.nodes)
         if self.drive not in get_args(Drive):
             raise InvalidProblem(
                 f"input.drive: expected 'displacement' or 'force', got {self.drive!r}"
             )
-        direction = _unit_vectors("input.direction", self.direction, len(nodes))
+        direction = unit_vectors("input.direction", self.direction, len(nodes))
         object.__setattr__(self, "nodes", locked(nodes))
         object.__setattr__(self, "direction", locked(direction))
         object.__setattr__(self, "amount", positive_number("input.amount", self.amount))
@@ -198,8 +198,8 @@ class Output:
     spring_kind: SpringKind | None = None
 
     def __post_init__(self) -> None:
-        nodes = _region("output.nodes", self.nodes)
-        direction = _unit_vectors("output.direction", self.direction, len(nodes))
+        nodes = node_region("output.nodes", self.nodes)
+        direction = unit_vectors("output.direction", self.direction, len(nodes))
         if self.spring_kind is not None and self.spring_kind not in get_args(SpringKind):
             raise InvalidProblem(
                 "output.spring_kind: expected 'directional' or 'isotropic', "
@@ -216,14 +216,26 @@ class Output:
     __reduce__ = rebuild
 
 
-def _region(name: str, values: NDArray[np.int64]) -> NDArray[np.int64]:
+def node_region(name: str, values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return node ids, at least one.
+
+    Raises
+    ------
+    InvalidProblem
+    """
     nodes = id_list(name, values)
     if len(nodes) == 0:
         raise InvalidProblem(f"{name}: expected at least one node, got none")
     return nodes
 
 
-def _unit_vectors(name: str, values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def unit_vectors(name: str, values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return (count, d) unit vectors; a single vector is repeated.
+
+    Raises
+    ------
+    InvalidProblem
+    """
     vectors = real_array(name, values)
     if vectors.shape not in {(2,), (3,), (count, 2), (count, 3)}:
         raise InvalidProblem(

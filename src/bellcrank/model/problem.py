@@ -27,9 +27,11 @@ from bellcrank.model.checks import (
     check_slender,
     check_texts,
 )
-from bellcrank.model.conditions import Aggregate, Input, Output, Stiffness, Supports
+from bellcrank.model.conditions import ROLLERS, Aggregate, Input, Output, Stiffness, Supports
+from bellcrank.model.loads import Loads
 from bellcrank.model.masks import pack_mask
 from bellcrank.model.section import DEFAULT_MATERIAL, Elasticity, Section
+from bellcrank.model.specification import Case, Specification
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,6 +76,10 @@ class Problem:
     material
         Material of the beams of a frame; by default Young's modulus is 1 and Poisson's ratio
         0.48.
+    loads
+        Forces, springs and own weight besides the input; only for frames.
+    specification
+        What a design must meet, with further outputs and load cases; only for frames.
 
     Raises
     ------
@@ -119,16 +125,25 @@ class Problem:
     objective: str | None = None
     section: Section | None = None
     material: Elasticity | None = None
+    loads: Loads = Loads()  # noqa: RUF009 - frozen, so it is safe to share
+    specification: Specification | None = None
 
     def __post_init__(self) -> None:
-        lattice, given, wanted = self.lattice, self.input, self.output
+        lattice, given = self.lattice, self.input
         check_texts(self.name, self.aggregate, self.objective)
         check_section(lattice, self.section, self.material)
-        check_coordinates(lattice, self.supports, given, wanted)
+        outputs, loads = list(self.outputs.values()), self.loads
+        if self.section is None and (loads or self.specification is not None):
+            raise InvalidProblem(
+                "loads and specification: expected a problem with a section; the spring model has "
+                "neither"
+            )
+        check_coordinates(lattice, self.supports, given, outputs, loads)
         supports = self.supports.merged(lattice.dimension)
         object.__setattr__(self, "supports", supports)
-        check_regions(lattice, supports, given, wanted)
-        check_connection(lattice, given, wanted)
+        check_regions(lattice, supports, given, outputs, loads, sliding=self.section is not None)
+        for output in outputs:
+            check_connection(lattice, given, output)
         if self.section is not None and self.material is None:
             object.__setattr__(self, "material", DEFAULT_MATERIAL)
         beam_count = self.lattice.beam_count
@@ -150,12 +165,56 @@ class Problem:
             possible = initial.copy()
             possible[designable] = True
             check_slender(lattice, self.section, possible)
+        for case in () if self.specification is None else self.specification.cases:
+            self._problem_of(case)
 
     __reduce__ = rebuild
 
     def _default_designable(self) -> NDArray[np.int64]:
-        used = np.concatenate([self.supports.nodes, self.input.nodes, self.output.nodes])
-        return np.flatnonzero(~self.lattice.beams_touching(used))
+        used = [self.special_nodes]
+        for case in () if self.specification is None else self.specification.cases:
+            used += [case.supports.nodes, case.input.nodes, case.loads.nodes]
+            used += [output.nodes for output in case.outputs.values()]
+        return np.flatnonzero(~self.lattice.beams_touching(np.unique(np.concatenate(used))))
+
+    @property
+    def special_nodes(self) -> NDArray[np.int64]:
+        """Nodes of supports, input, outputs and loads, sorted."""
+        outputs = [output.nodes for output in self.outputs.values()]
+        regions = [self.supports.nodes, self.input.nodes, *outputs, self.loads.nodes]
+        return np.unique(np.concatenate(regions))
+
+    @property
+    def outputs(self) -> dict[str, Output]:
+        """All outputs by name, `output` first; it is named ``"output"`` without specification."""
+        if self.specification is None:
+            return {"output": self.output}
+        return {self.specification.output: self.output, **self.specification.outputs}
+
+    @property
+    def cases(self) -> dict[str, Problem]:
+        """Problems of the load cases by name, the first one being that of the problem itself.
+
+        Each has the outputs of its case, and no items.
+        """
+        wanted = self.specification
+        if wanted is None:
+            return {"case": self}
+        own = Specification(case=wanted.case, output=wanted.output, outputs=wanted.outputs)
+        first = replace(self, specification=own)
+        return {wanted.case: first} | {case.name: self._problem_of(case) for case in wanted.cases}
+
+    def _problem_of(self, case: Case) -> Problem:
+        """Return the problem of a further load case."""
+        (name, output), *others = case.outputs.items()
+        own = Specification(case=case.name, output=name, outputs=dict(others))
+        try:
+            return replace(
+                self, supports=case.supports, input=case.input, output=output, loads=case.loads,
+                specification=own,
+            )  # fmt: skip
+        except InvalidProblem as error:
+            raise InvalidProblem(f"case {case.name!r}: {error}") from None
 
     def full_design(self) -> Design:
         """Return the design with all the beams of `initial`."""
@@ -276,32 +335,69 @@ def problem_to_dict(problem: Problem) -> dict[str, Any]:
         "initial": pack_mask(problem.initial),
         "designable": problem.designable.tolist(),
         "stiffness": {"bond": problem.stiffness.bond, "angle": problem.stiffness.angle},
-        "supports": {
-            "fixed": problem.supports.fixed.tolist(),
-            "fixed_x": problem.supports.fixed_x.tolist(),
-            "fixed_y": problem.supports.fixed_y.tolist(),
-        },
-        "input": {
-            "nodes": problem.input.nodes.tolist(),
-            "direction": _one_or_each(problem.input.direction),
-            "drive": problem.input.drive,
-            "amount": problem.input.amount,
-        },
-        "output": {
-            "nodes": problem.output.nodes.tolist(),
-            "direction": _one_or_each(problem.output.direction),
-            "spring": problem.output.spring,
-            "spring_kind": problem.output.spring_kind,
-        },
+        "supports": _supports_data(problem.supports, problem.lattice.dimension),
+        "input": _input_data(problem.input),
+        "output": _output_data(problem.output),
         "aggregate": problem.aggregate,
     }
     if problem.objective is not None:
         data["objective"] = problem.objective
-    if problem.lattice.dimension == 3:
-        data["supports"]["fixed_z"] = problem.supports.fixed_z.tolist()
     if problem.section is not None and problem.material is not None:
         data["section"] = problem.section.to_dict()
         data["material"] = asdict(problem.material)
+    if problem.loads:
+        data["loads"] = problem.loads.to_dict()
+    if problem.specification is not None:
+        data["specification"] = _specification_data(
+            problem.specification, problem.lattice.dimension
+        )
+    return data
+
+
+def _supports_data(supports: Supports, dimension: int) -> dict[str, Any]:
+    names = ("fixed", *ROLLERS[:dimension])
+    return {name: getattr(supports, name).tolist() for name in names}
+
+
+def _input_data(given: Input) -> dict[str, Any]:
+    return {
+        "nodes": given.nodes.tolist(),
+        "direction": _one_or_each(given.direction),
+        "drive": given.drive,
+        "amount": given.amount,
+    }
+
+
+def _output_data(output: Output) -> dict[str, Any]:
+    return {
+        "nodes": output.nodes.tolist(),
+        "direction": _one_or_each(output.direction),
+        "spring": output.spring,
+        "spring_kind": output.spring_kind,
+    }
+
+
+def _specification_data(specification: Specification, dimension: int) -> dict[str, Any]:
+    data: dict[str, Any] = {"case": specification.case, "output": specification.output}
+    if specification.outputs:
+        data["outputs"] = {name: _output_data(each) for name, each in specification.outputs.items()}
+    if specification.cases:
+        data["cases"] = [
+            {
+                "name": case.name,
+                "supports": _supports_data(case.supports, dimension),
+                "input": _input_data(case.input),
+                "outputs": {name: _output_data(each) for name, each in case.outputs.items()},
+                **({"loads": case.loads.to_dict()} if case.loads else {}),
+            }
+            for case in specification.cases
+        ]
+    data["items"] = [item.to_dict() for item in specification.items]
+    data["maximise"] = [objective.to_dict() for objective in specification.maximise]
+    if specification.weight is not None:
+        data["weight"] = specification.weight.tolist()
+    if specification.symmetry:
+        data["symmetry"] = list(specification.symmetry)
     return data
 
 

@@ -65,11 +65,13 @@ from bellcrank.model.calls import call_with_keys
 from bellcrank.model.conditions import Input, Output, Stiffness, Supports
 from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
+from bellcrank.model.loads import Loads, NodeForce, NodeSpring
 from bellcrank.model.masks import unpack_mask
 from bellcrank.model.parsing import Table, parse
 from bellcrank.model.problem import Problem
 from bellcrank.model.regions import regions
 from bellcrank.model.section import Elasticity, Section, Shape
+from bellcrank.model.specification import Case, Item, ObjectiveTerm, Specification
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -115,6 +117,75 @@ class OutputTable(Table):
     spring_kind: Literal["directional", "isotropic"] | None = None
 
 
+class ForceTable(Table):
+    """An entry of ``loads.forces``."""
+
+    nodes: list[Any]
+    force: list[Any]
+
+
+class SpringTable(Table):
+    """An entry of ``loads.springs``."""
+
+    nodes: list[Any]
+    direction: list[Any]
+    stiffness: float
+
+
+class LoadsTable(Table):
+    """``[loads]``."""
+
+    forces: list[ForceTable] = Field(default_factory=list)
+    springs: list[SpringTable] = Field(default_factory=list)
+    weight: list[float] | None = None
+
+
+class CaseTable(Table):
+    """An entry of ``specification.cases``."""
+
+    name: str
+    supports: SupportsTable
+    input: InputTable
+    outputs: dict[str, OutputTable]
+    loads: LoadsTable = LoadsTable()
+
+
+class ItemTable(Table):
+    """An entry of ``specification.items``."""
+
+    quantity: str
+    case: str = ""
+    output: str = ""
+    of: Literal["every", "largest", "smallest", "spread"] = "every"
+    start: float = 1.0
+    stop: float = 1.0
+    at_least: float | None = None
+    at_most: float | None = None
+    path: list[list[float]] | None = None
+
+
+class ObjectiveTable(Table):
+    """An entry of ``specification.maximise``."""
+
+    quantity: str
+    case: str = ""
+    output: str = ""
+    scale: float = 1.0
+
+
+class SpecificationTable(Table):
+    """``[specification]``."""
+
+    case: str = "case"
+    output: str = "output"
+    outputs: dict[str, OutputTable] = Field(default_factory=dict)
+    cases: list[CaseTable] = Field(default_factory=list)
+    items: list[ItemTable] = Field(default_factory=list)
+    maximise: list[ObjectiveTable] = Field(default_factory=list)
+    weight: list[float] | None = None
+    symmetry: list[str] = Field(default_factory=list)
+
+
 class SectionTable(Table):
     """``[section]``."""
 
@@ -150,6 +221,8 @@ class ProblemTable(Table):
     objective: str | None = None
     section: SectionTable | None = None
     material: ElasticityTable | None = None
+    loads: LoadsTable = LoadsTable()
+    specification: SpecificationTable | None = None
 
 
 def problem_from_dict(data: Mapping[str, Any], source: str = "problem") -> Problem:
@@ -198,30 +271,14 @@ def problem_from_dict(data: Mapping[str, Any], source: str = "problem") -> Probl
 
 def _build(table: ProblemTable) -> Problem:
     lattice = _lattice(table)
-    supports, inputs, outputs = table.supports, table.input, table.output
-    if inputs.drive == "displacement":
-        _check_amount(lattice, inputs.amount)
+    if table.input.drive == "displacement":
+        _check_amount(lattice, table.input.amount)
     problem = Problem(
         name=table.name,
         lattice=lattice,
-        supports=Supports(
-            fixed=_nodes(lattice, supports.fixed, "supports.fixed"),
-            fixed_x=_nodes(lattice, supports.fixed_x, "supports.fixed_x"),
-            fixed_y=_nodes(lattice, supports.fixed_y, "supports.fixed_y"),
-            fixed_z=_nodes(lattice, supports.fixed_z, "supports.fixed_z"),
-        ),
-        input=Input(
-            nodes=_nodes(lattice, inputs.nodes, "input.nodes"),
-            direction=inputs.direction,  # type: ignore[arg-type]  # checked there
-            drive=inputs.drive,
-            amount=inputs.amount,
-        ),
-        output=Output(
-            nodes=_nodes(lattice, outputs.nodes, "output.nodes"),
-            direction=outputs.direction,  # type: ignore[arg-type]  # checked there
-            spring=outputs.spring,
-            spring_kind=outputs.spring_kind,
-        ),
+        supports=_supports(lattice, table.supports),
+        input=_input(lattice, table.input),
+        output=_output(lattice, table.output, "output"),
         stiffness=Stiffness(bond=table.stiffness.bond, angle=table.stiffness.angle),
         initial=_initial(table, lattice),  # type: ignore[arg-type]  # None means all
         designable=table.designable,  # type: ignore[arg-type]  # checked there
@@ -229,8 +286,85 @@ def _build(table: ProblemTable) -> Problem:
         objective=table.objective,
         section=section_of(table.section),
         material=elasticity_of(table.material),
+        loads=_loads(lattice, table.loads, "loads"),
+        specification=_specification(lattice, table.specification),
     )
     return _freeze(problem, table)
+
+
+def _supports(lattice: Lattice, table: SupportsTable) -> Supports:
+    return Supports(
+        fixed=_nodes(lattice, table.fixed, "supports.fixed"),
+        fixed_x=_nodes(lattice, table.fixed_x, "supports.fixed_x"),
+        fixed_y=_nodes(lattice, table.fixed_y, "supports.fixed_y"),
+        fixed_z=_nodes(lattice, table.fixed_z, "supports.fixed_z"),
+    )
+
+
+def _input(lattice: Lattice, table: InputTable) -> Input:
+    return Input(
+        nodes=_nodes(lattice, table.nodes, "input.nodes"),
+        direction=table.direction,  # type: ignore[arg-type]  # checked there
+        drive=table.drive,
+        amount=table.amount,
+    )
+
+
+def _output(lattice: Lattice, table: OutputTable, key: str) -> Output:
+    return Output(
+        nodes=_nodes(lattice, table.nodes, f"{key}.nodes"),
+        direction=table.direction,  # type: ignore[arg-type]  # checked there
+        spring=table.spring,
+        spring_kind=table.spring_kind,
+    )
+
+
+def _loads(lattice: Lattice, table: LoadsTable, key: str) -> Loads:
+    forces = [
+        NodeForce(_nodes(lattice, each.nodes, f"{key}.forces[{k}].nodes"), each.force)  # type: ignore[arg-type]
+        for k, each in enumerate(table.forces)
+    ]
+    springs = [
+        NodeSpring(
+            _nodes(lattice, each.nodes, f"{key}.springs[{k}].nodes"),
+            each.direction,  # type: ignore[arg-type]  # checked there
+            each.stiffness,
+        )
+        for k, each in enumerate(table.springs)
+    ]
+    return Loads(tuple(forces), tuple(springs), table.weight)  # type: ignore[arg-type]
+
+
+def _specification(lattice: Lattice, table: SpecificationTable | None) -> Specification | None:
+    if table is None:
+        return None
+    key = "specification"
+    cases = [
+        Case(
+            name=each.name,
+            supports=_supports(lattice, each.supports),
+            input=_input(lattice, each.input),
+            outputs={
+                name: _output(lattice, output, f"{key}.cases[{k}].outputs.{name}")
+                for name, output in each.outputs.items()
+            },
+            loads=_loads(lattice, each.loads, f"{key}.cases[{k}].loads"),
+        )
+        for k, each in enumerate(table.cases)
+    ]
+    return Specification(
+        case=table.case,
+        output=table.output,
+        outputs={
+            name: _output(lattice, output, f"{key}.outputs.{name}")
+            for name, output in table.outputs.items()
+        },
+        cases=tuple(cases),
+        items=tuple(Item(**each.model_dump()) for each in table.items),
+        maximise=tuple(ObjectiveTerm(**each.model_dump()) for each in table.maximise),
+        weight=table.weight,  # type: ignore[arg-type]  # cast there
+        symmetry=tuple(table.symmetry),
+    )
 
 
 def _lattice(table: ProblemTable) -> Lattice:

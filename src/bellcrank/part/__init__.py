@@ -8,21 +8,30 @@
 """
 
 from bellcrank.model.section import Section
-from bellcrank.part.frames import frame_problem, models, spring_problem
-from bellcrank.part.lengths import read_length
+from bellcrank.part.frames import (
+    frame_elasticity,
+    frame_problem,
+    frame_section,
+    models,
+    spring_problem,
+)
 from bellcrank.part.materials import Material, materials
 from bellcrank.part.part import Part
 from bellcrank.part.spec import PartSpec, read_part
+from bellcrank.part.units import read_length, read_quantity
 
 __all__ = [
     "Material",
     "Part",
     "PartSpec",
     "Section",
+    "frame_elasticity",
     "frame_problem",
+    "frame_section",
     "materials",
     "models",
     "read_length",
     "read_part",
+    "read_quantity",
     "spring_problem",
 ]

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.model import Elasticity, Section, require_plane
+from bellcrank.model import Elasticity, Section, Stiffness, require_plane
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bellcrank.model import Problem
+    from bellcrank.model import Lattice, Problem
     from bellcrank.part.spec import PartSpec
 
 models: Registry[Callable[[Problem, PartSpec], Problem]] = Registry("model")
@@ -57,16 +57,43 @@ def frame_problem(problem: Problem, spec: PartSpec) -> Problem:
     (10.0, 0.48)
     """
     _check_slender(problem, spec)
+    section = frame_section(spec, problem.lattice.dimension)
+    material = frame_elasticity(problem.lattice, section, spec, problem.stiffness)
+    return replace(problem, section=section, material=material)
+
+
+def frame_section(spec: PartSpec, dimension: int) -> Section:
+    """Return the cross-section of the struts of parts, in lattice units.
+
+    Examples
+    --------
+    >>> from bellcrank.part import PartSpec
+    >>> frame_section(PartSpec(), 3).shape
+    'round'
+    """
     width = spec.width / spec.scale
-    if problem.lattice.dimension == 3:
-        section = Section.round(width)
-    else:
-        section = Section(width, spec.thickness / spec.scale)
-    length = float(np.mean(problem.lattice.rest_length))
-    young = 2.0 * problem.stiffness.bond * length / section.area
-    return replace(
-        problem, section=section, material=Elasticity(young, spec.registered_material.poisson)
-    )
+    if dimension == 3:
+        return Section.round(width)
+    return Section(width, spec.thickness / spec.scale)
+
+
+def frame_elasticity(
+    lattice: Lattice, section: Section, spec: PartSpec, stiffness: Stiffness | None = None
+) -> Elasticity:
+    """Return the material of frames, whose beams are as stiff as those of the spring model.
+
+    Parameters
+    ----------
+    lattice, section
+        Those of the problem.
+    spec
+        Size and material of the parts.
+    stiffness
+        Stiffness of the spring model; its default if it is not given.
+    """
+    bond = (stiffness or Stiffness()).bond
+    young = 2.0 * bond * float(np.mean(lattice.rest_length)) / section.area
+    return Elasticity(young, spec.registered_material.poisson)
 
 
 def _check_slender(problem: Problem, spec: PartSpec) -> None:

@@ -11,9 +11,9 @@ from pydantic import Field
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.model.parsing import Table, parse, read_toml
 from bellcrank.model.section import Section
-from bellcrank.part.lengths import read_length
 from bellcrank.part.materials import Material, materials
 from bellcrank.part.part import Part
+from bellcrank.part.units import read_length
 
 if TYPE_CHECKING:
     import os

@@ -32,7 +32,7 @@ def clean(design: Design, evaluator: ModelEvaluator | None = None) -> Design:
 
     Loose pieces and dead ends are removed first, then parts connected by a single node or to
     supports only. In the spring model dead ends soften the joint that they are attached to; in a
-    real part all of these are unloaded mass.
+    real part all of these are unloaded mass. A beam that carries load in one load case remains.
 
     Parameters
     ----------
@@ -48,6 +48,8 @@ def clean(design: Design, evaluator: ModelEvaluator | None = None) -> Design:
     """
     evaluator = evaluator or model_evaluator(design.problem, "displacement")
     core = evaluator.load_bearing(design.mask)
+    for case in list(design.problem.cases.values())[1:]:
+        core = core | model_evaluator(case, "displacement").load_bearing(design.mask)
     if design.problem.section is None:
         core = loaded_beams(design.problem, core)
     return design.with_mask(core)

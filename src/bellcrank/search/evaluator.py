@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from bellcrank.mechanics import FlipPrediction, Response, check_memory, model_evaluator
 from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
+from bellcrank.search.specification import SpecificationEvaluator
 
 if TYPE_CHECKING:
     import numpy as np
@@ -73,6 +74,8 @@ def make_evaluator(
     dense = settings.predicts_flips and problem.section is None
     check_memory(problem, evaluators=len(settings.strokes), predict_flips=dense)
     options = settings.objective, settings.unloaded_beams, elements
+    if problem.specification is not None and problem.specification.items:
+        return SpecificationEvaluator(problem, elements)
     if not settings.goals and settings.strokes == (1.0,):
         return model_evaluator(problem, *options)
     cases = at_strokes(problem, settings.strokes)

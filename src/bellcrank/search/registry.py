@@ -16,6 +16,7 @@ from bellcrank.registry import Registry
 from bellcrank.search.blocks import BLOCK
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
 from bellcrank.search.selection import CandidateRule, plateau_ends
+from bellcrank.search.specification import SpecificationEvaluator
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -142,8 +143,8 @@ def advance_chain(
             f"chain {chain}: expected a state at a multiple of {BLOCK} steps, got step {state.step}"
         )
     after, proposals = searches[settings.name].advance(evaluator, settings, chain, state)
-    if isinstance(evaluator, ConstrainedEvaluator):
-        proposals = evaluator.expand_proposals(proposals)
+    if isinstance(evaluator, ConstrainedEvaluator | SpecificationEvaluator):
+        proposals = evaluator.groups.expand_proposals(proposals)
     return after, proposals
 
 

@@ -19,6 +19,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, Status, model_
 from bellcrank.model import Design, Problem
 from bellcrank.search.cleaning import clean, pieces
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
+from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -236,8 +237,8 @@ def _cleaned(
     seen: set[bytes] = set()
     for candidate in candidates:
         cleaned = clean(Design(problem, _bits(problem, candidate)), plain)
-        if isinstance(evaluator, ConstrainedEvaluator):
-            cleaned = cleaned.with_mask(evaluator.with_mirror_images(cleaned.mask))
+        if isinstance(evaluator, ConstrainedEvaluator | SpecificationEvaluator):
+            cleaned = cleaned.with_mask(evaluator.groups.with_images(cleaned.mask))
         key = np.packbits(cleaned.mask).tobytes()
         if key not in seen:
             seen.add(key)
@@ -251,7 +252,9 @@ def _bits(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
 
 def _reason_against(evaluator: Evaluator, design: Design, response: Response) -> str | None:
     """Return the reason to reject a cleaned design, if there is one."""
-    if response.status is Verdict.UNMET and isinstance(evaluator, ConstrainedEvaluator):
+    if response.status is Verdict.UNMET and isinstance(
+        evaluator, ConstrainedEvaluator | SpecificationEvaluator
+    ):
         return f"violates {', '.join(evaluator.violated(design.mask))}"
     if response.status is not Status.CONVERGED:
         return response.status.label

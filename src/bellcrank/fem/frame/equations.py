@@ -17,7 +17,7 @@ from bellcrank.mechanics.frames.system import (
     beam_stiffness,
     drive_and_load,
     held_unknowns,
-    output_springs,
+    spring_stiffness,
     subdivided,
 )
 from bellcrank.model import Elasticity
@@ -114,7 +114,7 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
         held=held_unknowns(problem, len(positions), 3) | ~there,
         drive=part.scale * drive * there,
         load=part.stiffness_unit * part.scale * load * there,
-        springs=(part.stiffness_unit * output_springs(problem, len(positions)))[:, :2, :2]
+        springs=(part.stiffness_unit * spring_stiffness(problem, len(positions)))[:, :2, :2]
         * there[:, :, None],
     )
 

@@ -218,22 +218,33 @@ def drive_and_load(problem: Problem, nodes: int, size: int) -> tuple[Floats, Flo
     drive, load = np.zeros((nodes, size)), np.zeros((nodes, size))
     given = problem.input
     target = drive if given.drive == "displacement" else load
-    target[given.nodes, : problem.lattice.dimension] = given.amount * given.direction
+    dimension = problem.lattice.dimension
+    target[given.nodes, :dimension] = given.amount * given.direction
+    for each in problem.loads.forces:
+        load[each.nodes, :dimension] += each.force
     return drive, load
 
 
-def output_springs(problem: Problem, nodes: int) -> Floats:
-    """Return (nodes, 3, 3) the stiffness of the springs at the output."""
-    ground, output = np.zeros((nodes, 3, 3)), problem.output
-    if output.spring:
-        direction = in_space(output.direction)
-        each = direction[:, :, None] * direction[:, None, :]
-        if output.spring_kind == "isotropic":
-            each = np.zeros_like(each)
-            axes = np.arange(problem.lattice.dimension)
-            each[:, axes, axes] = 1.0
-        ground[output.nodes] = output.spring * each
+def spring_stiffness(problem: Problem, nodes: int) -> Floats:
+    """Return (nodes, 3, 3) the stiffness of the springs at outputs and at other nodes."""
+    ground = np.zeros((nodes, 3, 3))
+    for output in problem.outputs.values():
+        if output.spring:
+            each = _along(output.direction)
+            if output.spring_kind == "isotropic":
+                each = np.zeros_like(each)
+                axes = np.arange(problem.lattice.dimension)
+                each[:, axes, axes] = 1.0
+            ground[output.nodes] += output.spring * each
+    for spring in problem.loads.springs:
+        ground[spring.nodes] += spring.stiffness * _along(spring.direction)
     return ground
+
+
+def _along(direction: NDArray[np.float64]) -> Floats:
+    """Return (n, 3, 3) the products of unit vectors with themselves."""
+    vectors = in_space(direction)
+    return np.asarray(vectors[:, :, None] * vectors[:, None, :])
 
 
 def build_frame(
@@ -256,7 +267,7 @@ def build_frame(
     mask : (M,) bool, optional
         Beams of the lattice that the frame has; all by default.
     weight : (d,), optional
-        Force on a unit of volume.
+        Force on a unit of volume; by default that of the problem.
 
     Raises
     ------
@@ -279,11 +290,11 @@ def build_frame(
     any_held, all_held = np.asarray(held.any(axis=1)), np.asarray(held.all(axis=1))
     drive, load = drive_and_load(problem, nodes, size)
     protected = any_held.astype(np.uint8)
-    protected[problem.input.nodes] = 1
-    protected[problem.output.nodes] = 1
+    protected[problem.special_nodes] = 1
     grounded, prescribed = np.zeros(nodes, np.uint8), np.zeros(nodes, np.uint8)
     grounded[problem.supports.fixed] = 1
     prescribed[problem.input.nodes] = problem.input.drive == "displacement"
+    ground = spring_stiffness(problem, nodes)
     space = in_space(positions)
     rest = triads(space[beams[:, 1]] - space[beams[:, 0]])
     length = np.linalg.norm(rest[:, 0], axis=1)
@@ -292,6 +303,8 @@ def build_frame(
     scale = objective.numerator_scale / (objective.denominator or problem.input.amount)
     sensitivity = abs(scale) * len(problem.output.nodes) * max(1.0, objective.exponent - 1.0)
     of_beam = np.zeros((len(beams), 3))
+    if weight is None:
+        weight = problem.loads.weight
     if weight is not None:
         of_beam[:, :dimension] = problem.section.area * length[:, None] * np.asarray(weight)
     return Frame(
@@ -314,7 +327,8 @@ def build_frame(
         load=load,
         weight=of_beam,
         has_weight=weight is not None,
-        ground=output_springs(problem, nodes),
+        ground=ground,
+        spring_nodes=np.flatnonzero(ground.any(axis=(1, 2))),
         input_nodes=np.array(problem.input.nodes),
         input_direction=in_space(problem.input.direction),
         output_nodes=np.array(problem.output.nodes),

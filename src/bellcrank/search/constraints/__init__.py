@@ -21,8 +21,9 @@ from bellcrank.search.constraints.constraint import (
     parse_goal,
 )
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator, penalty_of
-from bellcrank.search.constraints.response import near_pairs
-from bellcrank.search.constraints.structure import mass_of, mirror_images  # registers
+from bellcrank.search.constraints.response import printed_struts
+from bellcrank.search.constraints.structure import mass_of
+from bellcrank.search.mirror import mirror_images
 
 __all__ = [
     "ConstrainedEvaluator",
@@ -35,7 +36,7 @@ __all__ = [
     "constraints",
     "mass_of",
     "mirror_images",
-    "near_pairs",
     "parse_goal",
     "penalty_of",
+    "printed_struts",
 ]

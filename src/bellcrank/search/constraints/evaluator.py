@@ -18,7 +18,7 @@ from bellcrank.mechanics import (
 )
 from bellcrank.search.constraints.cases import LoadCase, check_compatible
 from bellcrank.search.constraints.constraint import TOLERANCE, DeformedDesign, parse_goal
-from bellcrank.search.constraints.structure import mirror_orbits
+from bellcrank.search.mirror import MirrorGroups
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import ModelEvaluator
     from bellcrank.search.constraints.constraint import Constraint
-    from bellcrank.storage import Proposals
 
 BASE_PENALTY = 100.0
 """Penalty of any violation, larger than any efficiency."""
@@ -59,8 +58,7 @@ class ConstrainedEvaluator:
     alone, without a response, and then with the response, expensive constraints last.
 
     With the constraint ``mirror``, mirror images are flipped together: the lowest beam of each
-    group represents all, and is the only designable one in `problem`. `expand` returns the
-    design that a mask represents.
+    group represents all, and is the only designable one in `problem` (`groups`).
 
     Parameters
     ----------
@@ -112,36 +110,11 @@ class ConstrainedEvaluator:
             each.structure_violation is not None for _, made in self._constraints for each in made
         )
         axes = [goal.value for goal in parsed if goal.name == "mirror"]
-        self._members = original.designable
-        self._orbits = mirror_orbits(original, axes) if axes else original.designable
-        self.problem = original
-        if axes:
-            initial = self.with_mirror_images(original.initial)
-            self.problem = replace(original, initial=initial, designable=np.unique(self._orbits))
+        self.groups = MirrorGroups(original, axes)
+        self.problem = self.groups.problem
         self._violation = self._reference_violation = math.inf
         self._efficiencies = [math.nan] * len(cases)
         self._deformed: list[DeformedDesign] = []
-
-    def expand(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return the design that a mask represents: each beam as the lowest of its images."""
-        design = np.asarray(mask, dtype=bool).copy()
-        design[..., self._members] = design[..., self._orbits]
-        return design
-
-    def with_mirror_images(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return a design with all mirror images of its beams."""
-        design = mask.copy()
-        chosen = np.unique(self._orbits[mask[self._members]])
-        design[self._members] = np.isin(self._orbits, chosen)
-        return design
-
-    def expand_proposals(self, proposals: Proposals) -> Proposals:
-        """Return recorded proposals with the designs that their masks represent."""
-        if np.array_equal(self._members, self._orbits):
-            return proposals
-        count = self.problem.lattice.beam_count
-        bits = np.unpackbits(proposals.mask, axis=1)[:, :count].astype(bool)
-        return proposals._replace(mask=np.packbits(self.expand(bits), axis=1))
 
     def evaluate(
         self,
@@ -165,7 +138,7 @@ class ConstrainedEvaluator:
         lower_bound
             With a warm start, a design of no higher score has the status UNVERIFIED.
         """
-        design = self.expand(mask)
+        design = self.groups.expand(mask)
         violation = self._structure_violation(design)
         if not warm_start:
             return self._evaluate_cases(
@@ -197,26 +170,23 @@ class ConstrainedEvaluator:
         The changes by mirror images, which are flipped together, are added. Only constraints
         with a prediction contribute.
         """
-        design = self.expand(mask)
-        change, strain = np.zeros(len(self._members)), np.zeros(len(self._members))
+        design = self.groups.expand(mask)
+        change, strain = np.zeros(len(self.groups.members)), np.zeros(len(self.groups.members))
         for index, evaluator in enumerate(self.evaluators):
-            prediction = evaluator.predict_flips(design, self._members)
+            prediction = evaluator.predict_flips(design, self.groups.members)
             if prediction is None:
                 return None
             value = self.cases[index].change(self._efficiencies[index], prediction.change)
             change += self.weights[index] * value
             strain = np.maximum(strain, np.abs(prediction.strain))
-        beams, group = np.unique(self._orbits, return_inverse=True)
-        total: NDArray[np.float64] = np.bincount(group, change).astype(float)
-        largest = np.zeros(len(beams))
-        np.maximum.at(largest, group, strain)
+        total = self.groups.total(change)
         if self._constraints:
-            total = total + self._predicted_penalties(design, group, total)
-        return FlipPrediction(beams, total, largest)
+            total = total + self._predicted_penalties(design, total)
+        return FlipPrediction(self.groups.beams, total, self.groups.largest(strain))
 
     def violated(self, mask: NDArray[np.bool_]) -> list[str]:
         """Return the goals that a design with a stable response violates."""
-        design = self.expand(mask)
+        design = self.groups.expand(mask)
         core = self._core(design)
         responses = [e.evaluate(design, VERIFICATION_INCREMENT) for e in self.evaluators]
         deformed = self._deformed_by(design, responses, verified=True)
@@ -291,7 +261,7 @@ class ConstrainedEvaluator:
         return replace(response, status=status, penalty=penalty_of(violation))
 
     def _predicted_penalties(
-        self, design: NDArray[np.bool_], group: NDArray[np.int64], change: NDArray[np.float64]
+        self, design: NDArray[np.bool_], change: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return the predicted change of the score by the changes of violations.
 
@@ -301,15 +271,15 @@ class ConstrainedEvaluator:
         increase = np.zeros(len(change))
         for _, made in self._constraints:
             if (flip_change := made[0].flip_change) is not None:
-                increase += np.bincount(group, flip_change(core)[self._members])
+                increase += self.groups.total(flip_change(core)[self.groups.members])
         satisfied = self._violation <= TOLERANCE
         penalty = np.where(
             satisfied & (increase > TOLERANCE), PROHIBITIVE, -VIOLATION_WEIGHT * increase
         )
         for _, made in self._constraints:
-            predicted = _predicted_increase(made, self._deformed, self._members)
+            predicted = _predicted_increase(made, self._deformed, self.groups.members)
             if predicted is not None:
-                penalty -= VIOLATION_WEIGHT * np.bincount(group, predicted)
+                penalty -= VIOLATION_WEIGHT * self.groups.total(predicted)
         return np.where(change != 0.0, penalty, 0.0)
 
 

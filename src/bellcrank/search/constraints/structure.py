@@ -17,6 +17,7 @@ from bellcrank.search.constraints.constraint import (
     counted,
     no_value,
 )
+from bellcrank.search.mirror import AXES, mirror_images
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
 
 TYPICAL_MISSING_BEAMS = 10.0
 """Number of missing beams at which the violation of `degree` is one half."""
-POSITION_TOLERANCE = 1e-4
-"""Tolerance on the position of a mirror image, in mean beam lengths."""
-AXES = {"x": 0, "y": 1}
 
 
 def mass_of(problem: Problem, core: NDArray[np.bool_]) -> float:
@@ -133,66 +131,6 @@ def mirror(problem: Problem, axis: str) -> Constraint:
         return float(np.mean(present != present[images]))
 
     return Constraint(structure_violation=violation)
-
-
-def mirror_images(problem: Problem, axis: str) -> NDArray[np.int64]:
-    """Return (D,) the index into the designable beams of the mirror image of each.
-
-    ``x`` exchanges left and right, ``y`` up and down, about the centre of the designable beams.
-
-    Raises
-    ------
-    ValueError
-        If the lattice is in space, or a beam has no designable image.
-    """
-    from scipy.spatial import cKDTree
-
-    lattice, beams = problem.lattice, problem.designable
-    if lattice.dimension != 2:
-        raise ValueError(f"problem {problem.name!r} is in space; expected one in the plane")
-    column = AXES[axis]
-    ends = lattice.positions[lattice.beams[beams]]
-    nodes = ends.reshape(-1, 2)
-    image = ends.copy()
-    image[..., column] = nodes[:, column].min() + nodes[:, column].max() - ends[..., column]
-    tolerance = POSITION_TOLERANCE * float(np.mean(lattice.rest_length))
-    distance, partner = cKDTree(_coordinates(ends)).query(_coordinates(image))
-    unmatched = np.flatnonzero(np.asarray(distance) > tolerance)
-    if len(unmatched):
-        raise ValueError(
-            f"problem {problem.name!r} is not symmetric in {axis}: {len(unmatched)} of "
-            f"{len(beams)} designable beams have no designable mirror image, the first is "
-            f"{beams[unmatched[0]]}"
-        )
-    found: NDArray[np.int64] = np.asarray(partner, dtype=np.int64)
-    return found
-
-
-def _coordinates(ends: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (n, 5) coordinates of beams that do not depend on the order of their ends."""
-    along = ends[:, 1] - ends[:, 0]
-    rise = np.sign(along[:, :1] * along[:, 1:].round(6)) * np.abs(along).min(axis=1)[:, None]
-    coordinates: NDArray[np.float64] = np.hstack([ends.mean(axis=1), np.abs(along), rise])
-    return coordinates
-
-
-def mirror_orbits(problem: Problem, axes: list[str]) -> NDArray[np.int64]:
-    """Return (D,) the lowest beam among the mirror images of each designable beam.
-
-    Examples
-    --------
-    >>> from bellcrank.model import find_problem
-    >>> problem = find_problem("scaling-8")
-    >>> len(problem.designable), len(set(mirror_orbits(problem, ["x"])))
-    (172, 88)
-    """
-    lowest = np.arange(len(problem.designable))
-    images = [mirror_images(problem, axis) for axis in axes]
-    for _ in range(2):
-        for image in images:
-            lowest = np.minimum(lowest, lowest[image])
-    orbits: NDArray[np.int64] = problem.designable[lowest]
-    return orbits
 
 
 for _name, _usage, _parse, _make in (

@@ -67,7 +67,9 @@ class Frame(Bundle):
     """(M, 3) force on each beam at full load, one half on either end."""
     has_weight: bool
     ground: Floats
-    """(N, 3, 3) stiffness of the output springs."""
+    """(N, 3, 3) stiffness of springs to the ground."""
+    spring_nodes: Ints
+    """Nodes with such springs."""
     input_nodes: Ints
     input_direction: Floats
     """(i, 3)"""

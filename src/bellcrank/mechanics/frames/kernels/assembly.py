@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @kernel
 def elastic_energy(frame: Frame, structure: Structure, state: State, memory: Memory) -> float:
-    """Return the elastic energy of the beams and the output springs."""
+    """Return the elastic energy of the beams and the springs."""
     total = 0.0
     d = memory.work[8, 0]
     for index in range(structure.sizes[1]):
@@ -46,7 +46,7 @@ def elastic_energy(frame: Frame, structure: Structure, state: State, memory: Mem
             for k in range(2):
                 own, other, a, b = section[2 + 2 * k], section[3 + 2 * k], d[2 + k], d[4 + k]
                 total += 0.5 * own * (a * a + b * b) + other * a * b
-    for node in frame.output_nodes:
+    for node in frame.spring_nodes:
         for i in range(3):
             for j in range(3):
                 total += 0.5 * frame.ground[node, i, j] * state.u[node, i] * state.u[node, j]
@@ -72,13 +72,13 @@ def clear_stiffness(structure: Structure, memory: Memory) -> None:
 def add_loads(
     frame: Frame, structure: Structure, fraction: float, state: State, gradient: Floats
 ) -> None:
-    """Add the forces of loads, own weight and output springs to the gradient."""
+    """Add the forces of loads, own weight and springs to the gradient."""
     size = len(frame.unit)
     for index in range(structure.sizes[0]):
         node = structure.order[index]
         for axis in range(size):
             gradient[node, axis] -= fraction * frame.load[node, axis]
-    for node in frame.output_nodes:
+    for node in frame.spring_nodes:
         for i in range(3):
             for j in range(3):
                 gradient[node, i] += frame.ground[node, i, j] * state.u[node, j]
@@ -165,9 +165,9 @@ def scatter(frame: Frame, structure: Structure, beam: int, memory: Memory) -> No
 
 @kernel
 def complete_diagonal(frame: Frame, structure: Structure, memory: Memory) -> None:
-    """Add output springs, and ones where an unknown is held or does not move."""
+    """Add springs, and ones where an unknown is held or does not move."""
     size = len(frame.unit)
-    for node in frame.output_nodes:
+    for node in frame.spring_nodes:
         block = frame.block[node]
         if block >= 0 and structure.active[node]:
             for i in range(3):
@@ -372,7 +372,7 @@ def find_load_rate(
         if not (frame.prescribed[first] or frame.prescribed[second]):
             continue
         add_driven_rate(frame, state, beam, rate, memory)
-    for node in frame.output_nodes:
+    for node in frame.spring_nodes:
         if frame.prescribed[node]:
             for i in range(3):
                 for j in range(3):

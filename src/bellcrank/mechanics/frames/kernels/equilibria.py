@@ -58,7 +58,7 @@ def stiffness_product(
 ) -> None:
     """Fill `product` (N, b) with the stiffness at a state times a motion, held unknowns included.
 
-    Beams and output springs; dead loads have no stiffness.
+    Beams and springs; dead loads have no stiffness.
     """
     size, tangent = len(frame.unit), memory.tangent_block
     clear(product, len(product))
@@ -75,7 +75,7 @@ def stiffness_product(
                     for b in range(size):
                         total += tangent[size * end + a, size * other + b] * motion[moved, b]
                 product[node, a] += total
-    for node in frame.output_nodes:
+    for node in frame.spring_nodes:
         for i in range(3):
             for j in range(3):
                 product[node, i] += frame.ground[node, i, j] * motion[node, j]

@@ -46,6 +46,11 @@ class Slopes(NamedTuple):
     """(k, N, b) by the unknowns of the linear motion."""
 
 
+def vector(values: Values) -> Values:
+    """Return the measures themselves."""
+    return values
+
+
 def single(values: Values) -> Values:
     """Return the only measure."""
     only: NDArray[np.float64] = values[..., 0]
@@ -63,7 +68,7 @@ class Quantity:
     slopes
         Function from an equilibrium and its measures to their derivatives.
     combine
-        Function from measures (..., k) to the quantity (...).
+        Function from measures (..., k) to the quantity (...), or (..., c) for one of c components.
     gradient
         Function from measures (k,) to the derivatives (k,) of the quantity.
     load

@@ -109,7 +109,7 @@ def _force_on_stop(equilibrium: Equilibrium) -> Values:
 quantities.register("blocked_force")(Quantity(*linear(_force_on_stop), load="held output"))
 
 
-def _mean_displacement(equilibrium: Equilibrium) -> Values:
+def mean_displacement_fields(equilibrium: Equilibrium) -> Values:
     """Return (d, N, b) the weights of the mean displacement of the output nodes."""
     nodes, dimension = equilibrium.problem.output.nodes, equilibrium.problem.lattice.dimension
     fields = equilibrium.fields(dimension)
@@ -124,11 +124,11 @@ def _sag(equilibrium: Equilibrium) -> Measures:
     motion = equilibrium.solve(-equilibrium.residual() - load)
     if motion is None:
         return Measures(np.full(equilibrium.problem.lattice.dimension, math.nan))
-    return Measures(np.einsum("kna,na->k", _mean_displacement(equilibrium), motion), motion)
+    return Measures(np.einsum("kna,na->k", mean_displacement_fields(equilibrium), motion), motion)
 
 
 def _sag_slopes(equilibrium: Equilibrium, measures: Measures) -> Slopes:
-    fields = _mean_displacement(equilibrium)
+    fields = mean_displacement_fields(equilibrium)
     return Slopes(fields, by_motion=None if measures.motion is None else fields)
 
 

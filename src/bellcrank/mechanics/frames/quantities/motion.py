@@ -42,9 +42,13 @@ def along_field(equilibrium: Equilibrium) -> Values:
 
 def _along_and_input(equilibrium: Equilibrium) -> Values:
     """Return (2, N, b) weights of the mean displacements of output and input."""
-    given, fields = equilibrium.problem.input, equilibrium.fields(2)
-    fields[0] = along_field(equilibrium)[0]
-    fields[1, given.nodes, : given.direction.shape[1]] = given.direction / len(given.nodes)
+    return np.concatenate([along_field(equilibrium), input_field(equilibrium)])
+
+
+def input_field(equilibrium: Equilibrium) -> Values:
+    """Return (1, N, b) the weights of the mean displacement of the input along its direction."""
+    given, fields = equilibrium.problem.input, equilibrium.fields(1)
+    fields[0, given.nodes, : given.direction.shape[1]] = given.direction / len(given.nodes)
     return fields
 
 

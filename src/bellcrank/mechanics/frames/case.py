@@ -1,0 +1,321 @@
+"""Responses of designs in one load case: several quantities of several outputs along the stroke.
+
+A *channel* is a quantity of one output at the states of the stroke. What a specification bounds
+is a function of channels (`bellcrank.mechanics.items`). The change of channels by flips follows
+from one Newton step at each state.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from bellcrank.mechanics.frames.evaluator import FrameEvaluator
+from bellcrank.mechanics.frames.quantities import quantities
+from bellcrank.mechanics.frames.quantities.definition import Quantity, linear, vector
+from bellcrank.mechanics.frames.quantities.forces import mean_displacement_fields
+from bellcrank.mechanics.frames.quantities.motion import input_field, output_fields
+from bellcrank.mechanics.frames.stroke import with_held_output
+from bellcrank.mechanics.status import Status
+from bellcrank.model import Specification
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from bellcrank.mechanics.evaluator import Response
+    from bellcrank.mechanics.frames.equilibria import Equilibrium
+    from bellcrank.mechanics.frames.quantities import Measures
+    from bellcrank.mechanics.frames.quantities.definition import Load
+    from bellcrank.model import Problem
+
+
+class Channel(NamedTuple):
+    """A quantity of an output; the output is empty where it belongs to the case."""
+
+    name: str
+    output: str = ""
+
+
+CHANNELS: dict[str, Quantity] = {
+    "motion": Quantity(*linear(output_fields), combine=vector),
+    "displacement": Quantity(*linear(mean_displacement_fields), combine=vector),
+    "input_motion": Quantity(*linear(input_field)),
+    "rotation": quantities["rotation"],
+    "input_force": quantities["input_force"],
+    "strain": quantities["strain"],
+    "stiffness": quantities["output_stiffness"],
+    "blocked_force": quantities["blocked_force"],
+    "sag": quantities["sag"],
+}
+"""Channels by name. Motion: along the wanted direction, then the components normal to it."""
+
+END_ONLY = frozenset({"stiffness", "blocked_force", "sag"})
+"""Channels with a single value: at full stroke, or at rest."""
+
+
+def with_output(problem: Problem, name: str) -> Problem:
+    """Return a problem whose primary output is the one of a name; all springs remain.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> from bellcrank.part import PartSpec, frame_problem
+    >>> crane = frame_problem(find_problem("crane"), PartSpec())
+    >>> with_output(crane, "output") is crane
+    True
+    """
+    outputs = problem.outputs
+    if name == next(iter(outputs)):
+        return problem
+    case = "case" if problem.specification is None else problem.specification.case
+    others = {key: output for key, output in outputs.items() if key != name}
+    return replace(
+        problem, output=outputs[name],
+        specification=Specification(case=case, output=name, outputs=others),
+    )  # fmt: skip
+
+
+def bound_to(quantity: Quantity, problem: Problem) -> Quantity:
+    """Return a quantity that is measured with the output of another problem."""
+    return replace(
+        quantity,
+        measure=lambda equilibrium: quantity.measure(replace(equilibrium, problem=problem)),
+        slopes=lambda equilibrium, found: quantity.slopes(
+            replace(equilibrium, problem=problem), found
+        ),
+    )
+
+
+class _Point(NamedTuple):
+    """An equilibrium with measured channels."""
+
+    row: int
+    evaluator: FrameEvaluator
+    equilibrium: Equilibrium
+    channels: list[Channel]
+    measured: list[tuple[Quantity, Measures]]
+
+
+class CaseEvaluator:
+    """Responses of designs in one load case, and channels along the stroke.
+
+    Parameters
+    ----------
+    problem
+        Problem of the case (`Problem.cases`), with a section.
+    elements : int, optional
+        As in `FrameEvaluator`.
+    weight : (d,), optional
+        Own weight that causes the sag: force on a unit of volume.
+
+    Examples
+    --------
+    >>> from bellcrank.model import human_design
+    >>> from bellcrank.part import PartSpec, frame_problem
+    >>> design = human_design("crane")
+    >>> case = CaseEvaluator(frame_problem(design.problem, PartSpec()))
+    >>> case.respond(design.mask).status.label
+    'converged'
+    >>> case.values([Channel("motion", "output")], [0.5, 1.0])["motion", "output"].round(3)
+    array([[ 0.32 ,  0.   , -0.052],
+           [ 0.522,  0.   , -0.095]])
+    """
+
+    def __init__(
+        self, problem: Problem, elements: int | None = None, weight: ArrayLike | None = None
+    ) -> None:
+        self.problem = problem
+        self.frame = FrameEvaluator(problem, "displacement", elements)
+        self._weight = weight
+        self._by_output = {name: with_output(problem, name) for name in problem.outputs}
+        self._others: dict[tuple[Load, str], FrameEvaluator] = {}
+        self._quantities: dict[Channel, Quantity] = {}
+        self._points: list[_Point] = []
+        self._mask: NDArray[np.bool_] = problem.initial
+        self._warm = False
+        self._converged: list[FrameEvaluator] = []
+
+    def respond(
+        self,
+        mask: NDArray[np.bool_],
+        largest_increment: float = 1.0,
+        *,
+        warm_start: bool = False,
+        lower_bound: float = -math.inf,
+    ) -> Response:
+        """Compute the response to the input; as `FrameEvaluator.evaluate`."""
+        self._points, self._mask, self._warm = [], mask, warm_start
+        self._converged = []
+        response = self.frame.evaluate(
+            mask, largest_increment, warm_start=warm_start, lower_bound=lower_bound
+        )
+        if response.status is Status.CONVERGED:
+            self._converged.append(self.frame)
+        return response
+
+    def set_reference(self) -> None:
+        """Make the responses computed last, as far as they have converged, the reference."""
+        for evaluator in self._converged:
+            evaluator.set_reference()
+
+    def values(
+        self,
+        channels: Iterable[Channel],
+        fractions: Sequence[float],
+        at_end: frozenset[str] = frozenset(),
+    ) -> dict[Channel, NDArray[np.float64]]:
+        """Return channels of the design evaluated last.
+
+        Parameters
+        ----------
+        channels
+            Channels to measure.
+        fractions
+            Fractions of the stroke, above 0 and at most 1. At 1, the last state of the response
+            counts, even if it is not verified that the path from rest leads to it.
+        at_end
+            Names of further channels to measure at full stroke alone.
+
+        Returns
+        -------
+        dict of (F,) or (F, c) float64
+            Of a channel that is measured at full stroke or at rest alone (`END_ONLY`), (1,) or
+            (1, c); nan where the path does not lead.
+        """
+        single = END_ONLY | at_end
+        by_load: dict[tuple[Load, str], list[Channel]] = {}
+        for channel in channels:
+            load = CHANNELS[channel.name].load
+            key: tuple[Load, str] = (load, channel.output if load == "held output" else "")
+            by_load.setdefault(key, []).append(channel)
+        found: dict[Channel, NDArray[np.float64]] = {}
+        for (load, output), wanted in by_load.items():
+            if load == "input":
+                along = [each for each in wanted if each.name not in single]
+                found |= self._measured(self.frame, self._along(fractions), along, len(fractions))
+                ends = [each for each in wanted if each.name in single]
+                found |= self._measured(self.frame, [self._along([1.0])[0]], ends, 1)
+            else:
+                evaluator = self._other(load, output)
+                state = self._state_of(load, evaluator)
+                found |= self._measured(evaluator, [state], wanted, 1)
+        return found
+
+    def _along(self, fractions: Sequence[float]) -> list[Equilibrium | None]:
+        """Return equilibria along the stroke; the state at full load is the last one computed."""
+        return [
+            self.frame.end if fraction == 1.0 else self.frame.equilibrium(fraction)
+            for fraction in fractions
+        ]
+
+    def _other(self, load: Load, output: str) -> FrameEvaluator:
+        """Return the evaluator of another load than the input."""
+        if (load, output) not in self._others:
+            elements = self.frame.elements
+            if load == "weight":
+                made = FrameEvaluator(self.problem, "displacement", elements, weight=self._weight)
+            else:
+                held = with_held_output(self._by_output[output])
+                made = FrameEvaluator(held, "displacement", elements)
+            self._others[load, output] = made
+        return self._others[load, output]
+
+    def _state_of(self, load: Load, evaluator: FrameEvaluator) -> Equilibrium | None:
+        """Return the state of another load in which its channels are measured."""
+        if load == "weight":
+            return evaluator.at_rest(self._mask)
+        response = evaluator.evaluate(self._mask, warm_start=self._warm)
+        if response.status is not Status.CONVERGED:
+            return None
+        self._converged.append(evaluator)
+        return evaluator.end
+
+    def _quantity(self, channel: Channel) -> Quantity:
+        if channel not in self._quantities:
+            quantity = CHANNELS[channel.name]
+            if channel.output and len(self._by_output) > 1:
+                quantity = bound_to(quantity, self._by_output[channel.output])
+            self._quantities[channel] = quantity
+        return self._quantities[channel]
+
+    def _measured(
+        self,
+        evaluator: FrameEvaluator,
+        states: Sequence[Equilibrium | None],
+        channels: list[Channel],
+        rows: int,
+    ) -> dict[Channel, NDArray[np.float64]]:
+        """Measure channels at states; keep what predictions of flips need."""
+        found: dict[Channel, NDArray[np.float64]] = {}
+        if not channels:
+            return found
+        chosen = [self._quantity(channel) for channel in channels]
+        for row, equilibrium in enumerate(states):
+            if equilibrium is None:
+                continue
+            measured = [(each, each.measure(equilibrium)) for each in chosen]
+            self._points.append(_Point(row, evaluator, equilibrium, channels, measured))
+            for channel, (quantity, measures) in zip(channels, measured, strict=True):
+                value = np.asarray(quantity.combine(measures.value))
+                if channel not in found:
+                    found[channel] = np.full((rows, *value.shape), np.nan)
+                found[channel][row] = value
+        for channel in channels:
+            if channel not in found:
+                found[channel] = np.full((rows, *self._shape(channel)), np.nan)
+        return found
+
+    def _shape(self, channel: Channel) -> tuple[int, ...]:
+        """Return the shape of the values of a channel at one state."""
+        dimension = self.problem.lattice.dimension
+        return {"motion": (1 + dimension,), "displacement": (dimension,)}.get(channel.name, ())
+
+    def predict_flips(
+        self, values: Mapping[Channel, NDArray[np.float64]], beams: NDArray[np.int64]
+    ) -> tuple[dict[Channel, NDArray[np.float64]], NDArray[np.bool_], NDArray[np.float64]] | None:
+        """Predict channels of the design evaluated last after each flip, by one Newton step.
+
+        Parameters
+        ----------
+        values
+            Channels that were measured last.
+        beams : (n,) int64
+            Beams to flip, one at a time.
+
+        Returns
+        -------
+        channels : dict of (n, F, ...) float64
+        changed : (n,) bool
+            Whether the flip changes any measure: False for beams that carry no load.
+        strain : (n,)
+            As in `bellcrank.mechanics.FlipPrediction`, the largest along the stroke.
+        None
+            If an equilibrium is unstable.
+        """
+        after = {
+            channel: np.repeat(value[None], len(beams), axis=0) for channel, value in values.items()
+        }
+        changed, strain = np.zeros(len(beams), dtype=bool), np.zeros(len(beams))
+        for point in self._points:
+            found = point.evaluator.flip_changes(
+                point.equilibrium, point.measured, beams, first_order=False
+            )
+            if found is None:
+                return None
+            np.maximum(strain, np.abs(found.strain), out=strain)
+            for channel, (quantity, before), change in zip(
+                point.channels, point.measured, found.measures, strict=True
+            ):
+                changed |= change.any(axis=1)
+                moved = before.value + change
+                if quantity.after_flips is not None:
+                    moved = quantity.after_flips(
+                        point.equilibrium, before, beams, found.forces, moved
+                    )
+                after[channel][:, point.row] = quantity.combine(moved)
+        return after, changed, strain

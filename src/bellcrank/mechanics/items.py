@@ -1,0 +1,280 @@
+"""Values and violations of the items of a specification, from channels along the stroke.
+
+All functions accept leading axes, so that the same code evaluates one response and the predicted
+responses of many flips.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics.frames.case import Channel
+from bellcrank.model import QUANTITIES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Item
+
+    Values = NDArray[np.float64]
+
+CHANNELS_OF: dict[str, tuple[str, ...]] = {
+    "gain": ("motion", "input_motion"),
+    "travel": ("motion",),
+    "off_axis": ("motion",),
+    "rotation": ("rotation",),
+    "path_error": ("displacement",),
+    "stiffness": ("stiffness",),
+    "payload": ("stiffness", "motion"),
+    "blocked_force": ("blocked_force",),
+    "sag": ("sag", "motion"),
+    "input_force": ("input_force",),
+    "strain": ("strain",),
+    "clearance": (),
+    "stable_stroke": (),
+    "mass": (),
+}
+"""Channels from which a quantity follows. The others are given (`StrokeRecord.given`)."""
+
+ZERO_SCALE = {
+    "ratio": 0.05, "length": 0.1, "angle": 2.0, "force": 1e-3, "stiffness": 1e-3, "volume": 1.0,
+}  # fmt: skip
+"""Scale of the violation of a bound that is zero, by dimension."""
+PATH_POINTS = 48
+"""Number of points at which a path is compared with the wanted one."""
+SMALLEST_TRAVEL = 1e-9
+"""Travel below which ratios to it count as infinite."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrokeRecord:
+    """Channels of one load case along the stroke.
+
+    Parameters
+    ----------
+    fractions : (F,)
+        Fractions of the full input, ascending; the last is 1.
+    channels
+        (..., F, ...) values of channels.
+    given
+        Values of quantities that do not follow from channels: clearance, stable stroke, mass, or
+        a payload that was computed.
+    """
+
+    fractions: NDArray[np.float64]
+    channels: Mapping[Channel, Values]
+    given: Mapping[str, Values | float] = field(default_factory=dict)
+
+    def of(self, name: str, output: str = "") -> Values:
+        """Return a channel."""
+        return self.channels[Channel(name, output)]
+
+
+def channels_of(quantity: str, output: str) -> list[Channel]:
+    """Return the channels that a quantity of an output needs.
+
+    Examples
+    --------
+    >>> channels_of("gain", "tip")
+    [Channel(name='motion', output='tip'), Channel(name='input_motion', output='')]
+    """
+    own = {"input_motion", "input_force", "strain"}
+    return [Channel(name, "" if name in own else output) for name in CHANNELS_OF[quantity]]
+
+
+def quantity_values(
+    record: StrokeRecord, quantity: str, output: str = "", path: Values | None = None
+) -> Values:
+    """Return a quantity: (..., F) where it has a value at every state, else (..., 1).
+
+    Parameters
+    ----------
+    record
+        Channels along the stroke.
+    quantity, output
+        Name of the quantity, and of the output.
+    path : (k, 2), optional
+        The wanted path, for ``path_error``.
+    """
+    if quantity in record.given:
+        return np.asarray(record.given[quantity], dtype=np.float64)[..., None]
+    if quantity == "path_error":
+        assert path is not None
+        return path_error(record.fractions, record.of("displacement", output), path)[..., None]
+    own = channels_of(quantity, output)
+    if "motion" not in CHANNELS_OF[quantity]:
+        return record.channels[own[0]]
+    motion = record.of("motion", output)
+    return _of_motion(quantity, motion, *(record.channels[each] for each in own))
+
+
+def _of_motion(quantity: str, motion: Values, *channels: Values) -> Values:
+    """Return a quantity that depends on the motion of the output and on other channels."""
+    along = motion[..., 0]
+    travel = np.abs(along[..., -1:])
+    if quantity == "gain":
+        along = _ratio(along, channels[1])
+    elif quantity == "off_axis":
+        normal = np.linalg.norm(motion[..., 1:], axis=-1)
+        along = _ratio(normal.max(axis=-1, keepdims=True), travel)
+    elif quantity == "payload":
+        along = np.asarray(0.5 * channels[0] * travel)
+    elif quantity == "sag":
+        along = _ratio(channels[0], travel)
+    return along
+
+
+def _ratio(numerator: Values, denominator: Values) -> Values:
+    """Return a ratio, infinite where the denominator vanishes."""
+    small = np.abs(denominator) < SMALLEST_TRAVEL
+    infinite = np.broadcast_to(np.where(numerator < 0.0, -np.inf, np.inf), small.shape).copy()
+    return np.asarray(np.divide(numerator, denominator, out=infinite, where=~small))
+
+
+def path_error(fractions: NDArray[np.float64], displacement: Values, path: Values) -> Values:
+    """Return the root mean square distance of a motion from a wanted path, over its length.
+
+    A cubic spline through the states is compared with the path at equal fractions of the lengths
+    of both, so that the pace along the path is free.
+
+    Parameters
+    ----------
+    fractions : (F,)
+        Fractions of the stroke.
+    displacement : (..., F, 2)
+        Displacement there.
+    path : (k, 2)
+        Corners of the path, relative to the first one.
+
+    Returns
+    -------
+    (...)
+
+    Examples
+    --------
+    >>> motion = np.array([[1.0, 0.0], [3.0, 0.0]])
+    >>> float(path_error(np.array([0.5, 1.0]), motion, np.array([[0.0, 0.0], [3.0, 0.0]])))
+    0.0
+    """
+    path = np.asarray(path) - path[0]
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    length = float(steps.sum())
+    at = np.concatenate([[0.0], np.cumsum(steps)]) / length
+    share = np.arange(1, PATH_POINTS + 1) / PATH_POINTS
+    wanted = np.stack([np.interp(share, at, path[:, axis]) for axis in range(2)], axis=-1)
+    points = np.asarray(displacement)
+    start = np.zeros((*points.shape[:-2], 1, 2))
+    fine = spline_basis(tuple(fractions.tolist())) @ np.concatenate([start, points], axis=-2)
+    moved = np.linalg.norm(np.diff(fine, axis=-2), axis=-1)
+    reached = np.concatenate([np.zeros((*moved.shape[:-1], 1)), np.cumsum(moved, axis=-1)], axis=-1)
+    rows = fine.reshape(-1, *fine.shape[-2:])
+    errors = np.empty(len(rows))
+    for row, (line, along) in enumerate(zip(rows, reached.reshape(len(rows), -1), strict=True)):
+        if not (np.isfinite(along).all() and along[-1] > 0.0):
+            errors[row] = np.inf
+            continue
+        there = [np.interp(share * along[-1], along, line[:, axis]) for axis in range(2)]
+        gap = np.stack(there, axis=-1) - wanted
+        errors[row] = math.sqrt(float((gap**2).sum(axis=-1).mean())) / length
+    return errors.reshape(points.shape[:-2])
+
+
+@lru_cache(maxsize=64)
+def spline_basis(fractions: tuple[float, ...]) -> Values:
+    """Return (m + 1, F + 1) the values of a cubic spline at m equal steps of the stroke.
+
+    Its knots are the state at rest and those at the fractions.
+    """
+    from scipy.interpolate import CubicSpline
+
+    knots = np.array([0.0, *fractions])
+    spline = CubicSpline(knots, np.eye(len(knots)))
+    values: Values = spline(np.arange(PATH_POINTS + 1) / PATH_POINTS)
+    return values
+
+
+def scale_of(item: Item) -> float:
+    """Return the size of the bounds of an item, by which its violation is normalised."""
+    bounds = [abs(bound) for bound in (item.at_least, item.at_most) if bound is not None]
+    return max(bounds) or ZERO_SCALE[QUANTITIES[item.quantity].dimension]
+
+
+def tightened(item: Item, margin: float) -> Item:
+    """Return an item whose bounds are tighter by a part of their size.
+
+    Two bounds approach their mean; a single one moves by a part of its size.
+
+    Examples
+    --------
+    >>> from bellcrank.model import Item
+    >>> tightened(Item(quantity="strain", case="push", at_most=0.2), 0.1).at_most
+    0.18
+    """
+    low, high = item.at_least, item.at_most
+    if low is not None and high is not None:
+        middle, half = 0.5 * (low + high), 0.5 * (1.0 - margin) * (high - low)
+        return replace(item, at_least=middle - half, at_most=middle + half)
+    if low is not None:
+        return replace(item, at_least=low + margin * abs(low))
+    assert high is not None
+    return replace(item, at_most=high - margin * abs(high))
+
+
+def reduced(item: Item, record: StrokeRecord) -> tuple[Values, Values]:
+    """Return the smallest and the largest value that the bounds of an item apply to, each (...)."""
+    values = quantity_values(record, item.quantity, item.output, item.path)
+    if values.shape[-1] > 1:
+        chosen = (record.fractions >= item.start - 1e-9) & (record.fractions <= item.stop + 1e-9)
+        values = values[..., chosen]
+    low, high = values.min(axis=-1), values.max(axis=-1)
+    if item.of == "largest":
+        return high, high
+    if item.of == "smallest":
+        return low, low
+    if item.of == "spread":
+        mean = np.abs(values.mean(axis=-1))
+        spread = _ratio(high - low, mean)
+        return spread, spread
+    return low, high
+
+
+def excess(item: Item, low: Values, high: Values) -> Values:
+    """Return by how much values exceed the bounds of an item; negative within them."""
+    over = np.full(np.shape(low), -np.inf)
+    if item.at_most is not None:
+        over = np.maximum(over, high - item.at_most)
+    if item.at_least is not None:
+        over = np.maximum(over, item.at_least - low)
+    return np.where(np.isnan(over), np.inf, over)
+
+
+def violation(item: Item, record: StrokeRecord) -> Values:
+    """Return (...) the violation: 0 if the item is met, one half at an excess of its scale.
+
+    It tends to 1 far from the bounds.
+    """
+    over = np.maximum(0.0, excess(item, *reduced(item, record)))
+    scale = scale_of(item)
+    return np.where(np.isinf(over), 1.0, over / (np.where(np.isinf(over), 0.0, over) + scale))
+
+
+def worst_value(item: Item, record: StrokeRecord) -> float:
+    """Return the value that is nearest to violating an item, or violates it most."""
+    low, high = (float(each) for each in reduced(item, record))
+    if item.at_most is None:
+        return low
+    if item.at_least is None:
+        return high
+    return high if high - item.at_most >= item.at_least - low else low
+
+
+def margin(item: Item, value: float) -> float:
+    """Return the distance of a value from the nearest bound, over the scale; negative beyond."""
+    return -float(excess(item, np.asarray(value), np.asarray(value))) / scale_of(item)

@@ -1,0 +1,381 @@
+"""Evaluator of searches for designs that meet a specification."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.fem.contact import find_contacts
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    CaseEvaluator,
+    FlipPrediction,
+    FrameEvaluator,
+    Status,
+    StrokeRecord,
+    channels_of,
+    margin,
+    near_pairs,
+    quantity_values,
+    tightened,
+    violation,
+    worst_value,
+)
+from bellcrank.mechanics.frames.analysis import centre_lines
+from bellcrank.mechanics.stroke import STATES
+from bellcrank.model import QUANTITIES
+from bellcrank.search.constraints.evaluator import BASE_PENALTY, VIOLATION_WEIGHT
+from bellcrank.search.mirror import MirrorGroups
+from bellcrank.search.verdict import Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics import Channel, Response
+    from bellcrank.model import Item, Problem
+
+    Values = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+"""Violation up to which an item is met."""
+SEARCH_STATES = 4
+"""Number of states along the stroke in a search, the full stroke included."""
+PATH_STATES = 8
+"""The same for cases with a wanted path."""
+VERIFIED_STATES = 16
+"""The same for designs that are verified."""
+
+
+class ItemResult(NamedTuple):
+    """An item with the value that a design reaches."""
+
+    item: Item
+    value: float
+    violation: float
+    margin: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the item is met."""
+        return self.violation <= TOLERANCE
+
+
+CHEAP = frozenset({"motion", "displacement", "input_motion", "rotation"})
+"""Channels that cost little at a known state; the others are measured last."""
+
+
+class _Case(NamedTuple):
+    """A load case and the items that belong to it."""
+
+    evaluator: CaseEvaluator
+    items: list[int]
+    channels: list[Channel]
+    cheap: list[Channel]
+    fractions: NDArray[np.float64]
+
+
+def fractions_of(items: Sequence[Item], *, verified: bool) -> NDArray[np.float64]:
+    """Return the fractions of the stroke at which items are evaluated.
+
+    Examples
+    --------
+    >>> from bellcrank.model import Item
+    >>> fractions_of([Item(quantity="travel", at_most=0.1, start=0.0, stop=0.6)], verified=False)
+    array([0.25, 0.5 , 0.6 , 0.75, 1.  ])
+    """
+    states = SEARCH_STATES
+    if any(item.quantity == "path_error" for item in items):
+        states = PATH_STATES
+    if verified:
+        states = VERIFIED_STATES
+    ends = [end for item in items for end in (item.start, item.stop) if end > 0.0]
+    return np.unique(np.concatenate([np.arange(1, states + 1) / states, ends]))
+
+
+class SpecificationEvaluator:
+    """Score of designs by the specification of their problem.
+
+    Parameters
+    ----------
+    problem
+        Problem with a specification.
+    elements : int, optional
+        As in `bellcrank.mechanics.FrameEvaluator`.
+    reserve
+        Part of their size by which all bounds are tightened, so that designs still meet them in a
+        better model.
+
+    Raises
+    ------
+    InvalidSettings
+        If the problem has no specification.
+    ValueError
+        If the lattice is not symmetric as the specification demands.
+    """
+
+    def __init__(self, problem: Problem, elements: int | None = None, reserve: float = 0.0) -> None:
+        wanted = problem.specification
+        if wanted is None:
+            raise InvalidSettings(f"problem {problem.name!r} has no specification")
+        self.groups = MirrorGroups(problem, wanted.symmetry)
+        self.problem = self.groups.problem
+        self.items = tuple(tightened(item, reserve) for item in wanted.items)
+        self.terms = wanted.maximise
+        self.elements = elements
+        section = problem.section
+        assert section is not None
+        self._width = section.width
+        self._volume = section.area * problem.lattice.rest_length
+        self._cases: dict[str, _Case] = {}
+        for name, case in problem.cases.items():
+            evaluator = CaseEvaluator(case, elements, wanted.weight)
+            chosen = [k for k, item in enumerate(self.items) if item.case == name]
+            needed = [(self.items[k].quantity, self.items[k].output) for k in chosen]
+            needed += [(term.quantity, term.output) for term in self.terms if term.case == name]
+            channels = list(dict.fromkeys(c for pair in needed for c in channels_of(*pair)))
+            used = [self.items[k] for k in chosen]
+            cheap = [channel for channel in channels if channel.name in CHEAP]
+            fractions = fractions_of(used, verified=False)
+            self._cases[name] = _Case(evaluator, chosen, channels, cheap, fractions)
+        self._design = [
+            k for k, item in enumerate(self.items) if QUANTITIES[item.quantity].scope == "design"
+        ]
+        self._core_finder = FrameEvaluator(self.problem).load_bearing
+        self.records: dict[str, StrokeRecord] = {}
+        self.violations = np.ones(len(self.items))
+        self._longer: dict[str, FrameEvaluator] = {}
+
+    def evaluate(
+        self,
+        mask: NDArray[np.bool_],
+        largest_increment: float = 1.0,
+        *,
+        warm_start: bool = False,
+        lower_bound: float = -math.inf,
+    ) -> Response:
+        """Return the response of a design; its status is UNMET if it violates items.
+
+        The efficiency is that of the first load case and its first output.
+
+        Parameters
+        ----------
+        mask : (M,) bool
+        largest_increment
+            Upper bound on the load increments, as a fraction of the full load. Up to
+            `VERIFICATION_INCREMENT` the design is verified: contact and stability are checked
+            along the whole stroke.
+        warm_start
+            Start from the reference (`set_reference`).
+        lower_bound
+            With a warm start, a design of no higher score has the status UNVERIFIED.
+        """
+        design = self.groups.expand(mask)
+        verified = largest_increment <= VERIFICATION_INCREMENT
+        structural = {"mass": float(self._volume @ design)}
+        if warm_start and lower_bound > -math.inf:
+            early = self._bound(design, structural, lower_bound)
+            if early is not None:
+                return early
+        responses = []
+        records: dict[str, StrokeRecord] = {}
+        for name, case in self._cases.items():
+            response = case.evaluator.respond(
+                design, largest_increment, warm_start=warm_start,
+                lower_bound=-1e300 if warm_start else -math.inf,
+            )  # fmt: skip
+            responses.append(response)
+            if response.status is not Status.CONVERGED:
+                self.violations = np.ones(len(self.items))
+                return replace(response, penalty=math.inf)
+            fractions = case.fractions
+            if verified:
+                fractions = fractions_of([self.items[k] for k in case.items], verified=True)
+            at_end = frozenset() if verified else frozenset({"strain"})
+            channels = case.evaluator.values(case.channels, fractions.tolist(), at_end)
+            given = self._given(name, design, verified=verified)
+            records[name] = StrokeRecord(fractions, channels, {**structural, **given})
+        self.records = records
+        self.violations = self._violations(records)
+        score = self._score_of(self.violations, records)
+        response = responses[0]
+        met = bool((self.violations <= TOLERANCE).all())
+        status = Status.CONVERGED if met else Verdict.UNMET
+        return replace(response, status=status, penalty=response.efficiency - score)
+
+    def _bound(
+        self, design: NDArray[np.bool_], structural: dict[str, float], lower_bound: float
+    ) -> Response | None:
+        """Return a response if the state at full load alone shows that the score is too low."""
+        records = {}
+        first = None
+        for name, case in self._cases.items():
+            response = case.evaluator.respond(design, warm_start=True, lower_bound=math.inf)
+            first = first or response
+            if response.status is not Verdict.UNVERIFIED and response.status != Status.UNVERIFIED:
+                if response.status is Status.CONVERGED:  # the reference itself
+                    return None
+                return replace(response, penalty=math.inf)
+            channels = case.evaluator.values(case.cheap, [1.0])
+            records[name] = StrokeRecord(np.ones(1), channels, structural)
+        score = self._score_of(self._violations(records, partial=True), records)
+        if score > lower_bound:
+            return None
+        assert first is not None
+        return replace(first, status=Status.UNVERIFIED, penalty=first.efficiency - score)
+
+    def _given(self, name: str, design: NDArray[np.bool_], *, verified: bool) -> dict[str, float]:
+        """Return the quantities of a case that do not follow from channels."""
+        case = self._cases[name]
+        wanted = {self.items[k].quantity: self.items[k].at_least or 0.0 for k in case.items}
+        given: dict[str, float] = {}
+        if "clearance" in wanted:
+            clearance = self._gap if verified else self._overlap
+            given["clearance"] = clearance(case.evaluator.frame, design, wanted["clearance"])
+        if "stable_stroke" in wanted:
+            bound = wanted["stable_stroke"]
+            given["stable_stroke"] = self._stable_stroke(name, design, bound) if verified else bound
+        return given
+
+    def _struts(self, frame: FrameEvaluator, design: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return (M,) the beams that carry load or join two held nodes."""
+        problem = frame.problem
+        held = np.zeros(problem.lattice.node_count, dtype=bool)
+        held[problem.supports.fixed] = True
+        between = design & held[problem.lattice.beams].all(axis=1)
+        return np.asarray(between | (frame.structure.present != 0))
+
+    def _overlap(self, frame: FrameEvaluator, design: NDArray[np.bool_], bound: float) -> float:
+        """Return the bound less the sum over pairs of struts of how far they are too near.
+
+        At full stroke, and for straight struts.
+        """
+        lattice = frame.problem.lattice
+        nodes, dimension = lattice.positions.shape
+        moved = lattice.positions + frame.state.u[:nodes, :dimension]
+        least = self._width + bound
+        _, distance = near_pairs(moved, lattice.beams[self._struts(frame, design)], least)
+        return bound - float(np.sum(least - distance))
+
+    def _gap(self, frame: FrameEvaluator, _design: NDArray[np.bool_], bound: float) -> float:
+        """Return the smallest gap between struts along the stroke; the bound if it is larger."""
+        rest, _ = centre_lines(frame, frame.state)
+        stroke = [
+            (fraction, centre_lines(frame, found.state)[1])
+            for fraction in (np.arange(1, STATES + 1) / STATES).tolist()
+            if (found := frame.equilibrium(fraction)) is not None
+        ]
+        touching = find_contacts(frame.beams, rest, stroke, self._width + bound)
+        return bound - float(touching.overlap.max(initial=0.0))
+
+    def _stable_stroke(self, name: str, design: NDArray[np.bool_], bound: float) -> float:
+        if name not in self._longer:
+            problem = self._cases[name].evaluator.problem
+            given = replace(problem.input, amount=bound * problem.input.amount)
+            self._longer[name] = FrameEvaluator(
+                replace(problem, input=given), "displacement", self.elements
+            )
+        response = self._longer[name].evaluate(design, VERIFICATION_INCREMENT)
+        return bound * response.reached if response.status is not Status.MECHANISM else 0.0
+
+    def _violations(self, records: dict[str, StrokeRecord], *, partial: bool = False) -> Values:
+        """Return (..., I) the violations of all items; 0 for those that need more states."""
+        found = []
+        for item in self.items:
+            record = records[item.case] if item.case else next(iter(records.values()))
+            if partial and not self._shows_at_end(item):
+                found.append(np.zeros(()))
+            else:
+                found.append(violation(item, record))
+        return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.zeros(0)
+
+    @staticmethod
+    def _shows_at_end(item: Item) -> bool:
+        """Whether the violation at full stroke is a lower bound of that of the item."""
+        if item.quantity == "path_error" or any(
+            channel.name not in CHEAP for channel in channels_of(item.quantity, item.output)
+        ):
+            return False
+        if not channels_of(item.quantity, item.output):
+            return item.quantity == "mass"
+        return item.stop == 1.0 and item.of == "every"
+
+    def _objective(self, records: dict[str, StrokeRecord]) -> Values:
+        """Return (...) the smallest term of the objective; without terms, the smallest margin."""
+        terms = []
+        for term in self.terms:
+            record = records[term.case] if term.case else next(iter(records.values()))
+            value = quantity_values(record, term.quantity, term.output)[..., -1]
+            terms.append(value / term.scale)
+        if not terms:
+            return np.zeros(())
+        return np.asarray(np.minimum.reduce(np.broadcast_arrays(*terms)))
+
+    def score(self, total: Values, objective: Values) -> Values:
+        """Return (...) the score for total violations and values of the objective."""
+        unmet = objective - BASE_PENALTY - VIOLATION_WEIGHT * total
+        return np.asarray(np.where(total > TOLERANCE, unmet, objective))
+
+    def _score_of(self, violations: Values, records: dict[str, StrokeRecord]) -> float:
+        """Return the score of one design."""
+        return float(self.score(violations.sum(), self._objective(records)))
+
+    def set_reference(self) -> None:
+        """Make the design evaluated last the reference of warm starts."""
+        for case in self._cases.values():
+            case.evaluator.set_reference()
+
+    def predict_flips(self, mask: NDArray[np.bool_]) -> FlipPrediction | None:
+        """Predict the change of the score by each flip of the design evaluated last.
+
+        The changes by mirror images, which are flipped together, are added.
+        """
+        design = self.groups.expand(mask)
+        members, count = self.groups.members, len(self.groups.beams)
+        strain, changed = np.zeros(len(members)), np.zeros(len(members), dtype=bool)
+        records = {}
+        volume = float(self._volume @ design)
+        sign = np.where(design[members], -1.0, 1.0)
+        for name, case in self._cases.items():
+            now = self.records[name]
+            found = case.evaluator.predict_flips(now.channels, members)
+            if found is None:
+                return None
+            after, differs, largest = found
+            changed |= differs
+            np.maximum(strain, largest, out=strain)
+            channels = {
+                channel: value + self.groups.total(after[channel] - value)
+                for channel, value in now.channels.items()
+            }
+            mass = volume + self.groups.total(sign * self._volume[members])
+            given = {key: np.full(count, value) for key, value in now.given.items()}
+            records[name] = StrokeRecord(now.fractions, channels, {**given, "mass": mass})
+        before = self._score_of(self.violations, self.records)
+        violations = self._violations(records)
+        with np.errstate(invalid="ignore"):
+            score = self.score(violations.sum(axis=-1), self._objective(records))
+        change = np.where(self.groups.largest(changed.astype(float)) > 0.0, score - before, 0.0)
+        return FlipPrediction(
+            self.groups.beams, np.nan_to_num(change, nan=-1e3, neginf=-1e3, posinf=1e3),
+            self.groups.largest(strain),
+        )  # fmt: skip
+
+    def results(self) -> list[ItemResult]:
+        """Return the items with the values of the design evaluated last."""
+        found = []
+        for item, over in zip(self.items, self.violations.tolist(), strict=True):
+            record = self.records[item.case] if item.case else next(iter(self.records.values()))
+            value = worst_value(item, record)
+            found.append(ItemResult(item, value, over, margin(item, value)))
+        return found
+
+    def violated(self, mask: NDArray[np.bool_]) -> list[str]:
+        """Return the names of the items that a design with a stable response violates."""
+        self.evaluate(mask, VERIFICATION_INCREMENT)
+        return [result.item.name for result in self.results() if not result.met]

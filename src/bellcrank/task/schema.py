@@ -1,0 +1,313 @@
+"""Tables of a task file, which are also the classes of a task in Python.
+
+Numbers may carry a unit (`bellcrank.part.units`); bare ones are in mm, N, g, degrees and N/mm.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+from pydantic_core import PydanticCustomError
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.model.parsing import Table
+from bellcrank.part.units import UNITS, read_quantity
+
+if TYPE_CHECKING:
+    from bellcrank.part.units import Quantity
+
+SCHEMA = "bellcrank/task/1"
+DIRECTIONS = {
+    "right": (1.0, 0.0), "left": (-1.0, 0.0), "up": (0.0, 1.0), "down": (0.0, -1.0),
+}  # fmt: skip
+"""Directions by name."""
+
+
+def _reader(quantity: Quantity) -> BeforeValidator:
+    """Return a validator that reads a number with a unit."""
+
+    def read(value: Any) -> float:
+        try:
+            return read_quantity("", value, quantity)
+        except InvalidSettings:
+            raise PydanticCustomError("unit", UNITS[quantity].wanted) from None
+
+    return BeforeValidator(read)
+
+
+Length = Annotated[float, _reader("length")]
+Force = Annotated[float, _reader("force")]
+Mass = Annotated[float, _reader("mass")]
+Angle = Annotated[float, _reader("angle")]
+Ratio = Annotated[float, _reader("ratio")]
+Stiffness = Annotated[float, _reader("stiffness")]
+Point = tuple[Length, Length]
+"""A point [x, y], mm."""
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _as_points(value: Any) -> Any:
+    return [_as_tuple(each) for each in value] if isinstance(value, list) else value
+
+
+def _as_list(value: Any) -> Any:
+    return value if isinstance(value, list) else [value]
+
+
+def _as_bounds(value: Any) -> Any:
+    """Return a list of tables for a table or a single value."""
+    return [
+        each if isinstance(each, dict | Bounds) else {"value": each} for each in _as_list(value)
+    ]
+
+
+def read_direction(value: Any) -> tuple[float, float]:
+    """Return the unit vector of a direction: a name, an angle from the x axis, or a vector.
+
+    Examples
+    --------
+    >>> read_direction("left"), read_direction([0, 2])
+    ((-1.0, 0.0), (0.0, 1.0))
+    """
+    if isinstance(value, str) and value in DIRECTIONS:
+        return DIRECTIONS[value]
+    if isinstance(value, str) and not value.strip().isdigit():
+        with suppress(InvalidSettings):
+            angle = math.radians(read_quantity("", value, "angle"))
+            return math.cos(angle), math.sin(angle)
+    if isinstance(value, list | tuple) and len(value) == 2:
+        with suppress(TypeError, ValueError, ZeroDivisionError):
+            x, y = (float(each) for each in value)
+            size = math.hypot(x, y)
+            if math.isfinite(size):
+                return x / size, y / size
+    raise PydanticCustomError(
+        "direction", "left, right, up, down, an angle like '30deg', or a vector [x, y]"
+    )
+
+
+def _switch(quantity: Quantity) -> BeforeValidator:
+    """Return a validator that reads a number with a unit, true or false."""
+
+    def read(value: Any) -> float | bool:
+        if isinstance(value, bool):
+            return value
+        try:
+            return read_quantity("", value, quantity)
+        except InvalidSettings:
+            message = f"{UNITS[quantity].wanted}, true or false"
+            raise PydanticCustomError("unit", message) from None
+
+    return BeforeValidator(read)
+
+
+OnePoint = Annotated[Point, BeforeValidator(_as_tuple)]
+PointList = Annotated[list[Point], BeforeValidator(_as_points)]
+Box = Annotated[tuple[Length, Length, Length, Length], BeforeValidator(_as_tuple)]
+Direction = Annotated[tuple[float, float], BeforeValidator(read_direction)]
+"""left, right, up, down, an angle from the x axis, or a vector; a unit vector when read."""
+
+
+class PartSection(Table):
+    """``[part]``: size of the struts and material."""
+
+    width: Length = 2.0
+    """Width of the struts."""
+    thickness: Length = 5.0
+    """Thickness of the part."""
+    spacing: Length = 10.0
+    """Length of a lattice unit: the distance of neighbouring nodes."""
+    fillet: Length | None = None
+    """Radius in the corners between struts."""
+    material: Any = "ninjaflex"
+    """Name of a registered material, or a table."""
+
+
+class Shape(Table):
+    """A region of the plane: exactly one of circle, box and polygon."""
+
+    circle: OnePoint | None = None
+    """Centre of a circle; with `radius`."""
+    radius: Length | None = None
+    box: Box | None = None
+    """x_min, y_min, x_max, y_max."""
+    polygon: PointList | None = None
+    """Corners."""
+
+
+class Place(Shape):
+    """Nodes: those in a shape, next to a point, on an edge of the domain, or given by number."""
+
+    point: OnePoint | None = None
+    """The nodes nearest to a point."""
+    count: int = 1
+    """Number of nodes nearest to the point."""
+    edge: Literal["left", "right", "top", "bottom"] | None = None
+    """The nodes on one side of the domain."""
+    between: OnePoint | None = None
+    """Range of an edge: from and to, along it."""
+    nodes: list[int] | None = None
+    """Numbers of nodes."""
+
+
+class DomainSection(Table):
+    """``[domain]``: where material may be."""
+
+    size: OnePoint | None = None
+    """Width and height of a rectangle with its lower left corner at the origin."""
+    outline: Any = None
+    """DXF or SVG file, next to the task file, or the corners of a polygon."""
+    lattice: dict[str, Any] | None = None
+    """A lattice by name, as in a problem file; in lattice units."""
+    problem: str | None = None
+    """A bundled problem, of which lattice, supports, input and output are taken."""
+    holes: list[Shape] = Field(default_factory=list)
+    """Regions without material."""
+    keep_out: list[Shape] = Field(default_factory=list)
+    """Regions that are free of struts, like holes."""
+    solid: list[Shape] = Field(default_factory=list)
+    """Regions in which all beams are present."""
+
+
+Places = Annotated[list[Place], BeforeValidator(_as_list)]
+"""A place, or several."""
+
+
+class SupportSection(Table):
+    """``[[supports]]``: nodes that are held."""
+
+    at: Places
+    hold: Literal["all", "x", "y"] = "all"
+    """Coordinates that are held; ``"x"`` and ``"y"`` are rollers."""
+
+
+class InputSection(Table):
+    """``[[cases.inputs]]``: nodes that are pushed."""
+
+    at: Places | None = None
+    direction: Direction | None = None
+    displacement: Length | None = None
+    """Displacement of each node."""
+    force: Force | None = None
+    """Total force."""
+
+
+class LoadSection(Table):
+    """``[[cases.loads]]``: a force, or a spring to the ground."""
+
+    at: Places
+    direction: Direction
+    force: Annotated[float, _reader("load")] | None = None
+    """Total force, or the mass whose weight acts; it grows with the input."""
+    spring: Stiffness | None = None
+    """Total stiffness."""
+
+
+class Bounds(Table):
+    """What is wanted of a quantity."""
+
+    value: Any = None
+    """A single value in place of a table: ``"maximise"``, or a bound in its usual sense."""
+    at_least: Any = None
+    at_most: Any = None
+    target: Any = None
+    """With `tolerance`."""
+    tolerance: Any = None
+    """A percentage of the target, or a number in its unit."""
+    start: Ratio | None = Field(default=None, alias="from")
+    """Fraction of the stroke from which the bounds hold."""
+    stop: Ratio | None = Field(default=None, alias="to")
+    """Fraction of the stroke up to which the bounds hold."""
+    of: Literal["every", "largest", "smallest", "spread"] = "every"
+    """Whether every value in the range is bounded, the largest, the smallest, or the spread."""
+    maximise: bool = False
+    """Whether to maximise it once all is met."""
+    minimise: bool = False
+    scale: Any = None
+    """Unit in which it is compared with other objectives."""
+
+
+Wanted = Annotated[list[Bounds], BeforeValidator(_as_bounds)]
+"""A table, several, or a single value with the usual meaning."""
+
+
+class PathSection(Table):
+    """A wanted path of the output."""
+
+    points: PointList | None = None
+    """Corners, from the rest position of the output, which is [0, 0]."""
+    arc: Annotated[tuple[Length, Angle], BeforeValidator(_as_tuple)] | None = None
+    """Radius and angle of an arc that begins along the direction of the output; a positive angle
+    turns left."""
+    error: Ratio = 0.01
+    """Allowed root mean square error, as a part of the length."""
+
+
+class OutputSection(Table):
+    """``[[cases.outputs]]``: nodes whose motion is wanted."""
+
+    name: str | None = None
+    at: Places | None = None
+    direction: Direction | None = None
+    spring: Stiffness | None = None
+    """Total stiffness of a workpiece that resists along the direction."""
+    gain: Wanted = Field(default_factory=list)
+    travel: Wanted = Field(default_factory=list)
+    off_axis: Wanted = Field(default_factory=list)
+    rotation: Wanted = Field(default_factory=list)
+    path: PathSection | None = None
+    stiffness: Wanted = Field(default_factory=list)
+    payload: Wanted = Field(default_factory=list)
+    blocked_force: Wanted = Field(default_factory=list)
+    sag: Wanted = Field(default_factory=list)
+
+
+class CaseSection(Table):
+    """``[[cases]]``: a load case."""
+
+    name: str | None = None
+    supports: list[SupportSection] = Field(default_factory=list)
+    """Supports of this case besides those of the task."""
+    inputs: list[InputSection] = Field(default_factory=list)
+    loads: list[LoadSection] = Field(default_factory=list)
+    gravity: Direction | None = None
+    """Direction in which the own weight acts; it grows with the input."""
+    outputs: list[OutputSection] = Field(default_factory=list)
+    input_force: Wanted = Field(default_factory=list)
+    strain: Wanted = Field(default_factory=list)
+
+
+class LimitsSection(Table):
+    """``[limits]``: what holds in every case."""
+
+    strain: Annotated[Any, _switch("ratio")] = True
+    """Largest principal strain; by default that of the material. false for no limit."""
+    clearance: Annotated[Any, _switch("length")] = True
+    """Smallest gap between struts along the stroke; by default they must not touch."""
+    stable_stroke: Ratio | None = None
+    """Part of the stroke up to which the part is stable, such as 1.2."""
+    mass: Mass | None = None
+    """Largest mass of the struts."""
+    symmetry: Literal["x", "y", "xy"] | None = None
+    """Mirror symmetry: left and right, top and bottom, or both."""
+    upright: Direction = (0.0, -1.0)
+    """Direction of the own weight for `sag`."""
+
+
+class TaskTable(Table):
+    """A task file."""
+
+    schema_: Literal["bellcrank/task/1"] = Field(default="bellcrank/task/1", alias="schema")
+    name: str
+    description: str = ""
+    part: PartSection = PartSection()
+    domain: DomainSection
+    supports: list[SupportSection] = Field(default_factory=list)
+    cases: list[CaseSection]
+    limits: LimitsSection = LimitsSection()

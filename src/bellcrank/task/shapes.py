@@ -1,0 +1,198 @@
+"""Regions of the plane and places of nodes, in mm."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely.geometry import Point, Polygon, box
+
+from bellcrank.errors import InvalidProblem
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
+
+    from bellcrank.task.schema import Place, Shape
+
+SHAPES = ("circle", "box", "polygon")
+PLACES = ("point", "edge", "nodes", *SHAPES)
+SNAP = 0.75
+"""Largest distance of a node from the point that it is named by, in spacings."""
+ROW = {"top": 0.3, "bottom": 0.3, "left": 0.55, "right": 0.55}
+"""Distance from the extreme coordinate up to which nodes belong to an edge, in spacings: rows of a
+triangular lattice end alternately half a spacing inside."""
+
+
+def kind_of(place: Shape, names: Sequence[str], key: str) -> str:
+    """Return the one key that says what a shape or place is.
+
+    Raises
+    ------
+    InvalidProblem
+        If there is none, or several.
+    """
+    given = [name for name in names if getattr(place, name, None) is not None]
+    if len(given) != 1:
+        raise InvalidProblem(
+            f"{key}: expected one of {', '.join(names)}, got {' and '.join(given) or 'none'}"
+        )
+    if (place.radius is not None) != (given[0] == "circle"):
+        raise InvalidProblem(f"{key}: expected circle and radius together")
+    return given[0]
+
+
+def shape_of(shape: Shape, key: str) -> BaseGeometry:
+    """Return the region that a table describes.
+
+    Raises
+    ------
+    InvalidProblem
+        If it describes none, several, or an empty one.
+
+    Examples
+    --------
+    >>> from bellcrank.task.schema import Shape
+    >>> round(shape_of(Shape(box=[0, 0, 20, "1cm"]), "hole").area, 1)
+    200.0
+    """
+    kind = kind_of(shape, SHAPES, key)
+    if kind == "circle":
+        assert shape.circle is not None
+        assert shape.radius is not None
+        if shape.radius <= 0.0:
+            raise InvalidProblem(f"{key}.radius: expected a length above 0, got {shape.radius:g}")
+        return Point(shape.circle).buffer(shape.radius, quad_segs=32)
+    if kind == "box":
+        assert shape.box is not None
+        x_min, y_min, x_max, y_max = shape.box
+        if x_min >= x_max or y_min >= y_max:
+            raise InvalidProblem(
+                f"{key}.box: expected [x_min, y_min, x_max, y_max], got {list(shape.box)}"
+            )
+        return box(*shape.box)
+    assert shape.polygon is not None
+    return polygon_of(shape.polygon, f"{key}.polygon")
+
+
+def polygon_of(points: Sequence[Sequence[float]], key: str) -> Polygon:
+    """Return a polygon.
+
+    Raises
+    ------
+    InvalidProblem
+        If it has fewer than three corners, or intersects itself.
+    """
+    if len(points) < 3:
+        raise InvalidProblem(f"{key}: expected at least 3 corners, got {len(points)}")
+    polygon = Polygon(points)
+    if not polygon.is_valid or polygon.area == 0.0:
+        reason = shapely.is_valid_reason(polygon)
+        raise InvalidProblem(f"{key}: expected a polygon that does not intersect itself ({reason})")
+    return polygon
+
+
+def nodes_at(
+    places: Sequence[Place], positions: NDArray[np.float64], spacing: float, key: str
+) -> NDArray[np.int64]:
+    """Return the nodes of places, sorted.
+
+    Parameters
+    ----------
+    places
+        Tables of a task.
+    positions : (N, 2)
+        Nodes of the lattice, mm.
+    spacing
+        Distance of neighbouring nodes, mm.
+    key
+        Name of the places, for errors.
+
+    Raises
+    ------
+    InvalidProblem
+        If a place has no node; says where the nearest one is.
+    """
+    found = []
+    for index, place in enumerate(places):
+        name = f"{key}[{index}]" if len(places) > 1 else key
+        found.append(_nodes(place, positions, spacing, name))
+    return np.unique(np.concatenate(found))
+
+
+def _nodes(
+    place: Place, positions: NDArray[np.float64], spacing: float, key: str
+) -> NDArray[np.int64]:
+    kind = kind_of(place, PLACES, key)
+    if place.between is not None and kind != "edge":
+        raise InvalidProblem(f"{key}.between: expected with edge, got it with {kind}")
+    if place.count != 1 and kind != "point":
+        raise InvalidProblem(f"{key}.count: expected with point, got it with {kind}")
+    if kind == "nodes":
+        assert place.nodes is not None
+        bad = [node for node in place.nodes if not 0 <= node < len(positions)]
+        if bad or not place.nodes:
+            raise InvalidProblem(
+                f"{key}.nodes: expected numbers from 0 to {len(positions) - 1}, got "
+                f"{bad[0] if bad else 'none'}"
+            )
+        return np.array(place.nodes, dtype=np.int64)
+    if kind == "point":
+        return _nearest(place, positions, spacing, key)
+    if kind == "edge":
+        return _edge(place, positions, spacing, key)
+    shape = shape_of(place, key).buffer(1e-6 * spacing)
+    inside = np.flatnonzero(shapely.contains_xy(shape, positions[:, 0], positions[:, 1]))
+    if not len(inside):
+        gap = shapely.distance(shape, shapely.points(positions))
+        near = positions[int(np.argmin(gap))]
+        raise InvalidProblem(
+            f"{key}: no node lies in this {kind}; the nearest one is at "
+            f"[{near[0]:.4g}, {near[1]:.4g}] mm, {gap.min():.3g} mm outside"
+        )
+    return inside
+
+
+def _nearest(
+    place: Place, positions: NDArray[np.float64], spacing: float, key: str
+) -> NDArray[np.int64]:
+    assert place.point is not None
+    if not 1 <= place.count <= len(positions):
+        raise InvalidProblem(
+            f"{key}.count: expected 1 to {len(positions)} nodes, got {place.count}"
+        )
+    gap = np.linalg.norm(positions - np.array(place.point), axis=1)
+    order = np.argsort(gap.round(9), kind="stable")
+    if gap[order[0]] > SNAP * spacing:
+        near = positions[order[0]]
+        low, high = positions.min(axis=0), positions.max(axis=0)
+        raise InvalidProblem(
+            f"{key}.point: the node nearest to {list(place.point)} mm is at [{near[0]:.4g}, "
+            f"{near[1]:.4g}] mm, {gap[order[0]]:.3g} mm away; expected a point within "
+            f"{SNAP * spacing:.3g} mm of a node; the lattice extends from x = {low[0]:.4g} to "
+            f"{high[0]:.4g} and y = {low[1]:.4g} to {high[1]:.4g} mm"
+        )
+    return np.sort(order[: place.count])
+
+
+def _edge(
+    place: Place, positions: NDArray[np.float64], spacing: float, key: str
+) -> NDArray[np.int64]:
+    assert place.edge is not None
+    axis = 0 if place.edge in {"left", "right"} else 1
+    across = positions[:, axis]
+    depth = across - across.min() if place.edge in {"left", "bottom"} else across.max() - across
+    chosen = depth <= ROW[place.edge] * spacing
+    if place.between is not None:
+        low, high = place.between
+        along = positions[:, 1 - axis]
+        chosen &= (along >= low - 1e-6 * spacing) & (along <= high + 1e-6 * spacing)
+        if not chosen.any():
+            raise InvalidProblem(
+                f"{key}.between: no node of the {place.edge} edge lies between {low:g} and "
+                f"{high:g} mm; the edge extends from {along.min():.4g} to {along.max():.4g} mm"
+            )
+    return np.flatnonzero(chosen)
