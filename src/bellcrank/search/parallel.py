@@ -1,7 +1,8 @@
-"""Several chains of one run in parallel threads, stored as they advance.
+"""Several chains of one run in parallel, stored as they advance.
 
-The compiled loop releases the interpreter lock, so threads use all cores. The results do not
-depend on their number.
+Each chain has a thread. The compiled loop of the spring model releases the interpreter lock, so
+threads use all cores; chains of frames are computed in processes (`chain_process`). The results do
+not depend on their number.
 """
 
 from __future__ import annotations
@@ -17,18 +18,12 @@ import numpy as np
 
 from bellcrank.errors import BellcrankError
 from bellcrank.mechanics import evaluators_that_fit
-from bellcrank.search.evaluator import make_evaluator
-from bellcrank.search.registry import (
-    State,
-    advance_chain,
-    is_done,
-    read_state,
-    start_chain,
-)
+from bellcrank.search.chain_process import ChainProcess, chain_steps
+from bellcrank.search.registry import State, is_done, read_state
 from bellcrank.storage import Proposals, RunFolder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from bellcrank.search.settings import SearchSettings
 
@@ -93,8 +88,17 @@ class ChainRunner:
         Whether the chain has reached its end.
     """
 
-    def __init__(self, folder: RunFolder, settings: SearchSettings, chain: int) -> None:
+    def __init__(
+        self,
+        folder: RunFolder,
+        settings: SearchSettings,
+        chain: int,
+        *,
+        in_process: bool = False,
+    ) -> None:
         self.done = False
+        self._in_process = in_process
+        self._process: ChainProcess | None = None
         self._folder = folder
         self._settings = settings
         self.chain = chain
@@ -108,10 +112,11 @@ class ChainRunner:
         """Advance the chain to its end, or until `stopped()` or `close`."""
         folder, settings, chain = self._folder, self._settings, self.chain
         self._stored_steps, stored = folder.progress(chain)
-        evaluator = make_evaluator(folder.problem, settings)
-        state = read_state(settings, stored) if stored else start_chain(evaluator, settings, chain)
-        while not is_done(state, settings) and not stopped():
-            state, proposals = advance_chain(evaluator, settings, chain, state)
+        if stored and is_done(read_state(settings, stored), settings):
+            self.done = True
+            self.close()
+            return
+        for state, proposals in self._steps():
             with self._lock:
                 if self._closed:
                     return
@@ -122,13 +127,32 @@ class ChainRunner:
             temperature = float(proposals.temperature[-1])
             accepted = int(proposals.accepted.sum())
             progress(Progress(chain, state, temperature, len(proposals.accepted), accepted))
-        self.done = is_done(state, settings)
+            self.done = is_done(state, settings)
+            if stopped():
+                break
         self.close()
+
+    def _steps(self) -> Iterator[tuple[State, Proposals]]:
+        """Yield blocks, from a process if the chain has one."""
+        if not self._in_process:
+            yield from chain_steps(self._folder, self._settings, self.chain)
+            return
+        with self._lock:
+            if self._closed:
+                return
+            self._process = ChainProcess(self._folder, self._settings, self.chain)
+        try:
+            yield from self._process
+        except RuntimeError:
+            if not self._closed:
+                raise
 
     def close(self) -> None:
         """Store the complete blocks; what `run` computes afterwards is discarded."""
         with self._lock:
             self._closed = True
+            if self._process is not None:
+                self._process.kill()
             self._store()
 
     def _store(self) -> None:
@@ -161,7 +185,7 @@ def run_chains(
     settings
         Settings of the search.
     workers
-        Number of threads; by default one for each core.
+        Number of chains at a time; by default one for each core.
     progress
         Called with the progress of a chain after each block, from the thread of that chain.
     stop
@@ -173,7 +197,13 @@ def run_chains(
         Whether every chain has reached its end.
     """
     stop = stop or threading.Event()
-    runners = [ChainRunner(folder, settings, chain) for chain in range(settings.chains)]
+    count = evaluators_that_fit(
+        folder.problem, workers or default_workers(), predict_flips=settings.predicts_flips
+    )
+    several = min(count, settings.chains) > 1 and folder.problem.section is not None
+    runners = [
+        ChainRunner(folder, settings, chain, in_process=several) for chain in range(settings.chains)
+    ]
     waiting = deque(runners)
     errors: list[BaseException] = []
 
@@ -191,9 +221,6 @@ def run_chains(
             except BaseException as error:  # raised again below
                 errors.append(error)
 
-    count = evaluators_that_fit(
-        folder.problem, workers or default_workers(), predict_flips=settings.predicts_flips
-    )
     # Daemon threads do not delay the end of the process while they compute a block.
     threads = [threading.Thread(target=work, daemon=True) for _ in range(min(count, len(runners)))]
     for thread in threads:

@@ -12,7 +12,9 @@ from shapely.geometry import box
 from bellcrank.errors import InvalidFile, InvalidProblem
 from bellcrank.model import Lattice
 from bellcrank.model.lattice import MAX_NODES
+from bellcrank.model.parsing import parse
 from bellcrank.task.outlines import read_outline
+from bellcrank.task.schema import Shape
 from bellcrank.task.shapes import polygon_of, shape_of
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from bellcrank.task.schema import DomainSection, Shape
+    from bellcrank.task.schema import DomainSection
 
 ROW_HEIGHT = math.sqrt(3.0) / 2.0
 """Distance of the rows of a triangular lattice, in spacings."""
@@ -140,6 +142,9 @@ def region_of(domain: DomainSection, folder: Path) -> BaseGeometry:
         region: Any = box(0.0, 0.0, width, height)
     elif isinstance(domain.outline, str):
         region = read_outline(folder / domain.outline)
+    elif isinstance(domain.outline, dict | Shape):
+        shape = parse(Shape, domain.outline, "domain.outline")  # type: ignore[arg-type]
+        region = shape_of(shape, "domain.outline")
     else:
         region = polygon_of(_corners(domain.outline), "domain.outline")
     for name in ("holes", "keep_out"):
@@ -155,7 +160,7 @@ def _corners(outline: object) -> list[list[float]]:
     from bellcrank.errors import InvalidSettings
     from bellcrank.part.units import read_length
 
-    wanted = "a DXF or SVG file, or corners [[x, y], ...]"
+    wanted = "a DXF or SVG file, a shape, or corners [[x, y], ...]"
     if not isinstance(outline, list | tuple):
         raise InvalidFile(f"domain.outline: expected {wanted}, got {outline!r}")
     corners = []

@@ -162,7 +162,7 @@ class DomainSection(Table):
     size: OnePoint | None = None
     """Width and height of a rectangle with its lower left corner at the origin."""
     outline: Any = None
-    """DXF or SVG file, next to the task file, or the corners of a polygon."""
+    """DXF or SVG file, next to the task file, a shape, or the corners of a polygon."""
     lattice: dict[str, Any] | None = None
     """A lattice by name, as in a problem file; in lattice units."""
     problem: str | None = None
