@@ -81,7 +81,7 @@ def run_chain(problem: Problem, settings: SearchSettings, chain: int = 0) -> dic
         "path": downsampled_path(value),
         "reached": {str(mark): _reached(step, value, mark) for mark in (0.5, 1.0, 2.0)},
         "offered": [
-            {"mask": each.mask.hex(), "efficiency": each.efficiency, "step": each.step}
+            {"mask": each.mask.hex(), "efficiency": each.score, "step": each.step}
             for each in offers
         ],
     }

@@ -264,7 +264,7 @@ def best_design(store: Store, task: Task) -> tuple[Design, Candidate]:
             PER_RUN,
         )
     ]  # fmt: skip
-    chosen = heapq.nlargest(PER_TASK, candidates, key=lambda candidate: candidate.efficiency)
+    chosen = heapq.nlargest(PER_TASK, candidates, key=lambda candidate: candidate.score)
     if not chosen:
         raise InvalidSettings(f"task {task.name!r}: no accepted design is stored yet")
     selection = select_design(problem, chosen, settings)

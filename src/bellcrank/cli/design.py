@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 
 @app.command()
 def design(
-    problem: Annotated[str | None, typer.Argument(help="Bundled problem or problem file.")] = None,
+    problem: Annotated[
+        str | None, typer.Argument(help="Bundled task or problem, or a file of one.")
+    ] = None,
     steps: Annotated[
         int | None, typer.Option(help="Number of proposals per chain. [25000]")
     ] = None,
@@ -171,7 +173,7 @@ def design(
             stop.exit()  # a thread may still compute a block, which delays a usual exit
     assert report is not None
     _print_report(report)
-    if report.failures:
+    if report.failures or report.missed:
         sys.exit(NOT_MET)
 
 
@@ -259,6 +261,11 @@ def _design(problem: str | None, begin: str) -> Design:
     from bellcrank.model import find_problem
 
     if problem is not None:
+        from bellcrank.task import find_task
+
+        if (task := find_task(problem)) is not None:
+            design = task.problem.full_design()
+            return replace(design, provenance={"part": task.part.to_dict()})
         return find_problem(problem).full_design()
     design = design_named(begin)
     return replace(design, problem=replace(design.problem, initial=design.mask))
@@ -273,6 +280,14 @@ def _in_model(design: Design, model: str, part: dict[str, str]) -> tuple[Problem
     from bellcrank.workflows import spec_for
 
     make = models[model]
+    if design.problem.specification is not None:
+        given = ["--model springs"] if model == "springs" else [_option(key) for key in part]
+        if given:
+            raise InvalidSettings(
+                f"{given[0]}: {design.problem.name!r} is a task, which is designed as a part of "
+                "frames; size and material are in its [part]"
+            )
+        return design.problem, spec_for(design)
     if model == "springs":
         return make(design.problem, spec_for(design)), None
     changes = dict(part)
@@ -292,17 +307,34 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
         raise InvalidSettings(f"{option} {text}: expected numbers separated by commas") from None
 
 
+def _grid(rows: list[list[str]]) -> Table:
+    """Return rows of texts as a table; efficiencies and items that are missed are bold."""
+    grid = Table.grid(padding=(0, 2))
+    for name, *values in rows:
+        bold = name.startswith("efficiency (") or "NO" in values
+        grid.add_row(
+            plain(name), *(f"[bold]{plain(each)}[/]" if bold else plain(each) for each in values)
+        )
+    grid.add_row("")
+    return grid
+
+
 def _print_report(report: DesignReport) -> None:
     """Print the results in a table, with warnings."""
-    from bellcrank.workflows.report import figure_table
+    from bellcrank.workflows.report import (
+        figure_table,
+        item_table,
+        nearest_table,
+        part_figure_table,
+    )
 
     selection = report.selection
     table = Table.grid(padding=(0, 2))
-    figures = Table.grid(padding=(0, 2))
-    for name, *values in figure_table(report):
-        figures.add_row(name, *(f"[bold]{plain(value)}[/]" if name.startswith("efficiency") else
-                                plain(value) for value in values))  # fmt: skip
-    results.print(figures)
+    for rows in (
+        item_table(report), nearest_table(report), figure_table(report), part_figure_table(report)
+    ):  # fmt: skip
+        if rows:
+            results.print(_grid(rows))
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
     table.add_row("initial design", f"{report.initial_efficiency:.4f}")
     if report.human_response is not None:
@@ -317,7 +349,16 @@ def _print_report(report: DesignReport) -> None:
     table.add_row("designs evaluated", f"{report.proposals}")
     table.add_row("results", plain(f"{report.folder}/"))
     results.print(table)
-    if report.failures:
+    if report.missed:
+        first, *others = report.missed
+        rest = f", then {', '.join(each.item.name for each in others)}" if others else ""
+        notes.print(
+            "[bold yellow]warning:[/] no design meets the specification; the binding item is "
+            f"{plain(first.item.name)}{plain(rest)}. Relax it, use more steps (--steps) or more "
+            "chains (--chains), or give the part more room: a larger domain, a smaller spacing, "
+            "thinner struts."
+        )
+    elif report.failures:
         notes.print(
             f"[bold yellow]warning:[/] no design works: {plain('; '.join(report.failures))}. "
             "Use more steps (--steps), more chains (--chains), another initial design (--from) or, "

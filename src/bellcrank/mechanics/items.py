@@ -32,7 +32,7 @@ CHANNELS_OF: dict[str, tuple[str, ...]] = {
     "rotation": ("rotation",),
     "path_error": ("displacement",),
     "stiffness": ("stiffness",),
-    "payload": ("stiffness", "motion"),
+    "payload": ("loaded_motion", "motion"),
     "blocked_force": ("blocked_force",),
     "sag": ("sag", "motion"),
     "input_force": ("input_force",),
@@ -64,13 +64,15 @@ class StrokeRecord:
     channels
         (..., F, ...) values of channels.
     given
-        Values of quantities that do not follow from channels: clearance, stable stroke, mass, or
-        a payload that was computed.
+        Values of quantities that do not follow from channels: clearance, stable stroke, mass.
+    payloads
+        Forces under which the loaded motion of outputs was measured.
     """
 
     fractions: NDArray[np.float64]
     channels: Mapping[Channel, Values]
     given: Mapping[str, Values | float] = field(default_factory=dict)
+    payloads: Mapping[str, float] = field(default_factory=dict)
 
     def of(self, name: str, output: str = "") -> Values:
         """Return a channel."""
@@ -112,6 +114,11 @@ def quantity_values(
     if "motion" not in CHANNELS_OF[quantity]:
         return record.channels[own[0]]
     motion = record.of("motion", output)
+    if quantity == "payload":
+        # The travel decreases linearly with the load, to first order.
+        loaded = record.of("loaded_motion", output)[..., 0]
+        lost = _ratio(motion[..., -1:, 0] - loaded, motion[..., -1:, 0])
+        return _ratio(np.full(lost.shape, 0.5 * record.payloads[output]), np.maximum(lost, 0.0))
     return _of_motion(quantity, motion, *(record.channels[each] for each in own))
 
 
@@ -124,8 +131,6 @@ def _of_motion(quantity: str, motion: Values, *channels: Values) -> Values:
     elif quantity == "off_axis":
         normal = np.linalg.norm(motion[..., 1:], axis=-1)
         along = _ratio(normal.max(axis=-1, keepdims=True), travel)
-    elif quantity == "payload":
-        along = np.asarray(0.5 * channels[0] * travel)
     elif quantity == "sag":
         along = _ratio(channels[0], travel)
     return along

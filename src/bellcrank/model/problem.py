@@ -178,6 +178,12 @@ class Problem:
         return np.flatnonzero(~self.lattice.beams_touching(np.unique(np.concatenate(used))))
 
     @property
+    def is_specified(self) -> bool:
+        """Whether the problem says what a design must meet or maximise."""
+        wanted = self.specification
+        return wanted is not None and bool(wanted.items or wanted.maximise)
+
+    @property
     def special_nodes(self) -> NDArray[np.int64]:
         """Nodes of supports, input, outputs and loads, sorted."""
         outputs = [output.nodes for output in self.outputs.values()]

@@ -21,7 +21,12 @@ Examples
 
 from bellcrank.search.blocks import BLOCK
 from bellcrank.search.cleaning import clean, pieces
-from bellcrank.search.evaluator import Evaluator, make_evaluator, verification_evaluator
+from bellcrank.search.evaluator import (
+    Evaluator,
+    make_evaluator,
+    verification_evaluator,
+    with_stable_initial,
+)
 from bellcrank.search.hopping import HoppingSettings, HoppingState
 from bellcrank.search.markov import (
     ChainState,
@@ -62,6 +67,7 @@ from bellcrank.search.selection import (
     select,
 )
 from bellcrank.search.settings import SearchSettings
+from bellcrank.search.specification import ItemResult, SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 
 __all__ = [
@@ -75,6 +81,7 @@ __all__ = [
     "Finalist",
     "HoppingSettings",
     "HoppingState",
+    "ItemResult",
     "MetropolisSettings",
     "Move",
     "Progress",
@@ -82,6 +89,7 @@ __all__ = [
     "Search",
     "SearchSettings",
     "Selection",
+    "SpecificationEvaluator",
     "State",
     "TemperingSettings",
     "TemperingState",
@@ -109,4 +117,5 @@ __all__ = [
     "select",
     "start_chain",
     "verification_evaluator",
+    "with_stable_initial",
 ]

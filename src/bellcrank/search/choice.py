@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bellcrank.search.evaluator import verification_evaluator
 from bellcrank.search.selection import most_efficient, select
+from bellcrank.search.verdict import Verdict
 from bellcrank.search.verification import Verifier
 
 if TYPE_CHECKING:
@@ -16,17 +17,23 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
     from bellcrank.search.selection import Candidate, Choice, Finalist, Refusals, Selection
     from bellcrank.search.settings import SearchSettings
+    from bellcrank.search.specification import ItemResult
     from bellcrank.search.verification import Verification
 
 MOST = 48
 """Largest number of candidates that are verified."""
+MOST_UNMET = 12
+"""The same for candidates that do not meet their specification in the model of the search."""
+MOST_NEAREST = 5
+"""Largest number of designs that are reported where none meets the specification."""
 
 
 @dataclass(frozen=True, slots=True)
 class FirstWithoutFault:
-    """Choice of the most efficient finalist without a fault.
+    """Choice of the best finalist without a fault.
 
-    Without such a one, the most efficient one that is stable is chosen, or the most efficient.
+    Without such a one, the best one that is stable is chosen, or the best; for a problem with a
+    specification the stable one with the smallest total violation.
 
     Parameters
     ----------
@@ -39,8 +46,12 @@ class FirstWithoutFault:
     verifier: Verifier
     report: Callable[[int, int], None] = lambda _done, _total: None
 
-    def __call__(self, finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals]:
-        """Return the chosen finalist with its verification, and the faults of others."""
+    def __call__(self, finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals, list[Finalist]]:
+        """Return the chosen finalist with its verification, the faults of others, and the nearest.
+
+        The nearest ones are those of which none is better in every item (`nondominated`), if no
+        finalist meets the specification.
+        """
         listed = shortlist(finalists)
         verified: list[Finalist] = []
         for done, finalist in enumerate(listed):
@@ -50,11 +61,44 @@ class FirstWithoutFault:
             if verification.fault is None:
                 break
         chosen = min(verified, key=_rank)
-        return chosen, [
-            (each.response.efficiency, str(_verification(each).fault))
+        refusals = [
+            (each.response.score, str(_verification(each).fault))
             for each in verified
             if each is not chosen
         ]
+        if _verification(chosen).fault is None:
+            return chosen, refusals, []
+        stable = [each for each in verified if _verification(each).items]
+        front = nondominated([_violations(_verification(each).items) for each in stable])
+        nearest = sorted((stable[index] for index in front), key=_rank)
+        return chosen, refusals, nearest[:MOST_NEAREST]
+
+
+def nondominated(violations: Sequence[Sequence[float]]) -> list[int]:
+    """Return the indices of the vectors that no other one equals or beats in every component.
+
+    Of equal vectors the first one counts.
+
+    Examples
+    --------
+    >>> nondominated([[0.1, 0.5], [0.3, 0.2], [0.3, 0.6], [0.1, 0.5]])
+    [0, 1]
+    """
+    found = []
+    for index, own in enumerate(violations):
+        better = any(
+            all(a <= b for a, b in zip(other, own, strict=True))
+            and (tuple(other) != tuple(own) or place < index)
+            for place, other in enumerate(violations)
+            if place != index
+        )
+        if not better:
+            found.append(index)
+    return found
+
+
+def _violations(items: Sequence[ItemResult]) -> list[float]:
+    return [item.violation for item in items]
 
 
 def select_design(
@@ -96,25 +140,39 @@ def _verification(finalist: Finalist) -> Verification:
     return finalist.verification
 
 
-def _rank(finalist: Finalist) -> int:
-    """Return 0 without a fault, 1 with one, 2 without stability; the order is kept by `min`."""
+def _rank(finalist: Finalist) -> tuple[int, float]:
+    """Return 0 without a fault, 1 with one, 2 without stability, and the total violation.
+
+    The order of equal ones is kept by `min`.
+    """
     found = _verification(finalist)
-    return 0 if found.fault is None else 2 - found.is_stable
+    rank = 0 if found.fault is None else 2 - found.is_stable
+    return rank, sum(_violations(found.items))
 
 
 def shortlist(finalists: Sequence[Finalist]) -> list[Finalist]:
-    """Return the best finalists of each chain, in all at most `MOST`, in their order.
+    """Return the finalists to verify, in their order.
+
+    The best ones of each chain, in all at most `MOST`; of those that do not meet the specification
+    of their problem in the model of the search, the ones of which none is better in every item,
+    at most `MOST_UNMET`.
 
     Parameters
     ----------
     finalists
-        Finalists in descending order of efficiency.
+        Finalists in descending order of the score.
     """
     seen: dict[int, int] = {}
     ranked = []
+    unmet = []
     for index, finalist in enumerate(finalists):
+        if finalist.response.status is Verdict.UNMET:
+            unmet.append(index)
+            continue
         rank = seen.get(finalist.found.chain, 0)
         seen[finalist.found.chain] = rank + 1
         ranked.append((rank, index))
     chosen = sorted(index for _, index in sorted(ranked)[:MOST])
+    front = nondominated([_violations(finalists[index].items) for index in unmet])
+    chosen += [unmet[place] for place in front[:MOST_UNMET]]
     return [finalists[index] for index in chosen]

@@ -6,12 +6,14 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import FlipPrediction, Response, check_memory, model_evaluator
 from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
 from bellcrank.search.specification import SpecificationEvaluator
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
@@ -74,7 +76,12 @@ def make_evaluator(
     dense = settings.predicts_flips and problem.section is None
     check_memory(problem, evaluators=len(settings.strokes), predict_flips=dense)
     options = settings.objective, settings.unloaded_beams, elements
-    if problem.specification is not None and problem.specification.items:
+    if problem.is_specified:
+        if settings.goals or settings.strokes != (1.0,):
+            raise InvalidSettings(
+                f"goals and strokes: problem {problem.name!r} has a specification; change the "
+                "items of its task instead"
+            )
         return SpecificationEvaluator(problem, elements)
     if not settings.goals and settings.strokes == (1.0,):
         return model_evaluator(problem, *options)
@@ -100,3 +107,41 @@ def verification_evaluator(
     """
     changed = replace(settings, **{"unloaded_beams": "keep", **changes})
     return make_evaluator(problem, changed, elements)
+
+
+DENSITIES = (0.9, 0.8, 0.7, 0.6, 0.5)
+"""Probabilities with which beams of initial designs are present, in order."""
+TRIALS = 20
+"""Number of initial designs that are tried with each."""
+
+
+def with_stable_initial(problem: Problem, settings: SearchSettings) -> Problem:
+    """Return a problem whose initial design has a stable response in all load cases.
+
+    If the full lattice snaps, designs with random beams are tried.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    settings
+        Settings of the search, with the seed of the random beams.
+
+    Returns
+    -------
+    Problem
+        Unchanged if its own initial design is stable, or if no stable one is found.
+    """
+    evaluator = make_evaluator(problem, settings)
+    if evaluator.evaluate(evaluator.problem.initial).is_admissible:
+        return problem
+    rng = np.random.default_rng(settings.seed)
+    for density in DENSITIES:
+        for _ in range(TRIALS):
+            beams = evaluator.problem.designable
+            mask = evaluator.problem.initial.copy()
+            mask[beams] &= rng.random(len(beams)) < density
+            if evaluator.evaluate(mask).is_admissible:
+                groups = getattr(evaluator, "groups", None)
+                return replace(problem, initial=mask if groups is None else groups.expand(mask))
+    return problem

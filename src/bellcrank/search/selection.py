@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from bellcrank.errors import NoDesignFound
-from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, Status, model_evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, model_evaluator
 from bellcrank.model import Design, Problem
 from bellcrank.search.cleaning import clean, pieces
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import ModelEvaluator
     from bellcrank.search.evaluator import Evaluator
+    from bellcrank.search.specification import ItemResult
     from bellcrank.search.verification import Verification
 
 CandidateRule: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.uint8]], list[int]]"
@@ -48,15 +49,15 @@ class Candidate:
 
     Parameters
     ----------
-    efficiency
-        As recorded by the chain.
+    score
+        As recorded by the chain: the efficiency, or the score by a specification.
     chain, step
         Chain and step at which it was found.
     mask
         Its packed mask.
     """
 
-    efficiency: float
+    score: float
     chain: int
     step: int
     mask: bytes
@@ -74,6 +75,8 @@ class Finalist:
         The cleaned design: one piece, all beams carry load.
     response
         Its response from rest.
+    items
+        Items of the specification, as the model of the search has them.
     verification
         Its verification as a frame, if there is one.
     """
@@ -81,13 +84,15 @@ class Finalist:
     found: Candidate
     design: Design
     response: Response
+    items: tuple[ItemResult, ...] = ()
     verification: Verification | None = None
 
 
 Refusals: TypeAlias = "list[tuple[float, str]]"
-"""Efficiencies of rejected designs, with the reasons."""
-Choice: TypeAlias = "Callable[[Sequence[Finalist]], tuple[Finalist, Refusals]]"
-"""From finalists, the most efficient first, to one of them and the reasons against others."""
+"""Scores of rejected designs, with the reasons."""
+Choice: TypeAlias = "Callable[[Sequence[Finalist]], tuple[Finalist, Refusals, Sequence[Finalist]]]"
+"""From finalists, the best first, to one of them, the reasons against others, and the nearest ones
+to a specification that none meets."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,6 +113,11 @@ class Selection:
         Number of rejected candidates of higher efficiency, by reason.
     verification
         Verification of a frame with several elements in each beam.
+    items
+        Items of the specification, as the model of the search has them.
+    nearest
+        Where no design meets the specification: verified designs of which none is better in every
+        item.
     """
 
     design: Design
@@ -117,6 +127,8 @@ class Selection:
     efficiency_after: float
     refused: dict[str, int]
     verification: Verification | None = None
+    items: tuple[ItemResult, ...] = ()
+    nearest: tuple[Finalist, ...] = ()
 
 
 def plateaus(
@@ -252,18 +264,16 @@ def _bits(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
 
 def _reason_against(evaluator: Evaluator, design: Design, response: Response) -> str | None:
     """Return the reason to reject a cleaned design, if there is one."""
-    if response.status is Verdict.UNMET and isinstance(
-        evaluator, ConstrainedEvaluator | SpecificationEvaluator
-    ):
+    if response.status is Verdict.UNMET and isinstance(evaluator, ConstrainedEvaluator):
         return f"violates {', '.join(evaluator.violated(design.mask))}"
-    if response.status is not Status.CONVERGED:
+    if not response.is_admissible:
         return response.status.label
     return "in several pieces" if pieces(design.problem, design.mask) > 1 else None
 
 
-def most_efficient(finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals]:
+def most_efficient(finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals, list[Finalist]]:
     """Return the first finalist."""
-    return finalists[0], []
+    return finalists[0], [], []
 
 
 def select(
@@ -302,23 +312,28 @@ def select(
     for candidate, design in _cleaned(problem, candidates, plain, evaluator):
         response = evaluator.evaluate(design.mask, largest_increment=VERIFICATION_INCREMENT)
         if (reason := _reason_against(evaluator, design, response)) is not None:
-            refused.append((response.efficiency, reason))
+            refused.append((response.score, reason))
         else:
-            finalists.append(Finalist(candidate, design, response))
+            items: tuple[ItemResult, ...] = ()
+            if isinstance(evaluator, SpecificationEvaluator):
+                items = tuple(evaluator.results())
+            finalists.append(Finalist(candidate, design, response, items))
     if not finalists:
         raise NoDesignFound(_no_candidate(problem, len(candidates), refused, evaluator))
-    finalists.sort(key=lambda each: each.response.efficiency, reverse=True)
-    chosen, passed_over = choose(finalists)
-    best = chosen.response.efficiency
+    finalists.sort(key=lambda each: each.response.score, reverse=True)
+    chosen, passed_over, nearest = choose(finalists)
+    best = chosen.response.score
     reasons = [reason for value, reason in (*refused, *passed_over) if value > best]
     return Selection(
         design=chosen.design,
         response=chosen.response,
         found=chosen.found,
         efficiency_before=evaluator.evaluate(_bits(problem, chosen.found)).efficiency,
-        efficiency_after=best,
+        efficiency_after=chosen.response.efficiency,
         refused={reason: reasons.count(reason) for reason in sorted(set(reasons))},
         verification=chosen.verification,
+        items=chosen.items,
+        nearest=tuple(nearest),
     )
 
 

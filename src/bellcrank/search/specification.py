@@ -134,7 +134,12 @@ class SpecificationEvaluator:
         self._volume = section.area * problem.lattice.rest_length
         self._cases: dict[str, _Case] = {}
         for name, case in problem.cases.items():
-            evaluator = CaseEvaluator(case, elements, wanted.weight)
+            payloads = {
+                item.output: item.at_least
+                for item in self.items
+                if item.quantity == "payload" and item.case == name and item.at_least is not None
+            }
+            evaluator = CaseEvaluator(case, elements, wanted.weight, payloads)
             chosen = [k for k, item in enumerate(self.items) if item.case == name]
             needed = [(self.items[k].quantity, self.items[k].output) for k in chosen]
             needed += [(term.quantity, term.output) for term in self.terms if term.case == name]
@@ -199,7 +204,9 @@ class SpecificationEvaluator:
             at_end = frozenset() if verified else frozenset({"strain"})
             channels = case.evaluator.values(case.channels, fractions.tolist(), at_end)
             given = self._given(name, design, verified=verified)
-            records[name] = StrokeRecord(fractions, channels, {**structural, **given})
+            records[name] = StrokeRecord(
+                fractions, channels, {**structural, **given}, case.evaluator.payloads
+            )
         self.records = records
         self.violations = self._violations(records)
         score = self._score_of(self.violations, records)
@@ -236,7 +243,7 @@ class SpecificationEvaluator:
         given: dict[str, float] = {}
         if "clearance" in wanted:
             clearance = self._gap if verified else self._overlap
-            given["clearance"] = clearance(case.evaluator.frame, design, wanted["clearance"])
+            given["clearance"] = clearance(case, design, wanted["clearance"])
         if "stable_stroke" in wanted:
             bound = wanted["stable_stroke"]
             given["stable_stroke"] = self._stable_stroke(name, design, bound) if verified else bound
@@ -250,28 +257,37 @@ class SpecificationEvaluator:
         between = design & held[problem.lattice.beams].all(axis=1)
         return np.asarray(between | (frame.structure.present != 0))
 
-    def _overlap(self, frame: FrameEvaluator, design: NDArray[np.bool_], bound: float) -> float:
+    def _overlap(self, case: _Case, design: NDArray[np.bool_], bound: float) -> float:
         """Return the bound less the sum over pairs of struts of how far they are too near.
 
-        At full stroke, and for straight struts.
+        For straight struts, at the state of the stroke where the sum is largest.
         """
-        lattice = frame.problem.lattice
+        lattice = case.evaluator.problem.lattice
         nodes, dimension = lattice.positions.shape
-        moved = lattice.positions + frame.state.u[:nodes, :dimension]
-        least = self._width + bound
-        _, distance = near_pairs(moved, lattice.beams[self._struts(frame, design)], least)
-        return bound - float(np.sum(least - distance))
+        struts = lattice.beams[self._struts(case.evaluator.frame, design)]
+        least, worst = self._width + bound, 0.0
+        for fraction in case.fractions.tolist():
+            if (found := case.evaluator.state(fraction)) is not None:
+                moved = lattice.positions + found.state.u[:nodes, :dimension]
+                _, distance = near_pairs(moved, struts, least)
+                worst = max(worst, float(np.sum(least - distance)))
+        return bound - worst
 
-    def _gap(self, frame: FrameEvaluator, _design: NDArray[np.bool_], bound: float) -> float:
-        """Return the smallest gap between struts along the stroke; the bound if it is larger."""
+    def _gap(self, case: _Case, design: NDArray[np.bool_], bound: float) -> float:
+        """Return the smallest gap between struts along the stroke; infinite above the bound."""
+        frame = case.evaluator.frame
         rest, _ = centre_lines(frame, frame.state)
+        chosen = design[frame.beams]
         stroke = [
-            (fraction, centre_lines(frame, found.state)[1])
+            (fraction, centre_lines(frame, found.state)[1][chosen])
             for fraction in (np.arange(1, STATES + 1) / STATES).tolist()
-            if (found := frame.equilibrium(fraction)) is not None
+            if (found := case.evaluator.state(fraction)) is not None
         ]
-        touching = find_contacts(frame.beams, rest, stroke, self._width + bound)
-        return bound - float(touching.overlap.max(initial=0.0))
+        least = self._width + bound
+        touching = find_contacts(frame.beams[chosen], rest[chosen], stroke, least)
+        if not len(touching.overlap):
+            return math.inf
+        return bound - float(touching.overlap.max())
 
     def _stable_stroke(self, name: str, design: NDArray[np.bool_], bound: float) -> float:
         if name not in self._longer:
@@ -355,7 +371,9 @@ class SpecificationEvaluator:
             }
             mass = volume + self.groups.total(sign * self._volume[members])
             given = {key: np.full(count, value) for key, value in now.given.items()}
-            records[name] = StrokeRecord(now.fractions, channels, {**given, "mass": mass})
+            records[name] = StrokeRecord(
+                now.fractions, channels, {**given, "mass": mass}, now.payloads
+            )
         before = self._score_of(self.violations, self.records)
         violations = self._violations(records)
         with np.errstate(invalid="ignore"):
@@ -374,8 +392,3 @@ class SpecificationEvaluator:
             value = worst_value(item, record)
             found.append(ItemResult(item, value, over, margin(item, value)))
         return found
-
-    def violated(self, mask: NDArray[np.bool_]) -> list[str]:
-        """Return the names of the items that a design with a stable response violates."""
-        self.evaluate(mask, VERIFICATION_INCREMENT)
-        return [result.item.name for result in self.results() if not result.met]

@@ -24,6 +24,7 @@ from bellcrank.mechanics.frames.analysis import centre_lines
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
 from bellcrank.search.evaluator import verification_evaluator
+from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from bellcrank.mechanics import Response
     from bellcrank.model import Problem
     from bellcrank.search.settings import SearchSettings
+    from bellcrank.search.specification import ItemResult
 
 ELEMENTS = 8
 """Number of elements of each beam; with it efficiencies are within 1e-4 of the limit of many."""
@@ -54,6 +56,8 @@ class Verification:
         Beams that touch along the stroke; lengths in lattice units.
     fault
         Reason why the design cannot be built, in a few words, or None.
+    items
+        Items of the specification of the problem, with the values that the design reaches.
     """
 
     elements: int
@@ -61,6 +65,7 @@ class Verification:
     strain: float
     contacts: Contacts
     fault: str | None
+    items: tuple[ItemResult, ...] = ()
 
     @property
     def is_stable(self) -> bool:
@@ -110,6 +115,8 @@ class Verifier:
     def verify(self, mask: NDArray[np.bool_]) -> Verification:
         """Verify a design."""
         response = self._evaluator.evaluate(mask, VERIFICATION_INCREMENT)
+        if isinstance(self._evaluator, SpecificationEvaluator):
+            return self._by_items(mask, response, self._evaluator)
         moved = self._frame.evaluate(mask, VERIFICATION_INCREMENT).displacement
         found = Verification(
             elements=self.elements,
@@ -123,6 +130,24 @@ class Verifier:
         contacts = self._contacts()
         fault = "beams touch along the stroke" if len(contacts.pairs) else None
         return replace(found, contacts=contacts, fault=fault)
+
+    def _by_items(
+        self, mask: NDArray[np.bool_], response: Response, evaluator: SpecificationEvaluator
+    ) -> Verification:
+        """Verify a design by the items of its specification."""
+        items = evaluator.results() if response.is_admissible else []
+        strain = max(
+            (item.value for item in items if item.item.quantity == "strain"), default=math.nan
+        )
+        found = Verification(self.elements, response, strain, NO_CONTACT, None, tuple(items))
+        fault = None
+        if not np.isin(self.problem.lattice.beams[mask], self.problem.supports.nodes).any():
+            fault = "held by no support"
+        elif not response.is_admissible:
+            fault = f"{response.status.label} with {self.elements} elements in each beam"
+        elif missed := [item.item.name for item in items if not item.met]:
+            fault = f"misses {', '.join(missed)} with {self.elements} elements in each beam"
+        return replace(found, fault=fault)
 
     def _fault(
         self, mask: NDArray[np.bool_], found: Verification, moved: NDArray[np.float64]

@@ -7,7 +7,7 @@ page of the documentation describes every key.
 """
 
 from bellcrank.task.build import Task, build_task
-from bellcrank.task.files import is_task, read_task, task_from_dict
+from bellcrank.task.files import bundled_tasks, find_task, is_task, read_task, task_from_dict
 from bellcrank.task.schema import TaskTable
 from bellcrank.task.units import NAMES, ProblemUnits, units_of
 
@@ -17,6 +17,8 @@ __all__ = [
     "Task",
     "TaskTable",
     "build_task",
+    "bundled_tasks",
+    "find_task",
     "is_task",
     "read_task",
     "task_from_dict",

@@ -15,6 +15,50 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
+FOLDERS = (
+    Path(__file__).parent / "bundled",
+    Path(__file__).parents[3] / "examples" / "tasks",
+)
+"""Folders of the bundled tasks: in an installed package, and in its source."""
+
+
+def bundled_tasks() -> dict[str, Path]:
+    """Return the files of the bundled tasks by name.
+
+    Examples
+    --------
+    >>> "slider" in bundled_tasks()
+    True
+    """
+    folder = next((each for each in FOLDERS if each.is_dir()), None)
+    return {} if folder is None else {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def find_task(name_or_path: str | os.PathLike[str]) -> Task | None:
+    """Return the bundled task of a name, or that of a task file; None if there is neither.
+
+    Raises
+    ------
+    InvalidFile, InvalidProblem
+        If the file is a task but not a valid one.
+
+    Examples
+    --------
+    >>> find_task("slider").problem.name
+    'slider'
+    """
+    name = os.fspath(name_or_path)
+    if name in (known := bundled_tasks()):
+        return read_task(known[name])
+    path = Path(name)
+    if path.suffix.lower() not in {".toml", ".json"} or not path.is_file():
+        return None
+    data = read_table(path)
+    if not is_task(data):
+        return None
+    return task_from_dict(data, source=name, folder=path.parent)
+
+
 def read_task(path: str | os.PathLike[str]) -> Task:
     """Read a task file, TOML or JSON.
 

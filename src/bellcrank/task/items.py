@@ -112,7 +112,7 @@ class ItemReader:
     def _single(self, quantity: str, value: Any, key: str, named: dict[str, Any]) -> None:
         """Read a single value in place of a table."""
         reading = READINGS[quantity]
-        if value in {"maximise", "minimise"}:
+        if value in {"maximise", "minimise"} and quantity != "payload":
             sign = 1.0 if value == "maximise" else -1.0
             self._add_objective(named, sign, scaled=False)
             return
@@ -215,6 +215,10 @@ class ItemReader:
                     f"{key}.scale: expected a number above 0, got {bounds.scale!r}"
                 )
         sign = 1.0 if bounds.maximise else -1.0
+        if quantity == "payload" and bounds.at_least is None:
+            raise InvalidProblem(
+                f"{key}: a payload that is maximised needs at_least, to begin with"
+            )
         self._add_objective(named, sign * scale, scaled=bounds.scale is not None)
 
     def _add_objective(self, named: dict[str, Any], scale: float, *, scaled: bool) -> None:

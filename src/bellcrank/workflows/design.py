@@ -24,20 +24,24 @@ from bellcrank.search import (
     Progress,
     SearchSettings,
     Selection,
+    Verdict,
     advance_chain,
     candidates_of,
+    costs,
     make_evaluator,
     read_settings,
     run_chains,
     searches,
     start_chain,
     verification_evaluator,
+    with_stable_initial,
 )
 from bellcrank.search.choice import select_design
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.storage import RunFolder, check_no_run, remove_temporaries
 from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows.figures import figures_of, model_record
+from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.report import RESULTS, DesignReport, write_report
 from bellcrank.workflows.validation import Validation, replace_record, validate
 
@@ -95,8 +99,10 @@ def start_design(
         if problem.lattice.dimension == 2:
             part.of(problem.full_design())
         notes["part"] = part.to_dict()
-        if not settings.goals and problem.section is not None:
+        if not settings.goals and problem.section is not None and not problem.is_specified:
             settings = replace(settings, goals=(f"no-contact {problem.section.width:g}",))
+    if problem.is_specified:
+        problem = with_stable_initial(problem, settings)
     prepare(problem, settings)
     return RunFolder.create(out, problem, settings.to_dict(), notes=notes)
 
@@ -176,19 +182,26 @@ def accepted_candidates(
 ) -> tuple[list[Candidate], int, list[float]]:
     """Return candidates of all chains, the number of proposals and the best of each chain.
 
-    Accepted designs that violate goals are no candidates.
+    Accepted designs that violate goals are no candidates; those that do not meet a specification
+    are, ranked by their scores.
     """
+    specified = folder.problem.is_specified
+    statuses = [Status.CONVERGED, *([Verdict.UNMET] if specified else [])]
+    cost = costs[getattr(settings, "cost", "negative")]
     candidates: list[Candidate] = []
     proposals = 0
     best: list[float] = []
     for chain in range(settings.chains):
-        records = folder.read(chain, ["step", "mask", "efficiency", "accepted", "status"])
-        taken = np.flatnonzero(records["accepted"] & (records["status"] == Status.CONVERGED))
+        columns = ["step", "mask", "efficiency", "cost", "accepted", "status"]
+        records = folder.read(chain, columns)
+        taken = np.flatnonzero(records["accepted"] & np.isin(records["status"], statuses))
         proposals += len(records["accepted"])
-        efficiency = records["efficiency"][taken]
-        best.append(float(efficiency.max(initial=-np.inf)))
+        score = records["efficiency"][taken]
+        if specified:
+            score = np.array([cost.inverse(each) for each in records["cost"][taken].tolist()])
+        best.append(float(score.max(initial=-np.inf)))
         candidates += candidates_of(
-            chain, records["step"][taken], records["mask"][taken], efficiency,
+            chain, records["step"][taken], records["mask"][taken], score,
             searches[settings.name].candidate_rule,
         )  # fmt: skip
     return candidates, proposals, best
@@ -228,6 +241,7 @@ def conclude(
     human_response = None
     if human is not None:
         human_response = all_beams.evaluate(human.mask, VERIFICATION_INCREMENT)
+    without = problem.section is None or problem.lattice.dimension == 3
     report = DesignReport(
         folder=folder.path,
         settings=settings,
@@ -241,6 +255,7 @@ def conclude(
         figures=_figures(selection),
         part=spec,
         validation=_validated(selection.design, spec),
+        part_figures=[] if spec is None or without else part_figures(selection.design, spec),
     )
     part = {} if spec is None else {"part": spec.to_dict()}
     design = replace(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import cast, get_args
 
@@ -10,6 +11,7 @@ from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.model import Design, builtin, find_problem, gallery_design, read_design
 from bellcrank.model.gallery import Kind
 from bellcrank.storage import is_unfinished_run
+from bellcrank.task import find_task
 
 DESIGN_FILE = "design.json"
 """Name of the design in a result folder."""
@@ -25,9 +27,10 @@ def find_design(name_or_path: str) -> Design:
     2. a result folder, which holds a ``design.json``; the folder of an unfinished run is an error,
     3. a bundled problem: its initial design,
     4. a design file,
-    5. an entry of the library, a bundled machine or a strut (``strut-6``), unless a file of that
+    5. a bundled task or a task file: its initial design,
+    6. an entry of the library, a bundled machine or a strut (``strut-6``), unless a file of that
        name exists,
-    6. a problem file: its initial design.
+    7. a problem file: its initial design.
 
     Parameters
     ----------
@@ -66,11 +69,18 @@ def find_design(name_or_path: str) -> Design:
         return find_problem(name_or_path).full_design()
     if path.suffix == ".json" and path.is_file() and _is_design(path):
         return read_design(path)
-    if not path.exists():
-        design = _design_of_machines(name_or_path)
-        if design is not None:
-            return design
-    return find_problem(name_or_path).full_design()
+    found = _initial_of_task(name_or_path)
+    if found is None and not path.exists():
+        found = _design_of_machines(name_or_path)
+    return find_problem(name_or_path).full_design() if found is None else found
+
+
+def _initial_of_task(name_or_path: str) -> Design | None:
+    """Return the initial design of a bundled task or of a task file, or None."""
+    task = find_task(name_or_path)
+    if task is None:
+        return None
+    return replace(task.problem.full_design(), provenance={"part": task.part.to_dict()})
 
 
 def hides_problem(name: str) -> bool:

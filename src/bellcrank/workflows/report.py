@@ -5,20 +5,22 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.mechanics import model_name, objective_name
 from bellcrank.model.storage import write_text
 from bellcrank.workflows.figures import figure_text, model_words
+from bellcrank.workflows.specification import binding, item_data, item_rows
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from bellcrank.mechanics import Response
     from bellcrank.model import Design
     from bellcrank.part import PartSpec
-    from bellcrank.search import SearchSettings, Selection
+    from bellcrank.search import ItemResult, SearchSettings, Selection
     from bellcrank.storage import RunFolder
     from bellcrank.workflows.validation import Validation
 
@@ -63,6 +65,8 @@ class DesignReport:
         Part for which the design was searched, if any.
     validation
         Frame analysis of that part, if it is in the plane and all its pieces are supported.
+    part_figures
+        Figures of the part for each output of each load case (`bellcrank.workflows.part_figures`).
     """
 
     folder: Path
@@ -77,12 +81,29 @@ class DesignReport:
     figures: list[dict[str, Any]]
     part: PartSpec | None = None
     validation: Validation | None = None
+    part_figures: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def items(self) -> dict[str, Sequence[ItemResult]]:
+        """Items of the specification by model; empty without one."""
+        found, problem = self.selection.verification, self.selection.design.problem
+        if not self.selection.items:
+            return {}
+        known: dict[str, Sequence[ItemResult]] = {model_words(problem): self.selection.items}
+        if found is not None and found.items:
+            known[model_words(problem, found.elements)] = found.items
+        return known
+
+    @property
+    def missed(self) -> list[ItemResult]:
+        """Items that the design misses in the best model, the binding one first."""
+        return binding(list(self.items.values())[-1]) if self.items else []
 
     @property
     def failures(self) -> list[str]:
         """Reasons why the design does not work; empty if it does."""
         found = []
-        if self.selection.efficiency_after <= 0.0:
+        if not self.items and self.selection.efficiency_after <= 0.0:
             found.append("the output does not move in the wanted direction")
         warnings = [] if self.validation is None else self.validation.analyses[0].warnings
         verification = self.selection.verification
@@ -129,6 +150,8 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "human_efficiency": human.efficiency if human else None,
         "verification": _verification(report),
         "figures": report.figures,
+        **_specification(report),
+        "part_figures": report.part_figures,
         "as_part": _as_part(report),
         "found": {
             "chain": selection.found.chain,
@@ -139,6 +162,28 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "best_by_chain": [_finite(best) for best in report.best_by_chain],
         "settings": report.settings.to_dict(),
     }
+
+
+def _specification(report: DesignReport) -> dict[str, Any]:
+    """Return the items of the specification, and the nearest designs if it is not met."""
+    if not report.items or report.part is None:
+        return {}
+    problem, part = report.selection.design.problem, report.part
+    data: dict[str, Any] = {
+        "met": not report.missed,
+        "binding": report.missed[0].item.name if report.missed else None,
+        "items": item_data(problem, part, report.items),
+    }
+    if report.selection.nearest:
+        data["nearest"] = [
+            {
+                "mask": each.design.mask_hex,
+                "items": item_data(problem, part, {"": each.verification.items}),
+            }
+            for each in report.selection.nearest
+            if each.verification is not None
+        ]
+    return {"specification": data}
 
 
 def _as_part(report: DesignReport) -> dict[str, Any] | None:
@@ -197,6 +242,60 @@ def figure_table(report: DesignReport, number: str = "{:.4f}") -> list[list[str]
     return [*rows, *_part_rows(report)]
 
 
+def item_table(report: DesignReport) -> list[list[str]]:
+    """Return the items of the specification as rows of texts; empty without one."""
+    if not report.items or report.part is None:
+        return []
+    return item_rows(report.selection.design.problem, report.part, report.items)
+
+
+def nearest_table(report: DesignReport) -> list[list[str]]:
+    """Return the nearest designs as rows of texts: the items of each; empty if all is met."""
+    nearest = [each for each in report.selection.nearest if each.verification is not None]
+    if not nearest or report.part is None:
+        return []
+    columns = {
+        f"nearest {number}": each.verification.items
+        for number, each in enumerate(nearest, 1)
+        if each.verification is not None
+    }
+    rows = item_rows(report.selection.design.problem, report.part, columns)
+    return [row[:-2] for row in rows]
+
+
+FIGURES = (
+    ("efficiency at half and full stroke", ("efficiency_half", "efficiency"), "{:.3g}", ""),
+    ("travel", ("travel_mm",), "{:.3g}", "mm"),
+    ("off-axis motion", ("off_axis",), "{:.1%}", ""),
+    ("rotation", ("rotation_deg",), "{:.2g}", "deg"),
+    ("input force, largest along the stroke", ("largest_input_force_N",), "{:.3g}", "N"),
+    ("output stiffness", ("output_stiffness_N_per_mm",), "{:.3g}", "N/mm"),
+    ("payload that halves the travel", ("payload_N",), "{:.3g}", "N"),
+    ("sag under own weight, upright", ("sag_mm",), "{:.3g}", "mm"),
+)
+"""Figures of a part: name, keys, format and unit."""
+
+
+def part_figure_table(report: DesignReport) -> list[list[str]]:
+    """Return the figures of the part as rows of texts, a column for each output."""
+    found = report.part_figures
+    if not found:
+        return []
+    several = len({row["case"] for row in found}) > 1
+    names = [f"{row['case']}, {row['output']}" if several else row["output"] for row in found]
+    rows = [["as a part, 8 elements", *names]]
+    for label, keys, form, unit in FIGURES:
+        texts = []
+        for row in found:
+            values = [row.get(key) for key in keys]
+            known = [form.format(value) if value is not None else "-" for value in values]
+            texts.append(f"{', '.join(known)} {unit}".rstrip())
+        rows.append([label, *texts])
+    points = [row.get("limit_points") or [] for row in found]
+    texts = [", ".join(f"{point:.0%}" for point in each) or "none" for each in points]
+    return [*rows, ["limit points of the force", *texts]]
+
+
 def _force(report: DesignReport, force: list[float] | None) -> str:
     """Return the size of the input force: of a part in the plane in N, else in lattice units."""
     design, part = report.selection.design, report.part
@@ -252,8 +351,9 @@ def summary_text(report: DesignReport) -> str:
     motion = "![the design at rest and displaced](motion.png)\n\n" if flat else ""
     return f"""# {selection.design.problem.name}
 
-{figures_table}
+{_markdown(item_table(report))}{_markdown(nearest_table(report))}{figures_table}
 
+{_markdown(part_figure_table(report))}
 | | |
 |---|---|
 {table}
@@ -265,6 +365,15 @@ in a real part, so the efficiency after cleaning is the one to expect.
 {refused}
 {motion}![efficiency along the chains](efficiency.png)
 """
+
+
+def _markdown(rows: list[list[str]]) -> str:
+    """Return rows of texts as a Markdown table with an empty line after it; nothing for none."""
+    if not rows:
+        return ""
+    head, *body = (" | ".join(row) for row in rows)
+    rule = "|---" * len(rows[0])
+    return "\n".join([f"| {head} |", f"{rule}|", *(f"| {row} |" for row in body)]) + "\n\n"
 
 
 def write_report(report: DesignReport, folder: RunFolder) -> None:

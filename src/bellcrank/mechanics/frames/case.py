@@ -20,7 +20,7 @@ from bellcrank.mechanics.frames.quantities.forces import mean_displacement_field
 from bellcrank.mechanics.frames.quantities.motion import input_field, output_fields
 from bellcrank.mechanics.frames.stroke import with_held_output
 from bellcrank.mechanics.status import Status
-from bellcrank.model import Specification
+from bellcrank.model import Loads, NodeForce, Specification
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -50,11 +50,12 @@ CHANNELS: dict[str, Quantity] = {
     "strain": quantities["strain"],
     "stiffness": quantities["output_stiffness"],
     "blocked_force": quantities["blocked_force"],
+    "loaded_motion": Quantity(*linear(output_fields), combine=vector, load="payload"),
     "sag": quantities["sag"],
 }
 """Channels by name. Motion: along the wanted direction, then the components normal to it."""
 
-END_ONLY = frozenset({"stiffness", "blocked_force", "sag"})
+END_ONLY = frozenset({"stiffness", "blocked_force", "loaded_motion", "sag"})
 """Channels with a single value: at full stroke, or at rest."""
 
 
@@ -78,6 +79,27 @@ def with_output(problem: Problem, name: str) -> Problem:
         problem, output=outputs[name],
         specification=Specification(case=case, output=name, outputs=others),
     )  # fmt: skip
+
+
+def with_payload(problem: Problem, force: float) -> Problem:
+    """Return a problem with a force on its output against the wanted direction.
+
+    Parameters
+    ----------
+    force
+        Total force, shared equally by the output nodes.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> from bellcrank.part import PartSpec, frame_problem
+    >>> crane = frame_problem(find_problem("crane"), PartSpec())
+    >>> with_payload(crane, 0.1).loads.forces[0].force.sum(axis=0).round(3)
+    array([0.1, 0. ])
+    """
+    output, given = problem.output, problem.loads
+    own = NodeForce(output.nodes, -force / len(output.nodes) * output.direction)
+    return replace(problem, loads=Loads((*given.forces, own), given.springs, given.weight))
 
 
 def bound_to(quantity: Quantity, problem: Problem) -> Quantity:
@@ -112,6 +134,8 @@ class CaseEvaluator:
         As in `FrameEvaluator`.
     weight : (d,), optional
         Own weight that causes the sag: force on a unit of volume.
+    payloads : dict of str to float, optional
+        Force on each output under which its loaded motion is measured.
 
     Examples
     --------
@@ -127,15 +151,21 @@ class CaseEvaluator:
     """
 
     def __init__(
-        self, problem: Problem, elements: int | None = None, weight: ArrayLike | None = None
+        self,
+        problem: Problem,
+        elements: int | None = None,
+        weight: ArrayLike | None = None,
+        payloads: Mapping[str, float] | None = None,
     ) -> None:
         self.problem = problem
         self.frame = FrameEvaluator(problem, "displacement", elements)
         self._weight = weight
+        self.payloads = dict(payloads or {})
         self._by_output = {name: with_output(problem, name) for name in problem.outputs}
         self._others: dict[tuple[Load, str], FrameEvaluator] = {}
         self._quantities: dict[Channel, Quantity] = {}
         self._points: list[_Point] = []
+        self._states: dict[float, Equilibrium | None] = {}
         self._mask: NDArray[np.bool_] = problem.initial
         self._warm = False
         self._converged: list[FrameEvaluator] = []
@@ -149,7 +179,8 @@ class CaseEvaluator:
         lower_bound: float = -math.inf,
     ) -> Response:
         """Compute the response to the input; as `FrameEvaluator.evaluate`."""
-        self._points, self._mask, self._warm = [], mask, warm_start
+        self._points, self._states = [], {}
+        self._mask, self._warm = mask, warm_start
         self._converged = []
         response = self.frame.evaluate(
             mask, largest_increment, warm_start=warm_start, lower_bound=lower_bound
@@ -191,27 +222,34 @@ class CaseEvaluator:
         by_load: dict[tuple[Load, str], list[Channel]] = {}
         for channel in channels:
             load = CHANNELS[channel.name].load
-            key: tuple[Load, str] = (load, channel.output if load == "held output" else "")
+            shared = load in {"input", "weight"}
+            key: tuple[Load, str] = (load, "" if shared else channel.output)
             by_load.setdefault(key, []).append(channel)
         found: dict[Channel, NDArray[np.float64]] = {}
         for (load, output), wanted in by_load.items():
             if load == "input":
                 along = [each for each in wanted if each.name not in single]
-                found |= self._measured(self.frame, self._along(fractions), along, len(fractions))
+                found |= self._measured(
+                    self.frame, [self.state(each) for each in fractions], along, len(fractions)
+                )
                 ends = [each for each in wanted if each.name in single]
-                found |= self._measured(self.frame, [self._along([1.0])[0]], ends, 1)
+                found |= self._measured(self.frame, [self.state(1.0)], ends, 1)
             else:
                 evaluator = self._other(load, output)
                 state = self._state_of(load, evaluator)
                 found |= self._measured(evaluator, [state], wanted, 1)
         return found
 
-    def _along(self, fractions: Sequence[float]) -> list[Equilibrium | None]:
-        """Return equilibria along the stroke; the state at full load is the last one computed."""
-        return [
-            self.frame.end if fraction == 1.0 else self.frame.equilibrium(fraction)
-            for fraction in fractions
-        ]
+    def state(self, fraction: float) -> Equilibrium | None:
+        """Return the equilibrium at a fraction of the stroke; None where the path does not lead.
+
+        At 1, the last state of the response, even if it is not verified that the path from rest
+        leads to it.
+        """
+        if fraction not in self._states:
+            found = self.frame.end if fraction == 1.0 else self.frame.equilibrium(fraction)
+            self._states[fraction] = found
+        return self._states[fraction]
 
     def _other(self, load: Load, output: str) -> FrameEvaluator:
         """Return the evaluator of another load than the input."""
@@ -219,6 +257,9 @@ class CaseEvaluator:
             elements = self.frame.elements
             if load == "weight":
                 made = FrameEvaluator(self.problem, "displacement", elements, weight=self._weight)
+            elif load == "payload":
+                loaded = with_payload(self._by_output[output], self.payloads[output])
+                made = FrameEvaluator(loaded, "displacement", elements)
             else:
                 held = with_held_output(self._by_output[output])
                 made = FrameEvaluator(held, "displacement", elements)
@@ -238,7 +279,8 @@ class CaseEvaluator:
     def _quantity(self, channel: Channel) -> Quantity:
         if channel not in self._quantities:
             quantity = CHANNELS[channel.name]
-            if channel.output and len(self._by_output) > 1:
+            shared = quantity.load in {"input", "weight"}
+            if channel.output and shared and len(self._by_output) > 1:
                 quantity = bound_to(quantity, self._by_output[channel.output])
             self._quantities[channel] = quantity
         return self._quantities[channel]
@@ -273,7 +315,9 @@ class CaseEvaluator:
     def _shape(self, channel: Channel) -> tuple[int, ...]:
         """Return the shape of the values of a channel at one state."""
         dimension = self.problem.lattice.dimension
-        return {"motion": (1 + dimension,), "displacement": (dimension,)}.get(channel.name, ())
+        if channel.name in {"motion", "loaded_motion"}:
+            return (1 + dimension,)
+        return (dimension,) if channel.name == "displacement" else ()
 
     def predict_flips(
         self, values: Mapping[Channel, NDArray[np.float64]], beams: NDArray[np.int64]

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-Load = Literal["input", "held output", "weight"]
+Load = Literal["input", "held output", "payload", "weight"]
 """Load of an equilibrium: the input; the input with the output held along the wanted direction; the
-own weight alone, at rest."""
+input with a force on the output against that direction; the own weight alone, at rest."""
 
 
 class Measures(NamedTuple):

@@ -1,0 +1,185 @@
+"""Figures of a part that are always reported beside its specification."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    CaseEvaluator,
+    Channel,
+    Status,
+)
+from bellcrank.mechanics.frames.case import with_output, with_payload
+from bellcrank.task import units_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Design, Problem
+    from bellcrank.part import PartSpec
+    from bellcrank.task import ProblemUnits
+
+    Values = NDArray[np.float64]
+
+STATES = 16
+"""Number of states along the stroke."""
+PAYLOAD_TRIALS = 12
+"""Largest number of responses in the search for the payload that halves the motion."""
+PAYLOAD_TOLERANCE = 0.01
+"""Relative accuracy of this payload."""
+UPRIGHT = (0.0, -1.0)
+"""Direction of the weight of a part that stands upright."""
+
+
+def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> list[dict[str, Any]]:
+    """Return figures of a design as a part, for each output of each load case.
+
+    Parameters
+    ----------
+    design
+        Design of a frame in the plane.
+    spec
+        Size and material of the part.
+    elements
+        As in `bellcrank.mechanics.FrameEvaluator`.
+
+    Returns
+    -------
+    list of dict
+        Plain data with units in the keys; None where a figure does not exist. ``path_mm`` are the
+        displacements of the output at equal fractions of the stroke.
+
+    Examples
+    --------
+    >>>     >>> from dataclasses import replace
+    >>> from bellcrank.model import human_design
+    >>> from bellcrank.part import PartSpec, frame_problem
+    >>> spec, design = PartSpec(), human_design("crane")
+    >>> design = replace(design, problem=frame_problem(design.problem, spec))
+    >>> (row,) = part_figures(design, spec, elements=None)
+    >>> round(row["efficiency"], 2), round(row["efficiency_half"], 2), row["limit_points"]
+    (1.21, 1.48, [])
+    """
+    units = units_of(design.problem, spec)
+    upright = None
+    if not math.isnan(units.density):
+        upright = units.weight * np.array(UPRIGHT)
+    rows = []
+    for name, case in design.problem.cases.items():
+        evaluator = CaseEvaluator(case, elements, upright)
+        response = evaluator.respond(design.mask, VERIFICATION_INCREMENT)
+        about = {"case": name, "status": response.status.label, "stable_to": response.reached}
+        for output in case.outputs:
+            row: dict[str, Any] = {**about, "output": output}
+            if response.status is Status.CONVERGED:
+                row |= _motion(evaluator, output, units)
+                stiffness = row["output_stiffness_N_per_mm"] or 0.0
+                payload = _payload(
+                    with_output(case, output),
+                    design.mask,
+                    elements,
+                    row["travel_mm"] / units.length,
+                    units.in_problem("stiffness", stiffness),
+                )
+                row["payload_N"] = _finite(payload and units.in_part("force", payload))
+            rows.append(row)
+    return rows
+
+
+def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[str, Any]:
+    """Return the figures that follow from one response."""
+    fractions = np.arange(1, STATES + 1) / STATES
+    names = ["motion", "displacement", "rotation", "stiffness"]
+    if units.density == units.density:
+        names.append("sag")
+    own = [Channel(name, output) for name in names]
+    shared = [Channel("input_motion"), Channel("input_force"), Channel("strain")]
+    found = evaluator.values([*own, *shared], fractions.tolist())
+    motion, moved = found[Channel("motion", output)], found[Channel("input_motion")]
+    travel, force = motion[:, 0], found[Channel("input_force")]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gain = travel / moved
+        off_axis = np.linalg.norm(motion[:, 1:], axis=1).max() / abs(travel[-1])
+    sag = found[Channel("sag", output)][0] if "sag" in names else math.nan
+    path = units.in_part("length", 1.0) * found[Channel("displacement", output)]
+    return {
+        "efficiency": _finite(gain[-1]),
+        "efficiency_half": _finite(gain[STATES // 2 - 1]),
+        "travel_mm": _finite(units.in_part("length", travel[-1])),
+        "input_mm": _finite(units.in_part("length", moved[-1])),
+        "off_axis": _finite(off_axis),
+        "rotation_deg": _finite(float(np.abs(found[Channel("rotation", output)]).max())),
+        "input_force_N": _finite(units.in_part("force", force[-1])),
+        "largest_input_force_N": _finite(units.in_part("force", force.max())),
+        "strain": _finite(found[Channel("strain")].max()),
+        "output_stiffness_N_per_mm": _finite(
+            units.in_part("stiffness", found[Channel("stiffness", output)][0])
+        ),
+        "sag_mm": _finite(units.in_part("length", sag)),
+        "limit_points": limit_points(fractions, force),
+        "path_mm": np.vstack([np.zeros(path.shape[1]), path]).round(4).tolist(),
+    }
+
+
+def limit_points(fractions: Values, force: Values) -> list[float]:
+    """Return the fractions of the stroke at which the input force is largest or smallest.
+
+    Parameters
+    ----------
+    fractions, force : (F,)
+        Force along the stroke, which begins with zero at rest.
+
+    Examples
+    --------
+    >>> limit_points(np.array([0.25, 0.5, 0.75, 1.0]), np.array([2.0, 3.0, 1.0, 2.0]))
+    [0.5, 0.75]
+    """
+    whole = np.concatenate([[0.0], force])
+    turns = np.diff(np.sign(np.diff(whole)))
+    return [float(fractions[index]) for index in np.flatnonzero(turns)]
+
+
+def _payload(
+    problem: Problem,
+    mask: NDArray[np.bool_],
+    elements: int | None,
+    travel: float,
+    stiffness: float,
+) -> float | None:
+    """Return the force against the direction of the output that halves its travel.
+
+    None if the motion is lost before. Found by bisection between loads, from the linear estimate.
+    """
+    if travel <= 0.0 or stiffness <= 0.0:
+        return None
+
+    def travel_under(force: float) -> float:
+        evaluator = CaseEvaluator(with_payload(problem, force), elements)
+        response = evaluator.respond(mask, VERIFICATION_INCREMENT)
+        if response.status is not Status.CONVERGED:
+            return -math.inf
+        name = next(iter(problem.outputs))
+        channel = Channel("motion", name)
+        return float(evaluator.values([channel], [1.0])[channel][0, 0])
+
+    low, high = 0.0, 0.5 * travel * stiffness
+    for _ in range(PAYLOAD_TRIALS):
+        if high - low <= PAYLOAD_TOLERANCE * high and low > 0.0:
+            break
+        middle = high if low == 0.0 else 0.5 * (low + high)
+        if travel_under(middle) >= 0.5 * travel:
+            low = middle
+            if middle == high:
+                high *= 2.0
+        else:
+            high = middle
+            low = low or 1e-12 * middle
+    return low if low > 1e-9 * high else None
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)

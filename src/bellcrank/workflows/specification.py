@@ -1,0 +1,181 @@
+"""Items of a specification in the units of the part: wanted, reached, margin, met."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from bellcrank.model import QUANTITIES
+from bellcrank.task import NAMES, units_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from bellcrank.model import Item, Problem
+    from bellcrank.part import PartSpec
+    from bellcrank.search import ItemResult
+    from bellcrank.task import ProblemUnits
+
+LABELS = {
+    "off_axis": "off-axis motion", "path_error": "path error", "blocked_force": "blocked force",
+    "input_force": "input force", "stable_stroke": "stable stroke",
+}  # fmt: skip
+"""Names of quantities whose words differ from their keys."""
+
+
+def item_label(item: Item, problem: Problem) -> str:
+    """Return the name of an item: case and output where there are several, and the quantity.
+
+    Examples
+    --------
+    >>> from bellcrank.task import find_task
+    >>> problem = find_task("selector").problem
+    >>> item_label(problem.specification.items[0], problem)
+    'A: gain'
+    """
+    several_cases = len(problem.cases) > 1
+    wanted = problem.specification
+    outputs = () if wanted is None or not item.case else wanted.output_names(item.case)
+    parts = [item.case] if several_cases and item.case else []
+    parts += [item.output] if len(outputs) > 1 and item.output else []
+    name = LABELS.get(item.quantity, item.quantity)
+    return f"{', '.join(parts)}: {name}" if parts else name
+
+
+def number_text(item: Item, value: float, units: ProblemUnits) -> str:
+    """Return a value of the quantity of an item with its unit.
+
+    Examples
+    --------
+    >>> from bellcrank.model import Item
+    >>> from bellcrank.task import ProblemUnits
+    >>> units = ProblemUnits(length=10.0, force=12.0)
+    >>> number_text(Item(quantity="off_axis", at_most=0.1), 0.0321, units)
+    '3.21 %'
+    """
+    if value == math.inf:
+        return "more"
+    if not math.isfinite(value):
+        return "-"
+    unit = _unit(item)
+    number = 100.0 * value if unit == "%" else value
+    if item.of != "spread":
+        number = units.in_part(QUANTITIES[item.quantity].dimension, number)
+    return f"{number:.3g} {unit}".rstrip()
+
+
+def wanted_text(item: Item, units: ProblemUnits) -> str:
+    """Return the bounds of an item as text.
+
+    Examples
+    --------
+    >>> from bellcrank.model import Item
+    >>> from bellcrank.task import ProblemUnits
+    >>> units = ProblemUnits(length=10.0, force=12.0)
+    >>> wanted_text(Item(quantity="travel", at_least=-0.05, at_most=0.05, start=0, stop=0.5), units)
+    '-0.5 to 0.5 mm, up to 50 % of the stroke'
+    """
+    low, high = item.at_least, item.at_most
+    if low is not None and high is not None:
+        first = number_text(item, low, units).removesuffix(f" {_unit(item)}")
+        text = f"{first} to {number_text(item, high, units)}"
+    elif high is not None:
+        text = f"at most {number_text(item, high, units)}"
+    else:
+        assert low is not None
+        text = f"at least {number_text(item, low, units)}"
+    if item.of != "every":
+        text = f"{item.of} {text}"
+    if not QUANTITIES[item.quantity].along or item.quantity == "strain":
+        return text
+    start, stop = f"{100.0 * item.start:.3g}", f"{100.0 * item.stop:.3g}"
+    if item.start == item.stop == 1.0:
+        return text
+    if item.start == 0.0 and item.stop == 1.0:
+        return f"{text}, along the stroke"
+    if item.start == 0.0:
+        return f"{text}, up to {stop} % of the stroke"
+    return f"{text}, from {start} to {stop} % of the stroke"
+
+
+def _unit(item: Item) -> str:
+    """Return the unit in which the values of an item are written."""
+    dimension = QUANTITIES[item.quantity].dimension
+    if item.of == "spread" or (dimension == "ratio" and item.quantity != "gain"):
+        return "%"
+    return NAMES[dimension]
+
+
+def item_rows(
+    problem: Problem, spec: PartSpec, results: Mapping[str, Sequence[ItemResult]]
+) -> list[list[str]]:
+    """Return the items as rows of texts, the first one with the names of the columns.
+
+    Parameters
+    ----------
+    problem
+        Problem with a specification.
+    spec
+        Size and material of the part.
+    results
+        Items by model, the last one being that which counts: margin and whether an item is met
+        are its own.
+    """
+    units = units_of(problem, spec)
+    rows = [["item", "wanted", *results, "margin", "met"]]
+    columns = list(results.values())
+    for values in zip(*columns, strict=True):
+        item, last = values[0].item, values[-1]
+        rows.append(
+            [
+                item_label(item, problem),
+                wanted_text(item, units),
+                *(number_text(item, each.value, units) for each in values),
+                f"{100.0 * last.margin:+.0f} %" if math.isfinite(last.margin) else "-",
+                "yes" if last.met else "NO",
+            ]
+        )
+    return rows
+
+
+def item_data(
+    problem: Problem, spec: PartSpec, results: Mapping[str, Sequence[ItemResult]]
+) -> list[dict[str, Any]]:
+    """Return the items as plain data, in the units of the part (`bellcrank.task.NAMES`).
+
+    Parameters
+    ----------
+    problem, spec, results
+        As in `item_rows`.
+    """
+    units = units_of(problem, spec)
+    rows = []
+    for values in zip(*results.values(), strict=True):
+        item = values[0].item
+        dimension = "ratio" if item.of == "spread" else QUANTITIES[item.quantity].dimension
+        data = item.to_dict()
+        data.pop("path", None)
+        for key in ("at_least", "at_most"):
+            if key in data:
+                data[key] = units.in_part(dimension, data[key])
+        reached = {
+            model: {
+                "value": _finite(units.in_part(dimension, each.value)),
+                "margin": _finite(each.margin),
+                "violation": each.violation,
+                "met": each.met,
+            }
+            for model, each in zip(results, values, strict=True)
+        }
+        rows.append({"name": item.name, **data, "unit": NAMES[dimension], "reached": reached})
+    return rows
+
+
+def binding(results: Sequence[ItemResult]) -> list[ItemResult]:
+    """Return the items that are not met, the one that is farthest from being met first."""
+    missed = [each for each in results if not each.met]
+    return sorted(missed, key=lambda each: -each.violation)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
