@@ -33,8 +33,10 @@ from bellcrank.mechanics.frames.evaluator import FrameEvaluator
 from bellcrank.mechanics.frames.quantities import quantities
 from bellcrank.mechanics.frames.stroke import Quantities
 from bellcrank.mechanics.items import (
+    ItemResult,
     StrokeRecord,
     channels_of,
+    item_results,
     margin,
     quantity_values,
     reduced,
@@ -71,6 +73,7 @@ __all__ = [
     "Coupling",
     "FlipPrediction",
     "FrameEvaluator",
+    "ItemResult",
     "LinearEquations",
     "ModelEvaluator",
     "Movable",
@@ -96,6 +99,7 @@ __all__ = [
     "follow",
     "free_nodes",
     "increment_at",
+    "item_results",
     "load_bearing_core",
     "loaded_beams",
     "margin",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from bellcrank.mechanics.frames.case import Channel
 from bellcrank.model import QUANTITIES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -283,3 +283,39 @@ def worst_value(item: Item, record: StrokeRecord) -> float:
 def margin(item: Item, value: float) -> float:
     """Return the distance of a value from the nearest bound, over the scale; negative beyond."""
     return -float(excess(item, np.asarray(value), np.asarray(value))) / scale_of(item)
+
+
+TOLERANCE = 1e-9
+"""Violation up to which an item is met."""
+
+
+class ItemResult(NamedTuple):
+    """An item with the value that a design reaches."""
+
+    item: Item
+    value: float
+    violation: float
+    margin: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the item is met."""
+        return self.violation <= TOLERANCE
+
+
+def item_results(items: Sequence[Item], records: Mapping[str, StrokeRecord]) -> list[ItemResult]:
+    """Return items with the values that a design reaches.
+
+    Parameters
+    ----------
+    items
+        Items of a specification.
+    records
+        Channels of the design in each load case.
+    """
+    found = []
+    for item in items:
+        record = records[item.case] if item.case else next(iter(records.values()))
+        value = worst_value(item, record)
+        found.append(ItemResult(item, value, float(violation(item, record)), margin(item, value)))
+    return found

@@ -67,7 +67,7 @@ from bellcrank.search.selection import (
     select,
 )
 from bellcrank.search.settings import SearchSettings
-from bellcrank.search.specification import ItemResult, SpecificationEvaluator
+from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 
 __all__ = [
@@ -81,7 +81,6 @@ __all__ = [
     "Finalist",
     "HoppingSettings",
     "HoppingState",
-    "ItemResult",
     "MetropolisSettings",
     "Move",
     "Progress",

@@ -14,10 +14,10 @@ from bellcrank.search.verification import Verifier
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from bellcrank.mechanics import ItemResult
     from bellcrank.model import Problem
     from bellcrank.search.selection import Candidate, Choice, Finalist, Refusals, Selection
     from bellcrank.search.settings import SearchSettings
-    from bellcrank.search.specification import ItemResult
     from bellcrank.search.verification import Verification
 
 MOST = 48

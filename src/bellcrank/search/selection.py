@@ -27,9 +27,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import ModelEvaluator
+    from bellcrank.mechanics import ItemResult, ModelEvaluator
     from bellcrank.search.evaluator import Evaluator
-    from bellcrank.search.specification import ItemResult
     from bellcrank.search.verification import Verification
 
 CandidateRule: TypeAlias = "Callable[[NDArray[np.float64], NDArray[np.uint8]], list[int]]"

@@ -15,17 +15,18 @@ from bellcrank.mechanics import (
     CaseEvaluator,
     FlipPrediction,
     FrameEvaluator,
+    ItemResult,
     Status,
     StrokeRecord,
     channels_of,
-    margin,
+    item_results,
     near_pairs,
     quantity_values,
     tightened,
     violation,
-    worst_value,
 )
 from bellcrank.mechanics.frames.analysis import centre_lines
+from bellcrank.mechanics.items import TOLERANCE
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.model import QUANTITIES
 from bellcrank.search.constraints.evaluator import BASE_PENALTY, VIOLATION_WEIGHT
@@ -42,28 +43,12 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-TOLERANCE = 1e-9
-"""Violation up to which an item is met."""
 SEARCH_STATES = 4
 """Number of states along the stroke in a search, the full stroke included."""
 PATH_STATES = 8
 """The same for cases with a wanted path."""
 VERIFIED_STATES = 16
 """The same for designs that are verified."""
-
-
-class ItemResult(NamedTuple):
-    """An item with the value that a design reaches."""
-
-    item: Item
-    value: float
-    violation: float
-    margin: float
-
-    @property
-    def met(self) -> bool:
-        """Whether the item is met."""
-        return self.violation <= TOLERANCE
 
 
 CHEAP = frozenset({"motion", "displacement", "input_motion", "rotation"})
@@ -96,6 +81,49 @@ def fractions_of(items: Sequence[Item], *, verified: bool) -> NDArray[np.float64
         states = VERIFIED_STATES
     ends = [end for item in items for end in (item.start, item.stop) if end > 0.0]
     return np.unique(np.concatenate([np.arange(1, states + 1) / states, ends]))
+
+
+def bent_pieces(
+    frame: FrameEvaluator, beams: NDArray[np.int64], u: Values
+) -> tuple[Values, NDArray[np.int64]]:
+    """Return points of bent struts and the straight pieces between them.
+
+    In the plane every strut has a point in its middle, on the cubic that its end rotations define.
+
+    Parameters
+    ----------
+    frame
+        Evaluator with one element in each beam.
+    beams : (n,) int64
+        The struts.
+    u : (N, 3)
+        State of the nodes.
+
+    Returns
+    -------
+    points : (N + n, d)
+    pieces : (2 n, 2) int64
+        In space (N, d) and (n, 2): struts are straight.
+    """
+    lattice = frame.problem.lattice
+    nodes, dimension = lattice.positions.shape
+    moved = lattice.positions + u[:nodes, :dimension]
+    ends = lattice.beams[beams]
+    if dimension == 3:
+        return moved, ends
+    rest = lattice.positions[ends[:, 1]] - lattice.positions[ends[:, 0]]
+    chord = moved[ends[:, 1]] - moved[ends[:, 0]]
+    # The difference of the end rotations does not depend on the rotation of the chord, but each
+    # must be within half a turn of it.
+    turned = np.arctan2(rest[:, 0] * chord[:, 1] - rest[:, 1] * chord[:, 0], (rest * chord).sum(1))
+    first, second = ((u[ends[:, k], 2] - turned + np.pi) % (2.0 * np.pi) - np.pi for k in (0, 1))
+    normal = np.column_stack([-chord[:, 1], chord[:, 0]])
+    middle = moved[ends].mean(axis=1) + normal * ((first - second) / 8.0)[:, None]
+    number = nodes + np.arange(len(beams))
+    pieces = np.concatenate(
+        [np.column_stack([ends[:, 0], number]), np.column_stack([number, ends[:, 1]])]
+    )
+    return np.concatenate([moved, middle]), pieces
 
 
 class SpecificationEvaluator:
@@ -260,16 +288,15 @@ class SpecificationEvaluator:
     def _overlap(self, case: _Case, design: NDArray[np.bool_], bound: float) -> float:
         """Return the bound less the sum over pairs of struts of how far they are too near.
 
-        For straight struts, at the state of the stroke where the sum is largest.
+        At the state of the stroke where the sum is largest. Bent struts have two straight pieces.
         """
-        lattice = case.evaluator.problem.lattice
-        nodes, dimension = lattice.positions.shape
-        struts = lattice.beams[self._struts(case.evaluator.frame, design)]
+        frame = case.evaluator.frame
+        beams = np.flatnonzero(self._struts(frame, design))
         least, worst = self._width + bound, 0.0
         for fraction in case.fractions.tolist():
             if (found := case.evaluator.state(fraction)) is not None:
-                moved = lattice.positions + found.state.u[:nodes, :dimension]
-                _, distance = near_pairs(moved, struts, least)
+                points, pieces = bent_pieces(frame, beams, found.state.u)
+                _, distance = near_pairs(points, pieces, least)
                 worst = max(worst, float(np.sum(least - distance)))
         return bound - worst
 
@@ -386,9 +413,4 @@ class SpecificationEvaluator:
 
     def results(self) -> list[ItemResult]:
         """Return the items with the values of the design evaluated last."""
-        found = []
-        for item, over in zip(self.items, self.violations.tolist(), strict=True):
-            record = self.records[item.case] if item.case else next(iter(self.records.values()))
-            value = worst_value(item, record)
-            found.append(ItemResult(item, value, over, margin(item, value)))
-        return found
+        return item_results(self.items, self.records)

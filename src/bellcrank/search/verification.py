@@ -30,10 +30,9 @@ from bellcrank.search.verdict import Verdict
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Response
+    from bellcrank.mechanics import ItemResult, Response
     from bellcrank.model import Problem
     from bellcrank.search.settings import SearchSettings
-    from bellcrank.search.specification import ItemResult
 
 ELEMENTS = 8
 """Number of elements of each beam; with it efficiencies are within 1e-4 of the limit of many."""

@@ -55,7 +55,7 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
 
     Examples
     --------
-    >>>     >>> from dataclasses import replace
+    >>> from dataclasses import replace
     >>> from bellcrank.model import human_design
     >>> from bellcrank.part import PartSpec, frame_problem
     >>> spec, design = PartSpec(), human_design("crane")

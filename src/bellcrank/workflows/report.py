@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from bellcrank.mechanics import Response
+    from bellcrank.mechanics import ItemResult, Response
     from bellcrank.model import Design
     from bellcrank.part import PartSpec
-    from bellcrank.search import ItemResult, SearchSettings, Selection
+    from bellcrank.search import SearchSettings, Selection
     from bellcrank.storage import RunFolder
     from bellcrank.workflows.validation import Validation
 

@@ -11,9 +11,9 @@ from bellcrank.task import NAMES, units_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from bellcrank.mechanics import ItemResult
     from bellcrank.model import Item, Problem
     from bellcrank.part import PartSpec
-    from bellcrank.search import ItemResult
     from bellcrank.task import ProblemUnits
 
 LABELS = {

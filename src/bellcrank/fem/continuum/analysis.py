@@ -124,7 +124,7 @@ def _point_of(part: Part, state: ContinuumState) -> StrokePoint:
 def _contacts_of(part: Part, response: ContinuumResponse) -> Contacts:
     """Find the struts whose centre lines come too close in any equilibrium of the path."""
     lines = centre_lines(part.positions[part.struts])
-    interpolate = _interpolator(response.fields[0], lines.reshape(-1, 2))
+    interpolate = interpolator(response.fields[0], lines.reshape(-1, 2))
     stroke = (
         (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
         for state, field in zip(response.states, response.fields, strict=True)
@@ -133,7 +133,7 @@ def _contacts_of(part: Part, response: ContinuumResponse) -> Contacts:
     return find_contacts(beams, lines, stroke, part.section.width)
 
 
-def _interpolator(
+def interpolator(
     field: Field, points: NDArray[np.float64]
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
     """Return a function that interpolates vertex displacements to points of a part.

@@ -107,19 +107,53 @@ class ContinuumEquations:
     def load(self) -> NDArray[np.float64]:
         """(F,) derivative of the residual with respect to the load, for all degrees of freedom."""
         system = self.system
-        module, boundary = ngsolve(), system.boundary
-        rules = integration(system.mesh.dimension, MEAN_ORDER)
-        test = self.space.TestFunction()[0]
-        form = module.LinearForm(self.space)
-        for node, force in zip(boundary.loaded.tolist(), boundary.force.tolist(), strict=True):
-            pulled = sum(part * test[axis] for axis, part in enumerate(force))
-            hub = system.mesh.hub(node)
-            form += pulled / self.hub_sizes[node] * module.dx(definedon=hub, intrules=rules)
+        boundary = system.boundary
+        form = self._hub_load(boundary.loaded, boundary.force)
+        if boundary.weight is not None:
+            form += self._body_force(self.space.TestFunction()[0], boundary.weight)
         form.Assemble()
         load: NDArray[np.float64] = -form.vec.FV().NumPy()
         motion = np.array([constraint.motion for constraint in boundary.means])
         load[len(load) - len(motion) :] -= system.unit * motion
         return load
+
+    def _hub_load(self, nodes: NDArray[np.int64], force: NDArray[np.float64]) -> Any:
+        """Return the form of the work of forces (n, 2) on hubs, N."""
+        module, system = ngsolve(), self.system
+        rules = integration(system.mesh.dimension, MEAN_ORDER)
+        test = self.space.TestFunction()[0]
+        form = module.LinearForm(self.space)
+        for node, vector in zip(nodes.tolist(), force.tolist(), strict=True):
+            pulled = sum(part * test[axis] for axis, part in enumerate(vector))
+            hub = system.mesh.hub(node)
+            form += pulled / self.hub_sizes[node] * module.dx(definedon=hub, intrules=rules)
+        return form
+
+    def _body_force(self, test: Any, weight: NDArray[np.float64]) -> Any:
+        """Return the work of the own weight, N / mm^3."""
+        module, system = ngsolve(), self.system
+        pulled = sum(part * test[axis] for axis, part in enumerate(weight.tolist()))
+        return system.mesh.thickness * pulled * module.dx
+
+    def motion_by_weight(self, weight: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (f,) the linear motion at rest by the own weight (2,), N / mm^3."""
+        module = ngsolve()
+        form = module.LinearForm(self.space)
+        form += self._body_force(self.space.TestFunction()[0], weight)
+        form.Assemble()
+        right: NDArray[np.float64] = form.vec.FV().NumPy()[self.free]
+        self.factorise(np.zeros(self.count))
+        return self.solve(right)
+
+    def motion_by_forces(
+        self, unknowns: NDArray[np.float64], nodes: NDArray[np.int64], force: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return (f,) the linear motion from a state by forces (n, 2) on hubs, N."""
+        form = self._hub_load(nodes, force)
+        form.Assemble()
+        right: NDArray[np.float64] = form.vec.FV().NumPy()[self.free]
+        self.factorise(unknowns)
+        return self.solve(right)
 
     def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearisation:
         """Linearise the equations; raises RuntimeError if the state has no finite energy."""

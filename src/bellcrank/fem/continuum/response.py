@@ -140,7 +140,7 @@ def solve_mesh(
         path = follow_path(equations, control, report)
     stresses = [stress_field(equations, state.unknowns) for state in path.states]
     states = [
-        _complete(part, equations, state, stress)
+        complete_state(part, equations, state, stress)
         for state, stress in zip(path.states, stresses, strict=True)
     ]
     fields = [stress.field for stress in stresses]
@@ -159,13 +159,13 @@ def _solve_linear(equations: ContinuumEquations) -> EquilibriumPath:
     return EquilibriumPath([rest, PathState(1.0, unknowns)], PathStatus.CONVERGED, 1)
 
 
-def _complete(
+def complete_state(
     part: Part, equations: ContinuumEquations, state: PathState, stress: StressField
 ) -> ContinuumState:
     """Return an equilibrium with displacements and forces at the lattice nodes."""
     system, given = equations.system, part.design.problem.input
     force = _hub_forces(equations, state)
-    motion = _hub_displacements(equations, state)
+    motion = hub_displacements(equations, state)
     mesh = system.mesh
     density = mesh.thickness * system.law.energy(equations.gradient, system.lame)
     rules = integration(mesh.dimension, system.order)
@@ -181,7 +181,7 @@ def _complete(
     )
 
 
-def _hub_displacements(equations: ContinuumEquations, state: PathState) -> NDArray[np.float64]:
+def hub_displacements(equations: ContinuumEquations, state: PathState) -> NDArray[np.float64]:
     """Return (N, d) the mean displacements of hubs, mm; 0 for nodes without a hub."""
     module, mesh = ngsolve(), equations.system.mesh
     equations.set_state(state.unknowns)

@@ -16,6 +16,8 @@ from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.fem.continuum.laws import lame_of, laws
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from bellcrank.fem.continuum.laws import Lame, Law
@@ -66,12 +68,15 @@ class Boundary:
         Lattice nodes whose hubs are loaded by forces.
     force : (p, 2) float64
         Forces on them at the full load, N.
+    weight : (2,) float64, optional
+        Own weight at the full load, N / mm^3.
     """
 
     clamped: NDArray[np.int64]
     means: tuple[MeanConstraint, ...]
     loaded: NDArray[np.int64]
     force: NDArray[np.float64]
+    weight: NDArray[np.float64] | None = None
 
 
 def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary:
@@ -90,14 +95,14 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
         2 in the plane, 3 in space.
     """
     problem = part.design.problem
-    supports, given, output = problem.supports, problem.input, problem.output
+    supports, given = problem.supports, problem.input
     axes = [tuple(row) for row in np.eye(dimension).tolist()]
     means: list[MeanConstraint] = []
     for nodes, held in ((supports.fixed_x, 0), (supports.fixed_y, 1)):
         for node in np.intersect1d(nodes, hubs).tolist():
             means += [MeanConstraint(node, axis) for axis in (axes[held], *axes[2:])]
     present = np.isin(given.nodes, hubs)
-    loaded, force = np.empty(0, dtype=np.int64), np.empty((0, 2))
+    total = np.zeros((len(problem.lattice.positions), 2))
     if given.drive == "displacement":
         full = given.amount * part.scale * given.direction[present]
         for node, motion in zip(given.nodes[present].tolist(), full.tolist(), strict=True):
@@ -106,18 +111,41 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
             ]
             means += [MeanConstraint(node, axis) for axis in axes[2:]]
     else:
-        unit = part.stiffness_unit * part.scale
-        loaded, force = given.nodes[present], given.amount * unit * given.direction[present]
-    if output.spring is not None:
-        spring = output.spring * part.stiffness_unit
-        present = np.isin(output.nodes, hubs)
-        for node, along in zip(
-            output.nodes[present].tolist(), output.direction[present].tolist(), strict=True
-        ):
+        total[given.nodes] += given.amount * given.direction
+    for each in problem.loads.forces:
+        total[each.nodes] += each.force
+    loaded = np.intersect1d(np.flatnonzero(total.any(axis=1)), hubs)
+    unit = part.stiffness_unit * part.scale
+    weight = problem.loads.weight
+    return Boundary(
+        np.intersect1d(supports.fixed, hubs),
+        tuple(means) + tuple(_springs(part, hubs, axes)),
+        loaded,
+        unit * total[loaded],
+        None if weight is None else unit / part.scale**3 * weight,
+    )
+
+
+def _springs(
+    part: Part, hubs: NDArray[np.int64], axes: list[tuple[float, ...]]
+) -> Iterator[MeanConstraint]:
+    """Yield the springs at outputs and at other hubs."""
+    problem = part.design.problem
+    rest = axes[0][2:]
+    for output in problem.outputs.values():
+        if output.spring is None:
+            continue
+        for node, along in zip(output.nodes.tolist(), output.direction.tolist(), strict=True):
             isotropic = output.spring_kind == "isotropic"
-            directions = axes[:2] if isotropic else [(*along, *axes[0][2:])]
-            means += [MeanConstraint(node, direction, spring=spring) for direction in directions]
-    return Boundary(np.intersect1d(supports.fixed, hubs), tuple(means), loaded, force)
+            for direction in axes[:2] if isotropic else [(*along, *rest)]:
+                if node in hubs:
+                    spring = output.spring * part.stiffness_unit
+                    yield MeanConstraint(node, direction, spring=spring)
+    for given in problem.loads.springs:
+        for node, along in zip(given.nodes.tolist(), given.direction.tolist(), strict=True):
+            if node in hubs:
+                spring = given.stiffness * part.stiffness_unit
+                yield MeanConstraint(node, (*along, *rest), spring=spring)
 
 
 def integration(dimension: int, order: int) -> dict[Any, Any]:

@@ -1,0 +1,283 @@
+"""Items of a specification in the sheet: the printed outline in plane stress."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.fem.contact import centre_lines, find_contacts
+from bellcrank.fem.continuum.analysis import interpolator
+from bellcrank.fem.continuum.equations import ContinuumEquations
+from bellcrank.fem.continuum.fields import stress_field
+from bellcrank.fem.continuum.mesh import plane_mesh
+from bellcrank.fem.continuum.response import complete_state, hub_displacements
+from bellcrank.fem.continuum.system import continuum_system
+from bellcrank.fem.path import PathState, PathStatus, StepControl, follow_path
+from bellcrank.mechanics import Channel, StrokeRecord, channels_of, item_results
+from bellcrank.mechanics.frames.case import with_output, with_payload
+from bellcrank.mechanics.frames.stroke import with_held_output
+from bellcrank.mechanics.output import best_fit_rotation, motion_weights
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.fem.continuum.mesh import ContinuumMesh
+    from bellcrank.fem.continuum.response import ContinuumState
+    from bellcrank.fem.path import EquilibriumPath
+    from bellcrank.fem.results import Field
+    from bellcrank.mechanics import ItemResult
+    from bellcrank.model import Item, Problem
+    from bellcrank.part import Part
+
+    Values = NDArray[np.float64]
+
+STEPS = StepControl(first=0.125, largest=0.125)
+STATES = 16
+"""Number of states along the stroke at which items are evaluated; between the computed ones,
+channels are interpolated by a cubic spline."""
+LAW = "neo-hookean"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SheetPath:
+    """Path of a part in plane stress in one load case."""
+
+    part: Part
+    equations: ContinuumEquations
+    path: EquilibriumPath
+    states: list[ContinuumState]
+    fields: list[Field]
+
+    @property
+    def loads(self) -> Values:
+        """(S,) fractions of the stroke of the states, from 0 on."""
+        return np.array([state.load for state in self.states])
+
+    @property
+    def motion(self) -> Values:
+        """(S, N, 2) mean displacements of the hubs of lattice nodes, lattice units."""
+        return np.stack([state.motion for state in self.states]) / self.part.scale
+
+
+def sheet_items(
+    part: Part,
+    size: float | None = None,
+    report: Callable[[str, float], None] = lambda _case, _load: None,
+) -> list[ItemResult] | None:
+    """Return the items of the specification of a part in the sheet.
+
+    Parameters
+    ----------
+    part
+        Part whose problem has a specification.
+    size
+        Largest edge of the triangles, mm; half the strut width by default.
+    report
+        Called with the name of the load case and the fraction of the stroke reached.
+
+    Returns
+    -------
+    list of ItemResult or None
+        None if the part is not stable along the whole stroke in every load case.
+
+    Raises
+    ------
+    InvalidSettings
+        If NGSolve is not installed, or the part cannot be meshed.
+    """
+    wanted = part.design.problem.specification
+    assert wanted is not None
+    mesh = plane_mesh(part, size)
+    records = {}
+    for name, case in part.design.problem.cases.items():
+        items = [item for item in wanted.items if item.case == name]
+        record = _Sheet(part, mesh, case, items, wanted.weight).record(partial(report, name))
+        if record is None:
+            return None
+        records[name] = record
+    return item_results(wanted.items, records)
+
+
+class _Sheet:
+    """Channels of one load case in the sheet."""
+
+    def __init__(
+        self,
+        part: Part,
+        mesh: ContinuumMesh,
+        case: Problem,
+        items: Sequence[Item],
+        weight: Values | None,
+    ) -> None:
+        self.part, self.mesh, self.case = part, mesh, case
+        self.items = items
+        self.weight = weight
+        self.force_unit = part.stiffness_unit * part.scale
+
+    def record(self, report: Callable[[float], None]) -> StrokeRecord | None:
+        """Return the channels that the items need; None without a stable path."""
+        main = self._path(self.case, lambda state: report(state.load))
+        if main is None:
+            return None
+        ends = [end for item in self.items for end in (item.start, item.stop) if end > 0.0]
+        fractions = np.unique(np.concatenate([np.arange(1, STATES + 1) / STATES, ends]))
+        needed = [
+            channel for item in self.items for channel in channels_of(item.quantity, item.output)
+        ]
+        channels = {
+            channel: self._channel(channel, main, fractions) for channel in dict.fromkeys(needed)
+        }
+        return StrokeRecord(fractions, channels, self._given(main), self._payloads())
+
+    def _payloads(self) -> dict[str, float]:
+        return {
+            item.output: item.at_least
+            for item in self.items
+            if item.quantity == "payload" and item.at_least is not None
+        }
+
+    def _path(
+        self, problem: Problem, report: Callable[[PathState], None] = lambda _state: None
+    ) -> SheetPath | None:
+        """Follow a load case to the full stroke; None if stability is lost before."""
+        part = replace(self.part, design=replace(self.part.design, problem=problem))
+        equations = ContinuumEquations(continuum_system(part, self.mesh, LAW))
+        path = follow_path(equations, STEPS, report)
+        if path.status is not PathStatus.CONVERGED:
+            return None
+        stresses = [stress_field(equations, state.unknowns) for state in path.states]
+        states = [
+            complete_state(part, equations, state, stress)
+            for state, stress in zip(path.states, stresses, strict=True)
+        ]
+        return SheetPath(part, equations, path, states, [each.field for each in stresses])
+
+    def _channel(self, channel: Channel, main: SheetPath, fractions: Values) -> Values:
+        """Return a channel at fractions of the stroke, or the one value that it has."""
+        problem = with_output(self.case, channel.output) if channel.output else self.case
+        single: dict[str, Callable[[SheetPath, Problem, str], Values]] = {
+            "stiffness": self._stiffness, "sag": self._sag, "loaded_motion": self._loaded,
+            "blocked_force": self._blocked,
+        }  # fmt: skip
+        if channel.name in single:
+            return single[channel.name](main, problem, channel.output)
+        from scipy.interpolate import CubicSpline
+
+        values: Values = CubicSpline(main.loads, self._along(channel, main, problem))(fractions)
+        return values
+
+    def _along(self, channel: Channel, main: SheetPath, problem: Problem) -> Values:
+        """Return (S,) or (S, c) a channel at the states of a path."""
+        name = channel.name
+        if name == "motion":
+            return self._means(main, problem)
+        if name == "rotation":
+            return self._rotation(main, problem)
+        if name == "displacement":
+            return np.asarray(main.motion[:, problem.output.nodes].mean(axis=1))
+        if name == "input_motion":
+            return self._input_motion(main)
+        if name == "input_force":
+            return np.array([state.input_force / self.force_unit for state in main.states])
+        assert name == "strain"
+        return np.array([state.strain for state in main.states])
+
+    def _means(self, main: SheetPath, problem: Problem) -> Values:
+        moved = main.motion[:, problem.output.nodes]
+        return np.asarray(np.einsum("kna,sna->sk", motion_weights(problem), moved))
+
+    def _input_motion(self, main: SheetPath) -> Values:
+        given = self.case.input
+        return np.asarray((main.motion[:, given.nodes] * given.direction).sum(axis=2).mean(axis=1))
+
+    def _rotation(self, main: SheetPath, problem: Problem) -> Values:
+        """Return (S,) the rotation of the output: of its nodes, or of a single hub."""
+        nodes, rest = problem.output.nodes, problem.lattice.positions
+        if len(nodes) > 1:
+            turns = [best_fit_rotation(rest[nodes], moved[nodes]) for moved in main.motion]
+            return np.array(turns, dtype=np.float64)
+        inside = self.mesh.elements[self.mesh.hub_of_element == nodes[0]]
+        corners = np.unique(inside)
+        return np.array(
+            [
+                best_fit_rotation(field.rest[corners], field.displacement[corners])
+                for field in main.fields
+            ],
+            dtype=np.float64,
+        )
+
+    def _stiffness(self, main: SheetPath, problem: Problem, _output: str) -> Values:
+        """Return (1,) the stiffness of the output at full stroke, lattice units."""
+        output = problem.output
+        force = output.direction / len(output.nodes)
+        unknowns = main.path.states[-1].unknowns
+        motion = main.equations.motion_by_forces(unknowns, output.nodes, force)
+        moved = self._hub_motion(main, motion)[output.nodes]
+        compliance = float((moved * output.direction).sum(axis=1).mean())
+        stiffness = 1.0 / compliance if compliance > 0.0 else 0.0
+        return np.array([stiffness / self.part.stiffness_unit])
+
+    def _sag(self, main: SheetPath, problem: Problem, _output: str) -> Values:
+        """Return (1,) the motion of the output by the own weight at rest, lattice units."""
+        assert self.weight is not None
+        weight = self.force_unit / self.part.scale**3 * self.weight
+        moved = self._hub_motion(main, main.equations.motion_by_weight(weight))
+        size = float(np.linalg.norm(moved[problem.output.nodes].mean(axis=0)))
+        return np.array([size / self.part.scale])
+
+    def _hub_motion(self, main: SheetPath, unknowns: Values) -> Values:
+        """Return (N, 2) the mean displacements of hubs, mm."""
+        return hub_displacements(main.equations, PathState(1.0, unknowns))[:, :2]
+
+    def _loaded(self, _main: SheetPath, problem: Problem, output: str) -> Values:
+        """Return (1, 3) the motion of the output under its payload."""
+        found = self._path(with_payload(problem, self._payloads()[output]))
+        if found is None:
+            return np.full((1, 3), np.nan)
+        return self._means(found, problem)[-1:]
+
+    def _blocked(self, _main: SheetPath, problem: Problem, _output: str) -> Values:
+        """Return (1,) the force of the output on springs that hold it, lattice units."""
+        held = with_held_output(problem)
+        found = self._path(held)
+        if found is None:
+            return np.full(1, np.nan)
+        assert held.output.spring is not None
+        moved = found.motion[-1, held.output.nodes]
+        return np.array([held.output.spring * float((moved * held.output.direction).sum())])
+
+    def _given(self, main: SheetPath) -> dict[str, float]:
+        """Return the quantities that do not follow from channels."""
+        wanted = {item.quantity: item.at_least or 0.0 for item in self.items}
+        problem = self.part.design.problem
+        assert problem.section is not None
+        length = problem.lattice.rest_length[self.part.design.mask].sum()
+        given = {"mass": problem.section.area * float(length)}
+        if "clearance" in wanted:
+            given["clearance"] = self._gap(main, wanted["clearance"])
+        if "stable_stroke" in wanted:
+            bound = wanted["stable_stroke"]
+            longer = replace(self.case.input, amount=bound * self.case.input.amount)
+            stable = self._path(replace(self.case, input=longer)) is not None
+            given["stable_stroke"] = bound if stable else 1.0
+        return given
+
+    def _gap(self, main: SheetPath, bound: float) -> float:
+        """Return the smallest gap between struts; infinite above the bound. Lattice units."""
+        part = self.part
+        lines = centre_lines(part.positions[part.struts])
+        interpolate = interpolator(main.fields[0], lines.reshape(-1, 2))
+        stroke = (
+            (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
+            for state, field in zip(main.states, main.fields, strict=True)
+        )
+        least = part.section.width + bound * part.scale
+        beams = np.flatnonzero(part.design.mask)
+        overlap = find_contacts(beams, lines, stroke, least).overlap
+        return bound - float(overlap.max()) / part.scale if len(overlap) else math.inf
