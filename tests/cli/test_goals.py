@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bellcrank.mechanics import Core, SpringEvaluator
+from bellcrank.mechanics import Core, SpringEvaluator, near_pairs
 from bellcrank.model import read_design
-from bellcrank.mechanics import near_pairs
 from bellcrank.search.constraints import mass_of, mirror_images
 
 from .helpers import PROBLEM, call, colours, refusal

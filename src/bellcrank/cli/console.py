@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
+from rich.table import Table
 
 from bellcrank.provenance import other_version
 
@@ -70,3 +71,15 @@ def number_of(count: int, what: str) -> str:
 def print_json(text: str) -> None:
     """Print machine-readable output without formatting."""
     sys.stdout.write(text + "\n")
+
+
+def text_grid(rows: list[list[str]]) -> Table:
+    """Return rows of texts as a table; efficiencies and items that are missed are bold."""
+    grid = Table.grid(padding=(0, 2))
+    for name, *values in rows:
+        bold = name.startswith("efficiency (") or "NO" in values
+        grid.add_row(
+            plain(name), *(f"[bold]{plain(each)}[/]" if bold else plain(each) for each in values)
+        )
+    grid.add_row("")
+    return grid

@@ -18,6 +18,7 @@ from bellcrank.cli.console import (
     notes,
     plain,
     results,
+    text_grid,
     warn_of_another_version,
 )
 from bellcrank.errors import InvalidSettings
@@ -307,18 +308,6 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
         raise InvalidSettings(f"{option} {text}: expected numbers separated by commas") from None
 
 
-def _grid(rows: list[list[str]]) -> Table:
-    """Return rows of texts as a table; efficiencies and items that are missed are bold."""
-    grid = Table.grid(padding=(0, 2))
-    for name, *values in rows:
-        bold = name.startswith("efficiency (") or "NO" in values
-        grid.add_row(
-            plain(name), *(f"[bold]{plain(each)}[/]" if bold else plain(each) for each in values)
-        )
-    grid.add_row("")
-    return grid
-
-
 def _print_report(report: DesignReport) -> None:
     """Print the results in a table, with warnings."""
     from bellcrank.workflows.report import (
@@ -334,7 +323,7 @@ def _print_report(report: DesignReport) -> None:
         item_table(report), nearest_table(report), figure_table(report), part_figure_table(report)
     ):  # fmt: skip
         if rows:
-            results.print(_grid(rows))
+            results.print(text_grid(rows))
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
     table.add_row("initial design", f"{report.initial_efficiency:.4f}")
     if report.human_response is not None:

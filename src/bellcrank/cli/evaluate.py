@@ -12,7 +12,7 @@ from rich.table import Table
 
 from bellcrank.cli.app import app
 from bellcrank.cli.arguments import UNLOADED_BEAMS, ModelName, design_in_model, design_named
-from bellcrank.cli.console import announce_compilation, print_json, results
+from bellcrank.cli.console import announce_compilation, print_json, results, text_grid
 
 
 @app.command()
@@ -50,7 +50,9 @@ def evaluate(
         objective_name,
     )
     from bellcrank.model import pack_mask, read_masks
+    from bellcrank.workflows import spec_for
     from bellcrank.workflows.figures import figure_text, figures_of, model_record, model_words
+    from bellcrank.workflows.specification import item_data, item_rows, results_for
 
     design = design_named(problem)
     masks = read_masks(designs, design.problem) if designs else [design.mask]
@@ -61,10 +63,16 @@ def evaluate(
         **model_record(task, elements),
     }
     announce_compilation()
-    rows = []
+    rows, items = [], []
     for mask in masks:
         response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
         row = {"mask": pack_mask(mask), **figures_of(evaluator, response)}
+        found = results_for(task, mask, elements)
+        if found is not None:
+            part = spec_for(design)
+            model = model_words(task, elements)
+            row["specification"] = item_data(task, part, {model: found})
+            items.append(item_rows(task, part, {model: found}))
         rows.append({**row, "beams": int(mask.sum()), **about})
     if as_json:
         print_json(json.dumps({"results": rows}, indent=1))
@@ -80,3 +88,7 @@ def evaluate(
             figure_text(row["energy"], "{:.7f}"), row["status"],
         )  # fmt: skip
     results.print(table)
+    for number, texts in enumerate(items):
+        if len(items) > 1:
+            results.print(f"design {number}")
+        results.print(text_grid(texts))

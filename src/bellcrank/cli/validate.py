@@ -25,7 +25,14 @@ from bellcrank.cli.arguments import (
     design_named,
     part_of,
 )
-from bellcrank.cli.console import announce_compilation, notes, plain, print_json, results
+from bellcrank.cli.console import (
+    announce_compilation,
+    notes,
+    plain,
+    print_json,
+    results,
+    text_grid,
+)
 from bellcrank.cli.live import Live
 from bellcrank.errors import InvalidSettings, StorageError
 
@@ -242,7 +249,8 @@ def _saver(path: Path | None, *, required: bool) -> Callable[[Validation], None]
                 raise
             notes.print(f"[yellow]record not written:[/] {plain(error)}")
             return
-        if len(validation.analyses) == len(validation.plan):
+        complete = len(validation.analyses) == len(validation.plan)
+        if complete and bool(validation.items) == validation.has_items:
             notes.print(f"wrote {plain(path)}")
 
     return save
@@ -252,6 +260,7 @@ def _print(validation: Validation) -> None:
     """Print the figures of each level in a table, one column for each."""
     from bellcrank.mechanics import objective_name
     from bellcrank.workflows.figures import model_words
+    from bellcrank.workflows.specification import item_rows
 
     table = Table(box=SIMPLE)
     table.add_column("")
@@ -273,6 +282,9 @@ def _print(validation: Validation) -> None:
     for row, name in enumerate(names):
         table.add_row(name, first[row], *(column[row] for column in columns))
     results.print(table)
+    if validation.items:
+        rows = item_rows(validation.design.problem, validation.spec, validation.items)
+        results.print(text_grid(rows))
     for doubt in validation.doubts:
         notes.print(f"[yellow]design:[/] {plain(doubt)}")
     for analysis in validation.analyses:

@@ -47,6 +47,8 @@ ZERO_SCALE = {
     "ratio": 0.05, "length": 0.1, "angle": 2.0, "force": 1e-3, "stiffness": 1e-3, "volume": 1.0,
 }  # fmt: skip
 """Scale of the violation of a bound that is zero, by dimension."""
+TWO_SIDED = 4.0
+"""Factor of the reserve of items with two bounds, over that of items with one."""
 PATH_POINTS = 48
 """Number of points at which a path is compared with the wanted one."""
 SMALLEST_TRAVEL = 1e-9
@@ -211,10 +213,11 @@ def scale_of(item: Item) -> float:
     return max(bounds) or ZERO_SCALE[QUANTITIES[item.quantity].dimension]
 
 
-def tightened(item: Item, margin: float) -> Item:
+def tightened(item: Item, reserve: float) -> Item:
     """Return an item whose bounds are tighter by a part of their size.
 
-    Two bounds approach their mean; a single one moves by a part of its size.
+    Two bounds approach their mean by four times this part of half their distance; a single one
+    moves by this part of its size, or of `ZERO_SCALE`.
 
     Examples
     --------
@@ -224,12 +227,14 @@ def tightened(item: Item, margin: float) -> Item:
     """
     low, high = item.at_least, item.at_most
     if low is not None and high is not None:
-        middle, half = 0.5 * (low + high), 0.5 * (1.0 - margin) * (high - low)
+        half = 0.5 * max(0.0, 1.0 - TWO_SIDED * reserve) * (high - low)
+        middle = 0.5 * (low + high)
         return replace(item, at_least=middle - half, at_most=middle + half)
+    step = reserve * scale_of(item)
     if low is not None:
-        return replace(item, at_least=low + margin * abs(low))
+        return replace(item, at_least=low + step)
     assert high is not None
-    return replace(item, at_most=high - margin * abs(high))
+    return replace(item, at_most=high - step)
 
 
 def reduced(item: Item, record: StrokeRecord) -> tuple[Values, Values]:

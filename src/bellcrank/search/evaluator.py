@@ -11,7 +11,7 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import FlipPrediction, Response, check_memory, model_evaluator
 from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
-from bellcrank.search.specification import SpecificationEvaluator
+from bellcrank.search.specification import RESERVE, SpecificationEvaluator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +50,10 @@ class Evaluator(Protocol):
 
 
 def make_evaluator(
-    problem: Problem, settings: SearchSettings, elements: int | None = None
+    problem: Problem,
+    settings: SearchSettings,
+    elements: int | None = None,
+    reserve: float = RESERVE,
 ) -> Evaluator:
     """Return the evaluator of a search.
 
@@ -65,6 +68,8 @@ def make_evaluator(
         Settings of the search.
     elements : int, optional
         As in `bellcrank.mechanics.model_evaluator`.
+    reserve
+        Part of their size by which the bounds of a specification are tightened.
 
     Raises
     ------
@@ -82,7 +87,7 @@ def make_evaluator(
                 f"goals and strokes: problem {problem.name!r} has a specification; change the "
                 "items of its task instead"
             )
-        return SpecificationEvaluator(problem, elements)
+        return SpecificationEvaluator(problem, elements, reserve)
     if not settings.goals and settings.strokes == (1.0,):
         return model_evaluator(problem, *options)
     cases = at_strokes(problem, settings.strokes)
@@ -106,7 +111,7 @@ def verification_evaluator(
         Settings that differ from those of the search.
     """
     changed = replace(settings, **{"unloaded_beams": "keep", **changes})
-    return make_evaluator(problem, changed, elements)
+    return make_evaluator(problem, changed, elements, reserve=0.0)
 
 
 DENSITIES = (0.9, 0.8, 0.7, 0.6, 0.5)

@@ -26,7 +26,7 @@ from bellcrank.mechanics import (
     violation,
 )
 from bellcrank.mechanics.frames.analysis import centre_lines
-from bellcrank.mechanics.items import TOLERANCE
+from bellcrank.mechanics.items import TOLERANCE, excess, reduced, scale_of
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.model import QUANTITIES
 from bellcrank.search.constraints.evaluator import BASE_PENALTY, VIOLATION_WEIGHT
@@ -51,6 +51,9 @@ VERIFIED_STATES = 16
 """The same for designs that are verified."""
 
 
+RESERVE = 0.05
+"""Part of their size by which a search tightens all bounds, so that its designs meet them with more
+elements and in the sheet too."""
 CHEAP = frozenset({"motion", "displacement", "input_motion", "rotation"})
 """Channels that cost little at a known state; the others are measured last."""
 
@@ -142,16 +145,17 @@ class SpecificationEvaluator:
     Raises
     ------
     InvalidSettings
-        If the problem has no specification.
-    ValueError
-        If the lattice is not symmetric as the specification demands.
+        If the problem has no specification, or its lattice is not symmetric as demanded.
     """
 
     def __init__(self, problem: Problem, elements: int | None = None, reserve: float = 0.0) -> None:
         wanted = problem.specification
         if wanted is None:
             raise InvalidSettings(f"problem {problem.name!r} has no specification")
-        self.groups = MirrorGroups(problem, wanted.symmetry)
+        try:
+            self.groups = MirrorGroups(problem, wanted.symmetry)
+        except ValueError as error:
+            raise InvalidSettings(f"limits.symmetry: {error}") from None
         self.problem = self.groups.problem
         self.items = tuple(tightened(item, reserve) for item in wanted.items)
         self.terms = wanted.maximise
@@ -258,7 +262,8 @@ class SpecificationEvaluator:
                 return replace(response, penalty=math.inf)
             channels = case.evaluator.values(case.cheap, [1.0])
             records[name] = StrokeRecord(np.ones(1), channels, structural)
-        score = self._score_of(self._violations(records, partial=True), records)
+        violations = self._violations(records, partial=True)
+        score = float(self.score(violations.sum(), self._objective(records, partial=True)))
         if score > lower_bound:
             return None
         assert first is not None
@@ -338,26 +343,52 @@ class SpecificationEvaluator:
         return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.zeros(0)
 
     @staticmethod
-    def _shows_at_end(item: Item) -> bool:
+    def _is_cheap(quantity: str, output: str) -> bool:
+        """Whether a quantity follows from cheap channels."""
+        return all(channel.name in CHEAP for channel in channels_of(quantity, output))
+
+    def _shows_at_end(self, item: Item) -> bool:
         """Whether the violation at full stroke is a lower bound of that of the item."""
-        if item.quantity == "path_error" or any(
-            channel.name not in CHEAP for channel in channels_of(item.quantity, item.output)
-        ):
+        if item.quantity in {"path_error", "clearance", "stable_stroke"}:
             return False
-        if not channels_of(item.quantity, item.output):
-            return item.quantity == "mass"
+        if not self._is_cheap(item.quantity, item.output):
+            return False
         return item.stop == 1.0 and item.of == "every"
 
-    def _objective(self, records: dict[str, StrokeRecord]) -> Values:
-        """Return (...) the smallest term of the objective; without terms, the smallest margin."""
+    def _objective(self, records: dict[str, StrokeRecord], *, partial: bool = False) -> Values:
+        """Return (...) the smallest term of the objective; without terms, the smallest margin.
+
+        With `partial`, an upper bound from the channels that are known.
+        """
         terms = []
         for term in self.terms:
+            if partial and not self._is_cheap(term.quantity, term.output):
+                continue
             record = records[term.case] if term.case else next(iter(records.values()))
             value = quantity_values(record, term.quantity, term.output)[..., -1]
             terms.append(value / term.scale)
+        if not self.terms:
+            return self._smallest_margin(records, partial=partial)
         if not terms:
-            return np.zeros(())
+            return np.asarray(np.inf)
         return np.asarray(np.minimum.reduce(np.broadcast_arrays(*terms)))
+
+    def _smallest_margin(self, records: dict[str, StrokeRecord], *, partial: bool) -> Values:
+        """Return (...) the smallest margin of an item that follows from channels.
+
+        Where items are not met, it is 0, and their violations count.
+        """
+        margins = [
+            -excess(item, *reduced(item, records[item.case])) / scale_of(item)
+            for item in self.items
+            if item.case
+            and channels_of(item.quantity, item.output)
+            and (not partial or self._shows_at_end(item))
+        ]
+        if not margins:
+            return np.zeros(())
+        smallest = np.minimum.reduce(np.broadcast_arrays(*margins))
+        return np.asarray(np.maximum(0.0, smallest))
 
     def score(self, total: Values, objective: Values) -> Values:
         """Return (...) the score for total violations and values of the objective."""

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import BellcrankError, InvalidFile, InvalidProblem, InvalidSettings
+from bellcrank.errors import (
+    BellcrankError,
+    InvalidFile,
+    InvalidProblem,
+    InvalidSettings,
+    UnknownName,
+)
 from bellcrank.model import (
     Case,
     Input,
@@ -446,6 +452,8 @@ def _part(table: TaskTable) -> PartSpec:
     try:
         part = PartSpec.from_dict({k: v for k, v in data.items() if v is not None}, "part")
         part.registered_material  # noqa: B018 - raises UnknownName
+    except UnknownName as error:
+        raise InvalidProblem(f"part.material: {error}") from None
     except InvalidSettings as error:
         raise InvalidProblem(f"part.{error}") from None
     return part

@@ -188,7 +188,8 @@ class ItemReader:
             raise InvalidProblem(
                 f"{key}: {quantity} is a single number; from, to and of do not apply to it"
             )
-        whole = READINGS[quantity].from_start and bounds.target is None
+        # A least value, such as that of a wanted rotation, cannot hold from rest on.
+        whole = READINGS[quantity].from_start and bounds.target is bounds.at_least is None
         start = 0.0 if whole or given or bounds.of != "every" else 1.0
         found = {"start": start, "stop": 1.0}
         for name, value in (("start", bounds.start), ("stop", bounds.stop)):

@@ -9,7 +9,7 @@ import math
 from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 from bellcrank.errors import InvalidSettings
@@ -211,6 +211,8 @@ class LoadSection(Table):
 
 class Bounds(Table):
     """What is wanted of a quantity."""
+
+    model_config = ConfigDict(populate_by_name=True)
 
     value: Any = None
     """A single value in place of a table: ``"maximise"``, or a bound in its usual sense."""

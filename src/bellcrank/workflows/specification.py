@@ -5,11 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from bellcrank.mechanics import VERIFICATION_INCREMENT
 from bellcrank.model import QUANTITIES
+from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import NAMES, units_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from bellcrank.mechanics import ItemResult
     from bellcrank.model import Item, Problem
@@ -169,6 +174,32 @@ def item_data(
         }
         rows.append({"name": item.name, **data, "unit": NAMES[dimension], "reached": reached})
     return rows
+
+
+def results_for(
+    problem: Problem, mask: NDArray[np.bool_], elements: int | None = None
+) -> list[ItemResult] | None:
+    """Return the items that a design reaches as a frame, from rest in small increments.
+
+    Parameters
+    ----------
+    problem
+        Any problem; None is returned for one without a specification.
+    mask : (M,) bool
+        The design.
+    elements : int, optional
+        As in `bellcrank.mechanics.FrameEvaluator`.
+
+    Returns
+    -------
+    list of ItemResult or None
+        None also for a design without a stable path to the full stroke.
+    """
+    if not problem.is_specified:
+        return None
+    evaluator = SpecificationEvaluator(problem, elements)
+    response = evaluator.evaluate(evaluator.groups.with_images(mask), VERIFICATION_INCREMENT)
+    return evaluator.results() if response.is_admissible else None
 
 
 def binding(results: Sequence[ItemResult]) -> list[ItemResult]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidFile, InvalidSettings
@@ -22,7 +22,10 @@ from bellcrank.model.storage import write_text
 from bellcrank.part import PartSpec, read_length
 from bellcrank.part.pieces import check_supported, connection_warnings
 from bellcrank.provenance import provenance
+from bellcrank.search.verification import ELEMENTS
 from bellcrank.storage.locking import locked
+from bellcrank.workflows.figures import model_words
+from bellcrank.workflows.specification import item_data, results_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
 
     from bellcrank.fem import Analysis
     from bellcrank.machines.bundled.contact import ContactCheck
+    from bellcrank.mechanics import ItemResult
     from bellcrank.model import Design
 
     Plan = Sequence[tuple[str, FemSettings]]
@@ -61,6 +65,10 @@ class Validation:
         Levels and settings.
     analyses
         Results, in the order of the plan, as far as they are computed.
+    items
+        Items of the specification of the problem by model, if it has one: the model of the search,
+        eight elements in each beam and, with the level ``plane``, the sheet. A model in which the
+        part is not stable is left out.
     """
 
     design: Design
@@ -68,11 +76,23 @@ class Validation:
     response: Response
     plan: Plan
     analyses: list[Analysis]
+    items: dict[str, list[ItemResult]] = field(default_factory=dict)
+
+    @property
+    def has_items(self) -> bool:
+        """Whether items are computed after the analyses."""
+        return self.design.problem.is_specified and self.spec == spec_for(self.design)
 
     @property
     def doubts(self) -> list[str]:
         """Defects of the design itself that a builder should know of, as sentences."""
         return connection_warnings(self.design)
+
+    def _specification(self) -> dict[str, Any]:
+        """Return the items of the specification as plain data, if there are any."""
+        if not self.items:
+            return {}
+        return {"specification": item_data(self.design.problem, self.spec, self.items)}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; the figures of the first analysis are repeated at the top."""
@@ -108,9 +128,35 @@ class Validation:
             **{key: results[0][key] for key in TOP},
             "discrete_model": discrete,
             "doubts": self.doubts,
+            **self._specification(),
             "results": results,
             "provenance": provenance(),
         }
+
+
+def validated_items(design: Design, spec: PartSpec, plan: Plan) -> dict[str, list[ItemResult]]:
+    """Return the items of the specification of a design by model.
+
+    Empty without a specification, and for another part than the one that it was written for.
+
+    Parameters
+    ----------
+    design, spec, plan
+        As in `validate`; the sheet is computed if the plan has the level ``plane``.
+    """
+    problem = design.problem
+    if not problem.is_specified or spec != spec_for(design):
+        return {}
+    found = {
+        model_words(problem, elements): results_for(problem, design.mask, elements)
+        for elements in (None, ELEMENTS)
+    }
+    sizes = [settings.size for level, settings in plan if level == "plane"]
+    if sizes:
+        from bellcrank.fem.specification import sheet_items
+
+        found["sheet"] = sheet_items(spec.of(design), sizes[0])
+    return {model: items for model, items in found.items() if items is not None}
 
 
 def problem_identity(design: Design) -> str:
@@ -250,6 +296,10 @@ def validate(
         )
         validation = replace(validation, analyses=[*validation.analyses, analysis])
         save(validation)
+    items = validated_items(design, spec, plan)
+    if items:
+        validation = replace(validation, items=items)
+        save(validation)
     return validation
 
 
@@ -305,6 +355,8 @@ def add_to_record(validation: Validation, path: Path) -> None:
         new = [_key(entry) for entry in data["results"]]
         others = [entry for entry in old if _key(entry) not in new]
         record = {key: data[key] for key in ("schema", "problem", "problem_hash", "mask")}
+        if "specification" in data:
+            record["specification"] = data["specification"]
         record |= {"results": [*others, *data["results"]], "provenance": data["provenance"]}
         write_text(path, json.dumps(record, indent=1) + "\n", overwrite=True)
 

@@ -1,0 +1,57 @@
+"""The page about tasks: every example is valid, and every key is documented."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from bellcrank.model import QUANTITIES
+from bellcrank.task import schema, task_from_dict
+
+PAGE = (Path(__file__).parents[2] / "docs" / "tasks.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+TABLES = [
+    each
+    for each in vars(schema).values()
+    if isinstance(each, type) and issubclass(each, BaseModel) and each.__module__ == schema.__name__
+]
+SHOWN_WITHOUT_KEY = {"value", "description"}
+"""Keys of the classes that a file does not have, or that need no explanation."""
+
+
+@pytest.mark.parametrize("text", EXAMPLES, ids=[tomllib.loads(each)["name"] for each in EXAMPLES])
+def test_an_example_of_the_page_is_a_valid_task(text: str) -> None:
+    data = tomllib.loads(text)
+    assert task_from_dict(data).problem.name == data["name"]
+
+
+def test_every_key_is_explained_on_the_page() -> None:
+    known = {
+        field.alias or name
+        for table in TABLES
+        for name, field in table.model_fields.items()
+        if name not in SHOWN_WITHOUT_KEY
+    }
+    explained = set(re.findall(r"`([a-z_]+)`", PAGE)) | set(re.findall(r"`\[+([a-z.]+)\]+`", PAGE))
+    assert len(known) > 50
+    assert sorted(known - explained - {"schema", "domain", "part", "limits", "cases"}) == []
+
+
+def test_every_key_is_used_in_an_example() -> None:
+    text = "\n".join(EXAMPLES)
+    unused = [
+        field.alias or name
+        for table in TABLES
+        for name, field in table.model_fields.items()
+        if name not in SHOWN_WITHOUT_KEY
+        and not re.search(rf"\b{re.escape(field.alias or name)}\b", text)
+    ]
+    assert unused == []
+
+
+def test_every_quantity_of_a_specification_has_a_meaning() -> None:
+    assert all(quantity.meaning for quantity in QUANTITIES.values())
