@@ -134,7 +134,7 @@ def test_flips_are_predicted_for_every_channel_of_every_output(mask: np.ndarray)
                 errors[channel.name].append(float(error / change))
     for name, found in errors.items():
         if name != "input_motion":  # it is prescribed
-            assert len(found) > 5, name
+            assert len(found) >= 5, name
             assert np.median(found) < 0.35, name
 
 

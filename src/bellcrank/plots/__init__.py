@@ -4,13 +4,14 @@ The functions draw plain arrays and records by the Agg backend of matplotlib thr
 interface. They neither read nor change global settings and can be called in any thread. The
 suffix of a path (png, svg, pdf) selects the format.
 
-- `draw_motion`, `draw_comparison` and `draw_design` draw designs, given as `Motion` or `Design`;
+- `draw_motion`, `draw_cases`, `draw_comparison` and `draw_design` draw designs, given as `Motion`
+  or `Design`;
 - `draw_paths` draws the efficiency along chains, given as `ChainPath`;
 - `draw_stress` draws parts coloured by their stress, given as `StressedPart`.
 """
 
 from bellcrank.plots.chain_paths import ChainPath, PathOptions, draw_paths
-from bellcrank.plots.motion import draw_comparison, draw_design, draw_motion
+from bellcrank.plots.motion import draw_cases, draw_comparison, draw_design, draw_motion
 from bellcrank.plots.scene import Motion
 from bellcrank.plots.stress import StressedPart, draw_stress
 from bellcrank.plots.strokes import StrokeCurve, StrokeLabels
@@ -22,6 +23,7 @@ __all__ = [
     "StressedPart",
     "StrokeCurve",
     "StrokeLabels",
+    "draw_cases",
     "draw_comparison",
     "draw_design",
     "draw_motion",

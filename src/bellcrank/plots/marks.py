@@ -129,6 +129,17 @@ def add_nodes(
     )
 
 
+def add_path(
+    panel: Panel, points: NDArray[np.float64], colour: str, *, wanted: bool = False
+) -> None:
+    """Draw a path (k, 2), lattice units; a wanted one is wide, below the others."""
+    panel.axes.plot(
+        points[:, 0], points[:, 1],
+        color=colour, linewidth=3.2 if wanted else 1.6, solid_capstyle="round",
+        zorder=6.4 if wanted else 6.6, clip_on=False,
+    )  # fmt: skip
+
+
 def add_supports(panel: Panel) -> None:
     """Draw fixed supports as hatched areas and rollers as wheels."""
     problem = panel.problem

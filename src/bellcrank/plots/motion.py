@@ -21,6 +21,7 @@ from bellcrank.plots.marks import (
     add_arrows,
     add_nodes,
     add_panel,
+    add_path,
     add_struts,
     add_supports,
 )
@@ -40,6 +41,7 @@ from bellcrank.plots.scene import (
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -129,12 +131,23 @@ def draw_comparison(
 
     The `name` of each is its heading. Other parameters and errors are those of `draw_motion`.
     """
+    draw_cases([left, right], path, overwrite=overwrite)
+
+
+def draw_cases(
+    motions: Sequence[Motion], path: str | os.PathLike[str], *, overwrite: bool = False
+) -> None:
+    """Draw a design in several load cases side by side at one scale.
+
+    The `name` of each motion is its heading. Other parameters and errors are those of
+    `draw_motion`.
+    """
     check_target(path, overwrite=overwrite)
     parts = [
         Drawing(motion.name or motion.design.problem.name, motion.caption, motion, displaced=True)
-        for motion in (left, right)
+        for motion in motions
     ]
-    save_figure(_picture(parts, WIDE), path, overwrite=overwrite)
+    save_figure(_picture(parts, WIDTH if len(parts) == 1 else WIDE), path, overwrite=overwrite)
 
 
 def draw_design(
@@ -215,14 +228,21 @@ def add_drawing(panel: Panel, part: Drawing) -> None:
     else:
         _add_struts_at_rest(panel, part.motion.design)
     rest, moved = problem.lattice.positions, part.motion.moved
-    for nodes, colour in ((problem.input.nodes, style.INPUT), (problem.output.nodes, style.OUTPUT)):
+    ends = [(problem.input.nodes, style.INPUT)]
+    ends += [(output.nodes, style.OUTPUT) for output in problem.outputs.values()]
+    for nodes, colour in ends:
         if part.displaced:
             add_nodes(panel, rest[nodes], colour, hollow=True)
         add_nodes(panel, moved[nodes], colour)
     add_arrows(panel, input_arrows(problem), style.INPUT, bold=True)
     add_arrows(panel, output_arrows(problem, moved), style.WANTED, bold=True)
-    if part.displaced:
+    if part.displaced and not part.motion.paths:
         add_arrows(panel, displacement_arrows(part.motion), style.OUTPUT, level=5.5)
+    if part.displaced:
+        for path in part.motion.drawn_paths(wanted=True):
+            add_path(panel, path, style.WANTED, wanted=True)
+        for path in part.motion.drawn_paths():
+            add_path(panel, path, style.OUTPUT)
 
 
 def _add_displaced_struts(panel: Panel, motion: Motion) -> None:
@@ -262,6 +282,11 @@ def legend_entries(parts: list[Drawing]) -> list[tuple[str, Any]]:
     entries += support_entries(problems)
     entries.append(("input", arrow_entry(style.INPUT)))
     entries.append(("output, wanted direction", arrow_entry(style.WANTED)))
-    if any(part.displaced and displacement_arrows(part.motion) for part in parts):
+    if any(motion.paths for motion in motions):
+        entries.append(("output, path", strut_entry(style.OUTPUT, 1.6)))
+    if any(len(path) for motion in motions for path in motion.wanted_paths):
+        entries.append(("output, wanted path", strut_entry(style.WANTED, 3.2)))
+    without = [part for part in parts if not part.motion.paths]
+    if any(part.displaced and displacement_arrows(part.motion) for part in without):
         entries.append(("output, displacement", arrow_entry(style.OUTPUT)))
     return entries

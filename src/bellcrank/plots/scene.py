@@ -35,6 +35,9 @@ class Motion:
         Text after the efficiency, for example a status.
     magnify
         Factor by which the drawn displacement is larger than the given one; part of the caption.
+    paths, wanted_paths : tuple of (k, 2) float64, lattice units
+        Paths of the outputs along the stroke, and wanted ones, as displacements of their mean
+        positions, in the order of the outputs; empty for those that are not drawn.
 
     Raises
     ------
@@ -57,6 +60,8 @@ class Motion:
     name: str = ""
     note: str = ""
     magnify: float = 1.0
+    paths: tuple[NDArray[np.float64], ...] = ()
+    wanted_paths: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
         require_plane(self.design.problem, "picture")
@@ -76,6 +81,18 @@ class Motion:
     def moved(self) -> NDArray[np.float64]:
         """(N, 2) drawn positions of the displaced nodes, lattice units."""
         return self.design.problem.lattice.positions + self.magnify * self.displacement
+
+    def drawn_paths(self, *, wanted: bool = False) -> list[NDArray[np.float64]]:
+        """Return the paths of the mean positions of outputs, (k, 2) each, lattice units."""
+        problem = self.design.problem
+        found = []
+        for output, path in zip(
+            problem.outputs.values(), self.wanted_paths if wanted else self.paths, strict=False
+        ):
+            if len(path):
+                middle = problem.lattice.positions[output.nodes].mean(axis=0)
+                found.append(middle + self.magnify * np.asarray(path))
+        return found
 
     @property
     def caption(self) -> str:
@@ -153,14 +170,20 @@ def input_arrows(problem: Problem) -> list[Arrow]:
 
 
 def output_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
-    """Return arrows along the output direction that start at each connected part of the output.
+    """Return arrows along the wanted directions that start at each connected part of an output.
 
     Parameters
     ----------
     moved : (N, 2) lattice units
         Positions of the displaced nodes, which the arrows do not overlap.
     """
-    region = problem.output
+    return [
+        arrow for output in problem.outputs.values() for arrow in _arrows_of(problem, output, moved)
+    ]
+
+
+def _arrows_of(problem: Problem, region: Output, moved: NDArray[np.float64]) -> list[Arrow]:
+    """Return the arrows of one output."""
     points = np.concatenate([problem.lattice.positions, moved], axis=1)[region.nodes]
     length, gap = arrow_length(problem), 0.45 * spacing(problem)
     arrows = []
@@ -183,7 +206,7 @@ def output_arrows(problem: Problem, moved: NDArray[np.float64]) -> list[Arrow]:
 def displacement_arrows(motion: Motion) -> list[Arrow]:
     """Return the displacements of the output nodes as arrows, if they are visible."""
     problem = motion.design.problem
-    nodes = problem.output.nodes
+    nodes = np.concatenate([output.nodes for output in problem.outputs.values()])
     pairs = zip(problem.lattice.positions[nodes], motion.moved[nodes], strict=True)
     least = 0.15 * spacing(problem)
     return [Arrow(_pair(a), _pair(b)) for a, b in pairs if np.hypot(*(b - a)) > least]

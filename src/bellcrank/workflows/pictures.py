@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.export.formats.vtu import mesh_to_bytes
-from bellcrank.mechanics import Status, model_evaluator
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Status, model_evaluator
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.plots import (
     ChainPath,
@@ -18,22 +18,26 @@ from bellcrank.plots import (
     StressedPart,
     StrokeCurve,
     StrokeLabels,
+    draw_cases,
     draw_comparison,
     draw_motion,
     draw_paths,
     draw_stress,
 )
 from bellcrank.plots.saving import check_target
-from bellcrank.search import MetropolisSettings, SearchSettings, read_settings, searches
+from bellcrank.search import MetropolisSettings, SearchSettings, Verdict, read_settings, searches
 from bellcrank.storage import RunFolder
 from bellcrank.workflows.figures import model_words
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from bellcrank.fem import Analysis
     from bellcrank.model import Design
+    from bellcrank.part import PartSpec
     from bellcrank.workflows.report import DesignReport
     from bellcrank.workflows.validation import Validation
 
@@ -41,17 +45,29 @@ if TYPE_CHECKING:
 def chain_paths(folder: RunFolder, settings: SearchSettings) -> list[ChainPath]:
     """Read the accepted efficiencies of each chain of a run.
 
-    For a search that accepts losses, the largest efficiency so far is returned.
+    For a search that accepts losses, the largest efficiency so far is returned; for a problem with
+    a specification, that of the design with the best score so far.
     """
     paths = []
     for chain in range(settings.chains):
-        columns = folder.read(chain, ["step", "efficiency", "accepted", "status"])
-        taken = columns["accepted"] & (columns["status"] == Status.CONVERGED)
+        columns = folder.read(chain, ["step", "efficiency", "cost", "accepted", "status"])
+        met = columns["status"] == Status.CONVERGED
+        if folder.problem.is_specified:
+            met |= columns["status"] == Verdict.UNMET
+        taken = columns["accepted"] & met
         efficiency = columns["efficiency"][taken]
         if searches[settings.name].plot_running_best:
-            efficiency = np.fmax.accumulate(efficiency)
+            cost = columns["cost"][taken] if folder.problem.is_specified else -efficiency
+            efficiency = efficiency[_running_best(cost)]
         paths.append(ChainPath(efficiency, columns["step"][taken]))
     return paths
+
+
+def _running_best(cost: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return (n,) the index of the lowest cost so far at each place."""
+    lowest = np.fmin.accumulate(cost)
+    new = np.concatenate([[True], lowest[1:] < lowest[:-1]])[: len(cost)]
+    return np.maximum.accumulate(np.where(new, np.arange(len(cost)), 0))
 
 
 def path_options(folder: RunFolder, settings: SearchSettings) -> PathOptions:
@@ -119,10 +135,56 @@ def draw_report(report: DesignReport, folder: RunFolder) -> None:
         selection.efficiency_after,
         name="machine",
     )
-    draw_motion(machine, folder.path / "motion.png", overwrite=True)
+    if selection.design.problem.is_specified and report.part is not None:
+        motions = case_motions(selection.design, report.part, report.part_figures)
+        draw_cases(motions, folder.path / "motion.png", overwrite=True)
+    else:
+        draw_motion(machine, folder.path / "motion.png", overwrite=True)
     if report.human is not None and human is not None:
         drawn = Motion(report.human, human.displacement, human.efficiency, name="human")
         draw_comparison(drawn, machine, folder.path / "comparison.png", overwrite=True)
+
+
+def case_motions(
+    design: Design, spec: PartSpec, figures: Sequence[Mapping[str, Any]]
+) -> list[Motion]:
+    """Return the motion of a design in each load case, with the paths of its outputs.
+
+    Parameters
+    ----------
+    design
+        Design of a problem with a specification.
+    spec
+        Size and material of the part.
+    figures
+        Figures of the part (`bellcrank.workflows.part_figures`), with the paths.
+    """
+    wanted = design.problem.specification
+    assert wanted is not None
+    cases, motions = design.problem.cases, []
+    for name, case in cases.items():
+        found = {
+            row["output"]: np.array(row.get("path_mm", [])) / spec.scale
+            for row in figures
+            if row["case"] == name
+        }
+        asked = {
+            item.output: item.path
+            for item in wanted.items
+            if item.case == name and item.path is not None
+        }
+        response = model_evaluator(case).evaluate(design.mask, VERIFICATION_INCREMENT)
+        motions.append(
+            Motion(
+                replace(design, problem=case),
+                response.displacement,
+                response.efficiency,
+                name=design.problem.name if len(cases) == 1 else f"{design.problem.name}: {name}",
+                paths=tuple(found.get(output, np.empty((0, 2))) for output in case.outputs),
+                wanted_paths=tuple(asked.get(output, np.empty((0, 2))) for output in case.outputs),
+            )
+        )
+    return motions
 
 
 def check_targets(picture: Path | None, vtu: Path | None, *, overwrite: bool) -> None:
