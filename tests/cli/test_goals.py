@@ -70,7 +70,7 @@ def test_a_mirror_symmetric_design_stays_so_when_it_is_cleaned(tmp_path: Path) -
     ("words", "message"),
     [
         (("--goal", "mass < 1"), "goal 'mass < 1': expected 'mass <= NUMBER'"),
-        (("--goal", "weight <= 1"), "unknown goal 'weight'; known: mass, degree, connected"),
+        (("--goal", "weight <= 1"), "unknown goal 'weight'; known: stiffness, input-stiffness"),
         (("--goal", ""), "goal '': expected a text like 'mass <= 0.6'"),
         (("--goal", "mirror y"), "goal 'mirror y': problem 'scaling-8' is not symmetric in y"),
         (("--goal", "degree >= 9"), "goal 'degree >= 9': no node of problem 'scaling-8' has more"),

@@ -46,17 +46,17 @@ if TYPE_CHECKING:
 GATED = f"""
 import os
 from bellcrank.cli import main, stopping
-from bellcrank.search import parallel
+from bellcrank.search import chain_process, parallel
 
 stopping.EXIT_TIMEOUT = 30.0  # however busy the machine is, the complete blocks are stored
 parallel.SEGMENT_STEPS = {BLOCK}
-advance = parallel.advance_chain
+advance = chain_process.advance_chain
 
 def advance_at_the_gate(*words):
     os.read(0, 1)
     return advance(*words)
 
-parallel.advance_chain = advance_at_the_gate
+chain_process.advance_chain = advance_at_the_gate
 main()
 """
 """The command, whose chains wait for a byte before each block, or for the end of input."""
@@ -154,6 +154,38 @@ def test_a_search_stops_in_the_middle_of_a_block_and_resumes_to_the_same_end(
     outcome = call("design", "--resume", folder)
     assert outcome.code == 0, outcome.err
     assert_same_run(folder, whole)
+
+
+FRAMES = f"""
+from bellcrank.cli import main
+from bellcrank.search import parallel
+
+parallel.SEGMENT_STEPS = {BLOCK}
+main()
+"""
+"""The command, whose chains of frames run in processes and are stored after each block."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL], ids=["sigterm", "kill"])
+def test_a_search_of_frames_stops_with_its_processes_and_resumes_to_the_same_end(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    folder, whole = tmp_path / "run", tmp_path / "whole"
+    words = ("scaling-8", "--steps", 1000, "--goal", "mass <= 0.9")
+    with job(folder, *words, "--out", folder, "--workers", 2, program=FRAMES) as running:
+        wait_until(lambda: segments(folder) >= 2, running)
+        os.kill(running.pid, number)
+        assert running.wait(DEADLINE) == (130 if number == signal.SIGTERM else -number)
+        left = ["pgrep", "-g", str(running.pid)]
+        end = time.monotonic() + DEADLINE
+        while subprocess.run(left, check=False, capture_output=True).stdout:
+            assert time.monotonic() < end, "a process of a chain is left"
+            time.sleep(0.05)
+    assert call("design", "--resume", folder, "--workers", 2).code in {0, 3}
+    assert call("design", *words, "--out", whole, "--workers", 1).code in {0, 3}
+    found, expected = table(folder), table(whole)
+    assert all(found[name] == column for name, column in expected.items())
+    assert design_of(folder) == design_of(whole)
 
 
 @pytest.mark.slow

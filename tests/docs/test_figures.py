@@ -269,6 +269,7 @@ NUMBER = re.compile(r"\| [-+]?\d[\d.,]*( (%|s|ms|mm|MB|kB))?(?= \|)")
 NOT_MEASURED = {
     "| status | code | means |",
     "| setting | default | meaning |",
+    "| key | default | |",
     "| machine | parts | what it does |",
     "| name | E, MPa | Poisson's ratio | density, g/cm³ | strain limit | sources |",
 }

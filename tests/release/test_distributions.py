@@ -53,13 +53,16 @@ def names(path: Path) -> set[str]:
 
 def test_the_wheel_holds_the_package_and_nothing_else(built: dict[str, Path]) -> None:
     held = {name for name in names(built["wheel"]) if ".dist-info/" not in name}
-    assert held == {name.removeprefix("src/") for name in tracked("src")}
+    tasks = {name.replace("examples/tasks", "bellcrank/task/bundled") for name in
+             tracked("examples/tasks")}  # fmt: skip
+    assert held == {name.removeprefix("src/") for name in tracked("src")} | tasks
     assert "bellcrank/py.typed" in held
     for folder, suffix, least in (
         ("web/static", ".js", 1),
         ("machines/library", ".json", 72),
         ("machines/bundled", ".toml", 6),
         ("model/gallery", ".json", 8),
+        ("task/bundled", ".toml", 12),
         ("surrogate/pretrained", ".safetensors", 1),
     ):
         found = [n for n in held if n.startswith(f"bellcrank/{folder}/") and n.endswith(suffix)]

@@ -47,7 +47,7 @@ def test_candidates_are_the_ends_of_the_best_plateaus_best_first() -> None:
     efficiency = np.repeat([1.0, 3.0, 2.0], 6)
     mask = np.arange(18, dtype=np.uint8)[:, None]
     chosen = candidates_of(4, np.arange(18) * 10, mask, efficiency, count=2)
-    assert [(c.efficiency, c.chain, c.step, c.mask) for c in chosen] == [
+    assert [(c.score, c.chain, c.step, c.mask) for c in chosen] == [
         (3.0, 4, 110, b"\x0b"),
         (2.0, 4, 170, b"\x11"),
     ]

@@ -18,8 +18,8 @@ from bellcrank.task.schema import (
     CaseSection,
     DomainSection,
     InputSection,
+    NodeRegion,
     OutputSection,
-    Place,
     SupportSection,
     TaskTable,
 )
@@ -136,16 +136,18 @@ def test_a_task_in_python_equals_that_in_a_file(tmp_path: Path) -> None:
     table = TaskTable(
         name="slider",
         domain=DomainSection(size=(62.0, 54.0)),
-        supports=[SupportSection(at=[Place(edge="bottom")])],
+        supports=[SupportSection(at=[NodeRegion(edge="bottom")])],
         cases=[
             CaseSection(
                 inputs=[
                     InputSection(
-                        at=[Place(point=(51.0, 53.0))], direction="down", displacement="3 mm"
+                        at=[NodeRegion(point=(51.0, 53.0))], direction="down", displacement="3 mm"
                     )
                 ],
                 outputs=[
-                    OutputSection(at=[Place(point=(11.0, 53.0))], direction="left", gain="maximise")
+                    OutputSection(
+                        at=[NodeRegion(point=(11.0, 53.0))], direction="left", gain="maximise"
+                    )
                 ],
             )
         ],

@@ -81,5 +81,4 @@ def text_grid(rows: list[list[str]]) -> Table:
         grid.add_row(
             plain(name), *(f"[bold]{plain(each)}[/]" if bold else plain(each) for each in values)
         )
-    grid.add_row("")
     return grid

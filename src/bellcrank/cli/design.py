@@ -319,11 +319,12 @@ def _print_report(report: DesignReport) -> None:
 
     selection = report.selection
     table = Table.grid(padding=(0, 2))
-    for rows in (
-        item_table(report), nearest_table(report), figure_table(report), part_figure_table(report)
-    ):  # fmt: skip
+    shown = [item_table(report), nearest_table(report), figure_table(report)]
+    for rows in (*shown, part_figure_table(report)):
         if rows:
             results.print(text_grid(rows))
+            if report.part is not None:
+                results.print()
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
     table.add_row("initial design", f"{report.initial_efficiency:.4f}")
     if report.human_response is not None:

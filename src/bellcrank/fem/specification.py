@@ -263,8 +263,8 @@ class _Sheet:
             given["clearance"] = self._gap(main, wanted["clearance"])
         if "stable_stroke" in wanted:
             bound = wanted["stable_stroke"]
-            longer = replace(self.case.input, amount=bound * self.case.input.amount)
-            stable = self._path(replace(self.case, input=longer)) is not None
+            extended = replace(self.case.input, amount=bound * self.case.input.amount)
+            stable = self._path(replace(self.case, input=extended)) is not None
             given["stable_stroke"] = bound if stable else 1.0
         return given
 

@@ -255,7 +255,7 @@ def reduced(item: Item, record: StrokeRecord) -> tuple[Values, Values]:
     return low, high
 
 
-def excess(item: Item, low: Values, high: Values) -> Values:
+def distance_beyond(item: Item, low: Values, high: Values) -> Values:
     """Return by how much values exceed the bounds of an item; negative within them."""
     over = np.full(np.shape(low), -np.inf)
     if item.at_most is not None:
@@ -270,7 +270,7 @@ def violation(item: Item, record: StrokeRecord) -> Values:
 
     It tends to 1 far from the bounds.
     """
-    over = np.maximum(0.0, excess(item, *reduced(item, record)))
+    over = np.maximum(0.0, distance_beyond(item, *reduced(item, record)))
     scale = scale_of(item)
     return np.where(np.isinf(over), 1.0, over / (np.where(np.isinf(over), 0.0, over) + scale))
 
@@ -287,7 +287,7 @@ def worst_value(item: Item, record: StrokeRecord) -> float:
 
 def margin(item: Item, value: float) -> float:
     """Return the distance of a value from the nearest bound, over the scale; negative beyond."""
-    return -float(excess(item, np.asarray(value), np.asarray(value))) / scale_of(item)
+    return -float(distance_beyond(item, np.asarray(value), np.asarray(value))) / scale_of(item)
 
 
 TOLERANCE = 1e-9

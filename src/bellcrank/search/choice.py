@@ -88,9 +88,9 @@ def nondominated(violations: Sequence[Sequence[float]]) -> list[int]:
     for index, own in enumerate(violations):
         better = any(
             all(a <= b for a, b in zip(other, own, strict=True))
-            and (tuple(other) != tuple(own) or place < index)
-            for place, other in enumerate(violations)
-            if place != index
+            and (tuple(other) != tuple(own) or number < index)
+            for number, other in enumerate(violations)
+            if number != index
         )
         if not better:
             found.append(index)
@@ -174,5 +174,5 @@ def shortlist(finalists: Sequence[Finalist]) -> list[Finalist]:
         ranked.append((rank, index))
     chosen = sorted(index for _, index in sorted(ranked)[:MOST])
     front = nondominated([_violations(finalists[index].items) for index in unmet])
-    chosen += [unmet[place] for place in front[:MOST_UNMET]]
+    chosen += [unmet[number] for number in front[:MOST_UNMET]]
     return [finalists[index] for index in chosen]

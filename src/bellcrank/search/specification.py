@@ -26,7 +26,7 @@ from bellcrank.mechanics import (
     violation,
 )
 from bellcrank.mechanics.frames.analysis import centre_lines
-from bellcrank.mechanics.items import TOLERANCE, excess, reduced, scale_of
+from bellcrank.mechanics.items import TOLERANCE, distance_beyond, reduced, scale_of
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.model import QUANTITIES
 from bellcrank.search.constraints.evaluator import BASE_PENALTY, VIOLATION_WEIGHT
@@ -158,7 +158,7 @@ class SpecificationEvaluator:
             raise InvalidSettings(f"limits.symmetry: {error}") from None
         self.problem = self.groups.problem
         self.items = tuple(tightened(item, reserve) for item in wanted.items)
-        self.terms = wanted.maximise
+        self.objectives = wanted.maximise
         self.elements = elements
         section = problem.section
         assert section is not None
@@ -174,7 +174,11 @@ class SpecificationEvaluator:
             evaluator = CaseEvaluator(case, elements, wanted.weight, payloads)
             chosen = [k for k, item in enumerate(self.items) if item.case == name]
             needed = [(self.items[k].quantity, self.items[k].output) for k in chosen]
-            needed += [(term.quantity, term.output) for term in self.terms if term.case == name]
+            needed += [
+                (objective.quantity, objective.output)
+                for objective in self.objectives
+                if objective.case == name
+            ]
             channels = list(dict.fromkeys(c for pair in needed for c in channels_of(*pair)))
             used = [self.items[k] for k in chosen]
             cheap = [channel for channel in channels if channel.name in CHEAP]
@@ -186,7 +190,7 @@ class SpecificationEvaluator:
         self._core_finder = FrameEvaluator(self.problem).load_bearing
         self.records: dict[str, StrokeRecord] = {}
         self.violations = np.ones(len(self.items))
-        self._longer: dict[str, FrameEvaluator] = {}
+        self._extended: dict[str, FrameEvaluator] = {}
 
     def evaluate(
         self,
@@ -322,13 +326,13 @@ class SpecificationEvaluator:
         return bound - float(touching.overlap.max())
 
     def _stable_stroke(self, name: str, design: NDArray[np.bool_], bound: float) -> float:
-        if name not in self._longer:
+        if name not in self._extended:
             problem = self._cases[name].evaluator.problem
             given = replace(problem.input, amount=bound * problem.input.amount)
-            self._longer[name] = FrameEvaluator(
+            self._extended[name] = FrameEvaluator(
                 replace(problem, input=given), "displacement", self.elements
             )
-        response = self._longer[name].evaluate(design, VERIFICATION_INCREMENT)
+        response = self._extended[name].evaluate(design, VERIFICATION_INCREMENT)
         return bound * response.reached if response.status is not Status.MECHANISM else 0.0
 
     def _violations(self, records: dict[str, StrokeRecord], *, partial: bool = False) -> Values:
@@ -356,18 +360,18 @@ class SpecificationEvaluator:
         return item.stop == 1.0 and item.of == "every"
 
     def _objective(self, records: dict[str, StrokeRecord], *, partial: bool = False) -> Values:
-        """Return (...) the smallest term of the objective; without terms, the smallest margin.
+        """Return (...) the smallest objective of the objective; without terms, the smallest margin.
 
         With `partial`, an upper bound from the channels that are known.
         """
         terms = []
-        for term in self.terms:
-            if partial and not self._is_cheap(term.quantity, term.output):
+        for objective in self.objectives:
+            if partial and not self._is_cheap(objective.quantity, objective.output):
                 continue
-            record = records[term.case] if term.case else next(iter(records.values()))
-            value = quantity_values(record, term.quantity, term.output)[..., -1]
-            terms.append(value / term.scale)
-        if not self.terms:
+            record = records[objective.case] if objective.case else next(iter(records.values()))
+            value = quantity_values(record, objective.quantity, objective.output)[..., -1]
+            terms.append(value / objective.scale)
+        if not self.objectives:
             return self._smallest_margin(records, partial=partial)
         if not terms:
             return np.asarray(np.inf)
@@ -379,7 +383,7 @@ class SpecificationEvaluator:
         Where items are not met, it is 0, and their violations count.
         """
         margins = [
-            -excess(item, *reduced(item, records[item.case])) / scale_of(item)
+            -distance_beyond(item, *reduced(item, records[item.case])) / scale_of(item)
             for item in self.items
             if item.case
             and channels_of(item.quantity, item.output)

@@ -49,8 +49,8 @@ if TYPE_CHECKING:
         DomainSection,
         InputSection,
         LoadSection,
+        NodeRegions,
         OutputSection,
-        Places,
         SupportSection,
         TaskTable,
     )
@@ -196,8 +196,8 @@ class _Builder:
         region = region_of(domain, self.folder)
         return fill(region, self.part.scale, self.part.width)
 
-    def _nodes(self, places: Places, key: str) -> NDArray[np.int64]:
-        return nodes_at(places, self.positions, self.spacing, key)
+    def _nodes(self, regions: NodeRegions, key: str) -> NDArray[np.int64]:
+        return nodes_at(regions, self.positions, self.spacing, key)
 
     def _supports(self, sections: Sequence[tuple[str, SupportSection]]) -> Supports:
         held: dict[str, list[NDArray[np.int64]]] = {"all": [], "x": [], "y": []}
@@ -476,8 +476,8 @@ def _bounds_sag(items: Sequence[Item]) -> bool:
 
 def _check_objectives(terms: Sequence[ObjectiveTerm], scaled: Sequence[bool]) -> None:
     """Check that different objectives have scales by which they are compared."""
-    if len({term.quantity for term in terms}) > 1 and not all(scaled):
-        names = ", ".join(sorted({term.quantity for term in terms}))
+    if len({objective.quantity for objective in terms}) > 1 and not all(scaled):
+        names = ", ".join(sorted({objective.quantity for objective in terms}))
         raise InvalidProblem(
             f"cases: {names} are maximised together; expected a scale for each, such as "
             "{ maximise = true, scale = 2.0 }, in which they are compared"

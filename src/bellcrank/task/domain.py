@@ -106,11 +106,11 @@ def _within(positions: NDArray[np.float64], inner: BaseGeometry, spacing: float)
     graph = coo_matrix((np.ones(len(beams)), beams.T), shape=(count, count))
     _, piece = connected_components(graph, directed=False)
     largest = np.bincount(piece[beams[:, 0]]).argmax()
-    kept = np.flatnonzero(piece == largest)
+    connected = np.flatnonzero(piece == largest)
     number = np.full(count, -1)
-    number[kept] = np.arange(len(kept))
+    number[connected] = np.arange(len(connected))
     beams = np.sort(number[beams[piece[beams[:, 0]] == largest]], axis=1)
-    return Lattice(positions[kept] / spacing, beams[np.lexsort(beams.T[::-1])])
+    return Lattice(positions[connected] / spacing, beams[np.lexsort(beams.T[::-1])])
 
 
 def _size(region: BaseGeometry) -> str:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 SAGITTA = 0.02
-"""Largest distance of a curve from the straight pieces that replace it, mm."""
+"""Largest distance of a curve from the is_line pieces that replace it, mm."""
 GAP = 0.01
 """Gap between the ends of curves that is closed, mm."""
 DXF_UNITS = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 1e-3}
@@ -53,11 +53,11 @@ def read_outline(path: Path) -> BaseGeometry:
     faces = list(polygonize(unary_union(lines)))
     if not faces:
         raise InvalidFile(f"{path}: no closed curve found; expected the outline of a domain")
-    # A face belongs to the region if an odd number of closed rings surround it.
-    rings = [shapely.Polygon(face.exterior) for face in faces]
-    region = rings[0]
-    for ring in rings[1:]:
-        region = region.symmetric_difference(ring)
+    # A face belongs to the region if an odd number of closed loops surround it.
+    loops = [shapely.Polygon(face.exterior) for face in faces]
+    region = loops[0]
+    for loop in loops[1:]:
+        region = region.symmetric_difference(loop)
     return region.buffer(0.0)
 
 
@@ -112,9 +112,9 @@ def _svg_curves(path: Path) -> list[list[tuple[float, float]]]:
             for segment in part:
                 if isinstance(segment, svgelements.Move):
                     continue
-                straight = isinstance(segment, svgelements.Line | svgelements.Close)
-                length = segment.length(error=1e-3) if not straight else 0.0
-                count = 1 if straight else max(8, math.ceil(length / 0.5))
+                is_line = isinstance(segment, svgelements.Line | svgelements.Close)
+                length = segment.length(error=1e-3) if not is_line else 0.0
+                count = 1 if is_line else max(8, math.ceil(length / 0.5))
                 points += [
                     (each.x, height - each.y)
                     for each in (segment.point(k / count) for k in range(count + 1))

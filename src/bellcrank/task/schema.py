@@ -141,7 +141,7 @@ class Shape(Table):
     """Corners."""
 
 
-class Place(Shape):
+class NodeRegion(Shape):
     """Nodes: those in a shape, next to a point, on an edge of the domain, or given by number."""
 
     point: OnePoint | None = None
@@ -175,14 +175,14 @@ class DomainSection(Table):
     """Regions in which all beams are present."""
 
 
-Places = Annotated[list[Place], BeforeValidator(_as_list)]
-"""A place, or several."""
+NodeRegions = Annotated[list[NodeRegion], BeforeValidator(_as_list)]
+"""A region, or several."""
 
 
 class SupportSection(Table):
     """``[[supports]]``: nodes that are held."""
 
-    at: Places
+    at: NodeRegions
     hold: Literal["all", "x", "y"] = "all"
     """Coordinates that are held; ``"x"`` and ``"y"`` are rollers."""
 
@@ -190,7 +190,7 @@ class SupportSection(Table):
 class InputSection(Table):
     """``[[cases.inputs]]``: nodes that are pushed."""
 
-    at: Places | None = None
+    at: NodeRegions | None = None
     direction: Direction | None = None
     displacement: Length | None = None
     """Displacement of each node."""
@@ -201,7 +201,7 @@ class InputSection(Table):
 class LoadSection(Table):
     """``[[cases.loads]]``: a force, or a spring to the ground."""
 
-    at: Places
+    at: NodeRegions
     direction: Direction
     force: Annotated[float, _reader("load")] | None = None
     """Total force, or the mass whose weight acts; it grows with the input."""
@@ -255,7 +255,7 @@ class OutputSection(Table):
     """``[[cases.outputs]]``: nodes whose motion is wanted."""
 
     name: str | None = None
-    at: Places | None = None
+    at: NodeRegions | None = None
     direction: Direction | None = None
     spring: Stiffness | None = None
     """Total stiffness of a workpiece that resists along the direction."""

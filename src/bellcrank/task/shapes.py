@@ -1,4 +1,4 @@
-"""Regions of the plane and places of nodes, in mm."""
+"""Shapes and regions of nodes, in mm."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from bellcrank.task.schema import Place, Shape
+    from bellcrank.task.schema import NodeRegion, Shape
 
 SHAPES = ("circle", "box", "polygon")
-PLACES = ("point", "edge", "nodes", *SHAPES)
+REGIONS = ("point", "edge", "nodes", *SHAPES)
 SNAP = 0.75
 """Largest distance of a node from the point that it is named by, in spacings."""
 ROW = {"top": 0.3, "bottom": 0.3, "left": 0.55, "right": 0.55}
@@ -27,20 +27,20 @@ ROW = {"top": 0.3, "bottom": 0.3, "left": 0.55, "right": 0.55}
 triangular lattice end alternately half a spacing inside."""
 
 
-def kind_of(place: Shape, names: Sequence[str], key: str) -> str:
-    """Return the one key that says what a shape or place is.
+def kind_of(region: Shape, names: Sequence[str], key: str) -> str:
+    """Return the one key that says what a shape or region is.
 
     Raises
     ------
     InvalidProblem
         If there is none, or several.
     """
-    given = [name for name in names if getattr(place, name, None) is not None]
+    given = [name for name in names if getattr(region, name, None) is not None]
     if len(given) != 1:
         raise InvalidProblem(
             f"{key}: expected one of {', '.join(names)}, got {' and '.join(given) or 'none'}"
         )
-    if (place.radius is not None) != (given[0] == "circle"):
+    if (region.radius is not None) != (given[0] == "circle"):
         raise InvalidProblem(f"{key}: expected circle and radius together")
     return given[0]
 
@@ -96,55 +96,55 @@ def polygon_of(points: Sequence[Sequence[float]], key: str) -> Polygon:
 
 
 def nodes_at(
-    places: Sequence[Place], positions: NDArray[np.float64], spacing: float, key: str
+    regions: Sequence[NodeRegion], positions: NDArray[np.float64], spacing: float, key: str
 ) -> NDArray[np.int64]:
-    """Return the nodes of places, sorted.
+    """Return the nodes of regions, sorted.
 
     Parameters
     ----------
-    places
+    regions
         Tables of a task.
     positions : (N, 2)
         Nodes of the lattice, mm.
     spacing
         Distance of neighbouring nodes, mm.
     key
-        Name of the places, for errors.
+        Name of the regions, for errors.
 
     Raises
     ------
     InvalidProblem
-        If a place has no node; says where the nearest one is.
+        If a region has no node; says where the nearest one is.
     """
     found = []
-    for index, place in enumerate(places):
-        name = f"{key}[{index}]" if len(places) > 1 else key
-        found.append(_nodes(place, positions, spacing, name))
+    for index, region in enumerate(regions):
+        name = f"{key}[{index}]" if len(regions) > 1 else key
+        found.append(_nodes(region, positions, spacing, name))
     return np.unique(np.concatenate(found))
 
 
 def _nodes(
-    place: Place, positions: NDArray[np.float64], spacing: float, key: str
+    region: NodeRegion, positions: NDArray[np.float64], spacing: float, key: str
 ) -> NDArray[np.int64]:
-    kind = kind_of(place, PLACES, key)
-    if place.between is not None and kind != "edge":
+    kind = kind_of(region, REGIONS, key)
+    if region.between is not None and kind != "edge":
         raise InvalidProblem(f"{key}.between: expected with edge, got it with {kind}")
-    if place.count != 1 and kind != "point":
+    if region.count != 1 and kind != "point":
         raise InvalidProblem(f"{key}.count: expected with point, got it with {kind}")
     if kind == "nodes":
-        assert place.nodes is not None
-        bad = [node for node in place.nodes if not 0 <= node < len(positions)]
-        if bad or not place.nodes:
+        assert region.nodes is not None
+        bad = [node for node in region.nodes if not 0 <= node < len(positions)]
+        if bad or not region.nodes:
             raise InvalidProblem(
                 f"{key}.nodes: expected numbers from 0 to {len(positions) - 1}, got "
                 f"{bad[0] if bad else 'none'}"
             )
-        return np.array(place.nodes, dtype=np.int64)
+        return np.array(region.nodes, dtype=np.int64)
     if kind == "point":
-        return _nearest(place, positions, spacing, key)
+        return _nearest(region, positions, spacing, key)
     if kind == "edge":
-        return _edge(place, positions, spacing, key)
-    shape = shape_of(place, key).buffer(1e-6 * spacing)
+        return _edge(region, positions, spacing, key)
+    shape = shape_of(region, key).buffer(1e-6 * spacing)
     inside = np.flatnonzero(shapely.contains_xy(shape, positions[:, 0], positions[:, 1]))
     if not len(inside):
         gap = shapely.distance(shape, shapely.points(positions))
@@ -157,42 +157,42 @@ def _nodes(
 
 
 def _nearest(
-    place: Place, positions: NDArray[np.float64], spacing: float, key: str
+    region: NodeRegion, positions: NDArray[np.float64], spacing: float, key: str
 ) -> NDArray[np.int64]:
-    assert place.point is not None
-    if not 1 <= place.count <= len(positions):
+    assert region.point is not None
+    if not 1 <= region.count <= len(positions):
         raise InvalidProblem(
-            f"{key}.count: expected 1 to {len(positions)} nodes, got {place.count}"
+            f"{key}.count: expected 1 to {len(positions)} nodes, got {region.count}"
         )
-    gap = np.linalg.norm(positions - np.array(place.point), axis=1)
+    gap = np.linalg.norm(positions - np.array(region.point), axis=1)
     order = np.argsort(gap.round(9), kind="stable")
     if gap[order[0]] > SNAP * spacing:
         near = positions[order[0]]
         low, high = positions.min(axis=0), positions.max(axis=0)
         raise InvalidProblem(
-            f"{key}.point: the node nearest to {list(place.point)} mm is at [{near[0]:.4g}, "
+            f"{key}.point: the node nearest to {list(region.point)} mm is at [{near[0]:.4g}, "
             f"{near[1]:.4g}] mm, {gap[order[0]]:.3g} mm away; expected a point within "
             f"{SNAP * spacing:.3g} mm of a node; the lattice extends from x = {low[0]:.4g} to "
             f"{high[0]:.4g} and y = {low[1]:.4g} to {high[1]:.4g} mm"
         )
-    return np.sort(order[: place.count])
+    return np.sort(order[: region.count])
 
 
 def _edge(
-    place: Place, positions: NDArray[np.float64], spacing: float, key: str
+    region: NodeRegion, positions: NDArray[np.float64], spacing: float, key: str
 ) -> NDArray[np.int64]:
-    assert place.edge is not None
-    axis = 0 if place.edge in {"left", "right"} else 1
+    assert region.edge is not None
+    axis = 0 if region.edge in {"left", "right"} else 1
     across = positions[:, axis]
-    depth = across - across.min() if place.edge in {"left", "bottom"} else across.max() - across
-    chosen = depth <= ROW[place.edge] * spacing
-    if place.between is not None:
-        low, high = place.between
+    depth = across - across.min() if region.edge in {"left", "bottom"} else across.max() - across
+    chosen = depth <= ROW[region.edge] * spacing
+    if region.between is not None:
+        low, high = region.between
         along = positions[:, 1 - axis]
         chosen &= (along >= low - 1e-6 * spacing) & (along <= high + 1e-6 * spacing)
         if not chosen.any():
             raise InvalidProblem(
-                f"{key}.between: no node of the {place.edge} edge lies between {low:g} and "
+                f"{key}.between: no node of the {region.edge} edge lies between {low:g} and "
                 f"{high:g} mm; the edge extends from {along.min():.4g} to {along.max():.4g} mm"
             )
     return np.flatnonzero(chosen)
