@@ -6,7 +6,6 @@ responses of many flips.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -49,6 +48,9 @@ ZERO_SCALE = {
 """Scale of the violation of a bound that is zero, by dimension."""
 TWO_SIDED = 4.0
 """Factor of the reserve of items with two bounds, over that of items with one."""
+LARGER_RESERVE = {"strain": 4.0, "clearance": 4.0}
+"""The same for quantities that one element in each beam, and few states along the stroke, show
+less accurately."""
 PATH_POINTS = 48
 """Number of points at which a path is compared with the wanted one."""
 SMALLEST_TRAVEL = 1e-9
@@ -91,6 +93,14 @@ def channels_of(quantity: str, output: str) -> list[Channel]:
     """
     own = {"input_motion", "input_force", "strain"}
     return [Channel(name, "" if name in own else output) for name in CHANNELS_OF[quantity]]
+
+
+def has_channels(quantity: str, output: str, record: StrokeRecord) -> bool:
+    """Whether a record contains all that a quantity follows from."""
+    needed = channels_of(quantity, output)
+    if not needed:
+        return quantity in record.given
+    return all(channel in record.channels for channel in needed)
 
 
 def quantity_values(
@@ -167,7 +177,8 @@ def path_error(fractions: NDArray[np.float64], displacement: Values, path: Value
     Examples
     --------
     >>> motion = np.array([[1.0, 0.0], [3.0, 0.0]])
-    >>> float(path_error(np.array([0.5, 1.0]), motion, np.array([[0.0, 0.0], [3.0, 0.0]])))
+    >>> error = path_error(np.array([0.5, 1.0]), motion, np.array([[0.0, 0.0], [3.0, 0.0]]))
+    >>> round(float(error), 12)
     0.0
     """
     path = np.asarray(path) - path[0]
@@ -181,16 +192,24 @@ def path_error(fractions: NDArray[np.float64], displacement: Values, path: Value
     fine = spline_basis(tuple(fractions.tolist())) @ np.concatenate([start, points], axis=-2)
     moved = np.linalg.norm(np.diff(fine, axis=-2), axis=-1)
     reached = np.concatenate([np.zeros((*moved.shape[:-1], 1)), np.cumsum(moved, axis=-1)], axis=-1)
-    rows = fine.reshape(-1, *fine.shape[-2:])
-    errors = np.empty(len(rows))
-    for row, (line, along) in enumerate(zip(rows, reached.reshape(len(rows), -1), strict=True)):
-        if not (np.isfinite(along).all() and along[-1] > 0.0):
-            errors[row] = np.inf
-            continue
-        there = [np.interp(share * along[-1], along, line[:, axis]) for axis in range(2)]
-        gap = np.stack(there, axis=-1) - wanted
-        errors[row] = math.sqrt(float((gap**2).sum(axis=-1).mean())) / length
-    return errors.reshape(points.shape[:-2])
+    total = reached[..., -1:]
+    if reached.ndim == 1:
+        if not (np.isfinite(total[0]) and total[0] > 0.0):
+            return np.asarray(np.inf)
+        there = np.stack(
+            [np.interp(share * total[0], reached, fine[:, axis]) for axis in range(2)], axis=-1
+        )
+        return np.asarray(np.sqrt(((there - wanted) ** 2).sum(axis=-1).mean()) / length)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = reached / total
+    # The piece of the spline in which each share of its length lies, and where in it.
+    piece = np.minimum((along[..., None, 1:] < share[:, None] - 1e-12).sum(-1), PATH_POINTS - 1)
+    low, high = (np.take_along_axis(along, piece + k, axis=-1) for k in (0, 1))
+    part = np.divide(share - low, high - low, out=np.zeros_like(low), where=high > low)
+    ends = [np.take_along_axis(fine, (piece + k)[..., None], axis=-2) for k in (0, 1)]
+    there = ends[0] + part[..., None] * (ends[1] - ends[0])
+    error = np.sqrt(((there - wanted) ** 2).sum(axis=-1).mean(axis=-1)) / length
+    return np.where(np.isfinite(total[..., 0]) & (total[..., 0] > 0.0), error, np.inf)
 
 
 @lru_cache(maxsize=64)
@@ -217,12 +236,13 @@ def tightened(item: Item, reserve: float) -> Item:
     """Return an item whose bounds are tighter by a part of their size.
 
     Two bounds approach their mean by four times this part of half their distance; a single one
-    moves by this part of its size, or of `ZERO_SCALE`.
+    moves by this part of its size, or of `ZERO_SCALE`, and in some quantities more
+    (`LARGER_RESERVE`).
 
     Examples
     --------
     >>> from bellcrank.model import Item
-    >>> tightened(Item(quantity="strain", case="push", at_most=0.2), 0.1).at_most
+    >>> tightened(Item(quantity="sag", case="push", output="tip", at_most=0.2), 0.1).at_most
     0.18
     """
     low, high = item.at_least, item.at_most
@@ -230,7 +250,7 @@ def tightened(item: Item, reserve: float) -> Item:
         half = 0.5 * max(0.0, 1.0 - TWO_SIDED * reserve) * (high - low)
         middle = 0.5 * (low + high)
         return replace(item, at_least=middle - half, at_most=middle + half)
-    step = reserve * scale_of(item)
+    step = LARGER_RESERVE.get(item.quantity, 1.0) * reserve * scale_of(item)
     if low is not None:
         return replace(item, at_least=low + step)
     assert high is not None
@@ -265,14 +285,20 @@ def distance_beyond(item: Item, low: Values, high: Values) -> Values:
     return np.where(np.isnan(over), np.inf, over)
 
 
-def violation(item: Item, record: StrokeRecord) -> Values:
-    """Return (...) the violation: 0 if the item is met, one half at an excess of its scale.
+def violation(item: Item, low: Values, high: Values) -> Values:
+    """Return the violation of an item: 0 if it is met, one half at an excess of its scale.
 
     It tends to 1 far from the bounds.
+
+    Parameters
+    ----------
+    low, high : (...)
+        Smallest and largest value that the bounds apply to (`reduced`).
     """
-    over = np.maximum(0.0, distance_beyond(item, *reduced(item, record)))
-    scale = scale_of(item)
-    return np.where(np.isinf(over), 1.0, over / (np.where(np.isinf(over), 0.0, over) + scale))
+    over = np.maximum(0.0, distance_beyond(item, low, high))
+    infinite = np.isinf(over)
+    finite = np.where(infinite, 0.0, over)
+    return np.where(infinite, 1.0, finite / (finite + scale_of(item)))
 
 
 def worst_value(item: Item, record: StrokeRecord) -> float:
@@ -322,5 +348,6 @@ def item_results(items: Sequence[Item], records: Mapping[str, StrokeRecord]) -> 
     for item in items:
         record = records[item.case] if item.case else next(iter(records.values()))
         value = worst_value(item, record)
-        found.append(ItemResult(item, value, float(violation(item, record)), margin(item, value)))
+        own = float(violation(item, *reduced(item, record)))
+        found.append(ItemResult(item, value, own, margin(item, value)))
     return found

@@ -19,6 +19,7 @@ from bellcrank.mechanics import (
     Status,
     StrokeRecord,
     channels_of,
+    has_channels,
     item_results,
     near_pairs,
     quantity_values,
@@ -34,14 +35,16 @@ from bellcrank.search.mirror import MirrorGroups
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Channel, Response
+    from bellcrank.mechanics import Channel, Outcome, Response
     from bellcrank.model import Item, Problem
 
     Values = NDArray[np.float64]
+    Extremes = dict[int, tuple[Values, Values]]
+    """Smallest and largest values of items, by their number."""
 
 SEARCH_STATES = 4
 """Number of states along the stroke in a search, the full stroke included."""
@@ -159,6 +162,11 @@ class SpecificationEvaluator:
         self.problem = self.groups.problem
         self.items = tuple(tightened(item, reserve) for item in wanted.items)
         self.objectives = wanted.maximise
+        self._with_margin = [
+            index
+            for index, item in enumerate(self.items)
+            if item.case and channels_of(item.quantity, item.output) and not self.objectives
+        ]
         self.elements = elements
         section = problem.section
         assert section is not None
@@ -219,13 +227,11 @@ class SpecificationEvaluator:
         design = self.groups.expand(mask)
         verified = largest_increment <= VERIFICATION_INCREMENT
         structural = {"mass": float(self._volume @ design)}
-        if warm_start and lower_bound > -math.inf:
-            early = self._bound(design, structural, lower_bound)
-            if early is not None:
-                return early
+        bounded = warm_start and lower_bound > -math.inf
+        if bounded and (early := self._bound(design, structural, lower_bound)) is not None:
+            return early
         responses = []
-        records: dict[str, StrokeRecord] = {}
-        for name, case in self._cases.items():
+        for case in self._cases.values():
             response = case.evaluator.respond(
                 design, largest_increment, warm_start=warm_start,
                 lower_bound=-1e300 if warm_start else -math.inf,
@@ -234,22 +240,45 @@ class SpecificationEvaluator:
             if response.status is not Status.CONVERGED:
                 self.violations = np.ones(len(self.items))
                 return replace(response, penalty=math.inf)
-            fractions = case.fractions
-            if verified:
-                fractions = fractions_of([self.items[k] for k in case.items], verified=True)
-            at_end = frozenset() if verified else frozenset({"strain"})
-            channels = case.evaluator.values(case.channels, fractions.tolist(), at_end)
-            given = self._given(name, design, verified=verified)
-            records[name] = StrokeRecord(
-                fractions, channels, {**structural, **given}, case.evaluator.payloads
-            )
-        self.records = records
-        self.violations = self._violations(records)
-        score = self._score_of(self.violations, records)
         response = responses[0]
+        records: dict[str, StrokeRecord] = {}
+        extremes: Extremes = {}
+        for records in self._stages(design, structural, verified=verified):
+            extremes = self._extremes(records, extremes)
+            score = float(self._scores(records, extremes))
+            if bounded and score <= lower_bound:
+                status: Outcome = Status.UNVERIFIED
+                return replace(response, status=status, penalty=response.efficiency - score)
+        self.records = records
+        self.violations = self._violations(extremes)
+        score = float(self._scores(records, extremes))
         met = bool((self.violations <= TOLERANCE).all())
         status = Status.CONVERGED if met else Verdict.UNMET
         return replace(response, status=status, penalty=response.efficiency - score)
+
+    def _stages(
+        self, design: NDArray[np.bool_], structural: dict[str, float], *, verified: bool
+    ) -> Iterator[dict[str, StrokeRecord]]:
+        """Yield records with ever more quantities, the cheap ones first; the last is complete."""
+        at_end = frozenset() if verified else frozenset({"strain"})
+        records = {}
+        for name, case in self._cases.items():
+            fractions = case.fractions
+            if verified:
+                fractions = fractions_of([self.items[k] for k in case.items], verified=True)
+            channels = case.evaluator.values(case.cheap, fractions.tolist(), at_end)
+            records[name] = StrokeRecord(fractions, channels, structural, case.evaluator.payloads)
+        yield records
+        for name, case in self._cases.items():
+            now = records[name]
+            others = [channel for channel in case.channels if channel not in now.channels]
+            found = case.evaluator.values(others, now.fractions.tolist(), at_end)
+            records[name] = replace(now, channels={**now.channels, **found})
+        yield records
+        for name in self._cases:
+            given = self._given(name, design, verified=verified)
+            records[name] = replace(records[name], given={**structural, **given})
+        yield records
 
     def _bound(
         self, design: NDArray[np.bool_], structural: dict[str, float], lower_bound: float
@@ -260,14 +289,13 @@ class SpecificationEvaluator:
         for name, case in self._cases.items():
             response = case.evaluator.respond(design, warm_start=True, lower_bound=math.inf)
             first = first or response
-            if response.status is not Verdict.UNVERIFIED and response.status != Status.UNVERIFIED:
+            if response.status is not Status.UNVERIFIED:
                 if response.status is Status.CONVERGED:  # the reference itself
                     return None
                 return replace(response, penalty=math.inf)
             channels = case.evaluator.values(case.cheap, [1.0])
             records[name] = StrokeRecord(np.ones(1), channels, structural)
-        violations = self._violations(records, partial=True)
-        score = float(self.score(violations.sum(), self._objective(records, partial=True)))
+        score = float(self._scores(records, self._extremes(records)))
         if score > lower_bound:
             return None
         assert first is not None
@@ -302,7 +330,7 @@ class SpecificationEvaluator:
         frame = case.evaluator.frame
         beams = np.flatnonzero(self._struts(frame, design))
         least, worst = self._width + bound, 0.0
-        for fraction in case.fractions.tolist():
+        for fraction in (np.arange(1, SEARCH_STATES + 1) / SEARCH_STATES).tolist():
             if (found := case.evaluator.state(fraction)) is not None:
                 points, pieces = bent_pieces(frame, beams, found.state.u)
                 _, distance = near_pairs(points, pieces, least)
@@ -335,73 +363,76 @@ class SpecificationEvaluator:
         response = self._extended[name].evaluate(design, VERIFICATION_INCREMENT)
         return bound * response.reached if response.status is not Status.MECHANISM else 0.0
 
-    def _violations(self, records: dict[str, StrokeRecord], *, partial: bool = False) -> Values:
-        """Return (..., I) the violations of all items; 0 for those that need more states."""
-        found = []
-        for item in self.items:
+    def _extremes(
+        self, records: dict[str, StrokeRecord], earlier: Extremes | None = None
+    ) -> Extremes:
+        """Return smallest and largest values of all items that are known.
+
+        Parameters
+        ----------
+        records
+            Channels of each load case.
+        earlier
+            Those of records with fewer channels at the same states, which are not computed again.
+        """
+        found: Extremes = {} if earlier is None else dict(earlier)
+        for index, item in enumerate(self.items):
             record = records[item.case] if item.case else next(iter(records.values()))
-            if partial and not self._shows_at_end(item):
-                found.append(np.zeros(()))
-            else:
-                found.append(violation(item, record))
+            if index not in found and self._is_known(item, record):
+                found[index] = reduced(item, record)
+        return found
+
+    def _violations(self, extremes: Extremes) -> Values:
+        """Return (..., I) the violations of all items; 0 for those that are not known yet."""
+        found = [
+            violation(item, *extremes[index]) if index in extremes else np.zeros(())
+            for index, item in enumerate(self.items)
+        ]
         return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.zeros(0)
 
     @staticmethod
-    def _is_cheap(quantity: str, output: str) -> bool:
-        """Whether a quantity follows from cheap channels."""
-        return all(channel.name in CHEAP for channel in channels_of(quantity, output))
-
-    def _shows_at_end(self, item: Item) -> bool:
-        """Whether the violation at full stroke is a lower bound of that of the item."""
-        if item.quantity in {"path_error", "clearance", "stable_stroke"}:
+    def _is_known(item: Item, record: StrokeRecord) -> bool:
+        """Whether a record shows the violation of an item, or a lower bound of it."""
+        if not has_channels(item.quantity, item.output, record):
             return False
-        if not self._is_cheap(item.quantity, item.output):
-            return False
-        return item.stop == 1.0 and item.of == "every"
+        if len(record.fractions) > 1 or item.quantity == "mass":
+            return True
+        # Only the state at full stroke is known.
+        return item.quantity != "path_error" and item.stop == 1.0 and item.of == "every"
 
-    def _objective(self, records: dict[str, StrokeRecord], *, partial: bool = False) -> Values:
-        """Return (...) the smallest objective of the objective; without terms, the smallest margin.
+    def _objective(self, records: dict[str, StrokeRecord], extremes: Extremes) -> Values:
+        """Return (...) the smallest objective; without objectives, the smallest margin.
 
-        With `partial`, an upper bound from the channels that are known.
+        An upper bound where not all channels are known.
         """
-        terms = []
-        for objective in self.objectives:
-            if partial and not self._is_cheap(objective.quantity, objective.output):
-                continue
-            record = records[objective.case] if objective.case else next(iter(records.values()))
-            value = quantity_values(record, objective.quantity, objective.output)[..., -1]
-            terms.append(value / objective.scale)
-        if not self.objectives:
-            return self._smallest_margin(records, partial=partial)
-        if not terms:
-            return np.asarray(np.inf)
-        return np.asarray(np.minimum.reduce(np.broadcast_arrays(*terms)))
-
-    def _smallest_margin(self, records: dict[str, StrokeRecord], *, partial: bool) -> Values:
-        """Return (...) the smallest margin of an item that follows from channels.
-
-        Where items are not met, it is 0, and their violations count.
-        """
-        margins = [
-            -distance_beyond(item, *reduced(item, records[item.case])) / scale_of(item)
-            for item in self.items
-            if item.case
-            and channels_of(item.quantity, item.output)
-            and (not partial or self._shows_at_end(item))
+        values = [
+            -distance_beyond(self.items[index], *extremes[index]) / scale_of(self.items[index])
+            for index in self._with_margin
+            if index in extremes
         ]
-        if not margins:
-            return np.zeros(())
-        smallest = np.minimum.reduce(np.broadcast_arrays(*margins))
-        return np.asarray(np.maximum(0.0, smallest))
+        if not self.objectives:
+            smallest = np.minimum.reduce(np.broadcast_arrays(*values)) if values else np.zeros(())
+            # Where items are not met, their violations count.
+            return np.asarray(np.maximum(0.0, smallest))
+        values = []
+        for objective in self.objectives:
+            record = records[objective.case] if objective.case else next(iter(records.values()))
+            if has_channels(objective.quantity, objective.output, record):
+                value = quantity_values(record, objective.quantity, objective.output)[..., -1]
+                values.append(value / objective.scale)
+        if not values:
+            return np.asarray(np.inf)
+        return np.asarray(np.minimum.reduce(np.broadcast_arrays(*values)))
 
     def score(self, total: Values, objective: Values) -> Values:
         """Return (...) the score for total violations and values of the objective."""
         unmet = objective - BASE_PENALTY - VIOLATION_WEIGHT * total
         return np.asarray(np.where(total > TOLERANCE, unmet, objective))
 
-    def _score_of(self, violations: Values, records: dict[str, StrokeRecord]) -> float:
-        """Return the score of one design."""
-        return float(self.score(violations.sum(), self._objective(records)))
+    def _scores(self, records: dict[str, StrokeRecord], extremes: Extremes) -> Values:
+        """Return (...) the scores; upper bounds where not all channels are known."""
+        total = self._violations(extremes).sum(axis=-1)
+        return self.score(total, self._objective(records, extremes))
 
     def set_reference(self) -> None:
         """Make the design evaluated last the reference of warm starts."""
@@ -436,10 +467,9 @@ class SpecificationEvaluator:
             records[name] = StrokeRecord(
                 now.fractions, channels, {**given, "mass": mass}, now.payloads
             )
-        before = self._score_of(self.violations, self.records)
-        violations = self._violations(records)
+        before = self._scores(self.records, self._extremes(self.records))
         with np.errstate(invalid="ignore"):
-            score = self.score(violations.sum(axis=-1), self._objective(records))
+            score = self._scores(records, self._extremes(records))
         change = np.where(self.groups.largest(changed.astype(float)) > 0.0, score - before, 0.0)
         return FlipPrediction(
             self.groups.beams, np.nan_to_num(change, nan=-1e3, neginf=-1e3, posinf=1e3),

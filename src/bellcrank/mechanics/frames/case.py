@@ -116,10 +116,10 @@ def bound_to(quantity: Quantity, problem: Problem) -> Quantity:
 class _Point(NamedTuple):
     """An equilibrium with measured channels."""
 
-    row: int
     evaluator: FrameEvaluator
     equilibrium: Equilibrium
-    channels: list[Channel]
+    channels: list[tuple[Channel, int]]
+    """Channels, and the rows of their values."""
     measured: list[tuple[Quantity, Measures]]
 
 
@@ -301,7 +301,8 @@ class CaseEvaluator:
             if equilibrium is None:
                 continue
             measured = [(each, each.measure(equilibrium)) for each in chosen]
-            self._points.append(_Point(row, evaluator, equilibrium, channels, measured))
+            rows_of = [(channel, row) for channel in channels]
+            self._points.append(_Point(evaluator, equilibrium, rows_of, measured))
             for channel, (quantity, measures) in zip(channels, measured, strict=True):
                 value = np.asarray(quantity.combine(measures.value))
                 if channel not in found:
@@ -345,14 +346,14 @@ class CaseEvaluator:
             channel: np.repeat(value[None], len(beams), axis=0) for channel, value in values.items()
         }
         changed, strain = np.zeros(len(beams), dtype=bool), np.zeros(len(beams))
-        for point in self._points:
+        for point in self._merged_points():
             found = point.evaluator.flip_changes(
                 point.equilibrium, point.measured, beams, first_order=False
             )
             if found is None:
                 return None
             np.maximum(strain, np.abs(found.strain), out=strain)
-            for channel, (quantity, before), change in zip(
+            for (channel, row), (quantity, before), change in zip(
                 point.channels, point.measured, found.measures, strict=True
             ):
                 changed |= change.any(axis=1)
@@ -361,5 +362,18 @@ class CaseEvaluator:
                     moved = quantity.after_flips(
                         point.equilibrium, before, beams, found.forces, moved
                     )
-                after[channel][:, point.row] = quantity.combine(moved)
+                after[channel][:, row] = quantity.combine(moved)
         return after, changed, strain
+
+    def _merged_points(self) -> list[_Point]:
+        """Return the measured equilibria, each once with all its channels."""
+        merged: dict[int, _Point] = {}
+        for point in self._points:
+            known = merged.get(id(point.equilibrium))
+            if known is not None:
+                known.channels.extend(point.channels)
+                known.measured.extend(point.measured)
+            else:
+                own = point._replace(channels=[*point.channels], measured=[*point.measured])
+                merged[id(point.equilibrium)] = own
+        return list(merged.values())

@@ -49,6 +49,17 @@ def penalty_of(violation: float) -> float:
     return BASE_PENALTY + VIOLATION_WEIGHT * violation if violation > TOLERANCE else 0.0
 
 
+def without_base_penalty(score: float) -> float:
+    """Return a score without the base penalty of a violation.
+
+    Examples
+    --------
+    >>> without_base_penalty(-104.5), without_base_penalty(4.5)
+    (-4.5, 4.5)
+    """
+    return score + BASE_PENALTY if score < -0.5 * BASE_PENALTY else score
+
+
 class ConstrainedEvaluator:
     """Weighted mean of the efficiencies of a design in several load cases, under constraints.
 

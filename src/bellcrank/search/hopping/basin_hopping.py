@@ -28,6 +28,7 @@ from bellcrank.search.blocks import (
     random_numbers,
     steps_in_block,
 )
+from bellcrank.search.constraints.evaluator import without_base_penalty
 from bellcrank.search.hopping.local_search import LocalSearch, start_local_search
 from bellcrank.search.hopping.settings import HoppingSettings
 from bellcrank.search.markov.metropolis import ChainState, MetropolisSettings, metropolis_phase
@@ -242,7 +243,7 @@ class BasinHopping:
         settings = MetropolisSettings(
             cost="negative",
             schedule="constant",
-            cold=self.settings.temperature_factor * (abs(state.best) or 1.0),
+            cold=self.settings.temperature_factor * (abs(without_base_penalty(state.best)) or 1.0),
             unloaded_beams=self.settings.unloaded_beams,
         )
         score = response.score

@@ -44,7 +44,8 @@ class HoppingSettings(SearchSettings):
     phase_steps
         Steps of a Metropolis phase; 0 for no such phases.
     temperature_factor
-        Temperature of a Metropolis phase, as a fraction of the best efficiency.
+        Temperature of a Metropolis phase, as a fraction of the best score (without the base penalty
+        of violated goals).
     phase_share
         Largest fraction of the steps that go to Metropolis phases while progress stalls; a phase
         begins between two local searches.
