@@ -1,0 +1,124 @@
+"""How often searches meet the bundled tasks: ``python -m benchmarks.tasks``.
+
+Every bundled task is designed as by `bellcrank design TASK` with several seeds, on two cores. The
+chosen design is evaluated by frames with eight elements in each strut, and in the sheet. Each run
+is added to ``docs/tasks/runs.json`` as soon as it is done; runs that are in the record are not
+repeated unless ``--again`` is given. A table of medians is printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from bellcrank.errors import NoDesignFound
+from bellcrank.fem.specification import sheet_items
+from bellcrank.provenance import provenance
+from bellcrank.search import read_settings
+from bellcrank.task import bundled_tasks, find_task
+from bellcrank.workflows import complete_design, start_design
+from bellcrank.workflows.specification import binding, item_data
+
+RECORD = Path(__file__).parents[1] / "docs" / "tasks" / "runs.json"
+SEEDS = 5
+"""Number of searches of each task."""
+CORES = 2
+
+
+def run(name: str, seed: int) -> dict[str, Any]:
+    """Design a task with one seed, and evaluate the design."""
+    task = find_task(name)
+    assert task is not None
+    row: dict[str, Any] = {"task": name, "seed": seed}
+    started = time.perf_counter()
+    with TemporaryDirectory() as temporary:
+        folder = start_design(
+            task.problem, read_settings({"seed": seed}), Path(temporary) / "run", task.part
+        )
+        try:
+            report = complete_design(folder, workers=CORES)
+        except NoDesignFound as error:
+            return {**row, "seconds": time.perf_counter() - started, "error": str(error)}
+    assert report is not None
+    row["seconds"] = round(time.perf_counter() - started, 1)
+    design, models = report.selection.design, dict(report.items)
+    missed = binding(list(models.values())[-1])
+    row["met"] = not missed
+    row["binding"] = missed[0].item.name if missed else None
+    started = time.perf_counter()
+    sheet = sheet_items(task.part.of(design))
+    row["sheet_seconds"] = round(time.perf_counter() - started, 1)
+    row["stable_in_sheet"] = sheet is not None
+    row["met_in_sheet"] = sheet is not None and not binding(sheet)
+    row["binding_in_sheet"] = None
+    if sheet is not None:
+        models["sheet"] = sheet
+        missed = binding(sheet)
+        row["binding_in_sheet"] = missed[0].item.name if missed else None
+    first = report.part_figures[0]
+    row["efficiency"] = first.get("efficiency")
+    row["beams"] = design.beam_count
+    row["mask"] = design.mask_hex
+    row["proposals"] = report.proposals
+    row["items"] = item_data(design.problem, task.part, models)
+    return row
+
+
+def write(rows: list[dict[str, Any]]) -> None:
+    """Write the record."""
+    RECORD.parent.mkdir(exist_ok=True)
+    ordered = sorted(rows, key=lambda row: (row["task"], row["seed"]))
+    data = {"provenance": provenance(), "runs": ordered}
+    RECORD.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+
+def summary(rows: list[dict[str, Any]]) -> list[str]:
+    """Return the rows of the table: met, met in the sheet, gain, seconds, binding items."""
+    lines = []
+    for name in sorted({row["task"] for row in rows}):
+        own = [row for row in rows if row["task"] == name]
+        gains = [row["efficiency"] for row in own if row.get("efficiency") is not None]
+        missed = sorted({row["binding"] for row in own if row.get("binding")})
+        sheet = sorted({row["binding_in_sheet"] for row in own if row.get("binding_in_sheet")})
+        lines.append(
+            f"| `{name}` | {sum(row.get('met', False) for row in own)} of {len(own)} "
+            f"| {sum(row.get('met_in_sheet', False) for row in own)} of {len(own)} "
+            f"| {median(gains):.2f} | {median(row['seconds'] for row in own):.0f} "
+            f"| {', '.join(missed) or '-'} | {', '.join(sheet) or '-'} |"
+        )
+    return lines
+
+
+def main() -> None:
+    """Run what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", default=",".join(bundled_tasks()))
+    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--again", action="store_true")
+    given = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    if RECORD.exists():
+        rows = json.loads(RECORD.read_text(encoding="utf-8"))["runs"]
+    for seed in range(given.seeds):
+        for name in given.only.split(","):
+            known = [row for row in rows if (row["task"], row["seed"]) == (name, seed)]
+            if known and not given.again:
+                continue
+            row = run(name, seed)
+            rows = [each for each in rows if each not in known] + [row]
+            write(rows)
+            print(
+                f"{name} {seed}: met {row.get('met')}, in the sheet {row.get('met_in_sheet')}, "
+                f"{row['seconds']:.0f} s, {row.get('binding')} {row.get('binding_in_sheet')}",
+                flush=True,
+            )
+    print("\n".join(summary(rows)))
+
+
+if __name__ == "__main__":
+    main()
