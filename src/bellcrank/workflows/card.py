@@ -19,6 +19,7 @@ from bellcrank.search.verification import ELEMENTS
 from bellcrank.workflows.fabricate import profile_for
 from bellcrank.workflows.figures import figure_text, figures_of, model_words
 from bellcrank.workflows.pictures import stressed_part, stroke_labels
+from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.validation import problem_identity, read_record, validate
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def card_of(
             _part_table(bundle, bundle.part),
             _print_table(bundle, profile_for(None, spec)),
             _fem_table(validation, recorded, _motion_rows(spec.of(frame), found)),
-            _origin_table(design),
+            _specification_table(validation) if validation.items else _origin_table(design),
         ],
         footer=_footer(design),
     )
@@ -178,6 +179,17 @@ def _motion_rows(part: Part, found: dict[str, Any]) -> list[tuple[str, str]]:
         ("rotation", figure_text(found["output_rotation_deg"], "{:.1f} deg")),
         ("force", figure_text(force and [unit * each for each in force], "{:.3g} N")),
     ]
+
+
+def _specification_table(validation: Validation) -> Table:
+    """Return the items of the specification: reached in the best model, wanted."""
+    _, *rows = item_rows(validation.design.problem, validation.spec, validation.items)
+    model = list(validation.items)[-1]
+    shown = [
+        (label, f"{reached[-1]} ({wanted.split(',')[0]})" + ("" if met == "yes" else ", missed"))
+        for label, wanted, *reached, _margin, met in rows
+    ]
+    return f"Specification, {model}", shown
 
 
 def _origin_table(design: Design) -> Table:
