@@ -82,7 +82,15 @@ def test_a_design_that_misses_an_item_is_unmet_and_penalised(slider: Problem) ->
     missed = [result for result in evaluator.results() if not result.met]
     assert "case.output.gain" in [result.item.name for result in missed]
     total = sum(result.violation for result in missed)
-    assert response.score == pytest.approx(response.efficiency - 100.0 - 30.0 * total)
+    assert response.efficiency < 0.0
+    assert response.score == pytest.approx(response.efficiency - 100.0 - 3.0 * total)
+
+
+def test_the_score_weighs_an_objective_against_violations_only_where_items_are_missed() -> None:
+    score = SpecificationEvaluator.score(
+        np.array([0.0, 0.0, np.log(2.0), np.log(2.0)]), np.array([4.0, -1.0, 4.0, -1.0])
+    )
+    assert score == pytest.approx([4.0, -1.0, -100.0 + 4.0 / 8.0, -101.0 - 3.0 * np.log(2.0)])
 
 
 def test_predicted_scores_of_flips_rank_the_real_ones(slider: Problem) -> None:

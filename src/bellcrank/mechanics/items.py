@@ -53,6 +53,8 @@ LARGER_RESERVE = {"strain": 4.0, "clearance": 4.0}
 less accurately."""
 PATH_POINTS = 48
 """Number of points at which a path is compared with the wanted one."""
+LARGEST_EXCESS = 1e3
+"""Largest ratio of an excess to its scale, that of values that are infinite or unknown."""
 SMALLEST_TRAVEL = 1e-9
 """Travel below which ratios to it count as infinite."""
 
@@ -286,9 +288,9 @@ def distance_beyond(item: Item, low: Values, high: Values) -> Values:
 
 
 def violation(item: Item, low: Values, high: Values) -> Values:
-    """Return the violation of an item: 0 if it is met, one half at an excess of its scale.
+    """Return the violation of an item: ln(1 + e / s), e its excess and s its scale.
 
-    It tends to 1 far from the bounds.
+    It is 0 if the item is met, and ln 2 at an excess of the size of the bound.
 
     Parameters
     ----------
@@ -296,9 +298,7 @@ def violation(item: Item, low: Values, high: Values) -> Values:
         Smallest and largest value that the bounds apply to (`reduced`).
     """
     over = np.maximum(0.0, distance_beyond(item, low, high))
-    infinite = np.isinf(over)
-    finite = np.where(infinite, 0.0, over)
-    return np.where(infinite, 1.0, finite / (finite + scale_of(item)))
+    return np.log1p(np.minimum(over / scale_of(item), LARGEST_EXCESS))
 
 
 def worst_value(item: Item, record: StrokeRecord) -> float:

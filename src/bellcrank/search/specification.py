@@ -30,7 +30,7 @@ from bellcrank.mechanics.frames.analysis import centre_lines
 from bellcrank.mechanics.items import TOLERANCE, distance_beyond, reduced, scale_of
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.model import QUANTITIES
-from bellcrank.search.constraints.evaluator import BASE_PENALTY, VIOLATION_WEIGHT
+from bellcrank.search.constraints.evaluator import BASE_PENALTY
 from bellcrank.search.mirror import MirrorGroups
 from bellcrank.search.verdict import Verdict
 
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 SEARCH_STATES = 4
 """Number of states along the stroke in a search, the full stroke included."""
 PATH_STATES = 8
-"""The same for cases with a wanted path."""
+"""The same for cases with a wanted path, or with a wanted motion or force along the stroke."""
 VERIFIED_STATES = 16
 """The same for designs that are verified."""
 
@@ -57,6 +57,8 @@ VERIFIED_STATES = 16
 RESERVE = 0.05
 """Part of their size by which a search tightens all bounds, so that its designs meet them with more
 elements and in the sheet too."""
+VIOLATION_POWER = 3.0
+"""Weight of violations against the objective while a specification is not met."""
 CHEAP = frozenset({"motion", "displacement", "input_motion", "rotation"})
 """Channels that cost little at a known state; the others are measured last."""
 
@@ -78,10 +80,10 @@ def fractions_of(items: Sequence[Item], *, verified: bool) -> NDArray[np.float64
     --------
     >>> from bellcrank.model import Item
     >>> fractions_of([Item(quantity="travel", at_most=0.1, start=0.0, stop=0.6)], verified=False)
-    array([0.25, 0.5 , 0.6 , 0.75, 1.  ])
+    array([0.125, 0.25 , 0.375, 0.5  , 0.6  , 0.625, 0.75 , 0.875, 1.   ])
     """
     states = SEARCH_STATES
-    if any(item.quantity == "path_error" for item in items):
+    if any(item.quantity == "path_error" or _varies(item) for item in items):
         states = PATH_STATES
     if verified:
         states = VERIFIED_STATES
@@ -130,6 +132,11 @@ def bent_pieces(
         [np.column_stack([ends[:, 0], number]), np.column_stack([number, ends[:, 1]])]
     )
     return np.concatenate([moved, middle]), pieces
+
+
+def _varies(item: Item) -> bool:
+    """Whether an item describes how a motion or a force develops along the stroke."""
+    return item.quantity in {"gain", "travel", "input_force"} and item.start < 1.0
 
 
 class SpecificationEvaluator:
@@ -424,9 +431,21 @@ class SpecificationEvaluator:
             return np.asarray(np.inf)
         return np.asarray(np.minimum.reduce(np.broadcast_arrays(*values)))
 
-    def score(self, total: Values, objective: Values) -> Values:
-        """Return (...) the score for total violations and values of the objective."""
-        unmet = objective - BASE_PENALTY - VIOLATION_WEIGHT * total
+    @staticmethod
+    def score(total: Values, objective: Values) -> Values:
+        """Return (...) the score for total violations and values of the objective.
+
+        It is the objective where the specification is met. Elsewhere an objective above 0 is
+        divided by the third power of the product of all 1 + e / s
+        (`bellcrank.mechanics.violation`), so that neither the objective nor the violations alone
+        are improved.
+        """
+        reduced_objective = np.where(
+            objective > 0.0,
+            objective * np.exp(-VIOLATION_POWER * total),
+            objective - VIOLATION_POWER * total,
+        )
+        unmet = reduced_objective - BASE_PENALTY
         return np.asarray(np.where(total > TOLERANCE, unmet, objective))
 
     def _scores(self, records: dict[str, StrokeRecord], extremes: Extremes) -> Values:
