@@ -147,9 +147,7 @@ def design(
     model = "springs" if paper else model or "frames"
     task, part = None, None
     if resume is None:
-        plain_problem = model == "springs" or bool(wanted) or not PLAIN.isdisjoint(chosen)
-        given_design = _design(problem, str(begin), plain_problem=plain_problem)
-        task, part = _in_model(given_design, model, wanted)
+        task, part = _in_model(_design(problem, str(begin)), model, wanted)
     from bellcrank.search import read_settings
 
     method = "paper" if paper else search or "basin-hopping"
@@ -259,22 +257,14 @@ def _option(key: str) -> str:
     return OPTIONS.get(key, f"--set {key}")
 
 
-PLAIN = frozenset({"goals", "strokes", "objective"})
-"""Settings with which a bundled problem is designed without the specification of its task."""
-
-
-def _design(problem: str | None, begin: str, *, plain_problem: bool) -> Design:
-    """Return the named task or problem with its initial design, or a design as the initial one.
-
-    With `plain_problem`, a name that is both is that of the problem.
-    """
-    from bellcrank.model import builtin, find_problem
+def _design(problem: str | None, begin: str) -> Design:
+    """Return the named task or problem with its initial design, or a design as the initial one."""
+    from bellcrank.model import find_problem
 
     if problem is not None:
         from bellcrank.task import find_task
 
-        is_plain = plain_problem and problem in builtin
-        if not is_plain and (task := find_task(problem)) is not None:
+        if (task := find_task(problem)) is not None:
             design = task.problem.full_design()
             return replace(design, provenance={"part": task.part.to_dict()})
         return find_problem(problem).full_design()
