@@ -7,7 +7,7 @@ import shlex
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,9 @@ from bellcrank.cli.arguments import DesignName, design_in_model, design_named
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json
 from bellcrank.cli.library_view import MakingProgress, print_entries, print_entry, warn
 from bellcrank.errors import InvalidSettings
+
+if TYPE_CHECKING:
+    from bellcrank.part.units import Quantity
 
 library = typer.Typer(
     name="library",
@@ -53,6 +56,25 @@ def search(
     efficiency: Annotated[float | None, typer.Option(help="Minimum efficiency at rest.")] = None,
     stiffness: Annotated[float | None, typer.Option(help="Maximum input stiffness.")] = None,
     output_stiffness: Annotated[float | None, typer.Option(help="Minimum stiffness.")] = None,
+    gain: Annotated[
+        float | None, typer.Option(help="Minimum efficiency of the part at full stroke.")
+    ] = None,
+    travel: Annotated[
+        str | None, typer.Option(help="Minimum travel of the part, for example 8mm.")
+    ] = None,
+    off_axis: Annotated[
+        str | None, typer.Option(help="Maximum off-axis motion of the part, for example 5%.")
+    ] = None,
+    rotation: Annotated[
+        str | None, typer.Option(help="Maximum rotation of the output, for example 5deg.")
+    ] = None,
+    payload: Annotated[
+        str | None,
+        typer.Option(help="Minimum load that halves the travel, for example 50g or 0.5N."),
+    ] = None,
+    sag: Annotated[
+        str | None, typer.Option(help="Maximum sag under the own weight, for example 1mm.")
+    ] = None,
     better: Annotated[
         bool, typer.Option("--better", help="Only entries better than the plain lever.")
     ] = False,
@@ -61,13 +83,32 @@ def search(
         typer.Option("--no-warnings", help="Only entries without contact or loss of stability."),
     ] = False,
     sort: Annotated[
-        str, typer.Option(help="efficiency, stiffness, output-stiffness, work, gain or size.")
+        str,
+        typer.Option(
+            help="efficiency, stiffness, output-stiffness, work, gain, size, off-axis, payload or "
+            "travel."
+        ),
     ] = "efficiency",
     as_json: AsJson = False,
 ) -> None:
-    """Search for entries, the best first; lattice units."""
+    """Search for entries, the best first; lattice units, and those of the part where given."""
     from bellcrank.machines.library import library
+    from bellcrank.part import read_quantity
 
+    texts: list[tuple[str, str, str | None, Quantity]] = [
+        ("travel_mm", "--travel", travel, "length"),
+        ("off_axis", "--off-axis", off_axis, "ratio"),
+        ("rotation_deg", "--rotation", rotation, "angle"),
+        ("payload_N", "--payload", payload, "load"),
+        ("sag_mm", "--sag", sag, "length"),
+    ]
+    part = {
+        name: read_quantity(option, text, quantity)
+        for name, option, text, quantity in texts
+        if text is not None
+    }
+    if gain is not None:
+        part["gain"] = gain
     known = library()
     found = known.search(
         direction=direction,
@@ -79,6 +120,7 @@ def search(
         output_stiffness=output_stiffness,
         better=better,
         no_warnings=no_warnings,
+        part=part,
         sort=sort,
     )
     print_entries(known, found, as_json=as_json, spring=spring)

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from bellcrank.cli.console import notes, number_of, plain, print_json, results
 from bellcrank.cli.live import Live
+from bellcrank.part.units import GRAVITY
 
 if TYPE_CHECKING:
     from bellcrank.machines.library import Entry, Library, Summary
@@ -75,7 +76,7 @@ def print_entries(
     table.add_column("name", no_wrap=True)
     for heading in (
         "design\nload", f"spring\n{spring:g}" if spring else "free,\nat rest", "plain\nlever",
-        "frame", "input\nstiff.", "output\nstiff.",
+        "frame", "input\nstiff.", "output\nstiff.", "off-\naxis", "rota-\ntion", "payload,\ng",
     ):  # fmt: skip
         table.add_column(heading, justify="right", no_wrap=True)
     for each in found:
@@ -89,6 +90,9 @@ def print_entries(
             + ("!" if each.warnings else ""),
             _figure(each.input_stiffness, 3),
             _figure(port.output_stiffness, 3),
+            _figure(100.0 * each.off_axis, 2, "%"),
+            _figure(each.rotation_deg, 2, "°"),
+            _figure(each.payload_N / GRAVITY * 1e3, 2),
         )
     results.print(table)
     worse = len(found) - sum(each.better for each in found)
@@ -178,8 +182,8 @@ def _origin(entry: Entry) -> str:
     )
 
 
-def _figure(value: float, digits: int = 4) -> str:
-    """Return some digits, or a dash for a value that is not finite."""
+def _figure(value: float, digits: int = 4, unit: str = "") -> str:
+    """Return some digits and the unit, or a dash for a value that is not finite."""
     if not math.isfinite(value):
         return "-"
-    return "0" if abs(value) < 1e-12 else f"{value:.{digits}g}"
+    return f"0{unit}" if abs(value) < 1e-12 else f"{value:.{digits}g}{unit}"

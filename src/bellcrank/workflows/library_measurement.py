@@ -10,6 +10,7 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings
 from bellcrank.machines.characterisation import characterise
 from bellcrank.machines.library.entry import (
+    FIGURES,
     OWN,
     Entry,
     FrameResult,
@@ -22,6 +23,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, Status, model_evaluator
 from bellcrank.part import PartSpec, models
 from bellcrank.provenance import provenance
 from bellcrank.workflows import spec_for, validate
+from bellcrank.workflows.part_figures import part_figures
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -84,7 +86,19 @@ def measure(
         validation=frame_result(design, spec_for(design)),
         lever=lever_result(problem, () if kind == OWN else kinds[kind].goals),
         provenance={**provenance(**(notes or {})), **({"design": origin} if origin else {})},
+        figures=entry_figures(design),
     )
+
+
+def entry_figures(design: Design) -> dict[str, float | None]:
+    """Return the figures of a design as a part, with 8 elements in each strut; empty for springs.
+
+    Names and units are those of `bellcrank.machines.library.entry.FIGURES`.
+    """
+    if design.problem.section is None:
+        return {}
+    (row, *_) = part_figures(design, spec_for(design))
+    return {name: row.get(name) for name in FIGURES}
 
 
 def measure_again(entry: Entry, points: int = 20) -> Entry:

@@ -17,7 +17,7 @@ from bellcrank.machines.two_port import TwoPort
 from bellcrank.model.parsing import read_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from bellcrank.machines.library.entry import Entry
     from bellcrank.model import Design
@@ -50,6 +50,8 @@ class Summary:
         Whether the entry is more efficient than the plain lever.
     warnings
         Whether there are warnings: struts in contact, or a loss of stability.
+    gain, off_axis, rotation_deg, travel_mm, payload_N, sag_mm
+        Figures of the part with 8 elements in each strut; nan if they are unknown.
     """
 
     name: str
@@ -66,6 +68,12 @@ class Summary:
     lever_efficiency: float
     better: bool
     warnings: bool
+    gain: float = math.nan
+    off_axis: float = math.nan
+    rotation_deg: float = math.nan
+    travel_mm: float = math.nan
+    payload_N: float = math.nan  # noqa: N815 - the unit
+    sag_mm: float = math.nan
 
     @property
     def two_port(self) -> TwoPort:
@@ -78,6 +86,15 @@ class Summary:
             name: None if isinstance(value, float) and not math.isfinite(value) else value
             for name, value in asdict(self).items()
         }
+
+
+PART_FIGURES = ("off_axis", "rotation_deg", "travel_mm", "payload_N", "sag_mm")
+"""Figures of the part in a summary."""
+PART_BOUNDS = {
+    "gain": 1.0, "off_axis": -1.0, "rotation_deg": -1.0, "travel_mm": 1.0, "payload_N": 1.0,
+    "sag_mm": -1.0,
+}  # fmt: skip
+"""Figures that a search may bound: 1 for a lower bound, -1 for an upper one."""
 
 
 def read_summary(path: Path) -> Summary:
@@ -107,6 +124,8 @@ def read_summary(path: Path) -> Summary:
             lever_efficiency=_number(table.lever.efficiency, math.nan),
             better=table.lever.better,
             warnings=bool(table.validation.warnings or found["warnings"]),
+            gain=_number(table.figures.get("efficiency"), math.nan),
+            **{name: _number(table.figures.get(name), math.nan) for name in PART_FIGURES},
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InvalidFile(f"{path}: characterisation or design: {error!r}") from None
@@ -134,6 +153,11 @@ def user_folder() -> Path:
     return (Path(data) if data else Path.home() / ".local" / "share") / "bellcrank" / "library"
 
 
+def _known(value: float) -> float:
+    """Return a sort key that puts unknown values last."""
+    return math.inf if math.isnan(value) else value
+
+
 SORTS: dict[str, Callable[[Summary, float], float]] = {
     "efficiency": lambda each, spring: -each.two_port.efficiency_against(spring),
     "stiffness": lambda each, _spring: each.input_stiffness,
@@ -141,6 +165,9 @@ SORTS: dict[str, Callable[[Summary, float], float]] = {
     "work": lambda each, _spring: -each.two_port.best_work_share,
     "gain": lambda each, _spring: -(each.efficiency - each.lever_efficiency),
     "size": lambda each, _spring: float(each.beams),
+    "off-axis": lambda each, _spring: _known(each.off_axis),
+    "payload": lambda each, _spring: _known(-each.payload_N),
+    "travel": lambda each, _spring: _known(-each.travel_mm),
 }
 """Sort keys of a search, smallest first; the second argument is the spring at the output."""
 
@@ -259,6 +286,7 @@ class Library:
         output_stiffness: float | None = None,
         better: bool = False,
         no_warnings: bool = False,
+        part: Mapping[str, float] | None = None,
         sort: str = "efficiency",
     ) -> list[Summary]:
         """Return the summaries of the entries that satisfy all conditions, the best first.
@@ -279,13 +307,16 @@ class Library:
             Only entries that are more efficient than the plain lever.
         no_warnings
             Only entries without warnings: no struts in contact, no loss of stability.
+        part
+            Bounds on figures of the part, by their names in `PART_BOUNDS`; entries whose figures
+            are unknown do not satisfy them.
         sort
             A key of `SORTS`.
 
         Raises
         ------
         InvalidSettings, UnknownName
-            If direction, kind or sort key is unknown, or the spring is negative.
+            If direction, kind, sort key or a figure is unknown, or the spring is negative.
         """
         if direction is not None:
             check_direction(direction)
@@ -295,6 +326,13 @@ class Library:
             raise InvalidSettings(f"sort: expected one of {', '.join(SORTS)}, got {sort!r}")
         if not spring >= 0.0:
             raise InvalidSettings(f"spring: expected a stiffness of at least 0, got {spring!r}")
+
+        bounds = dict(part or {})
+        for name in bounds:
+            if name not in PART_BOUNDS:
+                raise InvalidSettings(
+                    f"part: expected one of {', '.join(PART_BOUNDS)}, got {name!r}"
+                )
 
         def matches(each: Summary) -> bool:
             return (
@@ -306,6 +344,10 @@ class Library:
                 and (output_stiffness is None or output_stiffness * each.output_compliance <= 1.0)
                 and (each.better or not better)
                 and not (each.warnings and no_warnings)
+                and all(
+                    PART_BOUNDS[name] * (getattr(each, name) - bound) >= 0.0
+                    for name, bound in bounds.items()
+                )
             )
 
         key = SORTS[sort]

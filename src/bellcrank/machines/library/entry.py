@@ -31,6 +31,13 @@ OWN = "own"
 """Kind of an entry that was added by the user, with an unknown load case."""
 
 
+FIGURES = (
+    "efficiency", "efficiency_half", "travel_mm", "off_axis", "rotation_deg",
+    "largest_input_force_N", "output_stiffness_N_per_mm", "payload_N", "sag_mm",
+)  # fmt: skip
+"""Figures of a part (`bellcrank.workflows.part_figures`) that an entry has."""
+
+
 @dataclass(frozen=True, slots=True)
 class Kind:
     """A kind of elementary actuator.
@@ -166,6 +173,8 @@ class Entry:
         Plain lever for comparison.
     provenance
         Origin of the design and of the results.
+    figures
+        Figures of the part with 8 elements in each strut (`FIGURES`); empty for springs.
     """
 
     design: Design
@@ -176,6 +185,7 @@ class Entry:
     validation: FrameResult
     lever: LeverResult
     provenance: dict[str, Any] = field(default_factory=dict)
+    figures: dict[str, float | None] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

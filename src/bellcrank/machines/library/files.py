@@ -9,7 +9,8 @@
 
 ``design`` has the form of a design file, ``characterisation`` that of a file of `bellcrank
 characterise`. The name ends with a hash of problem, beams and kind; ``checksum`` is a hash of all
-other keys. Both are verified when a file is read.
+other keys. Both are verified when a file is read. An entry of frames also has ``figures``, those
+of the part (`bellcrank.machines.library.entry.FIGURES`).
 """
 
 from __future__ import annotations
@@ -90,6 +91,7 @@ class EntryTable(Table):
     validation: FrameTable
     lever: LeverTable
     provenance: dict[str, Any]
+    figures: dict[str, float | None] = Field(default_factory=dict)
     checksum: str
 
 
@@ -108,6 +110,8 @@ def entry_to_dict(entry: Entry) -> dict[str, Any]:
         "provenance": dict(entry.provenance),
     }
     data["validation"]["warnings"] = list(entry.validation.warnings)
+    if entry.figures:
+        data["figures"] = dict(entry.figures)
     return {**data, "checksum": checksum(data)}
 
 
@@ -143,6 +147,7 @@ def entry_from_dict(data: Mapping[str, Any], source: str) -> Entry:
         validation=FrameResult(**{**check, "warnings": tuple(table.validation.warnings)}),
         lever=LeverResult(**lever),
         provenance=dict(table.provenance),
+        figures=dict(table.figures),
     )
     if entry.name != table.name:
         raise InvalidFile(
