@@ -203,3 +203,22 @@ def test_a_folder_that_cannot_be_written_is_said(
     assert "cannot be written" in refusal("library", "add", lever, code=1)
     told = refusal("library", "make", "--out", tmp_path / "file" / "folder", code=1)
     assert "cannot be written" in told
+
+
+def test_entries_are_found_by_figures_of_their_parts() -> None:
+    words = ("library", "search", "--direction", "left", "--payload", "40g", "--sort", "travel")
+    outcome = call(*words, "--json")
+    found = json.loads(outcome.out)
+    assert found
+    assert all(each["payload_N"] >= 0.04 * 9.80665 for each in found)
+    travels = [each["travel_mm"] for each in found]
+    assert travels == sorted(travels, reverse=True)
+    assert "payload" in call(*words).out
+    fewer = json.loads(call(*words, "--rotation", "2.3deg", "--json").out)
+    assert len(fewer) < len(found)
+    assert call(*words, "--gain", "1000").out.count("0 entries") == 1
+
+
+def test_a_figure_in_another_unit_is_refused() -> None:
+    line = refusal("library", "search", "--off-axis", "5 mm")
+    assert "--off-axis: expected a ratio like 10% or 0.1, got '5 mm'" in line

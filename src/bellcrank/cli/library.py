@@ -14,7 +14,13 @@ import typer
 from bellcrank.cli.app import INTERRUPTED, app
 from bellcrank.cli.arguments import DesignName, design_in_model, design_named
 from bellcrank.cli.console import announce_compilation, notes, plain, print_json
-from bellcrank.cli.library_view import MakingProgress, print_entries, print_entry, warn
+from bellcrank.cli.library_view import (
+    MakingProgress,
+    print_entries,
+    print_entry,
+    print_parts,
+    warn,
+)
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
@@ -123,7 +129,10 @@ def search(
         part=part,
         sort=sort,
     )
-    print_entries(known, found, as_json=as_json, spring=spring)
+    if part and not as_json:
+        print_parts(known, found)
+    else:
+        print_entries(known, found, as_json=as_json, spring=spring)
 
 
 @library.command()

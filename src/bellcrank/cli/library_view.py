@@ -76,7 +76,7 @@ def print_entries(
     table.add_column("name", no_wrap=True)
     for heading in (
         "design\nload", f"spring\n{spring:g}" if spring else "free,\nat rest", "plain\nlever",
-        "frame", "input\nstiff.", "output\nstiff.", "off-\naxis", "rota-\ntion", "payload,\ng",
+        "frame", "input\nstiff.", "output\nstiff.",
     ):  # fmt: skip
         table.add_column(heading, justify="right", no_wrap=True)
     for each in found:
@@ -90,9 +90,6 @@ def print_entries(
             + ("!" if each.warnings else ""),
             _figure(each.input_stiffness, 3),
             _figure(port.output_stiffness, 3),
-            _figure(100.0 * each.off_axis, 2, "%"),
-            _figure(each.rotation_deg, 2, "°"),
-            _figure(each.payload_N / GRAVITY * 1e3, 2),
         )
     results.print(table)
     worse = len(found) - sum(each.better for each in found)
@@ -103,6 +100,27 @@ def print_entries(
     for text, number in marks.items():
         if number:
             results.print(f"{text} ({number})")
+    warn(known)
+
+
+def print_parts(known: Library, found: list[Summary]) -> None:
+    """Print one line for each entry with the figures of its part."""
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    table.add_column("name", no_wrap=True)
+    for heading in ("gain", "travel", "off-axis", "rotation", "payload", "sag"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for each in found:
+        off_axis = "-" if math.isnan(each.off_axis) else f"{each.off_axis:.0%}"
+        table.add_row(
+            plain(each.name), _figure(each.gain, 3), _figure(each.travel_mm, 3, " mm"), off_axis,
+            _figure(each.rotation_deg, 2, " deg"), _figure(1e3 * each.payload_N / GRAVITY, 2, " g"),
+            _figure(each.sag_mm, 2, " mm"),
+        )  # fmt: skip
+    results.print(table)
+    count = "1 entry" if len(found) == 1 else f"{len(found)} entries"
+    results.print(
+        f"\n{count}; parts of struts 2 mm wide on 10 mm, by frames with 8 elements in each strut"
+    )
     warn(known)
 
 
