@@ -104,9 +104,12 @@ class ContinuumMesh:
 
 
 def hub_nodes(part: Part) -> NDArray[np.int64]:
-    """Return the lattice nodes of supports, inputs and outputs that have struts, ascending."""
+    """Return the lattice nodes of supports, inputs, outputs and loads that have struts, ascending.
+
+    Those of all load cases, so that one mesh serves them.
+    """
     problem = part.design.problem
-    roles = [problem.supports.nodes, problem.input.nodes, problem.output.nodes]
+    roles = [case.special_nodes for case in problem.cases.values()]
     built = np.unique(problem.lattice.beams[part.design.mask])
     nodes: NDArray[np.int64] = np.intersect1d(np.concatenate(roles), built)
     return nodes

@@ -1,0 +1,85 @@
+"""Items of a specification in the sheet, beside those of frames with eight elements."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from bellcrank.fem.specification import sheet_items
+from bellcrank.mechanics import VERIFICATION_INCREMENT
+from bellcrank.search import SpecificationEvaluator
+from bellcrank.task import task_from_dict
+
+pytest.importorskip("ngsolve")
+
+TASK = {
+    "name": "small",
+    "domain": {"size": ["42 mm", "54 mm"]},
+    "supports": [{"at": {"edge": "bottom"}}],
+    "cases": [
+        {
+            "name": "push",
+            "inputs": [
+                {"at": {"edge": "top", "between": [25, 42]}, "direction": "right",
+                 "displacement": "2 mm"},
+            ],
+            "input_force": {"at_least": "0.01 N"},
+            "loads": [
+                {"at": {"point": [1, 36]}, "direction": "down", "force": "20 mN"},
+                {"at": {"point": [41, 36]}, "direction": "right", "spring": "0.02 N/mm"},
+            ],
+            "outputs": [
+                {"name": "tip", "at": {"edge": "top", "between": [0, 16]}, "direction": "right",
+                 "gain": {"at_least": 0.1}, "off_axis": 2, "rotation": "40 deg", "sag": 2,
+                 "payload": "1 g", "stiffness": "0.001 N/mm", "blocked_force": "1 mN",
+                 "path": {"points": [[0, 0], [2, 0]], "error": "50%"}},
+                {"name": "side", "at": {"point": [41, 27]}, "direction": "right",
+                 "travel": "0.01 mm", "rotation": "40 deg"},
+            ],
+        },
+        {
+            "name": "pull",
+            "inputs": [
+                {"at": {"edge": "top", "between": [25, 42]}, "direction": "up",
+                 "displacement": "1 mm"},
+            ],
+            "gravity": "down",
+            "outputs": [
+                {"at": {"edge": "top", "between": [0, 16]}, "direction": "up",
+                 "travel": "0.01 mm"},
+            ],
+        },
+    ],
+    "limits": {"stable_stroke": 1.1, "mass": "8 g"},
+}  # fmt: skip
+DEVIATION = {
+    "strain": 1.5, "clearance": 0.0, "path_error": 0.5, "off_axis": 0.4, "rotation": 0.3,
+}  # fmt: skip
+"""Largest relative deviation of the sheet from the frame; that of the others is `USUAL`. Hubs make
+the sheet stiffer, and corners strain it more."""
+USUAL = 0.25
+
+
+@pytest.mark.slow
+def test_all_quantities_in_the_sheet_are_near_those_of_frames() -> None:
+    task = task_from_dict(TASK)
+    problem = task.problem
+    mask = problem.initial.copy()
+    ends = problem.lattice.positions[problem.lattice.beams].mean(axis=1)
+    inner = np.abs(ends - [2.1, 2.7]).max(axis=1) < 1.1
+    mask[inner & np.isin(np.arange(len(mask)), problem.designable)] = False
+    evaluator = SpecificationEvaluator(problem, elements=8)
+    assert evaluator.evaluate(mask, VERIFICATION_INCREMENT).is_admissible
+    frames = evaluator.results()
+    design = problem.full_design().with_mask(mask)
+    sheet = sheet_items(task.part.of(design), size=1.0)
+    assert sheet is not None
+    assert [each.item.name for each in sheet] == [each.item.name for each in frames]
+    for one, other in zip(frames, sheet, strict=True):
+        if math.isinf(one.value):
+            assert math.isinf(other.value), one.item.name
+            continue
+        limit = DEVIATION.get(one.item.quantity, USUAL)
+        assert other.value == pytest.approx(one.value, rel=limit, abs=1e-3), one.item.name
