@@ -18,7 +18,7 @@ from bellcrank.mechanics.analysis import (
     strain_of,
 )
 from bellcrank.mechanics.conditions import Conditions, LinearEquations
-from bellcrank.mechanics.contact import near_pairs
+from bellcrank.mechanics.contact import bent_pieces, near_pairs
 from bellcrank.mechanics.coupling import Coupling, free_nodes, uniform_motion
 from bellcrank.mechanics.evaluator import (
     VERIFICATION_INCREMENT,
@@ -93,6 +93,7 @@ __all__ = [
     "Superelement",
     "UnloadedBeams",
     "at_fraction",
+    "bent_pieces",
     "channels_of",
     "check_memory",
     "efficiency_of",

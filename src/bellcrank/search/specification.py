@@ -18,6 +18,7 @@ from bellcrank.mechanics import (
     ItemResult,
     Status,
     StrokeRecord,
+    bent_pieces,
     channels_of,
     has_channels,
     item_results,
@@ -29,7 +30,6 @@ from bellcrank.mechanics import (
 from bellcrank.mechanics.frames.analysis import centre_lines
 from bellcrank.mechanics.items import TOLERANCE, distance_beyond, reduced, scale_of
 from bellcrank.mechanics.stroke import STATES
-from bellcrank.model import QUANTITIES
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
 from bellcrank.search.mirror import MirrorGroups
 from bellcrank.search.verdict import Verdict
@@ -52,8 +52,6 @@ PATH_STATES = 8
 """The same for cases with a wanted path, or with a wanted motion or force along the stroke."""
 VERIFIED_STATES = 16
 """The same for designs that are verified."""
-
-
 RESERVE = 0.05
 """Part of their size by which a search tightens all bounds, so that its designs meet them with more
 elements and in the sheet too."""
@@ -89,49 +87,6 @@ def fractions_of(items: Sequence[Item], *, verified: bool) -> NDArray[np.float64
         states = VERIFIED_STATES
     ends = [end for item in items for end in (item.start, item.stop) if end > 0.0]
     return np.unique(np.concatenate([np.arange(1, states + 1) / states, ends]))
-
-
-def bent_pieces(
-    frame: FrameEvaluator, beams: NDArray[np.int64], u: Values
-) -> tuple[Values, NDArray[np.int64]]:
-    """Return points of bent struts and the straight pieces between them.
-
-    In the plane every strut has a point in its middle, on the cubic that its end rotations define.
-
-    Parameters
-    ----------
-    frame
-        Evaluator with one element in each beam.
-    beams : (n,) int64
-        The struts.
-    u : (N, 3)
-        State of the nodes.
-
-    Returns
-    -------
-    points : (N + n, d)
-    pieces : (2 n, 2) int64
-        In space (N, d) and (n, 2): struts are straight.
-    """
-    lattice = frame.problem.lattice
-    nodes, dimension = lattice.positions.shape
-    moved = lattice.positions + u[:nodes, :dimension]
-    ends = lattice.beams[beams]
-    if dimension == 3:
-        return moved, ends
-    rest = lattice.positions[ends[:, 1]] - lattice.positions[ends[:, 0]]
-    chord = moved[ends[:, 1]] - moved[ends[:, 0]]
-    # The difference of the end rotations does not depend on the rotation of the chord, but each
-    # must be within half a turn of it.
-    turned = np.arctan2(rest[:, 0] * chord[:, 1] - rest[:, 1] * chord[:, 0], (rest * chord).sum(1))
-    first, second = ((u[ends[:, k], 2] - turned + np.pi) % (2.0 * np.pi) - np.pi for k in (0, 1))
-    normal = np.column_stack([-chord[:, 1], chord[:, 0]])
-    middle = moved[ends].mean(axis=1) + normal * ((first - second) / 8.0)[:, None]
-    number = nodes + np.arange(len(beams))
-    pieces = np.concatenate(
-        [np.column_stack([ends[:, 0], number]), np.column_stack([number, ends[:, 1]])]
-    )
-    return np.concatenate([moved, middle]), pieces
 
 
 def _varies(item: Item) -> bool:
@@ -199,10 +154,6 @@ class SpecificationEvaluator:
             cheap = [channel for channel in channels if channel.name in CHEAP]
             fractions = fractions_of(used, verified=False)
             self._cases[name] = _Case(evaluator, chosen, channels, cheap, fractions)
-        self._design = [
-            k for k, item in enumerate(self.items) if QUANTITIES[item.quantity].scope == "design"
-        ]
-        self._core_finder = FrameEvaluator(self.problem).load_bearing
         self.records: dict[str, StrokeRecord] = {}
         self.violations = np.ones(len(self.items))
         self._extended: dict[str, FrameEvaluator] = {}
@@ -339,7 +290,7 @@ class SpecificationEvaluator:
         least, worst = self._width + bound, 0.0
         for fraction in (np.arange(1, SEARCH_STATES + 1) / SEARCH_STATES).tolist():
             if (found := case.evaluator.state(fraction)) is not None:
-                points, pieces = bent_pieces(frame, beams, found.state.u)
+                points, pieces = bent_pieces(frame.problem, beams, found.state.u)
                 _, distance = near_pairs(points, pieces, least)
                 worst = max(worst, float(np.sum(least - distance)))
         return bound - worst
