@@ -99,6 +99,8 @@ def test_items_of_a_task_have_bounds_ranges_and_reductions() -> None:
     switch = find_task("switch").problem.specification.items
     forces = [item.of for item in switch if item.quantity == "input_force"]
     assert forces == ["largest", "smallest", "every"]
+    spread = find_task("constant-force").problem.specification.items[1]
+    assert (spread.quantity, spread.of, spread.at_most) == ("input_force", "spread", 0.1)
     names = [item.quantity for item in switch]
     assert names[-2:] == ["strain", "clearance"]
     hub = next(

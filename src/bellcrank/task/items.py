@@ -45,6 +45,8 @@ READINGS = {
     "strain": Reading("ratio", "at_most", True, 2.0),
 }
 """Quantities that the tables of outputs and cases bound."""
+SPREAD = Reading("ratio", "at_most", False, 10.0)
+"""The same for the spread of a quantity, which is a ratio."""
 FRACTIONS = 1.0
 """Largest fraction of the stroke at which bounds hold."""
 
@@ -129,9 +131,9 @@ class ItemReader:
             bound: dict[str, Any] = {reading.single: number}
             self.items.append(Item(**named, **bound, **start))
 
-    def _number(self, quantity: str, value: Any, key: str) -> float:
-        """Return a bound in the units of the problem."""
-        reading = READINGS[quantity]
+    def _number(self, quantity: str, value: Any, key: str, *, spread: bool = False) -> float:
+        """Return a bound in the units of the problem; that of a spread is a ratio."""
+        reading = SPREAD if spread else READINGS[quantity]
         try:
             number = read_quantity(key, value, reading.unit)
         except InvalidSettings as error:
@@ -141,7 +143,7 @@ class ItemReader:
             raise InvalidProblem(
                 f"{key}: expected at most {reading.largest:g}, got {value!r}{hint}"
             )
-        return self.units.in_problem(QUANTITIES[quantity].dimension, number)
+        return number if spread else self.units.in_problem(QUANTITIES[quantity].dimension, number)
 
     def _limits(self, quantity: str, bounds: Bounds, key: str) -> dict[str, Any]:
         """Return the bounds of an item."""
@@ -149,13 +151,16 @@ class ItemReader:
             missing = "tolerance" if bounds.tolerance is None else "target"
             raise InvalidProblem(f"{key}: key {missing!r} is missing; target needs a tolerance")
         if bounds.target is not None:
+            if bounds.of == "spread":
+                raise InvalidProblem(f"{key}: expected at_most with of = 'spread', got target")
             if bounds.at_least is not None or bounds.at_most is not None:
                 raise InvalidProblem(f"{key}: expected target or at_least and at_most, got both")
             target = self._number(quantity, bounds.target, f"{key}.target")
             half = self._tolerance(quantity, bounds.tolerance, target, f"{key}.tolerance")
             return {"at_least": target - half, "at_most": target + half}
+        spread = bounds.of == "spread"
         limits: dict[str, Any] = {
-            name: self._number(quantity, value, f"{key}.{name}")
+            name: self._number(quantity, value, f"{key}.{name}", spread=spread)
             for name in ("at_least", "at_most")
             if (value := getattr(bounds, name)) is not None
         }
