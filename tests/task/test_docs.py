@@ -10,7 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 from bellcrank.model import QUANTITIES
-from bellcrank.task import schema, task_from_dict
+from bellcrank.task import bundled_tasks, schema, task_from_dict
 
 PAGE = (Path(__file__).parents[2] / "docs" / "tasks.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -55,3 +55,10 @@ def test_every_key_is_used_in_an_example() -> None:
 
 def test_every_quantity_of_a_specification_has_a_meaning() -> None:
     assert all(quantity.meaning for quantity in QUANTITIES.values())
+
+
+@pytest.mark.parametrize("name", bundled_tasks())
+def test_every_bundled_task_is_listed_with_its_description(name: str) -> None:
+    data = tomllib.loads(bundled_tasks()[name].read_text(encoding="utf-8"))
+    assert data["name"] == name
+    assert f"| `{name}` | {data['description']} |" in PAGE
