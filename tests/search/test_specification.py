@@ -19,8 +19,9 @@ from bellcrank.search import (
     with_stable_initial,
 )
 from bellcrank.search.choice import nondominated
-from bellcrank.search.specification import fractions_of
+from bellcrank.search.stroke_states import fractions_of
 from bellcrank.task import find_task
+from bellcrank.workflows.specification import results_for
 
 if TYPE_CHECKING:
     from bellcrank.mechanics import Response
@@ -205,3 +206,13 @@ def test_nondominated_vectors_are_beaten_by_no_other_one() -> None:
         assert (index in front) <= (not beaten)
         if not beaten:
             assert own in [vectors[place] for place in front]
+
+
+def test_a_given_design_is_evaluated_as_it_is_even_if_it_lacks_the_symmetry_of_its_task() -> None:
+    problem = problem_of("gripper")
+    mask = problem.initial.copy()
+    mask[problem.designable[3]] = False
+    results = results_for(problem, mask)
+    assert results is not None
+    left, right = (result.value for result in results if result.item.quantity == "gain")
+    assert abs(left - right) > 0.01

@@ -265,8 +265,7 @@ def _design(problem: str | None, begin: str) -> Design:
         from bellcrank.task import find_task
 
         if (task := find_task(problem)) is not None:
-            design = task.problem.full_design()
-            return replace(design, provenance={"part": task.part.to_dict()})
+            return task.initial_design()
         return find_problem(problem).full_design()
     design = design_named(begin)
     return replace(design, problem=replace(design.problem, initial=design.mask))

@@ -215,4 +215,4 @@ class Analysis:
 
 def finite(value: float) -> float | None:
     """Return a finite number unchanged, and None instead of infinity or nan."""
-    return value if math.isfinite(value) else None
+    return float(value) if math.isfinite(value) else None

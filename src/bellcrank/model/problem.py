@@ -27,9 +27,15 @@ from bellcrank.model.checks import (
     check_slender,
     check_texts,
 )
-from bellcrank.model.conditions import ROLLERS, Aggregate, Input, Output, Stiffness, Supports
+from bellcrank.model.conditions import Aggregate, Input, Output, Stiffness, Supports
 from bellcrank.model.loads import Loads
 from bellcrank.model.masks import pack_mask
+from bellcrank.model.plain_data import (
+    input_data,
+    output_data,
+    specification_data,
+    supports_data,
+)
 from bellcrank.model.section import DEFAULT_MATERIAL, Elasticity, Section
 from bellcrank.model.specification import Case, Specification
 
@@ -341,9 +347,9 @@ def problem_to_dict(problem: Problem) -> dict[str, Any]:
         "initial": pack_mask(problem.initial),
         "designable": problem.designable.tolist(),
         "stiffness": {"bond": problem.stiffness.bond, "angle": problem.stiffness.angle},
-        "supports": _supports_data(problem.supports, problem.lattice.dimension),
-        "input": _input_data(problem.input),
-        "output": _output_data(problem.output),
+        "supports": supports_data(problem.supports, problem.lattice.dimension),
+        "input": input_data(problem.input),
+        "output": output_data(problem.output),
         "aggregate": problem.aggregate,
     }
     if problem.objective is not None:
@@ -354,61 +360,5 @@ def problem_to_dict(problem: Problem) -> dict[str, Any]:
     if problem.loads:
         data["loads"] = problem.loads.to_dict()
     if problem.specification is not None:
-        data["specification"] = _specification_data(
-            problem.specification, problem.lattice.dimension
-        )
+        data["specification"] = specification_data(problem.specification, problem.lattice.dimension)
     return data
-
-
-def _supports_data(supports: Supports, dimension: int) -> dict[str, Any]:
-    names = ("fixed", *ROLLERS[:dimension])
-    return {name: getattr(supports, name).tolist() for name in names}
-
-
-def _input_data(given: Input) -> dict[str, Any]:
-    return {
-        "nodes": given.nodes.tolist(),
-        "direction": _one_or_each(given.direction),
-        "drive": given.drive,
-        "amount": given.amount,
-    }
-
-
-def _output_data(output: Output) -> dict[str, Any]:
-    return {
-        "nodes": output.nodes.tolist(),
-        "direction": _one_or_each(output.direction),
-        "spring": output.spring,
-        "spring_kind": output.spring_kind,
-    }
-
-
-def _specification_data(specification: Specification, dimension: int) -> dict[str, Any]:
-    data: dict[str, Any] = {"case": specification.case, "output": specification.output}
-    if specification.outputs:
-        data["outputs"] = {name: _output_data(each) for name, each in specification.outputs.items()}
-    if specification.cases:
-        data["cases"] = [
-            {
-                "name": case.name,
-                "supports": _supports_data(case.supports, dimension),
-                "input": _input_data(case.input),
-                "outputs": {name: _output_data(each) for name, each in case.outputs.items()},
-                **({"loads": case.loads.to_dict()} if case.loads else {}),
-            }
-            for case in specification.cases
-        ]
-    data["items"] = [item.to_dict() for item in specification.items]
-    data["maximise"] = [objective.to_dict() for objective in specification.maximise]
-    if specification.weight is not None:
-        data["weight"] = specification.weight.tolist()
-    if specification.symmetry:
-        data["symmetry"] = list(specification.symmetry)
-    return data
-
-
-def _one_or_each(vectors: NDArray[np.float64]) -> list[Any]:
-    """Return one vector if all are equal, otherwise all of them."""
-    same = bool((vectors == vectors[0]).all())
-    written: list[Any] = vectors[0].tolist() if same else vectors.tolist()
-    return written

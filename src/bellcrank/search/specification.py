@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.fem.contact import find_contacts
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     CaseEvaluator,
@@ -18,24 +17,22 @@ from bellcrank.mechanics import (
     ItemResult,
     Status,
     StrokeRecord,
-    bent_pieces,
     channels_of,
     has_channels,
     item_results,
-    near_pairs,
     quantity_values,
     tightened,
     violation,
 )
-from bellcrank.mechanics.frames.analysis import centre_lines
 from bellcrank.mechanics.items import TOLERANCE, distance_beyond, reduced, scale_of
-from bellcrank.mechanics.stroke import STATES
+from bellcrank.search.clearance import gap_less_overlaps, smallest_gap
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
 from bellcrank.search.mirror import MirrorGroups
+from bellcrank.search.stroke_states import fractions_of
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
@@ -46,12 +43,6 @@ if TYPE_CHECKING:
     Extremes = dict[int, tuple[Values, Values]]
     """Smallest and largest values of items, by their number."""
 
-SEARCH_STATES = 4
-"""Number of states along the stroke in a search, the full stroke included."""
-PATH_STATES = 8
-"""The same for cases with a wanted path, or with a wanted motion or force along the stroke."""
-VERIFIED_STATES = 16
-"""The same for designs that are verified."""
 RESERVE = 0.05
 """Part of their size by which a search tightens all bounds, so that its designs meet them with more
 elements and in the sheet too."""
@@ -69,29 +60,6 @@ class _Case(NamedTuple):
     channels: list[Channel]
     cheap: list[Channel]
     fractions: NDArray[np.float64]
-
-
-def fractions_of(items: Sequence[Item], *, verified: bool) -> NDArray[np.float64]:
-    """Return the fractions of the stroke at which items are evaluated.
-
-    Examples
-    --------
-    >>> from bellcrank.model import Item
-    >>> fractions_of([Item(quantity="travel", at_most=0.1, start=0.0, stop=0.6)], verified=False)
-    array([0.125, 0.25 , 0.375, 0.5  , 0.6  , 0.625, 0.75 , 0.875, 1.   ])
-    """
-    states = SEARCH_STATES
-    if any(item.quantity == "path_error" or _varies(item) for item in items):
-        states = PATH_STATES
-    if verified:
-        states = VERIFIED_STATES
-    ends = [end for item in items for end in (item.start, item.stop) if end > 0.0]
-    return np.unique(np.concatenate([np.arange(1, states + 1) / states, ends]))
-
-
-def _varies(item: Item) -> bool:
-    """Whether an item describes how a motion or a force develops along the stroke."""
-    return item.quantity in {"gain", "travel", "input_force"} and item.start < 1.0
 
 
 class SpecificationEvaluator:
@@ -124,15 +92,9 @@ class SpecificationEvaluator:
         self.problem = self.groups.problem
         self.items = tuple(tightened(item, reserve) for item in wanted.items)
         self.objectives = wanted.maximise
-        self._with_margin = [
-            index
-            for index, item in enumerate(self.items)
-            if item.case and channels_of(item.quantity, item.output) and not self.objectives
-        ]
         self.elements = elements
         section = problem.section
         assert section is not None
-        self._width = section.width
         self._volume = section.area * problem.lattice.rest_length
         self._cases: dict[str, _Case] = {}
         for name, case in problem.cases.items():
@@ -199,8 +161,8 @@ class SpecificationEvaluator:
                 self.violations = np.ones(len(self.items))
                 return replace(response, penalty=math.inf)
         response = responses[0]
-        records: dict[str, StrokeRecord] = {}
         extremes: Extremes = {}
+        score = -math.inf
         for records in self._stages(design, structural, verified=verified):
             extremes = self._extremes(records, extremes)
             score = float(self._scores(records, extremes))
@@ -209,7 +171,6 @@ class SpecificationEvaluator:
                 return replace(response, status=status, penalty=response.efficiency - score)
         self.records = records
         self.violations = self._violations(extremes)
-        score = float(self._scores(records, extremes))
         met = bool((self.violations <= TOLERANCE).all())
         status = Status.CONVERGED if met else Verdict.UNMET
         return replace(response, status=status, penalty=response.efficiency - score)
@@ -264,54 +225,15 @@ class SpecificationEvaluator:
         case = self._cases[name]
         wanted = {self.items[k].quantity: self.items[k].at_least or 0.0 for k in case.items}
         given: dict[str, float] = {}
-        if "clearance" in wanted:
-            clearance = self._gap if verified else self._overlap
-            given["clearance"] = clearance(case, design, wanted["clearance"])
-        if "stable_stroke" in wanted:
-            bound = wanted["stable_stroke"]
+        if (bound := wanted.get("clearance")) is not None:
+            clearance = smallest_gap if verified else gap_less_overlaps
+            given["clearance"] = clearance(case.evaluator, design, bound)
+        if (bound := wanted.get("stable_stroke")) is not None:
             given["stable_stroke"] = self._stable_stroke(name, design, bound) if verified else bound
         return given
 
-    def _struts(self, frame: FrameEvaluator, design: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return (M,) the beams that carry load or join two held nodes."""
-        problem = frame.problem
-        held = np.zeros(problem.lattice.node_count, dtype=bool)
-        held[problem.supports.fixed] = True
-        between = design & held[problem.lattice.beams].all(axis=1)
-        return np.asarray(between | (frame.structure.present != 0))
-
-    def _overlap(self, case: _Case, design: NDArray[np.bool_], bound: float) -> float:
-        """Return the bound less the sum over pairs of struts of how far they are too near.
-
-        At the state of the stroke where the sum is largest. Bent struts have two straight pieces.
-        """
-        frame = case.evaluator.frame
-        beams = np.flatnonzero(self._struts(frame, design))
-        least, worst = self._width + bound, 0.0
-        for fraction in (np.arange(1, SEARCH_STATES + 1) / SEARCH_STATES).tolist():
-            if (found := case.evaluator.state(fraction)) is not None:
-                points, pieces = bent_pieces(frame.problem, beams, found.state.u)
-                _, distance = near_pairs(points, pieces, least)
-                worst = max(worst, float(np.sum(least - distance)))
-        return bound - worst
-
-    def _gap(self, case: _Case, design: NDArray[np.bool_], bound: float) -> float:
-        """Return the smallest gap between struts along the stroke; infinite above the bound."""
-        frame = case.evaluator.frame
-        rest, _ = centre_lines(frame, frame.state)
-        chosen = design[frame.beams]
-        stroke = [
-            (fraction, centre_lines(frame, found.state)[1][chosen])
-            for fraction in (np.arange(1, STATES + 1) / STATES).tolist()
-            if (found := case.evaluator.state(fraction)) is not None
-        ]
-        least = self._width + bound
-        touching = find_contacts(frame.beams[chosen], rest[chosen], stroke, least)
-        if not len(touching.overlap):
-            return math.inf
-        return bound - float(touching.overlap.max())
-
     def _stable_stroke(self, name: str, design: NDArray[np.bool_], bound: float) -> float:
+        """Return the part of the stroke up to which a design is stable, at most a bound."""
         if name not in self._extended:
             problem = self._cases[name].evaluator.problem
             given = replace(problem.input, amount=bound * problem.input.amount)
@@ -363,15 +285,8 @@ class SpecificationEvaluator:
 
         An upper bound where not all channels are known.
         """
-        values = [
-            -distance_beyond(self.items[index], *extremes[index]) / scale_of(self.items[index])
-            for index in self._with_margin
-            if index in extremes
-        ]
         if not self.objectives:
-            smallest = np.minimum.reduce(np.broadcast_arrays(*values)) if values else np.zeros(())
-            # Where items are not met, their violations count.
-            return np.asarray(np.maximum(0.0, smallest))
+            return self._smallest_margin(extremes)
         values = []
         for objective in self.objectives:
             record = records[objective.case] if objective.case else next(iter(records.values()))
@@ -381,6 +296,17 @@ class SpecificationEvaluator:
         if not values:
             return np.asarray(np.inf)
         return np.asarray(np.minimum.reduce(np.broadcast_arrays(*values)))
+
+    def _smallest_margin(self, extremes: Extremes) -> Values:
+        """Return (...) the smallest margin of an item that follows from channels, at least 0."""
+        margins = [
+            -distance_beyond(item, *extremes[index]) / scale_of(item)
+            for index, item in enumerate(self.items)
+            if index in extremes and item.case and channels_of(item.quantity, item.output)
+        ]
+        smallest = np.minimum.reduce(np.broadcast_arrays(*margins)) if margins else np.zeros(())
+        # Where items are not met, their violations count.
+        return np.asarray(np.maximum(0.0, smallest))
 
     @staticmethod
     def score(total: Values, objective: Values) -> Values:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,41 +17,27 @@ from bellcrank.errors import (
     UnknownName,
 )
 from bellcrank.model import (
-    Case,
-    Input,
     Item,
     Lattice,
-    Loads,
-    NodeForce,
-    NodeSpring,
-    Output,
     Problem,
     Specification,
-    Supports,
     builtin,
     lattices,
 )
 from bellcrank.model.calls import call_with_keys
 from bellcrank.part import PartSpec, frame_elasticity, frame_section
+from bellcrank.task.conditions import CaseReader
 from bellcrank.task.domain import fill, in_regions, region_of
 from bellcrank.task.items import ItemReader
-from bellcrank.task.shapes import nodes_at
 from bellcrank.task.units import ProblemUnits, part_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from bellcrank.model import Design
     from bellcrank.model.specification import ObjectiveTerm
     from bellcrank.task.schema import (
-        CaseSection,
         DomainSection,
-        InputSection,
-        LoadSection,
-        NodeRegions,
-        OutputSection,
-        SupportSection,
         TaskTable,
     )
 
@@ -59,8 +45,6 @@ NARROWEST = 0.1
 """Smallest width and thickness of a strut, mm."""
 LARGEST_PART = 5000.0
 """Largest length of a part, mm."""
-SMALLEST_STROKE = 1e-3
-"""Smallest displacement of an input, in spacings."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +67,11 @@ class Task:
     part: PartSpec
     units: ProblemUnits
     description: str = ""
+
+    def initial_design(self) -> Design:
+        """Return the initial design, which records the part."""
+        design = self.problem.full_design()
+        return replace(design, provenance={"part": self.part.to_dict()})
 
 
 def build_task(table: TaskTable, folder: Path | None = None) -> Task:
@@ -120,8 +109,14 @@ class _Builder:
         self.section = frame_section(self.part, self.lattice.dimension)
         self.material = frame_elasticity(self.lattice, self.section, self.part)
         self.units = part_units(self.lattice, self.section, self.material, self.part)
-        self.positions = self.lattice.positions * self.part.scale
-        self.spacing = self.part.scale * float(np.median(self.lattice.rest_length))
+        self.cases = CaseReader(
+            part=self.part,
+            units=self.units,
+            positions=self.lattice.positions * self.part.scale,
+            spacing=self.part.scale * float(np.median(self.lattice.rest_length)),
+            supports=table.supports,
+            base=self.base,
+        )
 
     def task(self) -> Task:
         table = self.table
@@ -135,7 +130,7 @@ class _Builder:
         for index, (name, case) in enumerate(zip(names, table.cases, strict=True)):
             key = f"cases[{index}]" if len(names) > 1 else "cases[0]"
             reader = ItemReader(self.units, name)
-            cases.append(self._case(name, case, key, reader))
+            cases.append(self.cases.case(name, case, key, reader))
             items += reader.items
             maximise += reader.maximise
             scaled += reader.scaled
@@ -143,7 +138,7 @@ class _Builder:
         items += self._limits(names)
         first, *others = cases
         (output_name, output), *more = first.outputs.items()
-        weight = self._weight(table.limits.upright) if _bounds_sag(items) else None
+        weight = self.cases.weight(table.limits.upright) if _bounds_sag(items) else None
         problem = Problem(
             name=table.name,
             lattice=self.lattice,
@@ -196,172 +191,6 @@ class _Builder:
         region = region_of(domain, self.folder)
         return fill(region, self.part.scale, self.part.width)
 
-    def _nodes(self, regions: NodeRegions, key: str) -> NDArray[np.int64]:
-        return nodes_at(regions, self.positions, self.spacing, key)
-
-    def _supports(self, sections: Sequence[tuple[str, SupportSection]]) -> Supports:
-        held: dict[str, list[NDArray[np.int64]]] = {"all": [], "x": [], "y": []}
-        for key, section in sections:
-            held[section.hold].append(self._nodes(section.at, f"{key}.at"))
-        nodes = {
-            hold: np.unique(np.concatenate(each)) if each else np.empty(0, np.int64)
-            for hold, each in held.items()
-        }
-        return Supports(fixed=nodes["all"], fixed_x=nodes["x"], fixed_y=nodes["y"])
-
-    def _case(self, name: str, case: CaseSection, key: str, reader: ItemReader) -> Case:
-        given = [(f"supports[{k}]", each) for k, each in enumerate(self.table.supports)]
-        given += [(f"{key}.supports[{k}]", each) for k, each in enumerate(case.supports)]
-        if given:
-            supports = self._supports(given)
-        elif self.base is not None:
-            supports = self.base.supports
-        else:
-            raise InvalidProblem("supports: expected at least one support of the part")
-        outputs = self._outputs(case, key, reader)
-        reader.read("input_force", case.input_force, f"{key}.input_force")
-        reader.read("strain", case.strain, f"{key}.strain")
-        return Case(
-            name=name,
-            supports=supports,
-            input=self._input(case, key),
-            outputs=outputs,
-            loads=self._loads(case, key),
-        )
-
-    def _input(self, case: CaseSection, key: str) -> Input:
-        """Return the input of a case; several of them must be driven alike."""
-        if not case.inputs:
-            if self.base is None:
-                raise InvalidProblem(f"{key}.inputs: expected at least one")
-            return self.base.input
-        parts = [
-            self._one_input(section, f"{key}.inputs[{k}]") for k, section in enumerate(case.inputs)
-        ]
-        first = parts[0]
-        for k, other in enumerate(parts[1:], 1):
-            alike = math.isclose(other.amount, first.amount, rel_tol=1e-9)
-            if other.drive != first.drive or not alike:
-                raise InvalidProblem(
-                    f"{key}.inputs[{k}]: expected the same displacement as that of the first "
-                    "input, or the same force on each node; give another force as a load"
-                )
-        return Input(
-            nodes=np.concatenate([each.nodes for each in parts]),
-            direction=np.concatenate([each.direction for each in parts]),
-            drive=first.drive,
-            amount=first.amount,
-        )
-
-    def _one_input(self, section: InputSection, key: str) -> Input:
-        base = None if self.base is None else self.base.input
-        if section.at is None and base is None:
-            raise InvalidProblem(f"key '{key}.at' is missing")
-        if section.direction is None and base is None:
-            raise InvalidProblem(f"key '{key}.direction' is missing")
-        if (section.displacement is None) == (section.force is None) and base is None:
-            raise InvalidProblem(f"{key}: expected displacement or force, and not both")
-        nodes = base.nodes if section.at is None else self._nodes(section.at, f"{key}.at")  # type: ignore[union-attr]
-        direction: Any = base.direction if section.direction is None else section.direction  # type: ignore[union-attr]
-        if section.displacement is not None:
-            amount = self._displacement(section.displacement, f"{key}.displacement")
-            return Input(nodes, direction, "displacement", amount)
-        if section.force is not None:
-            if section.force <= 0.0:
-                raise InvalidProblem(
-                    f"{key}.force: expected a force above 0, got {section.force:g}; turn the "
-                    "direction for the opposite force"
-                )
-            amount = self.units.in_problem("force", section.force) / len(nodes)
-            return Input(nodes, direction, "force", amount)
-        assert base is not None
-        return replace(base, nodes=nodes, direction=direction)
-
-    def _displacement(self, value: float, key: str) -> float:
-        size = float(np.ptp(self.positions, axis=0).max())
-        if value <= 0.0:
-            raise InvalidProblem(
-                f"{key}: expected a length above 0, got {value:g}; turn the direction for the "
-                "opposite motion"
-            )
-        if value > size:
-            raise InvalidProblem(
-                f"{key}: {value:g} mm is more than the size of the domain, {size:.4g} mm; "
-                "lengths without a unit are in mm"
-            )
-        if value < SMALLEST_STROKE * self.spacing:
-            raise InvalidProblem(
-                f"{key}: {value:g} mm is less than a thousandth of the spacing, "
-                f"{self.spacing:g} mm; lengths without a unit are in mm (0.004 m is written "
-                "'0.004m')"
-            )
-        return value / self.part.scale
-
-    def _loads(self, case: CaseSection, key: str) -> Loads:
-        forces, springs = [], []
-        for k, section in enumerate(case.loads):
-            where = f"{key}.loads[{k}]"
-            if (section.force is None) == (section.spring is None):
-                raise InvalidProblem(f"{where}: expected force or spring, and not both")
-            nodes = self._nodes(section.at, f"{where}.at")
-            if section.force is not None:
-                total = self.units.in_problem("force", section.force)
-                forces.append(NodeForce(nodes, total / len(nodes) * np.array(section.direction)))
-            else:
-                springs.append(self._spring(nodes, section, where))
-        weight = None if case.gravity is None else self._weight(case.gravity)
-        return Loads(tuple(forces), tuple(springs), weight)
-
-    def _spring(self, nodes: NDArray[np.int64], section: LoadSection, key: str) -> NodeSpring:
-        assert section.spring is not None
-        if section.spring <= 0.0:
-            raise InvalidProblem(
-                f"{key}.spring: expected a stiffness above 0, got {section.spring}"
-            )
-        stiffness = self.units.in_problem("stiffness", section.spring) / len(nodes)
-        direction: Any = section.direction
-        return NodeSpring(nodes, direction, stiffness)
-
-    def _outputs(self, case: CaseSection, key: str, reader: ItemReader) -> dict[str, Output]:
-        """Return the outputs of a case by name, and read their items."""
-        if not case.outputs:
-            raise InvalidProblem(f"{key}.outputs: expected at least one")
-        outputs: dict[str, Output] = {}
-        for k, section in enumerate(case.outputs):
-            where = f"{key}.outputs[{k}]"
-            alone = len(case.outputs) == 1
-            name = section.name or ("output" if alone else f"output{k + 1}")
-            if name in outputs:
-                raise InvalidProblem(f"{where}.name: the name {name!r} is given twice")
-            outputs[name] = self._output(section, where)
-            for quantity in (
-                "gain", "travel", "off_axis", "rotation", "stiffness", "payload",
-                "blocked_force", "sag",
-            ):  # fmt: skip
-                wanted = getattr(section, quantity)
-                reader.read(quantity, wanted, f"{where}.{quantity}", name)
-            if section.path is not None:
-                x, y = outputs[name].direction[0]
-                reader.path(section.path, (float(x), float(y)), f"{where}.path", name)
-        return outputs
-
-    def _output(self, section: OutputSection, key: str) -> Output:
-        base = None if self.base is None else self.base.output
-        if section.at is None and base is None:
-            raise InvalidProblem(f"key '{key}.at' is missing")
-        nodes = base.nodes if section.at is None else self._nodes(section.at, f"{key}.at")  # type: ignore[union-attr]
-        direction: Any = section.direction
-        if direction is None:
-            direction = (0.0, 1.0) if base is None else base.direction
-        spring = None
-        if section.spring is not None:
-            if section.spring <= 0.0:
-                raise InvalidProblem(
-                    f"{key}.spring: expected a stiffness above 0, got {section.spring:g}"
-                )
-            spring = self.units.in_problem("stiffness", section.spring) / len(nodes)
-        return Output(nodes, direction, spring)
-
     def _limits(self, names: Sequence[str]) -> list[Item]:
         """Return the items that hold in every case."""
         limits, items = self.table.limits, []
@@ -407,16 +236,6 @@ class _Builder:
                 f"{whole:.3g} g, got {mass:g} g"
             )
         return Item(quantity="mass", at_most=self.units.in_problem("volume", mass))
-
-    def _weight(self, direction: tuple[float, float]) -> NDArray[np.float64]:
-        """Return the own weight: force on a unit of volume."""
-        if math.isnan(self.units.density):
-            raise InvalidProblem(
-                f"part.material: the density of {self.part.registered_material.name} is unknown, "
-                "which sag and gravity need; give a material with density"
-            )
-        weight: NDArray[np.float64] = self.units.weight * np.array(direction)
-        return weight
 
     def _with_solid(self, problem: Problem) -> Problem:
         """Return the problem whose solid regions keep all beams."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import cast, get_args
 
@@ -69,18 +68,11 @@ def find_design(name_or_path: str) -> Design:
         return find_problem(name_or_path).full_design()
     if path.suffix == ".json" and path.is_file() and _is_design(path):
         return read_design(path)
-    found = _initial_of_task(name_or_path)
+    task = find_task(name_or_path)
+    found = None if task is None else task.initial_design()
     if found is None and not path.exists():
         found = _design_of_machines(name_or_path)
     return find_problem(name_or_path).full_design() if found is None else found
-
-
-def _initial_of_task(name_or_path: str) -> Design | None:
-    """Return the initial design of a bundled task or of a task file, or None."""
-    task = find_task(name_or_path)
-    if task is None:
-        return None
-    return replace(task.problem.full_design(), provenance={"part": task.part.to_dict()})
 
 
 def hides_problem(name: str) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bellcrank.fem.results import finite
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     CaseEvaluator,
@@ -85,7 +86,7 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
                     row["travel_mm"] / units.length,
                     units.in_problem("stiffness", stiffness),
                 )
-                row["payload_N"] = _finite(payload and units.in_part("force", payload))
+                row["payload_N"] = None if payload is None else units.in_part("force", payload)
             rows.append(row)
     return rows
 
@@ -107,19 +108,19 @@ def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[
     sag = found[Channel("sag", output)][0] if "sag" in names else math.nan
     path = units.in_part("length", 1.0) * found[Channel("displacement", output)]
     return {
-        "efficiency": _finite(gain[-1]),
-        "efficiency_half": _finite(gain[STATES // 2 - 1]),
-        "travel_mm": _finite(units.in_part("length", travel[-1])),
-        "input_mm": _finite(units.in_part("length", moved[-1])),
-        "off_axis": _finite(off_axis),
-        "rotation_deg": _finite(float(np.abs(found[Channel("rotation", output)]).max())),
-        "input_force_N": _finite(units.in_part("force", force[-1])),
-        "largest_input_force_N": _finite(units.in_part("force", force.max())),
-        "strain": _finite(found[Channel("strain")].max()),
-        "output_stiffness_N_per_mm": _finite(
+        "efficiency": finite(gain[-1]),
+        "efficiency_half": finite(gain[STATES // 2 - 1]),
+        "travel_mm": finite(units.in_part("length", travel[-1])),
+        "input_mm": finite(units.in_part("length", moved[-1])),
+        "off_axis": finite(off_axis),
+        "rotation_deg": finite(float(np.abs(found[Channel("rotation", output)]).max())),
+        "input_force_N": finite(units.in_part("force", force[-1])),
+        "largest_input_force_N": finite(units.in_part("force", force.max())),
+        "strain": finite(found[Channel("strain")].max()),
+        "output_stiffness_N_per_mm": finite(
             units.in_part("stiffness", found[Channel("stiffness", output)][0])
         ),
-        "sag_mm": _finite(units.in_part("length", sag)),
+        "sag_mm": finite(units.in_part("length", sag)),
         "limit_points": limit_points(fractions, force),
         "path_mm": np.vstack([np.zeros(path.shape[1]), path]).round(4).tolist(),
     }
@@ -179,7 +180,3 @@ def _payload(
             high = middle
             low = low or 1e-12 * middle
     return low if low > 1e-9 * high else None
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)

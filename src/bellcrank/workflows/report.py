@@ -8,6 +8,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from bellcrank.fem.results import finite
 from bellcrank.mechanics import model_name, objective_name
 from bellcrank.model.storage import write_text
 from bellcrank.workflows.figures import figure_text, model_words
@@ -146,7 +147,7 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "mask": selection.design.mask_hex,
         "checks": report.checks,
         "verified": report.verified,
-        "initial_efficiency": _finite(report.initial_efficiency),
+        "initial_efficiency": finite(report.initial_efficiency),
         "human_efficiency": human.efficiency if human else None,
         "verification": _verification(report),
         "figures": report.figures,
@@ -159,7 +160,7 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         },
         "refused_candidates": selection.refused,
         "proposals": report.proposals,
-        "best_by_chain": [_finite(best) for best in report.best_by_chain],
+        "best_by_chain": [finite(best) for best in report.best_by_chain],
         "settings": report.settings.to_dict(),
     }
 
@@ -202,10 +203,10 @@ def _verification(report: DesignReport) -> dict[str, Any] | None:
         return None
     return {
         "elements": found.elements,
-        "efficiency": _finite(found.response.efficiency),
-        "difference": _finite(difference(report)),
+        "efficiency": finite(found.response.efficiency),
+        "difference": finite(difference(report)),
         "status": found.response.status.label,
-        "principal_strain": _finite(found.strain),
+        "principal_strain": finite(found.strain),
         "fault": found.fault,
     }
 
@@ -316,10 +317,6 @@ def _part_rows(report: DesignReport) -> list[list[str]]:
         ["largest stress, strain", "", f"{last.stress:.2g} MPa, {last.strain:.0%}"],
         ["contact", "", contact],
     ]
-
-
-def _finite(number: float) -> float | None:
-    return number if math.isfinite(number) else None
 
 
 def summary_text(report: DesignReport) -> str:

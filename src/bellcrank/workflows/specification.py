@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT
 from bellcrank.model import QUANTITIES
 from bellcrank.search import SpecificationEvaluator
@@ -38,10 +40,10 @@ def item_label(item: Item, problem: Problem) -> str:
     >>> item_label(problem.specification.items[0], problem)
     'A: gain'
     """
-    several_cases = len(problem.cases) > 1
     wanted = problem.specification
-    outputs = () if wanted is None or not item.case else wanted.output_names(item.case)
-    parts = [item.case] if several_cases and item.case else []
+    assert wanted is not None
+    outputs = wanted.output_names(item.case) if item.case else ()
+    parts = [item.case] if len(wanted.case_names) > 1 and item.case else []
     parts += [item.output] if len(outputs) > 1 and item.output else []
     name = LABELS.get(item.quantity, item.quantity)
     return f"{', '.join(parts)}: {name}" if parts else name
@@ -165,8 +167,8 @@ def item_data(
                 data[key] = units.in_part(dimension, data[key])
         reached = {
             model: {
-                "value": _finite(units.in_part(dimension, each.value)),
-                "margin": _finite(each.margin),
+                "value": finite(units.in_part(dimension, each.value)),
+                "margin": finite(each.margin),
                 "violation": each.violation,
                 "met": each.met,
             }
@@ -197,8 +199,11 @@ def results_for(
     """
     if not problem.is_specified:
         return None
-    evaluator = SpecificationEvaluator(problem, elements)
-    response = evaluator.evaluate(evaluator.groups.with_images(mask), VERIFICATION_INCREMENT)
+    assert problem.specification is not None
+    # The design itself counts, not the symmetric one that a search would make of it.
+    wanted = replace(problem.specification, symmetry=())
+    evaluator = SpecificationEvaluator(replace(problem, specification=wanted), elements)
+    response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
     return evaluator.results() if response.is_admissible else None
 
 
@@ -206,7 +211,3 @@ def binding(results: Sequence[ItemResult]) -> list[ItemResult]:
     """Return the items that are not met, the one that is farthest from being met first."""
     missed = [each for each in results if not each.met]
     return sorted(missed, key=lambda each: -each.violation)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

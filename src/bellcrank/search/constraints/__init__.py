@@ -21,7 +21,7 @@ from bellcrank.search.constraints.constraint import (
     parse_goal,
 )
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator, penalty_of
-from bellcrank.search.constraints.response import printed_struts
+from bellcrank.search.constraints.response import no_contact  # registers
 from bellcrank.search.constraints.structure import mass_of
 from bellcrank.search.mirror import mirror_images
 
@@ -36,7 +36,7 @@ __all__ = [
     "constraints",
     "mass_of",
     "mirror_images",
+    "no_contact",
     "parse_goal",
     "penalty_of",
-    "printed_struts",
 ]

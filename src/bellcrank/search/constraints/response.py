@@ -13,6 +13,7 @@ from bellcrank.mechanics import (
     near_pairs,
     predict_output_stiffness,
 )
+from bellcrank.search.clearance import printed_beams
 from bellcrank.search.constraints.constraint import (
     Constraint,
     ConstraintType,
@@ -129,7 +130,9 @@ def no_contact(_problem: Problem, width: float) -> Constraint:
         return float(np.sum(1.0 - distance / width)) if width else float(len(distance))
 
     def violation(deformed: DeformedDesign) -> float:
-        struts = printed_struts(deformed)
+        problem = deformed.evaluator.problem
+        chosen = printed_beams(problem, deformed.mask, deformed.core)
+        struts = problem.lattice.beams[chosen]
         worst = faults(deformed.positions, struts)
         if deformed.verified:
             evaluator = deformed.evaluator
@@ -141,18 +144,6 @@ def no_contact(_problem: Problem, width: float) -> Constraint:
         return counted(worst)
 
     return Constraint(response_violation=violation, evaluation_cost=3)
-
-
-def printed_struts(deformed: DeformedDesign) -> NDArray[np.int64]:
-    """Return (n, 2) the nodes of beams that carry load or join two held nodes."""
-    problem = deformed.evaluator.problem
-    held = np.zeros(problem.lattice.node_count, dtype=bool)
-    held[problem.supports.fixed] = True
-    if problem.input.drive == "displacement":
-        held[problem.input.nodes] = True
-    between = deformed.mask & held[problem.lattice.beams].all(axis=1)
-    struts: NDArray[np.int64] = problem.lattice.beams[deformed.core | between]
-    return struts
 
 
 for _name, _usage, _parse, _make in (
