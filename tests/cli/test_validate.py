@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("here")
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference" / "crane.problem.json"
-RUBBER = ("--young", 12, "--poisson", 0.48, "--thickness", "5mm", "--scale", "10mm")
+RUBBER = (
+    "--young", 12, "--poisson", 0.48, "--thickness", "5mm", "--scale", "10mm", "--joint", "0mm",
+)  # fmt: skip
 
 
 def validated(*words: object) -> dict[str, Any]:

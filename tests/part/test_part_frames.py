@@ -52,7 +52,7 @@ def test_beams_of_a_frame_have_the_stiffness_of_the_springs(name: str) -> None:
     frame = frame_problem(problem, PartSpec(width=1.6, thickness=4.0, scale=8.0, material="pla"))
     assert frame.section is not None
     assert frame.material is not None
-    assert frame.section == Section(0.2, 0.5)
+    assert frame.section == Section(0.2, 0.5, joint=0.06)
     assert frame.material.poisson == materials["pla"].poisson
     mean = float(problem.lattice.rest_length.mean())
     assert frame.material.young * frame.section.area / mean == pytest.approx(
@@ -101,7 +101,7 @@ def test_a_frame_is_made_anew_from_a_frame() -> None:
 
 def test_struts_of_a_frame_in_space_are_round() -> None:
     tower = frame_problem(in_space(), PartSpec(width=2.0, thickness=5.0))
-    assert tower.section == Section.round(0.2)
+    assert tower.section == Section.round(0.2, joint=0.06)
     assert tower.material is not None
     assert tower.material.poisson == 0.48
 

@@ -123,7 +123,7 @@ def test_a_file_that_describes_no_part_is_refused(tmp_path: Path, text: str, wor
 
 def test_the_part_of_a_section_has_it_in_millimetres() -> None:
     assert PartSpec.of_section(Section(0.15, 0.4), 8.0) == PartSpec(
-        width=1.2, thickness=3.2, scale=8.0
+        width=1.2, thickness=3.2, scale=8.0, joint=0.0
     )
 
 

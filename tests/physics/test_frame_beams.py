@@ -29,25 +29,27 @@ def oriented(positions: Array, ends: Array, normal: Array) -> Array:
 def stiffness(
     rest: Array, axial: float, torsion: float, bending: tuple[float, float], shear: float = np.inf
 ) -> Array:
-    """Return (m, 6) the stiffness of beams from EA, GJ, both EI and the shear stiffness GA."""
+    """Return (m, 8) the stiffness of beams from EA, GJ, both EI and the shear stiffness GA."""
     length = np.linalg.norm(rest[:, 0], axis=1)
     columns = [axial / length, torsion / length]
     for value in bending:
         ratio = 12.0 * value / (shear * length**2)
         flexural = value / (length * (1.0 + ratio))
-        columns += [flexural * (4.0 + ratio), flexural * (2.0 - ratio)]
+        own = flexural * (4.0 + ratio)
+        columns += [own, flexural * (2.0 - ratio), own]
     return np.stack(columns, axis=1)
 
 
 def response(
-    ends: Array, rest: Array, section: Array, u: Array, rotation: Array
+    ends: Array, rest: Array, section: Array, u: Array, rotation: Array, bow: Array | None = None
 ) -> tuple[Array, Array]:
     force, tangent = np.zeros((len(ends), 12)), np.zeros((len(ends), 12, 12))
-    space_beams(ends, rest, section, u, rotation, np.zeros((9, 9, 9)), force, tangent)
+    bow = np.zeros((len(ends), 2)) if bow is None else bow
+    space_beams(ends, rest, section, bow, u, rotation, np.zeros((9, 9, 9)), force, tangent)
     return force, tangent
 
 
-def energy(rest: Array, section: Array, u: Array, rotation: Array) -> float:
+def energy(rest: Array, section: Array, bow: Array, u: Array, rotation: Array) -> float:
     """Return the energy of one beam, by the formulas of the documentation."""
     chord = rest[0] + u[1] - u[0]
     first, second = ((r @ rest[1:].T).T for r in rotation)
@@ -62,9 +64,11 @@ def energy(rest: Array, section: Array, u: Array, rotation: Array) -> float:
         bends.append((-y * angle / q, z * angle / q))
     (a3, a2), (b3, b2) = bends
     longer = np.linalg.norm(chord) - np.linalg.norm(rest[0])
+    for a, b in ((a3, b3), (a2, b2)):
+        longer += bow[0] * (a**2 + b**2) + bow[1] * a * b
     stored = section[0] * longer**2 + section[1] * twist**2
-    stored += section[2] * (a3**2 + b3**2) + 2.0 * section[3] * a3 * b3
-    stored += section[4] * (a2**2 + b2**2) + 2.0 * section[5] * a2 * b2
+    stored += section[2] * a3**2 + 2.0 * section[3] * a3 * b3 + section[4] * b3**2
+    stored += section[5] * a2**2 + 2.0 * section[6] * a2 * b2 + section[7] * b2**2
     return 0.5 * float(stored)
 
 
@@ -74,16 +78,18 @@ def test_forces_and_stiffness_are_derivatives_of_the_energy(size: float) -> None
     ends = np.array([[0, 1]])
     rest = oriented(np.array([[0.0, 0.0, 0.0], [1.3, 0.4, -0.2]]), ends, np.array([0.1, 0.2, 1.0]))
     section = stiffness(rest, 50.0, 3.0, (2.0, 5.0))
+    section[:, [4, 7]] *= 1.3  # the second end has a longer part that does not deform
+    bow = np.array([[0.3, -0.1]])
     u = 0.3 * size * rng.normal(size=(2, 3))
     rotation = Rotation.from_rotvec(size * rng.normal(size=(2, 3))).as_matrix()
-    force, tangent = response(ends, rest, section, u, rotation)
+    force, tangent = response(ends, rest, section, u, rotation, bow)
     assert np.allclose(tangent[0], tangent[0].T, atol=1e-12)
     for _ in range(4):
         way = rng.normal(size=(2, 6))
 
         def along(step: float, way: Array = way) -> float:
             turned = Rotation.from_rotvec(step * way[:, 3:]).as_matrix() @ rotation
-            return energy(rest[0], section[0], u + step * way[:, :3], turned)
+            return energy(rest[0], section[0], bow[0], u + step * way[:, :3], turned)
 
         h = 1e-3
         e = [along(k * h) for k in (-3, -2, -1, 0, 1, 2, 3)]
@@ -102,8 +108,8 @@ def crisfield(frame: PartFrame, u: Array) -> tuple[Array, Array]:
     """
     force, tangent = np.zeros((len(frame.rest), 6)), np.zeros((len(frame.rest), 6, 6))
     for beam, (ends, rest) in enumerate(zip(frame.elements, frame.rest, strict=True)):
-        axial, own, other = frame.stiffness[beam, :3]
-        matrix = np.array([[axial, 0.0, 0.0], [0.0, own, other], [0.0, other, own]])
+        axial, one, other, two = frame.stiffness[beam]
+        matrix = np.array([[axial, 0.0, 0.0], [0.0, one, other], [0.0, other, two]])
         chord = rest + u[ends[1], :2] - u[ends[0], :2]
         before, length = np.hypot(*rest), np.hypot(*chord)
         c, s = chord / length
@@ -124,7 +130,7 @@ def crisfield(frame: PartFrame, u: Array) -> tuple[Array, Array]:
 def crane_states() -> tuple[PartFrame, Array]:
     """Return the frame of a crane and random displacements."""
     design = find_design("machine:crane")
-    frame = part_frame(spec_for(design).of(design), 1)
+    frame = part_frame(spec_for(design).of(design), 2)
     rng = np.random.default_rng(0)
     count = len(frame.positions)
     shift = rng.normal(size=(count, 2))
@@ -135,7 +141,8 @@ def test_plane_beams_equal_the_matrices_of_crisfield() -> None:
     frame, u = crane_states()
     expected_force, expected = crisfield(frame, u)
     force, tangent = np.zeros_like(expected_force), np.zeros_like(expected)
-    plane_beams(frame.elements, frame.rest, frame.stiffness, u, force, tangent)
+    bow = np.zeros((len(frame.rest), 2))
+    plane_beams(frame.elements, frame.rest, frame.stiffness, bow, u, force, tangent)
     assert np.allclose(force, expected_force, rtol=1e-12, atol=1e-12 * abs(force).max())
     assert np.allclose(tangent, expected, rtol=1e-12, atol=1e-12 * abs(tangent).max())
 
@@ -145,7 +152,7 @@ def test_beams_in_space_equal_those_in_the_plane_whatever_the_orientation() -> N
     expected_force, expected = crisfield(frame, u)
     positions = np.column_stack([frame.positions, np.zeros(len(u))])
     rest = oriented(positions, frame.elements, np.array([0.0, 0.0, 1.0]))
-    both = frame.stiffness[:, [0, 0, 1, 2, 1, 2]]
+    both = frame.stiffness[:, [0, 0, 1, 2, 3, 1, 2, 3]]
     shift = np.column_stack([u[:, :2], np.zeros(len(u))])
     turns = np.column_stack([np.zeros((len(u), 2)), u[:, 2]])
     rotation = Rotation.from_rotvec(turns).as_matrix()

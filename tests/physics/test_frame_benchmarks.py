@@ -56,7 +56,7 @@ def test_an_end_moment_rolls_a_cantilever_into_a_circle(dimension: int, turns: f
     # In space the bar bends about its weak axis and so does not buckle.
     section = stiffness(frame.rest, 10.0, 0.05, (rigidity, 0.1))
     if dimension == 2:
-        section = np.ascontiguousarray(section[:, [0, 2, 3, 3, 3, 3]])
+        section = np.ascontiguousarray(section[:, [0, 2, 3, 4]])
     load = np.zeros_like(frame.load)
     load[-1, -1] = 2.0 * np.pi * turns * rigidity / count
     found = equilibrium(replace(frame, section=section, load=load))
@@ -96,8 +96,8 @@ def toggle(count: int, drive: str, amount: float) -> Equilibrium:
     )
     length = frame_of(problem).rest_length
     rigidity = FLEXURAL / unit**2 / length
-    none = np.zeros_like(length)
-    section = np.stack([AXIAL / length, 4.0 * rigidity, 2.0 * rigidity, none, none, none], axis=1)
+    columns = [AXIAL / length, 4.0 * rigidity, 2.0 * rigidity, 4.0 * rigidity]
+    section = np.stack(columns, axis=1)
     held = frame_of(problem).held.copy()
     held[count, 0] = 0
     return equilibrium(frame_of(problem, section=section, held=held))
@@ -186,7 +186,7 @@ def column(count: int, dimension: int, factor: float) -> Equilibrium:
     rigidity = 1e-3 * count**2
     section = stiffness(frame.rest, 1e4, 0.7 * rigidity, (rigidity, 2.0 * rigidity))
     if dimension == 2:
-        section = np.ascontiguousarray(section[:, [0, 2, 3, 3, 3, 3]])
+        section = np.ascontiguousarray(section[:, [0, 2, 3, 4]])
     load = np.zeros_like(frame.load)
     load[-1, 0] = -factor * np.pi**2 * rigidity / (2.0 * count) ** 2
     return equilibrium(replace(frame, section=section, load=load))

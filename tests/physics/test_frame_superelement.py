@@ -18,6 +18,7 @@ from bellcrank.mechanics import (
     free_nodes,
     uniform_motion,
 )
+from bellcrank.mechanics.frames.system import bow_coefficients
 from bellcrank.model import Design, Elasticity, Output, Problem, Section, gallery_design
 from bellcrank.part import PartSpec, frame_problem
 
@@ -216,7 +217,7 @@ def driven(problem: Problem, motion: np.ndarray) -> Equilibrium:
             grounded=grounded,
             drive=drive,
             load=np.zeros_like(whole.load),
-            bow=whole.rest_length / 30.0,
+            bow=bow_coefficients(whole.rest_length, 0.0),
         )
     )
 

@@ -33,7 +33,9 @@ ModelName = Annotated[
 ]
 PartFile = Annotated[
     Path | None,
-    typer.Option("--part", help="TOML file with width, thickness, scale, material and fillet."),
+    typer.Option(
+        "--part", help="TOML file with width, thickness, scale, material, fillet and joint."
+    ),
 ]
 UNLOADED_BEAMS = "Beams that carry no load: keep, prune_dead_ends, or prune_all."
 Width = Annotated[str | None, typer.Option(help="Strut width (for example 2mm). \\[2mm]")]
@@ -41,6 +43,12 @@ Thickness = Annotated[str | None, typer.Option(help="Part thickness. \\[5mm]")]
 Scale = Annotated[str | None, typer.Option(help="Length of a lattice unit. \\[10mm]")]
 Fillet = Annotated[
     str | None, typer.Option(help="Fillet radius between struts. \\[a quarter of the width]")
+]
+Joint = Annotated[
+    str | None,
+    typer.Option(
+        help="Length of the ends of struts that do not deform in frames. \\[0.3 of the width]"
+    ),
 ]
 MaterialName = Annotated[
     str | None, typer.Option(help="Material: ninjaflex, tpu-95a, pla or petg. \\[ninjaflex]")

@@ -17,6 +17,7 @@ from bellcrank.cli.app import FAILED, app
 from bellcrank.cli.arguments import (
     DesignName,
     Fillet,
+    Joint,
     MaterialName,
     PartFile,
     Scale,
@@ -82,6 +83,7 @@ def validate(
     thickness: Thickness = None,
     scale: Scale = None,
     fillet: Fillet = None,
+    joint: Joint = None,
     stroke: Annotated[
         str | None,
         typer.Option(help="Input displacement (for example 4mm); default: that of the problem."),
@@ -121,7 +123,9 @@ def validate(
     check_targets(picture, vtu, overwrite=overwrite)
     target = record or record_of(design)
     _check_record(target, chosen, required=record is not None)
-    lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
+    lengths = {
+        "width": width, "thickness": thickness, "scale": scale, "fillet": fillet, "joint": joint,
+    }  # fmt: skip
     spec = part_of(spec_for(chosen), part, lengths, material, young, poisson)
     plan, missing = without_missing_levels(
         _plan(level, theory, law, linear=linear, elements=elements, size=size)

@@ -39,6 +39,7 @@ number. Both forms can be combined.
     shape = "rectangle"             # or: shape = "round", diameter = 0.2
     width = 0.2                     # in the plane of the lattice, lattice units
     thickness = 0.5                 # normal to it, lattice units
+    joint = 0.05                    # ends of beams that do not deform; optional, 0 by default
 
     [material]                      # of a frame; optional, these are the defaults
     young = 1.0
@@ -331,7 +332,7 @@ def section_of(table: SectionTable | None) -> Section | None:
     if table is None:
         return None
     known = SECTION_KEYS[table.shape]
-    lengths = table.model_dump(exclude={"shape"}, exclude_none=True)
+    lengths = table.model_dump(exclude={"shape", "joint"}, exclude_none=True)
     for key in known:
         if key not in lengths:
             raise InvalidFile(
@@ -344,7 +345,8 @@ def section_of(table: SectionTable | None) -> Section | None:
                 f"unknown key 'section.{key}' (section.shape is {table.shape!r}, whose keys are "
                 f"{', '.join(known)})"
             )
-    return Section(**lengths) if table.shape == "rectangle" else Section.round(**lengths)
+    make = Section if table.shape == "rectangle" else Section.round
+    return make(**lengths, joint=table.joint)
 
 
 def _initial(table: ProblemTable, lattice: Lattice) -> NDArray[np.bool_] | None:

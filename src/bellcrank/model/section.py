@@ -35,12 +35,15 @@ class Section:
         Size normal to the lattice; the diameter of a disc.
     shape
         ``"rectangle"`` or ``"round"``.
+    joint
+        Length of each end of a beam, from the node, that does not deform: where struts meet, they
+        are wider than one strut.
 
     Raises
     ------
     InvalidProblem
-        If a length is not finite and greater than 0, the shape is unknown, or a disc has two
-        diameters.
+        If a length is not finite and greater than 0, the shape is unknown, a disc has two
+        diameters, or joints are longer than half the width.
 
     Examples
     --------
@@ -53,6 +56,7 @@ class Section:
     width: float
     thickness: float
     shape: Shape = "rectangle"
+    joint: float = 0.0
 
     def __post_init__(self) -> None:
         if self.shape not in get_args(Shape):
@@ -67,19 +71,26 @@ class Section:
                 f"section.thickness: expected the diameter {width:g} of a round section, "
                 f"got {thickness:g}"
             )
+        joint = real_array("section.joint", self.joint)
+        if joint.ndim != 0 or not 0.0 <= joint <= 0.5 * width:
+            raise InvalidProblem(
+                f"section.joint: expected a length from 0 to half the width, {0.5 * width:g}, "
+                f"got {self.joint!r}"
+            )
         object.__setattr__(self, "width", width)
         object.__setattr__(self, "thickness", thickness)
+        object.__setattr__(self, "joint", float(joint))
 
     @classmethod
-    def round(cls, diameter: float) -> Section:
+    def round(cls, diameter: float, joint: float = 0.0) -> Section:
         """Return a disc.
 
         Raises
         ------
         InvalidProblem
-            If the diameter is not finite and greater than 0.
+            If the diameter is not finite and greater than 0, or joints are longer than half of it.
         """
-        return cls(diameter, diameter, "round")
+        return cls(diameter, diameter, "round", joint)
 
     @property
     def area(self) -> float:
@@ -145,10 +156,11 @@ class Section:
         Examples
         --------
         >>> Section(2.0, 5.0).scaled(0.1)
-        Section(width=0.2, thickness=0.5, shape='rectangle')
+        Section(width=0.2, thickness=0.5, shape='rectangle', joint=0.0)
         """
         factor = positive_number("factor", factor)
-        return Section(self.width * factor, self.thickness * factor, self.shape)
+        lengths = [factor * each for each in (self.width, self.thickness, self.joint)]
+        return Section(lengths[0], lengths[1], self.shape, lengths[2])
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, as in a problem file.
@@ -158,9 +170,12 @@ class Section:
         >>> Section.round(0.2).to_dict()
         {'shape': 'round', 'diameter': 0.2}
         """
+        data: dict[str, Any] = {"shape": self.shape}
         if self.shape == "round":
-            return {"shape": self.shape, "diameter": self.width}
-        return {"shape": self.shape, "width": self.width, "thickness": self.thickness}
+            data["diameter"] = self.width
+        else:
+            data.update(width=self.width, thickness=self.thickness)
+        return data | ({"joint": self.joint} if self.joint else {})
 
 
 @dataclass(frozen=True, slots=True)

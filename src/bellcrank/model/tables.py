@@ -120,6 +120,7 @@ class SectionTable(Table):
     width: float | None = None
     thickness: float | None = None
     diameter: float | None = None
+    joint: float = 0.0
 
 
 class ElasticityTable(Table):

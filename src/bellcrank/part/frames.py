@@ -52,7 +52,7 @@ def frame_problem(problem: Problem, spec: PartSpec) -> Problem:
     >>> from bellcrank.part import PartSpec
     >>> frame = frame_problem(find_problem("crane"), PartSpec(width=2.0, thickness=5.0))
     >>> frame.section
-    Section(width=0.2, thickness=0.5, shape='rectangle')
+    Section(width=0.2, thickness=0.5, shape='rectangle', joint=0.06)
     >>> round(frame.material.young * frame.section.area, 9), frame.material.poisson
     (10.0, 0.48)
     """
@@ -71,10 +71,7 @@ def frame_section(spec: PartSpec, dimension: int) -> Section:
     >>> frame_section(PartSpec(), 3).shape
     'round'
     """
-    width = spec.width / spec.scale
-    if dimension == 3:
-        return Section.round(width)
-    return Section(width, spec.thickness / spec.scale)
+    return spec.section(dimension).scaled(1.0 / spec.scale)
 
 
 def frame_elasticity(

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Design
 
-LENGTHS = ("width", "thickness", "scale", "fillet")
+LENGTHS = ("width", "thickness", "scale", "fillet", "joint")
+JOINT = 0.3
+"""Length of the ends of struts that do not deform, as a fraction of the width: the joints of frames
+are then as stiff as those of the sheet with its fillets (docs/validation.md)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,20 +40,30 @@ class PartSpec:
     fillet
         Radius in the corners between struts, mm; None for a quarter of the width, or less where
         there is no room for it.
+    joint
+        Length of the ends of struts that do not deform in frames, mm; None for 0.3 of the width.
     material
         Name of a registered material, or a material.
 
     Raises
     ------
-    UnknownName
-        If there is no such material.
+    InvalidSettings
+        If the joint is longer than half the width.
     """
 
     width: float = 2.0
     thickness: float = 5.0
     scale: float = 10.0
     fillet: float | None = None
+    joint: float | None = None
     material: str | Material = "ninjaflex"
+
+    def __post_init__(self) -> None:
+        if self.joint is not None and not 0.0 <= self.joint <= 0.5 * self.width:
+            raise InvalidSettings(
+                f"joint: expected a length from 0 to half the width, {0.5 * self.width:g} mm, got "
+                f"{self.joint:g} mm"
+            )
 
     @property
     def registered_material(self) -> Material:
@@ -68,8 +81,17 @@ class PartSpec:
             length = getattr(self, name)
             if not 0.0 < length < math.inf:
                 raise InvalidSettings(f"{name}: expected a length above 0 mm, got {length:g}")
-        section = Section(self.width, self.thickness)
+        section, modelled = self.section(2), design.problem.section
+        if self.joint is None and modelled is not None:
+            section = replace(section, joint=modelled.joint / modelled.width * self.width)
         return Part(design, self.registered_material, section, self.scale, self.fillet)
+
+    def section(self, dimension: int) -> Section:
+        """Return the cross-section of struts with joints; mm. Round in space."""
+        joint = JOINT * self.width if self.joint is None else self.joint
+        if dimension == 3:
+            return Section.round(self.width, joint)
+        return Section(self.width, self.thickness, joint=joint)
 
     @classmethod
     def of_section(cls, section: Section, scale: float = 10.0) -> PartSpec:
@@ -87,7 +109,7 @@ class PartSpec:
         (1.6, 4.0)
         """
         scaled = section.scaled(scale)
-        return cls(width=scaled.width, thickness=scaled.thickness, scale=scale)
+        return cls(width=scaled.width, thickness=scaled.thickness, scale=scale, joint=scaled.joint)
 
     def changed(self, changes: Mapping[str, Any]) -> PartSpec:
         """Return a copy with some values replaced; lengths may be texts with units.
@@ -150,6 +172,7 @@ class PartTable(Table):
     thickness: Any = None
     scale: Any = None
     fillet: Any = None
+    joint: Any = None
     material: Any = None
 
 

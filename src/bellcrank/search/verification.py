@@ -95,7 +95,7 @@ class Verifier:
     >>> verifier = Verifier(frame_problem(design.problem, PartSpec()), HoppingSettings())
     >>> verification = verifier.verify(design.mask)
     >>> verification.fault, round(verification.response.efficiency, 3)
-    (None, 1.21)
+    (None, 1.182)
     """
 
     def __init__(

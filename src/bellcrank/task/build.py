@@ -266,7 +266,7 @@ def _part(table: TaskTable) -> PartSpec:
         )
     data = {
         "width": given.width, "thickness": given.thickness, "scale": given.spacing,
-        "fillet": given.fillet, "material": given.material,
+        "fillet": given.fillet, "joint": given.joint, "material": given.material,
     }  # fmt: skip
     try:
         part = PartSpec.from_dict({k: v for k, v in data.items() if v is not None}, "part")

@@ -125,6 +125,8 @@ class PartSection(Table):
     """Length of a lattice unit: the distance of neighbouring nodes."""
     fillet: Length | None = None
     """Radius in the corners between struts."""
+    joint: Length | None = None
+    """Length of the ends of struts that do not deform in frames."""
     material: Any = "ninjaflex"
     """Name of a registered material, or a table."""
 

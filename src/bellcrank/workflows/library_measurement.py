@@ -66,7 +66,7 @@ def measure(
     >>> from bellcrank.model import human_design
     >>> entry = measure(human_design("crane"), points=2)
     >>> entry.direction, round(entry.efficiency, 3), round(entry.validation.efficiency, 2)
-    ('left', 1.01, 1.21)
+    ('left', 1.01, 1.18)
     """
     problem = design.problem
     response = model_evaluator(problem).evaluate(design.mask, VERIFICATION_INCREMENT)

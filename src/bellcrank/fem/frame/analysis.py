@@ -13,6 +13,7 @@ from bellcrank.fem.frame.equations import FrameEquations, part_frame
 from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import PathStatus, follow_path
 from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
+from bellcrank.mechanics.frames.analysis import without_ends
 from bellcrank.mechanics.frames.system import theories
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ levels.register("frame")(Level(analyse_frame, check_frame, title="Frame", durati
 
 def point_of(part: Part, frame: PartFrame, state: FrameState) -> StrokePoint:
     """Return the figures of an equilibrium."""
-    stress, strain = fibre_stress_and_strain(part, state)
+    stress, strain = fibre_stress_and_strain(part, frame, state)
     nodes = part.design.problem.input.nodes
     force = state.reaction + state.load * frame.load
     return stroke_point(
@@ -104,13 +105,13 @@ def point_of(part: Part, frame: PartFrame, state: FrameState) -> StrokePoint:
 def energy(frame: PartFrame, state: FrameState) -> float:
     """Return the elastic energy of the struts, N mm."""
     axial, first, second = state.resultants.T
-    extension, own, other = frame.stiffness[:, :3].T
-    bending = own * (first**2 + second**2) - 2.0 * other * first * second
-    return float((axial**2 / extension + bending / (own**2 - other**2)).sum() / 2.0)
+    extension, own1, other, own2 = frame.stiffness.T
+    bending = own2 * first**2 + own1 * second**2 - 2.0 * other * first * second
+    return float((axial**2 / extension + bending / (own1 * own2 - other**2)).sum() / 2.0)
 
 
 def fibre_stress_and_strain(
-    part: Part, state: FrameState
+    part: Part, frame: PartFrame, state: FrameState
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return (e,) the largest absolute stress of each element, MPa, and its largest strain.
 
@@ -118,7 +119,8 @@ def fibre_stress_and_strain(
     von Mises stress.
     """
     section, young = part.section, part.material.young
-    moment = np.abs(state.resultants[:, 1:]).max(axis=1)
+    length = np.linalg.norm(frame.rest, axis=1)[:, None]
+    moment = np.abs(without_ends(state.resultants[:, 1:], frame.rigid / length)).max(axis=1)
     bending = moment * section.width / (2.0 * young * section.inertia)
     axial = state.resultants[:, 0] / (young * section.area)
     # Compression in one direction is extension across it.
@@ -136,7 +138,7 @@ def contacts_of(part: Part, frame: PartFrame, states: Sequence[FrameState]) -> C
 def field_of(part: Part, frame: PartFrame, state: FrameState) -> Field:
     """Return a state for pictures and files, without the nodes that have no struts."""
     nodes, elements = np.unique(frame.elements, return_inverse=True)
-    stress, _ = fibre_stress_and_strain(part, state)
+    stress, _ = fibre_stress_and_strain(part, frame, state)
     return Field(
         frame.positions[nodes],
         state.displacement[nodes, :2],

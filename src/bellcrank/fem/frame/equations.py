@@ -44,7 +44,9 @@ class PartFrame:
         End nodes of the elements, strut by strut.
     struts : (s,) int64
         Lattice beams of the struts.
-    stiffness : (e, 6) float64
+    rigid : (e, 2) float64
+        Lengths of their ends that do not deform, mm.
+    stiffness : (e, 4) float64
         Stiffness of the elements, as `bellcrank.mechanics.frames` defines it.
     held : (n, 3) bool
         Unknowns that supports and the drive prescribe, and all those of nodes without struts.
@@ -59,6 +61,7 @@ class PartFrame:
     positions: NDArray[np.float64]
     elements: NDArray[np.int64]
     struts: NDArray[np.int64]
+    rigid: NDArray[np.float64]
     stiffness: NDArray[np.float64]
     held: NDArray[np.bool_]
     drive: NDArray[np.float64]
@@ -78,7 +81,7 @@ class PartFrame:
 
 
 def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -> PartFrame:
-    """Divide each strut of a part into elements of equal length.
+    """Divide each strut of a part into elements.
 
     Parameters
     ----------
@@ -99,7 +102,8 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
     if elements < 1:
         raise InvalidSettings(f"elements: expected at least 1 in each strut, got {elements}")
     problem, material = part.design.problem, part.material
-    positions, ends = subdivided(part.positions, part.struts.astype(np.int64), elements)
+    struts, joint = part.struts.astype(np.int64), part.section.joint
+    positions, ends, rigid = subdivided(part.positions, struts, elements, joint)
     length = np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1)
     elasticity = Elasticity(material.young, material.poisson)
     drive, load = drive_and_load(problem, len(positions), 3)
@@ -110,7 +114,8 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
         positions=positions,
         elements=ends,
         struts=np.flatnonzero(part.design.mask),
-        stiffness=beam_stiffness(part.section, elasticity, length, theory, 2),
+        rigid=rigid,
+        stiffness=beam_stiffness(part.section, elasticity, length, theory, 2, rigid),
         held=held_unknowns(problem, len(positions), 3) | ~there,
         drive=part.scale * drive * there,
         load=part.stiffness_unit * part.scale * load * there,
@@ -238,7 +243,8 @@ class FrameEquations:
         count = len(self._rest)
         force, tangent = np.empty((count, 6)), np.empty((count, 6, 6))
         plane_beams(
-            self.frame.elements, self._rest, self.frame.stiffness, displacement, force, tangent
+            self.frame.elements, self._rest, self.frame.stiffness, np.zeros((count, 2)),
+            displacement, force, tangent,
         )  # fmt: skip
         return force, tangent
 

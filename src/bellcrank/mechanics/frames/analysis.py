@@ -80,7 +80,7 @@ def deformations(frame: Frame, beams: Ints, start: State, end: State) -> Floats:
 
 def _bowing(bow: Floats, one: Floats, two: Floats) -> Floats:
     """Return (m,) the elongation by end rotations, if the frame includes it."""
-    elongation: Floats = bow * (2.0 * (one * one + two * two) - one * two)
+    elongation: Floats = bow[:, 0] * (one * one + two * two) + bow[:, 1] * one * two
     return elongation
 
 
@@ -108,11 +108,11 @@ def stress_resultants(frame: Frame, beams: Ints, deformation: Floats) -> Floats:
         pairs = [(1, 2, 1)]
     else:
         result[:, 1] = section[:, 1] * deformation[:, 1]
-        pairs = [(2, 4, 2), (3, 5, 4)]
+        pairs = [(2, 4, 2), (3, 5, 5)]
     for one, other, column in pairs:
-        own, carried = section[:, column], section[:, column + 1]
+        first, carried, second = section[:, column : column + 3].T
         a, b = deformation[:, one], deformation[:, other]
-        result[:, one], result[:, other] = own * a + carried * b, carried * a + own * b
+        result[:, one], result[:, other] = first * a + carried * b, carried * a + second * b
     return result
 
 
@@ -120,7 +120,8 @@ def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats
     """Return (m,) the largest principal strain in beams.
 
     Axial strain and bending strain of the outermost fibre, in space with the shear strain of
-    torsion of a round section. Compression in one direction is extension across it.
+    torsion of a round section. Compression in one direction is extension across it. Ends that do
+    not deform have no strain.
 
     Parameters
     ----------
@@ -131,24 +132,36 @@ def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats
     """
     assert problem.section is not None
     assert problem.material is not None
-    radius, nu = 0.5 * problem.section.width, problem.material.poisson
-    section, length = frame.section[beams], frame.rest_length[beams]
-    axial = resultants[:, 0] / (section[:, 0] * length)
+    section = problem.section
+    radius, nu = 0.5 * section.width, problem.material.poisson
+    length, rigid = frame.rest_length[beams], frame.rigid[beams]
+    # From the stiffness of each beam, which may be a part of that of its section.
+    extensional = frame.section[beams, 0] * (length - rigid.sum(axis=1))
+    axial = resultants[:, 0] / extensional
     shear = np.zeros(len(beams))
+    # Moments vary linearly along a beam.
+    share = rigid / length[:, None]
     if resultants.shape[1] == 3:
-        own, carried, moment = section[:, 1], section[:, 2], np.abs(resultants[:, 1:])
+        moment = np.abs(without_ends(resultants[:, 1:], share))
     else:
-        own, carried = section[:, 2], section[:, 3]
-        moment = np.hypot(resultants[:, [2, 4]], resultants[:, [3, 5]])
-        shear = np.abs(resultants[:, 1]) / (section[:, 1] * length) * radius
-    # Both stiffnesses differ by 2 E I / L, also with shear deformation.
-    bending = moment.max(axis=1, initial=0.0) * radius / (0.5 * length * (own - carried))
+        parts = [without_ends(resultants[:, [k, k + 2]], share) for k in (2, 3)]
+        moment = np.hypot(*parts)
+        torsional = frame.section[beams, 1] * (length - rigid.sum(axis=1))
+        shear = np.abs(resultants[:, 1]) * radius / torsional
+    flexural = extensional * (section.inertia / section.area)
+    bending = moment.max(axis=1, initial=0.0) * radius / flexural
     strains = [
         0.5 * (1.0 - nu) * normal + np.hypot(0.5 * (1.0 + nu) * normal, 0.5 * shear)
         for normal in (axial + bending, axial - bending)
     ]
     largest: Floats = np.maximum(*strains)
     return largest
+
+
+def without_ends(moments: Floats, share: Floats) -> Floats:
+    """Return (m, 2) the moments where beams begin to deform, from those at their nodes."""
+    inner: Floats = moments - share * moments.sum(axis=1)[:, None]
+    return inner
 
 
 def strain_of_frame(evaluator: ComputedFrame) -> Strain:

@@ -146,8 +146,8 @@ class CaseEvaluator:
     >>> case.respond(design.mask).status.label
     'converged'
     >>> case.values([Channel("motion", "output")], [0.5, 1.0])["motion", "output"].round(3)
-    array([[ 0.32 ,  0.   , -0.052],
-           [ 0.522,  0.   , -0.095]])
+    array([[ 0.307,  0.   , -0.05 ],
+           [ 0.508,  0.   , -0.092]])
     """
 
     def __init__(

@@ -133,8 +133,16 @@ def in_space(vectors: NDArray[np.float64]) -> Floats:
     return out
 
 
-def subdivided(positions: Floats, beams: Ints, elements: int) -> tuple[Floats, Ints]:
-    """Divide every beam into equal elements.
+def subdivided(
+    positions: Floats, beams: Ints, elements: int, joint: float = 0.0
+) -> tuple[Floats, Ints, Floats]:
+    """Divide every beam into elements.
+
+    Parameters
+    ----------
+    joint
+        Length of each end of a beam that does not deform. It belongs to the first and to the last
+        element; what lies between is divided equally.
 
     Returns
     -------
@@ -142,15 +150,21 @@ def subdivided(positions: Floats, beams: Ints, elements: int) -> tuple[Floats, I
         The nodes, then the inner nodes of each beam in order.
     beams : (M elements, 2) int64
         The elements of each beam in order.
+    rigid : (M elements, 2)
+        Lengths of their ends that do not deform.
     """
     count, inner = len(positions), elements - 1
-    fraction = np.arange(1, elements) / elements
     start, end = positions[beams[:, 0]], positions[beams[:, 1]]
-    between = start[:, None] + fraction[:, None] * (end - start)[:, None]
+    ratio = joint / np.linalg.norm(end - start, axis=1)[:, None]
+    fraction = ratio + (1.0 - 2.0 * ratio) * np.arange(1, elements) / elements
+    between = start[:, None] + fraction[:, :, None] * (end - start)[:, None]
     numbers = count + np.arange(len(beams) * inner).reshape(len(beams), inner)
     along = np.column_stack([beams[:, 0], numbers, beams[:, 1]])
     ends = np.stack([along[:, :-1], along[:, 1:]], axis=-1).reshape(-1, 2)
-    return np.concatenate([positions, between.reshape(-1, positions.shape[1])]), ends
+    rigid = np.zeros((len(beams), elements, 2))
+    rigid[:, 0, 0] = rigid[:, -1, 1] = joint
+    inner_nodes = between.reshape(-1, positions.shape[1])
+    return np.concatenate([positions, inner_nodes]), ends, rigid.reshape(-1, 2)
 
 
 theories: Registry[Callable[[Section, Elasticity], float]] = Registry("theory")
@@ -171,9 +185,23 @@ def timoshenko(section: Section, material: Elasticity) -> float:
 
 
 def beam_stiffness(
-    section: Section, material: Elasticity, length: Floats, theory: str, dimension: int
+    section: Section,
+    material: Elasticity,
+    length: Floats,
+    theory: str,
+    dimension: int,
+    rigid: Floats | None = None,
 ) -> Floats:
-    """Return (m, 6) the stiffness of beams of given lengths, as the kernels expect it.
+    """Return (m, 4) or (m, 8) the stiffness of beams, as the kernels expect it.
+
+    Parameters
+    ----------
+    length : (m,)
+        Their lengths.
+    theory
+        Name in the registry of theories.
+    rigid : (m, 2), optional
+        Lengths of their ends that do not deform.
 
     Raises
     ------
@@ -181,20 +209,42 @@ def beam_stiffness(
         If there is no such theory.
     """
     flexibility = theories[theory](section, material)
-    out = np.zeros((len(length), 6))
-    out[:, 0] = material.young * section.area / length
+    ends = np.zeros((len(length), 2)) if rigid is None else rigid
+    length = length - ends.sum(axis=1)
+    columns = [material.young * section.area / length]
     bending = [section.inertia]
-    first = 1
     if dimension == 3:
-        out[:, 1] = material.shear_modulus * section.torsion_constant / length
-        bending, first = [section.inertia, section.inertia_out_of_plane], 2
-    for k, inertia in enumerate(bending):
+        columns.append(material.shear_modulus * section.torsion_constant / length)
+        bending.append(section.inertia_out_of_plane)
+    # Rotations of the ends of the part that deforms, relative to its own chord.
+    (one, two) = (ends / length[:, None]).T
+    for inertia in bending:
         rigidity = material.young * inertia
         ratio = 12.0 * rigidity * flexibility / length**2
         flexural = rigidity / (length * (1.0 + ratio))
-        out[:, first + 2 * k] = (4.0 + ratio) * flexural
-        out[:, first + 1 + 2 * k] = (2.0 - ratio) * flexural
-    return out
+        own, other = (4.0 + ratio) * flexural, (2.0 - ratio) * flexural
+        both = own + other
+        columns += [
+            own + 2.0 * one * both * (1.0 + one),
+            other + (one + two + 2.0 * one * two) * both,
+            own + 2.0 * two * both * (1.0 + two),
+        ]
+    return np.stack(columns, axis=1)
+
+
+def bow_coefficients(length: Floats, joint: float) -> Floats:
+    """Return (m, 2) the coefficients p and q of the shortening of bent beams.
+
+    Half the integral of the squared slope along a beam of rigid ends and a cubic between them is
+    p (a^2 + b^2) + q a b for end rotations a and b relative to its chord. Without rigid ends p is
+    L / 15 and q is -L / 30.
+    """
+    inner = length - 2.0 * joint
+    ratio = joint / inner
+    chord = 0.5 * inner * ratio**2
+    own = 0.5 * joint + chord + inner / 30.0 * (2.0 + 3.0 * ratio * (1.0 + ratio))
+    other = 2.0 * chord + inner / 30.0 * (6.0 * ratio * (1.0 + ratio) - 1.0)
+    return np.stack([own, other], axis=1)
 
 
 def held_unknowns(problem: Problem, nodes: int, size: int) -> NDArray[np.bool_]:
@@ -282,8 +332,9 @@ def build_frame(
     lattice, dimension = problem.lattice, problem.lattice.dimension
     size = 3 * (dimension - 1)
     chosen = lattice.beams if mask is None else lattice.beams[mask]
-    positions, beams = subdivided(
-        np.array(lattice.positions), chosen.astype(np.int64), elements or 1
+    joint = problem.section.joint
+    positions, beams, rigid = subdivided(
+        np.array(lattice.positions), chosen.astype(np.int64), elements or 1, joint
     )
     nodes = len(positions)
     held = held_unknowns(problem, nodes, size)
@@ -298,7 +349,7 @@ def build_frame(
     space = in_space(positions)
     rest = triads(space[beams[:, 1]] - space[beams[:, 0]])
     length = np.linalg.norm(rest[:, 0], axis=1)
-    section = beam_stiffness(problem.section, problem.material, length, theory, dimension)
+    section = beam_stiffness(problem.section, problem.material, length, theory, dimension, rigid)
     incident_start, incident_beam = incident_beams(positions[:, :2], beams)
     scale = objective.numerator_scale / (objective.denominator or problem.input.amount)
     sensitivity = abs(scale) * len(problem.output.nodes) * max(1.0, objective.exponent - 1.0)
@@ -314,7 +365,8 @@ def build_frame(
         rest=rest,
         rest_length=length,
         section=section,
-        bow=length / 30.0 if elements is None else np.zeros_like(length),
+        bow=bow_coefficients(length, joint) if elements is None else np.zeros((len(length), 2)),
+        rigid=rigid,
         incident_start=incident_start,
         incident_beam=incident_beam,
         held=held.astype(np.uint8),

@@ -40,9 +40,11 @@ class Frame(Bundle):
     rest_length: Floats
     """(M,)"""
     section: Floats
-    """(M, 6) stiffness of the beams; columns as in `plane_beam` or `space_beam`."""
+    """(M, 4) or (M, 8) stiffness of the beams; columns as in `plane_beam` or `space_force`."""
     bow: Floats
-    """(M,) L / 30 where the shortening of bent beams is included, else 0."""
+    """(M, 2) coefficients of the shortening of bent beams where it is included, else 0."""
+    rigid: Floats
+    """(M, 2) lengths of the ends that do not deform."""
     incident_start: Ints
     """(N + 1,) index in `incident_beam` at which the beams of each node begin."""
     incident_beam: Ints

@@ -40,12 +40,14 @@ def elastic_energy(frame: Frame, structure: Structure, state: State, memory: Mem
         stretched = elongation(frame, beam, d)
         total += 0.5 * section[0] * stretched * stretched
         if len(frame.unit) == 3:
-            total += 0.5 * section[1] * (d[1] * d[1] + d[2] * d[2]) + section[2] * d[1] * d[2]
+            total += 0.5 * (section[1] * d[1] * d[1] + section[3] * d[2] * d[2])
+            total += section[2] * d[1] * d[2]
         else:
             total += 0.5 * section[1] * d[1] * d[1]
             for k in range(2):
-                own, other, a, b = section[2 + 2 * k], section[3 + 2 * k], d[2 + k], d[4 + k]
-                total += 0.5 * own * (a * a + b * b) + other * a * b
+                own1, other, own2 = section[2 + 3 * k], section[3 + 3 * k], section[4 + 3 * k]
+                a, b = d[2 + k], d[4 + k]
+                total += 0.5 * (own1 * a * a + own2 * b * b) + other * a * b
     for node in frame.spring_nodes:
         for i in range(3):
             for j in range(3):

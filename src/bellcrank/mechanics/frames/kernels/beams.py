@@ -122,10 +122,10 @@ def elongation(frame: Frame, beam: int, d: Floats) -> float:
     """Return the elongation of a beam, with the shortening by bending, from its deformations."""
     stretched, bow = d[0], frame.bow[beam]
     if len(frame.unit) == 3:
-        return stretched + bow * (2.0 * (d[1] * d[1] + d[2] * d[2]) - d[1] * d[2])
+        return stretched + bow[0] * (d[1] * d[1] + d[2] * d[2]) + bow[1] * d[1] * d[2]
     for k in range(2, 4):
         a, b = d[k], d[k + 2]
-        stretched += bow * (2.0 * (a * a + b * b) - a * b)
+        stretched += bow[0] * (a * a + b * b) + bow[1] * a * b
     return stretched
 
 
@@ -168,14 +168,20 @@ def keep_space_axial(beam: int, memory: Memory) -> None:
 
 @entry
 def plane_beams(
-    ends: Ints, rest: Floats, section: Floats, u: Floats, force: Floats, tangent: Floats
+    ends: Ints,
+    rest: Floats,
+    section: Floats,
+    bow: Floats,
+    u: Floats,
+    force: Floats,
+    tangent: Floats,
 ) -> None:
     """Compute the forces (m, 6) and the stiffness (m, 6, 6) of beams in the plane."""
     for beam in range(len(ends)):
         first, second = u[ends[beam, 0]], u[ends[beam, 1]]
         length = math.sqrt(rest[beam, 0] ** 2 + rest[beam, 1] ** 2)
-        result = plane_beam(rest[beam], length, section[beam], 0.0, first, second)
-        stiffness = plane_stiffness(result, section[beam], 0.0, result.axial, 1.0)
+        result = plane_beam(rest[beam], length, section[beam], bow[beam], first, second)
+        stiffness = plane_stiffness(result, section[beam], bow[beam], result.axial, 1.0)
         fill_plane_force(result, force[beam])
         fill_plane_tangent(stiffness, tangent[beam])
 
@@ -185,6 +191,7 @@ def space_beams(
     ends: Ints,
     rest: Floats,
     section: Floats,
+    bow: Floats,
     u: Floats,
     rotation: Floats,
     work: Floats,
@@ -200,11 +207,11 @@ def space_beams(
         space_force(
             rest[beam],
             section[beam],
-            0.0,
+            bow[beam],
             shift,
             rotation[first],
             rotation[second],
             work,
             force[beam],
         )
-        space_tangent(section[beam], 0.0, work[8, 1, 0], 1.0, work, tangent[beam])
+        space_tangent(section[beam], bow[beam], work[8, 1, 0], 1.0, work, tangent[beam])

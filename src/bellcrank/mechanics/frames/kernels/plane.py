@@ -1,7 +1,8 @@
 """Forces and tangent stiffness of a co-rotational beam in the plane.
 
 The deformations of a beam are its elongation and the rotations of its two ends relative to the
-chord; the beam is linear in them. With n the direction of the chord, t = n turned by 90 degrees,
+chord; the beam is linear in them. A beam may have rigid ends: parts of its length next to the nodes
+that turn with them. With n the direction of the chord, t = n turned by 90 degrees,
 l the length, N the axial force and M1, M2 the end moments, the tangent stiffness is
 
     B' K B + (N / l) z z' + ((M1 + M2) / l^2) (r z' + z r')
@@ -10,10 +11,10 @@ where r is the derivative of the elongation by the end displacements and z / l t
 rotation of the chord (M. A. Crisfield, Non-linear finite element analysis of solids and
 structures, vol. 1, 1991, ch. 7).
 
-A bent beam is shorter. With `bow` = L / 30 the elongation includes the shortening by the mean slope
-squared of its cubic, bow (2 a^2 - a b + 2 b^2) for end rotations a and b, so that compression
-softens the beam against bending and a single element follows the buckling of a strut. With 0 it is
-linear in its deformations.
+A bent beam is shorter by half the integral of its squared slope, p (a^2 + b^2) + q a b for end
+rotations a and b and the coefficients (p, q) of `bow`. The elongation includes this, so that
+compression softens the beam against bending and a single element follows the buckling of a strut.
+With zeros the beam is linear in its deformations.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def plane_deformations(
 
 @kernel
 def plane_beam(
-    rest: Floats, rest_length: float, section: Floats, bow: float, first: Floats, second: Floats
+    rest: Floats, rest_length: float, section: Floats, bow: Floats, first: Floats, second: Floats
 ) -> PlaneBeam:
     """Compute the forces of a beam.
 
@@ -116,15 +117,17 @@ def plane_beam(
     rest, rest_length, first, second
         As in `plane_deformations`.
     section
-        (3,) stiffness: axial EA/L, bending of an end by its own and by the other rotation.
+        (4,) stiffness: axial, bending of the first end by its own and by the other rotation, and
+        of the second end by its own.
     bow
-        L / 30, or 0 to leave out the shortening of a bent beam.
+        (2,) coefficients p and q of the shortening of a bent beam, or zeros.
     """
     elongation, one, two, inverse, c, s = plane_deformations(rest, rest_length, first, second)
-    axial = section[0] * (elongation + bow * (2.0 * (one * one + two * two) - one * two))
-    bow1, bow2 = bow * (4.0 * one - two), bow * (4.0 * two - one)
+    p, q = bow[0], bow[1]
+    axial = section[0] * (elongation + p * (one * one + two * two) + q * one * two)
+    bow1, bow2 = 2.0 * p * one + q * two, 2.0 * p * two + q * one
     moment1 = section[1] * one + section[2] * two + axial * bow1
-    moment2 = section[2] * one + section[1] * two + axial * bow2
+    moment2 = section[2] * one + section[3] * two + axial * bow2
     turn = (bow1 + bow2) * inverse
     return PlaneBeam(
         axial, (moment1 + moment2) * inverse, moment1, moment2, inverse, c, s, -c - turn * s,
@@ -134,7 +137,7 @@ def plane_beam(
 
 @kernel
 def plane_stiffness(
-    beam: PlaneBeam, section: Floats, bow: float, tension: float, softening: float
+    beam: PlaneBeam, section: Floats, bow: Floats, tension: float, softening: float
 ) -> PlaneStiffness:
     """Compute the tangent stiffness of a beam.
 
@@ -147,11 +150,12 @@ def plane_stiffness(
     """
     inverse, c, s = beam.inverse, beam.cosine, beam.sine
     axial = softening * tension
-    own, other = section[1] + 4.0 * bow * axial, section[2] - bow * axial
+    own1, own2 = section[1] + 2.0 * bow[0] * axial, section[3] + 2.0 * bow[0] * axial
+    other = section[2] + bow[1] * axial
     # Displacements: b t t' + e (n t' + t n') + a g g', with the derivative g of the axial force.
     a = section[0]
-    bend = (own + other) * inverse
-    b = (2.0 * bend + axial) * inverse
+    bend1, bend2 = (own1 + other) * inverse, (own2 + other) * inverse
+    b = (bend1 + bend2 + axial) * inverse
     e = softening * beam.shear * inverse
     gx, gy = beam.slope_x, beam.slope_y
     xx = b * s * s - 2.0 * e * c * s + a * gx * gx
@@ -159,8 +163,8 @@ def plane_stiffness(
     yy = b * c * c + 2.0 * e * c * s + a * gy * gy
     g1, g2 = a * beam.bow1, a * beam.bow2
     return PlaneStiffness(
-        xx, xy, yy, gx * g1 - bend * s, gy * g1 + bend * c, gx * g2 - bend * s, gy * g2 + bend * c,
-        own + g1 * beam.bow1, other + g1 * beam.bow2, own + g2 * beam.bow2,
+        xx, xy, yy, gx * g1 - bend1 * s, gy * g1 + bend1 * c, gx * g2 - bend2 * s,
+        gy * g2 + bend2 * c, own1 + g1 * beam.bow1, other + g1 * beam.bow2, own2 + g2 * beam.bow2,
     )  # fmt: skip
 
 

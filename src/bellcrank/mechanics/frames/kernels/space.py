@@ -84,7 +84,7 @@ def space_deformations(
 def space_force(
     rest: Floats,
     section: Floats,
-    bow: float,
+    bow: Floats,
     shift: Floats,
     rotation1: Floats,
     rotation2: Floats,
@@ -98,10 +98,10 @@ def space_force(
     rest
         (4, 3) vector along the beam at rest, then its triad, one vector a row.
     section
-        (6,) stiffness: axial EA/L, torsion GJ/L, bending about t3 of an end by its own and by the
-        other rotation, the same about t2.
+        (8,) stiffness: axial, torsion, bending about t3 of the first end by its own and by the
+        other rotation and of the second end by its own, the same three about t2.
     bow
-        L / 30, or 0 to leave out the shortening of a bent beam.
+        (2,) coefficients of the shortening of a bent beam, as in the plane, or zeros.
     shift
         (3,) displacement of the second end relative to the first.
     rotation1, rotation2
@@ -118,13 +118,13 @@ def space_force(
     stretched = d[0]
     for k in range(2, 4):
         a, b = d[k], d[k + 2]
-        stretched += bow * (2.0 * (a * a + b * b) - a * b)
-        slope[k], slope[k + 2] = bow * (4.0 * a - b), bow * (4.0 * b - a)
+        stretched += bow[0] * (a * a + b * b) + bow[1] * a * b
+        slope[k], slope[k + 2] = 2.0 * bow[0] * a + bow[1] * b, 2.0 * bow[0] * b + bow[1] * a
     q[0], q[1] = section[0] * stretched, section[1] * d[1]
     for k in range(2):
-        own, other = section[2 + 2 * k], section[3 + 2 * k]
-        q[2 + k] = own * d[2 + k] + other * d[4 + k] + q[0] * slope[2 + k]
-        q[4 + k] = other * d[2 + k] + own * d[4 + k] + q[0] * slope[4 + k]
+        own1, other, own2 = section[2 + 3 * k], section[3 + 3 * k], section[4 + 3 * k]
+        q[2 + k] = own1 * d[2 + k] + other * d[4 + k] + q[0] * slope[2 + k]
+        q[4 + k] = other * d[2 + k] + own2 * d[4 + k] + q[0] * slope[4 + k]
     length = math.sqrt(dot(chord, chord))
     for i in range(9):
         gradient[0, i] = chord[i] / length if i < 3 else 0.0
@@ -163,7 +163,7 @@ def end_gradients(
 
 @kernel
 def space_tangent(
-    section: Floats, bow: float, tension: float, softening: float, work: Floats, tangent: Floats
+    section: Floats, bow: Floats, tension: float, softening: float, work: Floats, tangent: Floats
 ) -> None:
     """Compute the tangent stiffness of a beam after `space_force`.
 
@@ -184,7 +184,7 @@ def space_tangent(
     add_twist_hessian(work[7, 4:7], moments[1], work[1], matrix)
     add_end(chord, work[7, 1:4], FIRST, moments[2:4], work[4], work[2], matrix)
     add_end(chord, work[7, 4:7], SECOND, moments[4:6], work[5], work[2], matrix)
-    add_stiffness(section, bow * softening * tension, gradient, matrix)
+    add_stiffness(section, bow, softening * tension, gradient, matrix)
     spread(matrix, tangent)
 
 
@@ -219,16 +219,21 @@ def add_end(
 
 
 @kernel
-def add_stiffness(section: Floats, bowing: float, gradient: Floats, matrix: Floats) -> None:
-    """Add the stiffness of the deformations to the matrix; `bowing` is bow times the tension."""
+def add_stiffness(
+    section: Floats, bow: Floats, tension: float, gradient: Floats, matrix: Floats
+) -> None:
+    """Add the stiffness of the deformations to the matrix."""
+    bowing = 2.0 * bow[0] * tension
     for i in range(9):
         for j in range(9):
             value = section[0] * gradient[6, i] * gradient[6, j]
             value += section[1] * gradient[1, i] * gradient[1, j]
             for k in range(2):
                 a, b = gradient[2 + k], gradient[4 + k]
-                own, other = section[2 + 2 * k] + 4.0 * bowing, section[3 + 2 * k] - bowing
-                value += own * (a[i] * a[j] + b[i] * b[j]) + other * (a[i] * b[j] + b[i] * a[j])
+                own1, own2 = section[2 + 3 * k] + bowing, section[4 + 3 * k] + bowing
+                other = section[3 + 3 * k] + bow[1] * tension
+                value += own1 * a[i] * a[j] + own2 * b[i] * b[j]
+                value += other * (a[i] * b[j] + b[i] * a[j])
             matrix[i, j] += value
 
 
