@@ -100,6 +100,13 @@ def design(
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE, any other setting of the search; repeatable."),
     ] = None,
+    refine: Annotated[
+        bool,
+        typer.Option(
+            "--refine/--no-refine",
+            help="Move the nodes of the design of a task with a specification after the search.",
+        ),
+    ] = True,
     workers: Annotated[
         int | None,
         typer.Option(help="Number of chains that run in parallel; does not change results."),
@@ -162,7 +169,7 @@ def design(
             folder = reopen_design(resume)
             warn_of_another_version(folder.provenance, "run")
         else:
-            folder = start_design(task, settings, out or _new_folder(task), part)
+            folder = start_design(task, settings, out or _new_folder(task), part, refine=refine)
             _print_stroke(task, 10.0 if part is None else part.scale)
         command = f"bellcrank design --resume {shlex.quote(str(folder.path))}"
         stop.hint = f"Stopped. To continue: {plain(command)}"
@@ -309,6 +316,7 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
 
 def _print_report(report: DesignReport) -> None:
     """Print the results in a table, with warnings."""
+    from bellcrank.workflows.refinement import refinement_text
     from bellcrank.workflows.report import (
         figure_table,
         item_table,
@@ -324,6 +332,8 @@ def _print_report(report: DesignReport) -> None:
             results.print(text_grid(rows))
             if report.part is not None:
                 results.print()
+    if report.refinement is not None:
+        table.add_row("refined", refinement_text(report.refinement))
     table.add_row("before cleaning", f"{selection.efficiency_before:.4f}")
     table.add_row("initial design", f"{report.initial_efficiency:.4f}")
     if report.human_response is not None:

@@ -18,6 +18,7 @@ COMMANDS = {
     "evaluate": "evaluate",
     "characterise": "characterise",
     "validate": "validate",
+    "refine": "refine",
     "export": "export",
     "print": "print_part",
     "card": "card",

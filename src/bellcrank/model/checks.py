@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from bellcrank.errors import InvalidProblem
-from bellcrank.model.arrays import check_ids
+from bellcrank.model.arrays import check_ids, real_array
 from bellcrank.model.conditions import ROLLERS, Aggregate
 from bellcrank.model.section import Elasticity, Section
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.model.conditions import Input, Output, Supports
     from bellcrank.model.lattice import Lattice
@@ -51,15 +51,36 @@ def check_section(lattice: Lattice, section: object, material: object) -> None:
         )
 
 
-def check_slender(lattice: Lattice, section: Section, possible: NDArray[np.bool_]) -> None:
+def check_widths(
+    lattice: Lattice, section: Section | None, widths: ArrayLike | None
+) -> NDArray[np.float64] | None:
+    """Return the widths of beams (M,), if any are given."""
+    if widths is None:
+        return None
+    if section is None:
+        raise InvalidProblem("widths: expected a problem with a section; springs have no width")
+    given = real_array("widths", widths)
+    if given.shape != (lattice.beam_count,):
+        raise InvalidProblem(
+            f"widths: expected shape ({lattice.beam_count},), one for each beam, got {given.shape}"
+        )
+    if not (given > 0.0).all():
+        wrong = int(np.argmin(given))
+        raise InvalidProblem(f"widths[{wrong}]: expected a number above 0, got {given[wrong]:g}")
+    return given
+
+
+def check_slender(
+    lattice: Lattice, section: Section, widths: NDArray[np.float64], possible: NDArray[np.bool_]
+) -> None:
     """Check that no beam that may be present, `possible` (M,), is shorter than wide."""
     lengths = np.where(possible, lattice.rest_length, np.inf)
-    shortest = int(lengths.argmin())
+    worst = int((lengths / widths).argmin())
     name = "diameter" if section.shape == "round" else "width"
-    if section.width >= lengths[shortest]:
+    if widths[worst] >= lengths[worst]:
         raise InvalidProblem(
-            f"section.{name}: beams {section.width:g} wide are not slender where "
-            f"beams[{shortest}] is {lengths[shortest]:g} long; expected a smaller {name}"
+            f"section.{name}: beams {widths[worst]:g} wide are not slender where "
+            f"beams[{worst}] is {lengths[worst]:g} long; expected a smaller {name}"
         )
 
 

@@ -26,6 +26,7 @@ from bellcrank.model.checks import (
     check_section,
     check_slender,
     check_texts,
+    check_widths,
 )
 from bellcrank.model.conditions import Aggregate, Input, Output, Stiffness, Supports
 from bellcrank.model.loads import Loads
@@ -86,6 +87,9 @@ class Problem:
         Forces, springs and own weight besides the input; only for frames.
     specification
         What a design must meet, with further outputs and load cases; only for frames.
+    widths : (M,) float64, lattice units
+        Width of each beam of a frame in the plane of the lattice, in space its diameter; None if
+        all have that of the section.
 
     Raises
     ------
@@ -133,6 +137,7 @@ class Problem:
     material: Elasticity | None = None
     loads: Loads = Loads()  # noqa: RUF009 - frozen, so it is safe to share
     specification: Specification | None = None
+    widths: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         lattice, given = self.lattice, self.input
@@ -167,10 +172,12 @@ class Problem:
             )
         object.__setattr__(self, "initial", locked(initial))
         object.__setattr__(self, "designable", locked(designable))
+        widths = check_widths(lattice, self.section, self.widths)
+        object.__setattr__(self, "widths", None if widths is None else locked(widths))
         if self.section is not None:
             possible = initial.copy()
             possible[designable] = True
-            check_slender(lattice, self.section, possible)
+            check_slender(lattice, self.section, self.beam_widths, possible)
         for case in () if self.specification is None else self.specification.cases:
             self._problem_of(case)
 
@@ -188,6 +195,40 @@ class Problem:
         """Whether the problem says what a design must meet or maximise."""
         wanted = self.specification
         return wanted is not None and bool(wanted.items or wanted.maximise)
+
+    @property
+    def beam_widths(self) -> NDArray[np.float64]:
+        """Width of each beam of a frame, (M,), lattice units."""
+        if self.widths is not None:
+            return self.widths
+        assert self.section is not None
+        return np.full(self.lattice.beam_count, self.section.width)
+
+    def with_geometry(
+        self, positions: NDArray[np.float64], widths: NDArray[np.float64] | None
+    ) -> Problem:
+        """Return the same problem with its nodes elsewhere and other widths of its beams.
+
+        Parameters
+        ----------
+        positions : (N, d) float64, lattice units
+        widths : (M,) float64, lattice units
+            None for the width of the section.
+
+        Raises
+        ------
+        InvalidProblem
+            If a beam is not longer than wide.
+
+        Examples
+        --------
+        >>> from bellcrank.model import Section, find_problem
+        >>> crane = replace(find_problem("crane"), section=Section(0.2, 0.5))
+        >>> wide = crane.with_geometry(crane.lattice.positions, np.full(352, 0.25))
+        >>> wide.beam_widths[:2]
+        array([0.25, 0.25])
+        """
+        return replace(self, lattice=replace(self.lattice, positions=positions), widths=widths)
 
     @property
     def special_nodes(self) -> NDArray[np.int64]:
@@ -357,6 +398,8 @@ def problem_to_dict(problem: Problem) -> dict[str, Any]:
     if problem.section is not None and problem.material is not None:
         data["section"] = problem.section.to_dict()
         data["material"] = asdict(problem.material)
+    if problem.widths is not None:
+        data["widths"] = problem.widths.tolist()
     if problem.loads:
         data["loads"] = problem.loads.to_dict()
     if problem.specification is not None:

@@ -157,6 +157,7 @@ def _build(table: ProblemTable) -> Problem:
         material=elasticity_of(table.material),
         loads=_loads(lattice, table.loads, "loads"),
         specification=_specification(lattice, table.specification),
+        widths=table.widths,  # type: ignore[arg-type]  # checked there
     )
     return _freeze(problem, table)
 

@@ -151,3 +151,4 @@ class ProblemTable(Table):
     material: ElasticityTable | None = None
     loads: LoadsTable = LoadsTable()
     specification: SpecificationTable | None = None
+    widths: list[float] | None = None

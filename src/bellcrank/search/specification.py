@@ -96,7 +96,7 @@ class SpecificationEvaluator:
         section = problem.section
         assert section is not None
         self._volume = section.area * problem.lattice.rest_length
-        self._cases: dict[str, _Case] = {}
+        self.cases: dict[str, _Case] = {}
         for name, case in problem.cases.items():
             payloads = {
                 item.output: item.at_least
@@ -115,7 +115,7 @@ class SpecificationEvaluator:
             used = [self.items[k] for k in chosen]
             cheap = [channel for channel in channels if channel.name in CHEAP]
             fractions = fractions_of(used, verified=False)
-            self._cases[name] = _Case(evaluator, chosen, channels, cheap, fractions)
+            self.cases[name] = _Case(evaluator, chosen, channels, cheap, fractions)
         self.records: dict[str, StrokeRecord] = {}
         self.violations = np.ones(len(self.items))
         self._extended: dict[str, FrameEvaluator] = {}
@@ -151,7 +151,7 @@ class SpecificationEvaluator:
         if bounded and (early := self._bound(design, structural, lower_bound)) is not None:
             return early
         responses = []
-        for case in self._cases.values():
+        for case in self.cases.values():
             response = case.evaluator.respond(
                 design, largest_increment, warm_start=warm_start,
                 lower_bound=-1e300 if warm_start else -math.inf,
@@ -181,20 +181,20 @@ class SpecificationEvaluator:
         """Yield records with ever more quantities, the cheap ones first; the last is complete."""
         at_end = frozenset() if verified else frozenset({"strain"})
         records = {}
-        for name, case in self._cases.items():
+        for name, case in self.cases.items():
             fractions = case.fractions
             if verified:
                 fractions = fractions_of([self.items[k] for k in case.items], verified=True)
             channels = case.evaluator.values(case.cheap, fractions.tolist(), at_end)
             records[name] = StrokeRecord(fractions, channels, structural, case.evaluator.payloads)
         yield records
-        for name, case in self._cases.items():
+        for name, case in self.cases.items():
             now = records[name]
             others = [channel for channel in case.channels if channel not in now.channels]
             found = case.evaluator.values(others, now.fractions.tolist(), at_end)
             records[name] = replace(now, channels={**now.channels, **found})
         yield records
-        for name in self._cases:
+        for name in self.cases:
             given = self._given(name, design, verified=verified)
             records[name] = replace(records[name], given={**structural, **given})
         yield records
@@ -205,7 +205,7 @@ class SpecificationEvaluator:
         """Return a response if the state at full load alone shows that the score is too low."""
         records = {}
         first = None
-        for name, case in self._cases.items():
+        for name, case in self.cases.items():
             response = case.evaluator.respond(design, warm_start=True, lower_bound=math.inf)
             first = first or response
             if response.status is not Status.UNVERIFIED:
@@ -222,7 +222,7 @@ class SpecificationEvaluator:
 
     def _given(self, name: str, design: NDArray[np.bool_], *, verified: bool) -> dict[str, float]:
         """Return the quantities of a case that do not follow from channels."""
-        case = self._cases[name]
+        case = self.cases[name]
         wanted = {self.items[k].quantity: self.items[k].at_least or 0.0 for k in case.items}
         given: dict[str, float] = {}
         if (bound := wanted.get("clearance")) is not None:
@@ -235,7 +235,7 @@ class SpecificationEvaluator:
     def _stable_stroke(self, name: str, design: NDArray[np.bool_], bound: float) -> float:
         """Return the part of the stroke up to which a design is stable, at most a bound."""
         if name not in self._extended:
-            problem = self._cases[name].evaluator.problem
+            problem = self.cases[name].evaluator.problem
             given = replace(problem.input, amount=bound * problem.input.amount)
             self._extended[name] = FrameEvaluator(
                 replace(problem, input=given), "displacement", self.elements
@@ -332,7 +332,7 @@ class SpecificationEvaluator:
 
     def set_reference(self) -> None:
         """Make the design evaluated last the reference of warm starts."""
-        for case in self._cases.values():
+        for case in self.cases.values():
             case.evaluator.set_reference()
 
     def predict_flips(self, mask: NDArray[np.bool_]) -> FlipPrediction | None:
@@ -346,7 +346,7 @@ class SpecificationEvaluator:
         records = {}
         volume = float(self._volume @ design)
         sign = np.where(design[members], -1.0, 1.0)
-        for name, case in self._cases.items():
+        for name, case in self.cases.items():
             now = self.records[name]
             found = case.evaluator.predict_flips(now.channels, members)
             if found is None:

@@ -236,6 +236,7 @@ def _search(
         if report is None and listener.command == "stop":
             try:
                 report = conclude(folder, settings, reporter.verifying)
+                assert report is not None  # without a request to stop
             except InvalidSettings:
                 return {"kind": "paused", "message": NO_DESIGN_YET}
             return {"kind": "stopped", "efficiency": report.selection.efficiency_after}

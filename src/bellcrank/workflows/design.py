@@ -42,6 +42,7 @@ from bellcrank.storage import RunFolder, check_no_run, remove_temporaries
 from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows.figures import figures_of, model_record
 from bellcrank.workflows.part_figures import part_figures
+from bellcrank.workflows.refinement import refine_selection, refinement_data
 from bellcrank.workflows.report import RESULTS, DesignReport, write_report
 from bellcrank.workflows.validation import Validation, replace_record, validate
 
@@ -66,7 +67,12 @@ def prepare(problem: Problem, settings: SearchSettings) -> None:
 
 
 def start_design(
-    problem: Problem, settings: SearchSettings, out: Path, part: PartSpec | None = None
+    problem: Problem,
+    settings: SearchSettings,
+    out: Path,
+    part: PartSpec | None = None,
+    *,
+    refine: bool = True,
 ) -> RunFolder:
     """Create the folder of a design job.
 
@@ -82,6 +88,8 @@ def start_design(
         Part to be designed. The beams of a problem of the spring model become its struts; a
         problem with a section keeps it. Without goals of its own, the search has the goal that no
         two struts come nearer than their width.
+    refine
+        Whether the selected design of a task with a specification is refined.
 
     Raises
     ------
@@ -93,7 +101,7 @@ def start_design(
         If the folder cannot be written.
     """
     check_no_run(out)
-    notes = {}
+    notes: dict[str, Any] = {}
     if part is not None:
         problem = models["frames"](problem, part)
         if problem.lattice.dimension == 2:
@@ -103,6 +111,7 @@ def start_design(
             settings = replace(settings, goals=(f"no-contact {problem.section.width:g}",))
     if problem.is_specified:
         problem = with_stable_initial(problem, settings)
+        notes["refine"] = refine
     prepare(problem, settings)
     return RunFolder.create(out, problem, settings.to_dict(), notes=notes)
 
@@ -159,9 +168,10 @@ def complete_design(
         try:
             done = run_chains(folder, settings, workers=workers, progress=progress, stop=stop)
             if done:
-                report = conclude(folder, settings, verifying)
-                folder.finish()
-                return report
+                report = conclude(folder, settings, verifying, stop)
+                if report is not None:
+                    folder.finish()
+                    return report
         except BaseException:
             _try_to_mark_stopped(folder)
             raise
@@ -217,10 +227,16 @@ def conclude(
     folder: RunFolder,
     settings: SearchSettings,
     verifying: Callable[[int, int], None] = lambda _done, _total: None,
-) -> DesignReport:
-    """Select, clean, verify and compare a design, and write the result files.
+    stop: threading.Event | None = None,
+) -> DesignReport | None:
+    """Select, clean, verify, refine and compare a design, and write the result files.
 
     Candidates of a frame are verified with more elements (`bellcrank.search.verification`).
+
+    Returns
+    -------
+    DesignReport or None
+        None if the refinement was stopped before its end.
 
     Raises
     ------
@@ -235,6 +251,13 @@ def conclude(
     candidates, proposals, best = accepted_candidates(folder, settings)
     limit = math.nan if spec is None else spec.registered_material.strain_limit
     selection = select_design(problem, candidates, settings, limit, verifying)
+    refinement = None
+    if folder.provenance.get("refine"):
+        selection, refinement = refine_selection(
+            selection, lambda _progress: stop is None or not stop.is_set()
+        )
+        if stop is not None and stop.is_set():
+            return None
     elements = None if problem.section is None else ELEMENTS
     all_beams = verification_evaluator(problem, settings, elements, goals=())
     human = human_counterpart(problem)
@@ -254,6 +277,7 @@ def conclude(
         best_by_chain=best,
         figures=_figures(selection),
         part=spec,
+        refinement=refinement,
         validation=_validated(selection.design, spec),
         part_figures=[] if spec is None or without else part_figures(selection.design, spec),
     )
@@ -310,4 +334,5 @@ def _origin(report: DesignReport) -> dict[str, Any]:
         "efficiency_before_cleaning": report.selection.efficiency_before,
         "checks": report.checks,
         "status": report.selection.response.status.label,
+        **({} if report.refinement is None else {"refinement": refinement_data(report.refinement)}),
     }

@@ -12,6 +12,7 @@ from bellcrank.fem.results import finite
 from bellcrank.mechanics import model_name, objective_name
 from bellcrank.model.storage import write_text
 from bellcrank.workflows.figures import figure_text, model_words
+from bellcrank.workflows.refinement import refinement_data
 from bellcrank.workflows.specification import binding, item_data, item_rows
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from bellcrank.mechanics import ItemResult, Response
     from bellcrank.model import Design
     from bellcrank.part import PartSpec
+    from bellcrank.refine import Refinement
     from bellcrank.search import SearchSettings, Selection
     from bellcrank.storage import RunFolder
     from bellcrank.workflows.validation import Validation
@@ -64,6 +66,8 @@ class DesignReport:
         frame also with the elements of its verification.
     part
         Part for which the design was searched, if any.
+    refinement
+        How the design was refined after the search, if it was.
     validation
         Frame analysis of that part, if it is in the plane and all its pieces are supported.
     part_figures
@@ -81,6 +85,7 @@ class DesignReport:
     best_by_chain: list[float]
     figures: list[dict[str, Any]]
     part: PartSpec | None = None
+    refinement: Refinement | None = None
     validation: Validation | None = None
     part_figures: list[dict[str, Any]] = field(default_factory=list)
 
@@ -152,6 +157,7 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "verification": _verification(report),
         "figures": report.figures,
         **_specification(report),
+        "refinement": None if report.refinement is None else refinement_data(report.refinement),
         "part_figures": report.part_figures,
         "as_part": _as_part(report),
         "found": {

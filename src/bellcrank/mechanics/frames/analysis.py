@@ -133,7 +133,7 @@ def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats
     assert problem.section is not None
     assert problem.material is not None
     section = problem.section
-    radius, nu = 0.5 * section.width, problem.material.poisson
+    radius, nu = 0.5 * frame.width[beams], problem.material.poisson
     length, rigid = frame.rest_length[beams], frame.rigid[beams]
     # From the stiffness of each beam, which may be a part of that of its section.
     extensional = frame.section[beams, 0] * (length - rigid.sum(axis=1))
@@ -148,7 +148,8 @@ def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats
         moment = np.hypot(*parts)
         torsional = frame.section[beams, 1] * (length - rigid.sum(axis=1))
         shear = np.abs(resultants[:, 1]) * radius / torsional
-    flexural = extensional * (section.inertia / section.area)
+    gyration = section.inertia / section.area * (frame.width[beams] / section.width) ** 2
+    flexural = extensional * gyration
     bending = moment.max(axis=1, initial=0.0) * radius / flexural
     strains = [
         0.5 * (1.0 - nu) * normal + np.hypot(0.5 * (1.0 + nu) * normal, 0.5 * shear)

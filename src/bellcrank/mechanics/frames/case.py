@@ -167,7 +167,7 @@ class CaseEvaluator:
         self._points: list[_Point] = []
         self._states: dict[float, Equilibrium | None] = {}
         self._mask: NDArray[np.bool_] = problem.initial
-        self._warm = False
+        self._warm, self._increment = False, 1.0
         self._converged: list[FrameEvaluator] = []
 
     def respond(
@@ -180,7 +180,7 @@ class CaseEvaluator:
     ) -> Response:
         """Compute the response to the input; as `FrameEvaluator.evaluate`."""
         self._points, self._states = [], {}
-        self._mask, self._warm = mask, warm_start
+        self._mask, self._warm, self._increment = mask, warm_start, largest_increment
         self._converged = []
         response = self.frame.evaluate(
             mask, largest_increment, warm_start=warm_start, lower_bound=lower_bound
@@ -235,7 +235,7 @@ class CaseEvaluator:
                 ends = [each for each in wanted if each.name in single]
                 found |= self._measured(self.frame, [self.state(1.0)], ends, 1)
             else:
-                evaluator = self._other(load, output)
+                evaluator = self.other(load, output)
                 state = self._state_of(load, evaluator)
                 found |= self._measured(evaluator, [state], wanted, 1)
         return found
@@ -251,7 +251,7 @@ class CaseEvaluator:
             self._states[fraction] = found
         return self._states[fraction]
 
-    def _other(self, load: Load, output: str) -> FrameEvaluator:
+    def other(self, load: Load, output: str) -> FrameEvaluator:
         """Return the evaluator of another load than the input."""
         if (load, output) not in self._others:
             elements = self.frame.elements
@@ -270,7 +270,7 @@ class CaseEvaluator:
         """Return the state of another load in which its channels are measured."""
         if load == "weight":
             return evaluator.at_rest(self._mask)
-        response = evaluator.evaluate(self._mask, warm_start=self._warm)
+        response = evaluator.evaluate(self._mask, self._increment, warm_start=self._warm)
         if response.status is not Status.CONVERGED:
             return None
         self._converged.append(evaluator)
@@ -346,7 +346,7 @@ class CaseEvaluator:
             channel: np.repeat(value[None], len(beams), axis=0) for channel, value in values.items()
         }
         changed, strain = np.zeros(len(beams), dtype=bool), np.zeros(len(beams))
-        for point in self._merged_points():
+        for point in self.merged_points():
             found = point.evaluator.flip_changes(
                 point.equilibrium, point.measured, beams, first_order=False
             )
@@ -365,7 +365,7 @@ class CaseEvaluator:
                 after[channel][:, row] = quantity.combine(moved)
         return after, changed, strain
 
-    def _merged_points(self) -> list[_Point]:
+    def merged_points(self) -> list[_Point]:
         """Return the measured equilibria, each once with all its channels."""
         merged: dict[int, _Point] = {}
         for point in self._points:

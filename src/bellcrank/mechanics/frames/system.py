@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.kernels.arrays import Floats, Ints
     from bellcrank.mechanics.objectives import Objective
     from bellcrank.model import Elasticity, Problem, Section
+
+    Complex = NDArray[np.complexfloating[Any, Any]]
 
 
 def allocate_state(nodes: int, size: int) -> State:
@@ -134,13 +137,13 @@ def in_space(vectors: NDArray[np.float64]) -> Floats:
 
 
 def subdivided(
-    positions: Floats, beams: Ints, elements: int, joint: float = 0.0
+    positions: Floats, beams: Ints, elements: int, joint: Floats | float = 0.0
 ) -> tuple[Floats, Ints, Floats]:
     """Divide every beam into elements.
 
     Parameters
     ----------
-    joint
+    joint : float or (M,)
         Length of each end of a beam that does not deform. It belongs to the first and to the last
         element; what lies between is divided equally.
 
@@ -155,7 +158,7 @@ def subdivided(
     """
     count, inner = len(positions), elements - 1
     start, end = positions[beams[:, 0]], positions[beams[:, 1]]
-    ratio = joint / np.linalg.norm(end - start, axis=1)[:, None]
+    ratio = np.asarray(joint / np.linalg.norm(end - start, axis=1))[:, None]
     fraction = ratio + (1.0 - 2.0 * ratio) * np.arange(1, elements) / elements
     between = start[:, None] + fraction[:, :, None] * (end - start)[:, None]
     numbers = count + np.arange(len(beams) * inner).reshape(len(beams), inner)
@@ -187,11 +190,12 @@ def timoshenko(section: Section, material: Elasticity) -> float:
 def beam_stiffness(
     section: Section,
     material: Elasticity,
-    length: Floats,
+    length: Floats | Complex,
     theory: str,
     dimension: int,
-    rigid: Floats | None = None,
-) -> Floats:
+    rigid: Floats | Complex | None = None,
+    ratio: Floats | Complex | float = 1.0,
+) -> Any:
     """Return (m, 4) or (m, 8) the stiffness of beams, as the kernels expect it.
 
     Parameters
@@ -202,6 +206,8 @@ def beam_stiffness(
         Name in the registry of theories.
     rigid : (m, 2), optional
         Lengths of their ends that do not deform.
+    ratio : (m,), optional
+        Width of each beam over that of the section; 1 by default.
 
     Raises
     ------
@@ -211,28 +217,30 @@ def beam_stiffness(
     flexibility = theories[theory](section, material)
     ends = np.zeros((len(length), 2)) if rigid is None else rigid
     length = length - ends.sum(axis=1)
-    columns = [material.young * section.area / length]
-    bending = [section.inertia]
+    # The thickness of a rectangle is the same for all widths, a round section has no other size.
+    both = ratio if section.shape == "round" else 1.0
+    columns = [material.young * section.area * ratio * both / length]
+    bending = [section.inertia * ratio**3 * both]
     if dimension == 3:
-        columns.append(material.shear_modulus * section.torsion_constant / length)
-        bending.append(section.inertia_out_of_plane)
+        columns.append(material.shear_modulus * section.torsion_constant * ratio**4 / length)
+        bending.append(section.inertia_out_of_plane * ratio * both**3)
     # Rotations of the ends of the part that deforms, relative to its own chord.
     (one, two) = (ends / length[:, None]).T
     for inertia in bending:
         rigidity = material.young * inertia
-        ratio = 12.0 * rigidity * flexibility / length**2
-        flexural = rigidity / (length * (1.0 + ratio))
-        own, other = (4.0 + ratio) * flexural, (2.0 - ratio) * flexural
-        both = own + other
+        shear = 12.0 * rigidity * flexibility / (ratio * both * length**2)
+        flexural = rigidity / (length * (1.0 + shear))
+        own, other = (4.0 + shear) * flexural, (2.0 - shear) * flexural
+        whole = own + other
         columns += [
-            own + 2.0 * one * both * (1.0 + one),
-            other + (one + two + 2.0 * one * two) * both,
-            own + 2.0 * two * both * (1.0 + two),
+            own + 2.0 * one * whole * (1.0 + one),
+            other + (one + two + 2.0 * one * two) * whole,
+            own + 2.0 * two * whole * (1.0 + two),
         ]
     return np.stack(columns, axis=1)
 
 
-def bow_coefficients(length: Floats, joint: float) -> Floats:
+def bow_coefficients(length: Floats | Complex, joint: Floats | Complex | float) -> Any:
     """Return (m, 2) the coefficients p and q of the shortening of bent beams.
 
     Half the integral of the squared slope along a beam of rigid ends and a cubic between them is
@@ -245,6 +253,37 @@ def bow_coefficients(length: Floats, joint: float) -> Floats:
     own = 0.5 * joint + chord + inner / 30.0 * (2.0 + 3.0 * ratio * (1.0 + ratio))
     other = 2.0 * chord + inner / 30.0 * (6.0 * ratio * (1.0 + ratio) - 1.0)
     return np.stack([own, other], axis=1)
+
+
+def reshaped(problem: Problem, frame: Frame, beams: Ints, chord: Floats, width: Floats) -> Frame:
+    """Return a frame with other beams, each like one of a frame but of another shape.
+
+    Parameters
+    ----------
+    beams : (m,)
+        Beams of the frame, of one element each.
+    chord : (m, 3)
+        Vectors from their first to their second end.
+    width : (m,)
+    """
+    assert problem.section is not None
+    assert problem.material is not None
+    length = np.linalg.norm(chord, axis=1)
+    ratio = width / problem.section.width
+    rigid = np.repeat((problem.section.joint * ratio)[:, None], 2, axis=1)
+    bowed = np.asarray(frame.bow[beams] != 0.0).max(axis=1, keepdims=True)
+    return replace(
+        frame,
+        rest=triads(chord),
+        rest_length=length,
+        section=beam_stiffness(
+            problem.section, problem.material, length, "euler-bernoulli",
+            problem.lattice.dimension, rigid, ratio,
+        ),
+        bow=bow_coefficients(length, rigid[:, 0]) * bowed,
+        width=width,
+        rigid=rigid,
+    )  # fmt: skip
 
 
 def held_unknowns(problem: Problem, nodes: int, size: int) -> NDArray[np.bool_]:
@@ -332,10 +371,13 @@ def build_frame(
     lattice, dimension = problem.lattice, problem.lattice.dimension
     size = 3 * (dimension - 1)
     chosen = lattice.beams if mask is None else lattice.beams[mask]
-    joint = problem.section.joint
+    wide = problem.beam_widths if mask is None else problem.beam_widths[mask]
+    ratio = wide / problem.section.width
     positions, beams, rigid = subdivided(
-        np.array(lattice.positions), chosen.astype(np.int64), elements or 1, joint
-    )
+        np.array(lattice.positions), chosen.astype(np.int64), elements or 1,
+        problem.section.joint * ratio,
+    )  # fmt: skip
+    ratio = np.repeat(ratio, elements or 1)
     nodes = len(positions)
     held = held_unknowns(problem, nodes, size)
     any_held, all_held = np.asarray(held.any(axis=1)), np.asarray(held.all(axis=1))
@@ -349,7 +391,9 @@ def build_frame(
     space = in_space(positions)
     rest = triads(space[beams[:, 1]] - space[beams[:, 0]])
     length = np.linalg.norm(rest[:, 0], axis=1)
-    section = beam_stiffness(problem.section, problem.material, length, theory, dimension, rigid)
+    section = beam_stiffness(
+        problem.section, problem.material, length, theory, dimension, rigid, ratio
+    )
     incident_start, incident_beam = incident_beams(positions[:, :2], beams)
     scale = objective.numerator_scale / (objective.denominator or problem.input.amount)
     sensitivity = abs(scale) * len(problem.output.nodes) * max(1.0, objective.exponent - 1.0)
@@ -357,7 +401,8 @@ def build_frame(
     if weight is None:
         weight = problem.loads.weight
     if weight is not None:
-        of_beam[:, :dimension] = problem.section.area * length[:, None] * np.asarray(weight)
+        area = problem.section.area * ratio * (ratio if problem.section.shape == "round" else 1.0)
+        of_beam[:, :dimension] = (area * length)[:, None] * np.asarray(weight)
     return Frame(
         unit=(0.0,) * size,
         positions=space,
@@ -365,7 +410,10 @@ def build_frame(
         rest=rest,
         rest_length=length,
         section=section,
-        bow=bow_coefficients(length, joint) if elements is None else np.zeros((len(length), 2)),
+        bow=bow_coefficients(length, rigid[:, 0])
+        if elements is None
+        else np.zeros((len(length), 2)),
+        width=problem.section.width * ratio,
         rigid=rigid,
         incident_start=incident_start,
         incident_beam=incident_beam,

@@ -43,6 +43,8 @@ class Frame(Bundle):
     """(M, 4) or (M, 8) stiffness of the beams; columns as in `plane_beam` or `space_force`."""
     bow: Floats
     """(M, 2) coefficients of the shortening of bent beams where it is included, else 0."""
+    width: Floats
+    """(M,) width in the plane of the lattice, in space the diameter."""
     rigid: Floats
     """(M, 2) lengths of the ends that do not deform."""
     incident_start: Ints

@@ -22,7 +22,7 @@ from bellcrank.mechanics.frames.kernels.assembly import (
 )
 from bellcrank.mechanics.frames.kernels.beams import dimension
 from bellcrank.mechanics.frames.kernels.newton import newton
-from bellcrank.mechanics.frames.kernels.path import LONGEST_STEP, follow_path
+from bellcrank.mechanics.frames.kernels.path import LONGEST_STEP, follow_path, lowest_stiffness
 from bellcrank.mechanics.frames.kernels.reference_path import (
     follows_reference,
     known_tension,
@@ -214,6 +214,22 @@ def find_reactions(
 ) -> None:
     """Compute in `memory.gradient` the forces on held unknowns, and the residual of the others."""
     find_residual(frame, structure, fraction, state, memory)
+
+
+@entry
+def find_softest_mode(
+    frame: Frame,
+    structure: Structure,
+    fraction: float,
+    state: State,
+    sweeps: int,
+    mode: Floats,
+    memory: Memory,
+) -> float:
+    """Return the lowest stiffness at a state and improve its mode (N, b); -1 if unstable."""
+    if not stiffness_is_definite(frame, structure, fraction, state, memory):
+        return -1.0
+    return lowest_stiffness(frame, structure, mode, sweeps, memory)
 
 
 @entry

@@ -84,6 +84,39 @@ def _compliance_slopes(equilibrium: Equilibrium, measures: Measures) -> Slopes:
     return Slopes(slope[None], by_motion=_unit_force(equilibrium)[None])
 
 
+SWEEPS = 12
+"""Number of steps of inverse iteration for the softest mode."""
+
+
+def _lowest_stiffness(equilibrium: Equilibrium) -> Measures:
+    """Measure the lowest eigenvalue of the stiffness; its mode has the size 1."""
+    from bellcrank.mechanics.frames.kernels.response import find_softest_mode
+
+    mode = np.array(np.random.default_rng(0).normal(size=equilibrium.fields(1)[0].shape))
+    lowest = find_softest_mode(
+        equilibrium.frame, equilibrium.structure, equilibrium.fraction, equilibrium.state, SWEEPS,
+        mode, equilibrium.memory,
+    )  # fmt: skip
+    if lowest <= 0.0:
+        return Measures(np.array([0.0]))
+    return Measures(np.array([lowest]), mode / np.linalg.norm(mode))
+
+
+def _lowest_stiffness_slopes(equilibrium: Equilibrium, measures: Measures) -> Slopes:
+    """Return the derivatives of z.K z at a fixed mode z, by central differences as above."""
+    mode = measures.motion
+    if mode is None:
+        return Slopes(equilibrium.fields(1))
+    step = STEP / np.abs(mode).max()
+    ahead, behind = (equilibrium.moved(sign * step * mode).forces_of(mode) for sign in (1.0, -1.0))
+    free = equilibrium.forces_of(mode) * (equilibrium.frame.held == 0)
+    return Slopes(((ahead - behind) / (2.0 * step))[None], by_motion=-free[None])
+
+
+LOWEST_STIFFNESS = Quantity(_lowest_stiffness, _lowest_stiffness_slopes)
+"""Lowest eigenvalue of the stiffness: how far an equilibrium is from a loss of stability."""
+
+
 def _inverse(compliance: Values) -> Values:
     """Return the stiffness; 0 where nothing holds the output, or not stably."""
     (value,) = np.moveaxis(compliance, -1, 0)

@@ -14,6 +14,7 @@ from bellcrank.mechanics.frames.quantities.definition import (
     Slopes,
     quantities,
 )
+from bellcrank.mechanics.frames.system import reshaped
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,6 +30,8 @@ MOTION_STEP = 1e-5
 """Motion of an end in the central difference of the deformations of a beam."""
 RELATIVE_STEP = 1e-6
 """Change in the central difference of a strain, as a part of the deformations."""
+SHAPE_STEP = 1e-5
+"""Change of a width or a length in the central difference of a strain, as a part of the width."""
 
 
 def strain_of(equilibrium: Equilibrium, beams: Ints, deformation: Floats) -> Floats:
@@ -76,6 +79,37 @@ def _slope_by_deformation(equilibrium: Equilibrium, beams: Ints, deformation: Fl
     ahead, behind = strains.reshape(2, width, count)
     slope: Floats = ((ahead - behind) / (2.0 * step)).T
     return slope
+
+
+def strain_by_geometry(equilibrium: Equilibrium, beams: Ints) -> tuple[Floats, Floats]:
+    """Return the derivatives of the strains of beams by their shape, at fixed motions of the ends.
+
+    By central differences.
+
+    Returns
+    -------
+    by_chord : (m, d)
+        By the vector from the first to the second end at rest.
+    by_width : (m,)
+    """
+    frame, dimension = equilibrium.frame, equilibrium.problem.lattice.dimension
+    count = len(beams)
+    changes = np.zeros((1 + dimension, 2, count, 4))
+    for row in range(1 + dimension):
+        changes[row, 0, :, row] = SHAPE_STEP * frame.width[beams]
+        changes[row, 1] = -changes[row, 0]
+    flat = changes.reshape(-1, 4)
+    many = np.tile(beams, 2 * (1 + dimension))
+    chord = frame.rest[many, 0].copy()
+    chord[:, :dimension] += flat[:, 1 : 1 + dimension]
+    varied = reshaped(equilibrium.problem, frame, many, chord, frame.width[many] + flat[:, 0])
+    local = np.arange(len(many))
+    deformation = deformations(varied, local, *equilibrium.ends(many))
+    resultants = stress_resultants(varied, local, deformation)
+    strains = fibre_strain(varied, equilibrium.problem, local, resultants)
+    ahead, behind = np.moveaxis(strains.reshape(1 + dimension, 2, count), 1, 0)
+    slope = (ahead - behind) / (2.0 * SHAPE_STEP * frame.width[beams])
+    return np.ascontiguousarray(slope[1:].T), slope[0]
 
 
 def _largest(strains: Values) -> Values:

@@ -1,0 +1,78 @@
+"""`bellcrank refine`: move the nodes of a design."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bellcrank.cli.app import NOT_MET, app
+from bellcrank.cli.arguments import DesignName, design_named
+from bellcrank.cli.console import announce_compilation, notes, plain, results, text_grid
+from bellcrank.errors import InvalidSettings, OutputExists
+
+if TYPE_CHECKING:
+    from bellcrank.refine.refinement import Progress
+
+
+@app.command()
+def refine(
+    design: DesignName,
+    out: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="File of the result; default: NAME-refined.json."),
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="Largest time.")] = 60.0,
+    largest_move: Annotated[
+        float, typer.Option(help="Largest change of a coordinate of a node, in beam lengths.")
+    ] = 0.45,
+    same_mass: Annotated[bool, typer.Option("--same-mass", help="The mass may not grow.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing file.")
+    ] = False,
+) -> None:
+    """Move the nodes of a design, so that it meets its specification and its gain grows."""
+    if not seconds > 0.0:
+        raise InvalidSettings(f"--seconds: expected a time above 0 s, got {seconds:g}")
+    if not 0.0 < largest_move <= 0.5:
+        raise InvalidSettings(
+            f"--largest-move: expected above 0 and at most 0.5 beam lengths, got {largest_move:g}"
+        )
+    chosen = design_named(design)
+    target = out or Path(f"{Path(chosen.problem.name).name}-refined.json")
+    if target.exists() and not overwrite:
+        raise OutputExists(f"{target} exists; choose another file, or --overwrite")
+    from bellcrank.cli.stopping import stopping_on_interrupt
+    from bellcrank.model import write_design
+    from bellcrank.refine import RefinementSettings
+    from bellcrank.workflows.refinement import refine_file, refinement_rows
+
+    settings = RefinementSettings(seconds=seconds, largest_move=largest_move, same_mass=same_mass)
+    announce_compilation()
+    with stopping_on_interrupt() as stop:
+
+        def report(progress: Progress) -> bool:
+            if progress.step % 10 == 0 and not progress.reason:
+                notes.print(
+                    f"step {progress.step}: objective {progress.rows.objective:.4g}, violation "
+                    f"{progress.rows.violation:.3g}"
+                )
+            return not stop.is_set()
+
+        found = refine_file(chosen, settings, report)
+    results.print(text_grid(refinement_rows(chosen, found)))
+    if found.design is chosen:
+        notes.print(f"the design was not improved: {found.reason}")
+        if stop.is_set():
+            stop.exit()
+        sys.exit(1)
+    results.print(
+        f"objective: {found.before.objective:.4g} before, {found.after.objective:.4g} after "
+        f"{found.steps} steps ({found.reason})"
+    )
+    write_design(found.design, target, overwrite=overwrite)
+    notes.print(f"wrote {plain(target)}")
+    if not found.after.met:
+        sys.exit(NOT_MET)

@@ -1,0 +1,170 @@
+"""Derivatives of quantities by the positions of nodes and by the widths of beams.
+
+At an equilibrium r(u; p) = 0 the derivative of a measure Q(u, z; p) by the parameters p of the
+geometry is
+
+    dQ/dp = Q_p - l . r_p - y . (K_p z) ,
+
+with the adjoints l of Q, y of the linear motion z on which it may depend, and the stiffness K. One
+adjoint solution for each measure and one pass over the beams give the derivatives by all positions
+and widths.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from bellcrank.mechanics.frames.quantities.strain import strain_by_geometry
+from bellcrank.mechanics.frames.system import beam_stiffness, bow_coefficients
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics.frames.equilibria import Equilibrium
+    from bellcrank.mechanics.frames.evaluator import FrameEvaluator
+    from bellcrank.mechanics.frames.quantities import Measures, Quantity
+    from bellcrank.mechanics.kernels.arrays import Floats
+
+COMPLEX_STEP = 1e-30
+MOTION_STEP = 1e-3
+"""Largest displacement or rotation in central differences of the stiffness along a motion."""
+
+
+class GeometrySlopes(NamedTuple):
+    """Derivatives of measures by the geometry."""
+
+    positions: NDArray[np.float64]
+    """(k, N, d) by the positions of the nodes."""
+    widths: NDArray[np.float64]
+    """(k, M) by the widths of the beams."""
+
+
+class BeamSlopes(NamedTuple):
+    """Derivatives of the properties of beams by length and by width."""
+
+    section: Floats
+    """(2, M, c) of their stiffness."""
+    bow: Floats
+    """(2, M, 2) of the coefficients of their shortening."""
+
+
+def beam_slopes(evaluator: FrameEvaluator) -> BeamSlopes:
+    """Return the derivatives of the properties of all beams, by complex steps."""
+    problem, frame = evaluator.problem, evaluator.frame
+    assert problem.section is not None
+    assert problem.material is not None
+    given, dimension = problem.section, problem.lattice.dimension
+    section, bow = [], []
+    for name in ("length", "width"):
+        length = frame.rest_length + (1j * COMPLEX_STEP if name == "length" else 0.0)
+        width = frame.width + (1j * COMPLEX_STEP if name == "width" else 0.0)
+        ratio = width / given.width
+        joint = given.joint * ratio
+        stiffness = beam_stiffness(
+            given, problem.material, length, evaluator.theory, dimension,
+            np.stack([joint, joint], axis=1), ratio,
+        )  # fmt: skip
+        section.append(stiffness.imag / COMPLEX_STEP)
+        coefficients = bow_coefficients(length, joint)
+        bowed = evaluator.elements is None
+        bow.append(coefficients.imag / COMPLEX_STEP * bowed)
+    return BeamSlopes(np.stack(section), np.stack(bow))
+
+
+def geometry_slopes(
+    equilibrium: Equilibrium,
+    measured: Sequence[tuple[Quantity, Measures]],
+    beams: BeamSlopes,
+) -> list[GeometrySlopes] | None:
+    """Return the derivatives of measures by the geometry; None if the equilibrium is unstable.
+
+    Parameters
+    ----------
+    equilibrium
+        One of an evaluator with one element in each beam.
+    measured
+        Quantities, and their measures there.
+    beams
+        Derivatives of the properties of beams.
+    """
+    from bellcrank.mechanics.frames.kernels.response import solve_fields
+
+    slopes = [quantity.slopes(equilibrium, found) for quantity, found in measured]
+    rows = [each.fields for each in slopes]
+    rows += [each.by_motion for each in slopes if each.by_motion is not None]
+    adjoints = np.concatenate(rows)
+    stable = solve_fields(
+        equilibrium.frame, equilibrium.structure, equilibrium.fraction, equilibrium.state,
+        adjoints, equilibrium.memory,
+    )  # fmt: skip
+    if not stable:
+        return None
+    counts = np.cumsum([0] + [len(each.fields) for each in slopes])
+    for begin, each in zip(counts[:-1].tolist(), slopes, strict=True):
+        if each.on_held is not None:
+            adjoints[begin : begin + len(each.fields)] += each.on_held
+    direct = _products(equilibrium, adjoints[: counts[-1]], beams)
+    found, begin_motion = [], int(counts[-1])
+    for index, (_, measures) in enumerate(measured):
+        own = slice(int(counts[index]), int(counts[index + 1]))
+        positions, widths = -direct.positions[own], -direct.widths[own]
+        by_motion = slopes[index].by_motion
+        if by_motion is not None:
+            motion_adjoints = adjoints[begin_motion : begin_motion + len(by_motion)]
+            begin_motion += len(by_motion)
+            if measures.motion is not None:
+                second = _stiffness_products(equilibrium, motion_adjoints, measures.motion, beams)
+                positions, widths = positions - second.positions, widths - second.widths
+        if measures.beams is not None:
+            by_chord, by_width = strain_by_geometry(equilibrium, measures.beams)
+            row = np.arange(len(by_chord))
+            first_node, second_node = equilibrium.frame.beams[measures.beams].T
+            positions[row, second_node] += by_chord
+            positions[row, first_node] -= by_chord
+            widths[row, measures.beams] += by_width
+        found.append(GeometrySlopes(positions, widths))
+    return found
+
+
+def _products(
+    equilibrium: Equilibrium, adjoints: NDArray[np.float64], beams: BeamSlopes
+) -> GeometrySlopes:
+    """Return the products of adjoints (k, N, b) with the derivatives of the residual."""
+    from bellcrank.mechanics.frames.kernels.geometry import geometry_products
+
+    frame = equilibrium.frame
+    dimension = equilibrium.problem.lattice.dimension
+    positions = np.zeros((len(adjoints), len(frame.positions), dimension))
+    widths = np.zeros((len(adjoints), len(frame.beams)))
+    geometry_products(
+        frame, equilibrium.structure, equilibrium.fraction, equilibrium.state,
+        np.ascontiguousarray(adjoints), beams.section, beams.bow, positions, widths,
+        equilibrium.memory,
+    )  # fmt: skip
+    return GeometrySlopes(positions, widths)
+
+
+def _stiffness_products(
+    equilibrium: Equilibrium,
+    adjoints: NDArray[np.float64],
+    motion: NDArray[np.float64],
+    beams: BeamSlopes,
+) -> GeometrySlopes:
+    """Return the products of adjoints with the derivatives of the stiffness times a motion.
+
+    By central differences of fourth order along the motion.
+    """
+    step = MOTION_STEP / max(float(np.abs(motion).max()), 1e-300)
+    positions: NDArray[np.float64] | float = 0.0
+    widths: NDArray[np.float64] | float = 0.0
+    for shift, weight in ((1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)):
+        for sign in (1.0, -1.0):
+            moved = equilibrium.moved(sign * shift * step * motion)
+            found = _products(moved, adjoints, beams)
+            positions = positions + sign * weight / step * found.positions
+            widths = widths + sign * weight / step * found.widths
+    return GeometrySlopes(np.asarray(positions), np.asarray(widths))

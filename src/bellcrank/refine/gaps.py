@@ -1,0 +1,121 @@
+"""Gaps between struts in an equilibrium, and their derivatives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from bellcrank.mechanics import bent_pieces, near_pairs
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics.frames.equilibria import Equilibrium
+
+
+class Gaps(NamedTuple):
+    """Gaps between pairs of struts that are near each other."""
+
+    pairs: NDArray[np.int64]
+    """(g, 2) the pieces of struts that are near each other."""
+    value: NDArray[np.float64]
+    """(g,) gaps less than the reach, lattice units."""
+    fields: NDArray[np.float64]
+    """(g, N, 3) derivatives by displacements and rotations of the nodes."""
+    widths: NDArray[np.float64]
+    """(g, M) derivatives by the widths of the beams."""
+
+
+def gaps_of(equilibrium: Equilibrium, beams: NDArray[np.int64], reach: float) -> Gaps:
+    """Return the gaps between struts without a common node that are below a reach, in the plane.
+
+    Struts are bent as in `bellcrank.mechanics.bent_pieces`: two straight pieces each.
+
+    Parameters
+    ----------
+    equilibrium
+        With one element in each beam.
+    beams : (n,) int64
+        The struts.
+    reach
+        Largest gap that is returned.
+    """
+    problem, count = equilibrium.problem, len(beams)
+    width = problem.beam_widths[beams]
+    points, pieces = bent_pieces(problem, beams, equilibrium.state.u)
+    pairs, distance = near_pairs(points, pieces, float(width.max()) + reach)
+    strut = pairs % count
+    gap = distance - 0.5 * width[strut].sum(axis=1)
+    # Struts that meet in a node overlap there; angles between them are constraints of their own.
+    ends = problem.lattice.beams[beams[strut]]
+    apart_at_rest = ~(ends[:, 0, :, None] == ends[:, 1, None, :]).any(axis=(1, 2))
+    chosen = np.flatnonzero((gap < reach) & apart_at_rest)
+    chosen = chosen[np.lexsort((pairs[chosen, 1], pairs[chosen, 0]))]
+    nodes = problem.lattice.node_count
+    fields = np.zeros((len(chosen), len(equilibrium.frame.positions), 3))
+    widths = np.zeros((len(chosen), problem.lattice.beam_count))
+    for row, index in enumerate(chosen.tolist()):
+        (a, b), (c, d) = (points[pieces[piece]] for piece in pairs[index])
+        s, t = nearest_points(a, b, c, d)
+        apart = a + s * (b - a) - c - t * (d - c)
+        size = float(np.linalg.norm(apart))
+        if size == 0.0:
+            continue
+        normal = apart / size
+        for piece, share, sign in ((pairs[index, 0], s, 1.0), (pairs[index, 1], t, -1.0)):
+            for point, weight in zip(pieces[piece].tolist(), (1.0 - share, share), strict=True):
+                vector = sign * weight * normal
+                if point < nodes:
+                    fields[row, point, :2] += vector
+                else:
+                    _add_middle(equilibrium, int(beams[point - nodes]), vector, fields[row])
+        widths[row, beams[strut[index]]] = -0.5
+    return Gaps(pairs[chosen], gap[chosen], fields, widths)
+
+
+def _add_middle(
+    equilibrium: Equilibrium,
+    beam: int,
+    vector: NDArray[np.float64],
+    field: NDArray[np.float64],
+) -> None:
+    """Add the derivatives of the motion of the middle of a bent strut along a vector."""
+    first, second = equilibrium.problem.lattice.beams[beam].tolist()
+    u = equilibrium.state.u
+    positions = equilibrium.problem.lattice.positions
+    chord = positions[second] + u[second, :2] - positions[first] - u[first, :2]
+    bend = (u[first, 2] - u[second, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    # The middle is that of the chord, and the chord turned by 90 degrees times bend / 8.
+    turned = bend / 8.0 * np.array([vector[1], -vector[0]])
+    field[first, :2] += 0.5 * vector - turned
+    field[second, :2] += 0.5 * vector + turned
+    slope = float(-chord[1] * vector[0] + chord[0] * vector[1]) / 8.0
+    field[first, 2] += slope
+    field[second, 2] -= slope
+
+
+def nearest_points(
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    c: NDArray[np.float64],
+    d: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Return where the segments a b and c d are nearest to each other, as parts of their lengths.
+
+    Examples
+    --------
+    >>> origin, x, y = np.zeros(2), np.array([2.0, 0.0]), np.array([1.0, 1.0])
+    >>> nearest_points(origin, x, y, 2.0 * y)
+    (0.5, 0.0)
+    """
+    best, found = np.inf, (0.0, 0.0)
+    for start, end, point, swap, share in (
+        (a, b, c, False, 0.0), (a, b, d, False, 1.0), (c, d, a, True, 0.0), (c, d, b, True, 1.0),
+    ):  # fmt: skip
+        along = end - start
+        part = float(np.clip((point - start) @ along / (along @ along), 0.0, 1.0))
+        distance = float(np.linalg.norm(start + part * along - point))
+        if distance < best:
+            best, found = distance, (share, part) if swap else (part, share)
+    return found

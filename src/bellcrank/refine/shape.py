@@ -1,0 +1,131 @@
+"""Constraints on the geometry at rest: slender struts, angles that print, and the volume."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+
+    Values = NDArray[np.float64]
+
+SLENDERNESS = 1.5
+"""Smallest length of a strut over its width."""
+SMALLEST_ANGLE = np.radians(20.0)
+"""Smallest angle between struts that meet."""
+NEAR_ANGLE = np.radians(45.0)
+"""Angles below which they are constraints."""
+
+
+class ShapeRows(NamedTuple):
+    """Constraints, at most 0 where they are met, and their derivatives."""
+
+    values: Values
+    """(r,)"""
+    names: tuple[str, ...]
+    keys: tuple[tuple[int, ...], ...]
+    positions: Values
+    """(r, N, d) derivatives by the positions of the nodes."""
+    widths: Values
+    """(r, M) derivatives by the widths of the beams."""
+
+
+def volume_of(problem: Problem, mask: NDArray[np.bool_]) -> tuple[float, Values, Values]:
+    """Return the volume of the struts, and its derivatives by positions (N, d) and widths (M,)."""
+    section, lattice = problem.section, problem.lattice
+    assert section is not None
+    ratio = problem.beam_widths / section.width
+    power = 2 if section.shape == "round" else 1
+    area = section.area * ratio**power * mask
+    ends = lattice.positions[lattice.beams]
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    slope = (area / length)[:, None] * along
+    positions = np.zeros(lattice.positions.shape)
+    np.add.at(positions, lattice.beams[:, 1], slope)
+    np.add.at(positions, lattice.beams[:, 0], -slope)
+    return float(area @ length), positions, power * area * length / problem.beam_widths
+
+
+def shape_rows(problem: Problem, mask: NDArray[np.bool_], volume: float) -> ShapeRows:
+    """Return the constraints on the geometry of a design.
+
+    Parameters
+    ----------
+    mask : (M,) bool
+        Beams of the design.
+    volume
+        Largest volume of its struts, cubed lattice units; infinite without a limit.
+    """
+    lattice, widths = problem.lattice, problem.beam_widths
+    beams = np.flatnonzero(mask)
+    along = lattice.positions[lattice.beams[beams, 1]] - lattice.positions[lattice.beams[beams, 0]]
+    length = np.linalg.norm(along, axis=1)
+    unit = along / length[:, None]
+    values: list[float] = []
+    names: list[str] = []
+    keys: list[tuple[int, ...]] = []
+    by_position: list[tuple[int, int, Values]] = []
+    by_width: list[tuple[int, int, float]] = []
+    for k in np.flatnonzero(length < 2.0 * SLENDERNESS * widths[beams]).tolist():
+        beam, row = int(beams[k]), len(values)
+        values.append(SLENDERNESS - length[k] / widths[beam])
+        names.append("length of struts")
+        keys.append((beam,))
+        slope = unit[k] / widths[beam]
+        by_position += [
+            (row, int(lattice.beams[beam, 1]), -slope), (row, int(lattice.beams[beam, 0]), slope),
+        ]  # fmt: skip
+        by_width.append((row, beam, length[k] / widths[beam] ** 2))
+    for node, one, two, angle, slopes in _narrow_angles(problem, beams, unit, length):
+        row = len(values)
+        values.append((SMALLEST_ANGLE - angle) / SMALLEST_ANGLE)
+        names.append("angle between struts")
+        keys.append((node, one, two))
+        for other, slope in zip((one, two), slopes, strict=True):
+            by_position += [
+                (row, other, -slope / SMALLEST_ANGLE), (row, node, slope / SMALLEST_ANGLE),
+            ]  # fmt: skip
+    count = len(values) + bool(np.isfinite(volume))
+    positions = np.zeros((count, *lattice.positions.shape))
+    of_widths = np.zeros((count, lattice.beam_count))
+    for row, node, rate in by_position:
+        positions[row, node] += rate
+    for row, beam, rate in by_width:
+        of_widths[row, beam] += rate
+    if np.isfinite(volume):
+        whole, moved, wider = volume_of(problem, mask)
+        values.append(whole / volume - 1.0)
+        names.append("mass")
+        keys.append(())
+        positions[-1], of_widths[-1] = moved / volume, wider / volume
+    return ShapeRows(
+        np.array(values, dtype=np.float64), tuple(names), tuple(keys), positions, of_widths
+    )
+
+
+def _narrow_angles(
+    problem: Problem, beams: NDArray[np.int64], unit: Values, length: Values
+) -> list[tuple[int, int, int, float, tuple[Values, Values]]]:
+    """Return node, other ends, angle and its derivatives by them of struts that meet narrowly."""
+    lattice, found = problem.lattice, []
+    at: dict[int, list[tuple[int, Values, float]]] = {}
+    for k, beam in enumerate(beams.tolist()):
+        first, second = lattice.beams[beam].tolist()
+        at.setdefault(first, []).append((second, unit[k], float(length[k])))
+        at.setdefault(second, []).append((first, -unit[k], float(length[k])))
+    for node, others in at.items():
+        for (one, a, length_a), (two, b, length_b) in combinations(others, 2):
+            cosine = float(np.clip(a @ b, -1.0, 1.0))
+            angle = float(np.arccos(cosine))
+            if angle >= NEAR_ANGLE or angle < 1e-6:
+                continue
+            sine = np.sin(angle)
+            slopes = ((cosine * a - b) / (sine * length_a), (cosine * b - a) / (sine * length_b))
+            found.append((node, one, two, angle, slopes))
+    return found

@@ -1,0 +1,140 @@
+"""Refinement of the selected design of a job, and of a design in a file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from bellcrank.mechanics import VERIFICATION_INCREMENT
+from bellcrank.provenance import provenance
+from bellcrank.refine import Refinement, RefinementSettings, refine_design, specified
+from bellcrank.search import HoppingSettings, SpecificationEvaluator
+from bellcrank.search.verification import Verifier
+from bellcrank.workflows.specification import item_rows
+from bellcrank.workflows.validation import spec_for
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bellcrank.model import Design
+    from bellcrank.refine.refinement import Progress
+    from bellcrank.search import Selection
+
+SECONDS = 25.0
+"""Time for the refinement of the selected design of a job."""
+MOST_REFINED = 3
+"""Number of designs that are refined where none meets the specification."""
+
+
+def refine_selection(
+    selection: Selection, report: Callable[[Progress], bool] = lambda _progress: True
+) -> tuple[Selection, Refinement | None]:
+    """Refine the selected design of a search; the nearest ones where none meets all.
+
+    Returns
+    -------
+    selection
+        With the refined design, if it is better.
+    refinement
+        How it came about; None if the problem has no specification or is in space.
+    """
+    problem = selection.design.problem
+    if not problem.is_specified or problem.lattice.dimension == 3:
+        return selection, None
+    designs = [selection.design]
+    found = selection.verification
+    if found is None or found.fault is not None:
+        designs += [
+            each.design
+            for each in selection.nearest
+            if each.design.mask_hex != selection.design.mask_hex
+        ]
+    designs = designs[:MOST_REFINED]
+    settings = RefinementSettings(seconds=SECONDS / len(designs))
+    results = [refine_design(design, settings, report) for design in designs]
+    best = max(results, key=lambda each: (each.after.met, each.after.objective))
+    if best.design is selection.design:
+        return selection, best
+    return with_design(selection, best.design), best
+
+
+def with_design(selection: Selection, design: Design) -> Selection:
+    """Return a selection of another design of the same specification."""
+    verification = Verifier(design.problem, HoppingSettings()).verify(design.mask)
+    evaluator = SpecificationEvaluator(design.problem)
+    response = evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
+    items = tuple(evaluator.results()) if response.is_admissible else ()
+    return replace(
+        selection,
+        design=design,
+        response=response,
+        efficiency_after=response.efficiency,
+        verification=verification,
+        items=items,
+        nearest=() if verification.fault is None else selection.nearest,
+    )
+
+
+def refinement_data(refinement: Refinement) -> dict[str, Any]:
+    """Return how a design was refined, as plain data."""
+
+    def finite(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {
+        "objective_before": finite(refinement.before.objective),
+        "objective_after": finite(refinement.after.objective),
+        "met_before": refinement.before.met,
+        "met_after": refinement.after.met,
+        "steps": refinement.steps,
+        "evaluations": refinement.evaluations,
+        "reason": refinement.reason,
+    }
+
+
+def refinement_text(refinement: Refinement) -> str:
+    """Return how a design was refined, in one sentence."""
+    before, after = refinement.before, refinement.after
+    if after is before:
+        return f"no better geometry found in {refinement.steps} steps ({refinement.reason})"
+    met = {True: "all items met", False: "items missed"}
+    return (
+        f"objective {before.objective:.3g} ({met[before.met]}) to {after.objective:.3g} "
+        f"({met[after.met]}) in {refinement.steps} steps"
+    )
+
+
+def refine_file(
+    design: Design,
+    settings: RefinementSettings,
+    report: Callable[[Progress], bool] = lambda _progress: True,
+) -> Refinement:
+    """Refine a design that is in a file, for the part that its file names.
+
+    Raises
+    ------
+    InvalidSettings
+        As `bellcrank.refine.refine_design`.
+    """
+    limit = spec_for(design).registered_material.strain_limit
+    result = refine_design(design, settings, report, limit)
+    if result.design is design:
+        return result
+    notes = {**design.provenance, "refinement": refinement_data(result)}
+    efficiency = (
+        Verifier(result.design.problem, HoppingSettings())
+        .verify(result.design.mask)
+        .response.efficiency
+    )
+    own = provenance(**{key: value for key, value in notes.items() if key not in provenance()})
+    refined = replace(result.design, efficiency=efficiency, provenance=own)
+    return replace(result, design=refined)
+
+
+def refinement_rows(design: Design, refinement: Refinement) -> list[list[str]]:
+    """Return the items before and after as rows of texts, the first with the names of columns."""
+    spec = spec_for(design)
+    problem = specified(design.problem, spec.registered_material.strain_limit)
+    states = {"before": refinement.before.items, "after": refinement.after.items}
+    return item_rows(problem, spec, {name: items for name, items in states.items() if items})
