@@ -14,7 +14,7 @@ from .helpers import call, refusal
 if TYPE_CHECKING:
     from pathlib import Path
 
-SETTINGS = ("--steps", 1000, "--seed", 1)
+SETTINGS = ("--steps", 1000, "--seed", 1, "--no-refine")
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def missed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
         """,
         encoding="utf-8",
     )
-    outcome = call("design", task, "--steps", 500, "--out", folder / "run")
+    outcome = call("design", task, "--steps", 500, "--no-refine", "--out", folder / "run")
     assert outcome.code == 3, outcome.err
     return folder / "run", outcome.out, outcome.err
 

@@ -59,7 +59,10 @@ def frame_problem(problem: Problem, spec: PartSpec) -> Problem:
     _check_slender(problem, spec)
     section = frame_section(spec, problem.lattice.dimension)
     material = frame_elasticity(problem.lattice, section, spec, problem.stiffness)
-    return replace(problem, section=section, material=material)
+    widths = problem.widths
+    if widths is not None and problem.section is not None:
+        widths = widths * (section.width / problem.section.width)
+    return replace(problem, section=section, material=material, widths=widths)
 
 
 def frame_section(spec: PartSpec, dimension: int) -> Section:
@@ -122,7 +125,7 @@ def spring_problem(problem: Problem) -> Problem:
     True
     """
     require_plane(problem, "spring model")
-    return replace(problem, section=None, material=None)
+    return replace(problem, section=None, material=None, widths=None)
 
 
 @models.register("springs")

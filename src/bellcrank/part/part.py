@@ -46,7 +46,8 @@ class Part:
     Raises
     ------
     InvalidSettings
-        If there are no beams, the struts are round, or they are not longer than wide.
+        If there are no beams, the struts are round or of different widths, or they are not
+        longer than wide.
     InvalidProblem
         If the problem is in space.
 
@@ -77,6 +78,11 @@ class Part:
             raise InvalidSettings(f"fillet: expected a radius of 0 mm or more, got {self.fillet!r}")
         if not 0.0 < self.scale < float("inf"):
             raise InvalidSettings(f"scale: expected a length above 0 mm, got {self.scale!r}")
+        if self.design.problem.widths is not None:
+            raise InvalidSettings(
+                "widths: parts with struts of different widths cannot be built yet; frames of them "
+                "can be evaluated"
+            )
         if not self.design.mask.any():
             raise InvalidSettings("the design has no beams")
         shortest = float(self.design.problem.lattice.rest_length[self.design.mask].min())

@@ -14,7 +14,7 @@ from bellcrank.mechanics import ItemResult, tightened
 from bellcrank.model import Item, ObjectiveTerm, Specification
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
 from bellcrank.refine.rows import RowEvaluator
-from bellcrank.refine.shape import volume_of
+from bellcrank.refine.shape import shape_rows, volume_of
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import HoppingSettings
 from bellcrank.search.verification import Verifier
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 RESERVE = 0.02
 """Part of their size by which bounds are tightened, so that more elements meet them too."""
+PRINTABLE = 1e-2
+"""Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
 
@@ -45,7 +47,7 @@ class State:
     items
         Items of the specification; empty if the response is not stable.
     met
-        Whether all of them are met.
+        Whether all of them are met, and the geometry prints.
     """
 
     objective: float
@@ -222,7 +224,8 @@ def state_of(problem: Problem, mask: NDArray[np.bool_]) -> State:
     objective = found.response.efficiency - found.response.penalty
     if found.fault is not None:
         objective = -sum(item.violation for item in found.items)
-    return State(objective, found.items, met=found.fault is None)
+    narrow = shape_rows(problem, mask, math.inf).values.max(initial=0.0)
+    return State(objective, found.items, met=found.fault is None and narrow < PRINTABLE)
 
 
 def moved(item: Item, change: float) -> Item:

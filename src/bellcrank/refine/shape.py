@@ -96,8 +96,8 @@ def shape_rows(problem: Problem, mask: NDArray[np.bool_], volume: float) -> Shap
     of_widths = np.zeros((count, lattice.beam_count))
     for row, node, rate in by_position:
         positions[row, node] += rate
-    for row, beam, rate in by_width:
-        of_widths[row, beam] += rate
+    for row, beam, wide in by_width:
+        of_widths[row, beam] += wide
     if np.isfinite(volume):
         whole, moved, wider = volume_of(problem, mask)
         values.append(whole / volume - 1.0)

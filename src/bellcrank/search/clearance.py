@@ -46,9 +46,8 @@ def gap_less_overlaps(case: CaseEvaluator, design: NDArray[np.bool_], bound: flo
         Wanted gap, lattice units.
     """
     problem = case.problem
-    assert problem.section is not None
     beams = np.flatnonzero(printed_beams(problem, design, case.frame.structure.present != 0))
-    least, worst = problem.section.width + bound, 0.0
+    least, worst = float(problem.beam_widths.max()) + bound, 0.0
     for fraction in (np.arange(1, SEARCH_STATES + 1) / SEARCH_STATES).tolist():
         if (found := case.state(fraction)) is not None:
             points, pieces = bent_pieces(problem, beams, found.state.u)
@@ -62,8 +61,7 @@ def smallest_gap(case: CaseEvaluator, design: NDArray[np.bool_], bound: float) -
 
     Parameters are those of `gap_less_overlaps`, with any number of elements in each beam.
     """
-    frame, section = case.frame, case.problem.section
-    assert section is not None
+    frame = case.frame
     rest, _ = centre_lines(frame, frame.state)
     chosen = design[frame.beams]
     stroke = [
@@ -72,6 +70,6 @@ def smallest_gap(case: CaseEvaluator, design: NDArray[np.bool_], bound: float) -
         if (found := case.state(fraction)) is not None
     ]
     overlap = find_contacts(
-        frame.beams[chosen], rest[chosen], stroke, section.width + bound
+        frame.beams[chosen], rest[chosen], stroke, float(case.problem.beam_widths.max()) + bound
     ).overlap
     return bound - float(overlap.max()) if len(overlap) else math.inf

@@ -1,0 +1,106 @@
+"""`bellcrank refine`, and the refinement at the end of `bellcrank design`."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from bellcrank.model import find_problem, read_design, write_design
+from bellcrank.workflows import find_design
+
+from .helpers import call, refusal
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("here")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, str]]:
+    """The same search with its refinement and without it."""
+    found = {}
+    for option in ("--refine", "--no-refine"):
+        folder = tmp_path_factory.mktemp("refine") / "inverter"
+        outcome = call("design", "inverter", "--steps", 1000, "--seed", 1, option, "--out", folder)
+        assert outcome.code == 0, outcome.err
+        found[option] = (folder, outcome.out)
+    return found
+
+
+def test_the_design_of_a_task_is_refined_by_default(runs: dict[str, tuple[Path, str]]) -> None:
+    folder, out = runs["--refine"]
+    plain, _ = runs["--no-refine"]
+    summaries = [json.loads((each / "summary.json").read_text()) for each in (folder, plain)]
+    assert summaries[1]["refinement"] is None
+    found = summaries[0]["refinement"]
+    assert found["met_after"]
+    assert found["objective_after"] >= found["objective_before"]
+    assert "refined" in out
+    designs = [read_design(each / "design.json") for each in (folder, plain)]
+    assert np.array_equal(designs[0].mask, designs[1].mask)
+    moved = designs[0].problem.lattice.positions - designs[1].problem.lattice.positions
+    assert np.abs(moved).max() > 0.01
+    assert designs[0].provenance["refinement"] == found
+
+
+def test_a_refined_design_is_evaluated_and_exported_as_it_is(
+    runs: dict[str, tuple[Path, str]], here: Path
+) -> None:
+    folder, _ = runs["--refine"]
+    summary = json.loads((folder / "summary.json").read_text())
+    outcome = call("evaluate", folder / "design.json", "--elements", 8, "--json")
+    assert json.loads(outcome.out)["results"][0]["efficiency"] == pytest.approx(
+        summary["efficiency"], rel=1e-6
+    )
+    assert call("export", folder / "design.json", "part.stl").code == 0
+    assert (here / "part.stl").exists()
+
+
+def test_a_design_in_a_file_is_refined(here: Path, runs: dict[str, tuple[Path, str]]) -> None:
+    plain, _ = runs["--no-refine"]
+    outcome = call("refine", plain / "design.json", "better.json", "--seconds", 4)
+    assert outcome.code == 0, outcome.err
+    assert "before" in outcome.out
+    assert "after" in outcome.out
+    before, after = read_design(plain / "design.json"), read_design(here / "better.json")
+    assert after.provenance["refinement"]["met_after"]
+    assert after.efficiency is not None
+    assert before.efficiency is not None
+    assert after.efficiency > before.efficiency
+    message = refusal("refine", plain / "design.json", "better.json", folder=here)
+    assert "better.json exists" in message
+
+
+def test_the_gain_of_a_free_design_grows(here: Path) -> None:
+    outcome = call("refine", "machine:discs", "discs.json", "--seconds", 5)
+    assert outcome.code == 0, outcome.err
+    start = find_design("machine:discs")
+    after = read_design(here / "discs.json")
+    assert after.efficiency is not None
+    assert after.efficiency > 8.9
+    assert not np.array_equal(after.problem.lattice.positions, start.problem.lattice.positions)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("crane",), "expected a frame in the plane"),
+        (("machine:pliers",), "driven by forces"),
+        (("machine:crane", "--seconds", "0"), "--seconds: expected a time above 0 s, got 0"),
+        (("machine:crane", "--largest-move", "0.9"), "--largest-move: expected above 0"),
+    ],
+)
+def test_what_cannot_be_refined_is_refused(
+    here: Path, words: tuple[str, ...], message: str
+) -> None:
+    assert message in refusal("refine", *words, folder=here)
+
+
+def test_a_file_of_a_design_without_beams_is_refused(here: Path) -> None:
+    crane = find_problem("crane")
+    write_design(crane.full_design(), here / "springs.json")
+    assert "expected a frame" in refusal("refine", "springs.json", folder=here)

@@ -1,0 +1,141 @@
+"""Derivatives of quantities and constraints by positions and widths, against differences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.mechanics.frames.case import CHANNELS, CaseEvaluator, Channel
+from bellcrank.mechanics.frames.geometry import beam_slopes, geometry_slopes
+from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
+from bellcrank.model import Design, Problem
+from bellcrank.refine.rows import RowEvaluator
+from bellcrank.refine.variables import variables_of
+
+from .designs import random_design, straight_crane
+
+SHARED = {"input_motion", "input_force", "strain"}
+ALL = [Channel(name, "" if name in SHARED else "output") for name in CHANNELS]
+SOFT = {"stiffness", "sag"}
+"""Quantities that follow from linear motions, which are rounded more."""
+
+
+def case_of(problem: Problem, mask: np.ndarray) -> CaseEvaluator:
+    """Return the response of a design, with tightly converged equilibria."""
+    case = CaseEvaluator(problem, None, [0.0, -1e-3], {"output": 1e-4})
+    frames = [case.frame, *(case.other(load, "output") for load in ("payload", "held output"))]
+    for frame in frames:
+        frame.frame = replace(frame.frame, tolerance=1e-13)
+    case.respond(mask)
+    case.values(ALL, [0.5, 1.0])
+    return case
+
+
+def measures(case: CaseEvaluator) -> dict[tuple[Channel, int], np.ndarray]:
+    return {
+        key: found.value
+        for point in case.merged_points()
+        for key, (_, found) in zip(point.channels, point.measured, strict=True)
+    }
+
+
+def central(function: object, step: float) -> np.ndarray:
+    """Return the derivative at 0 by a difference of fourth order."""
+    at = [function(k * step) for k in (-2, -1, 1, 2)]  # type: ignore[operator]
+    return (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * step)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_channels_have_the_derivatives_of_differences(seed: int) -> None:
+    design = random_design(seed)
+    problem, mask = design.problem, design.mask
+    positions, widths = problem.lattice.positions, problem.beam_widths
+    rng = np.random.default_rng(seed)
+    move = rng.normal(size=positions.shape)
+    move[problem.special_nodes] = 0.0
+    widen = 0.2 * rng.normal(size=widths.shape)
+    case = case_of(problem, mask)
+
+    def at(step: float) -> dict[tuple[Channel, int], np.ndarray]:
+        moved = problem.with_geometry(positions + step * move, widths + step * widen)
+        return measures(case_of(moved, mask))
+
+    nearby = {step: at(step * 1e-4) for step in (-2, -1, 1, 2)}
+    for point in case.merged_points():
+        found = geometry_slopes(point.equilibrium, point.measured, beam_slopes(point.evaluator))
+        assert found is not None
+        for key, slope in zip(point.channels, found, strict=True):
+            given = (slope.positions * move).sum(axis=(1, 2)) + slope.widths @ widen
+            expected = central(lambda step, key=key: nearby[round(step / 1e-4)][key], 1e-4)
+            size = np.abs(expected).max()
+            within = 1e-5 if key[0].name in SOFT else 1e-6
+            assert given == pytest.approx(expected, abs=within * size + 1e-12), key
+
+
+def test_the_lowest_stiffness_has_the_derivative_of_differences() -> None:
+    design = straight_crane()
+    problem, mask = design.problem, design.mask
+    rng = np.random.default_rng(0)
+    positions = problem.lattice.positions
+    move = rng.normal(size=positions.shape)
+    move[problem.special_nodes] = 0.0
+
+    def at(step: float) -> np.ndarray:
+        moved = problem.with_geometry(positions + step * move, None)
+        return LOWEST_STIFFNESS.measure(case_of(moved, mask).frame.end).value
+
+    frame = case_of(problem, mask).frame
+    measured = [(LOWEST_STIFFNESS, LOWEST_STIFFNESS.measure(frame.end))]
+    found = geometry_slopes(frame.end, measured, beam_slopes(frame))
+    assert found is not None
+    given = (found[0].positions * move).sum(axis=(1, 2))
+    assert given == pytest.approx(central(at, 1e-5), rel=1e-5)
+
+
+@pytest.mark.parametrize("widest", [1.0, 2.0])
+def test_constraints_have_the_derivatives_of_differences(
+    widest: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bellcrank.refine.rows.GAP_REACH", 3.0)
+    design = straight_crane()
+    width = design.problem.section.width
+    variables = variables_of(design, 0.4, (width, widest * width))
+    wanted = design.problem.specification
+    assert wanted is not None
+    rows = RowEvaluator(variables, design.mask, wanted.items, volume=20.0)
+    rng = np.random.default_rng(1)
+    start = np.where(variables.moves, 0.03, 0.01) * rng.normal(size=variables.count)
+    way = rng.normal(size=variables.count)
+    here = rows.evaluate(start, slopes=True)
+    step = 1e-6
+    ahead, behind = (rows.evaluate(start + sign * step * way) for sign in (1.0, -1.0))
+    assert here is not None
+    assert ahead is not None
+    assert behind is not None
+    objective = (ahead.objectives - behind.objectives) / (2.0 * step)
+    assert here.objective_slopes @ way == pytest.approx(objective, rel=1e-5)
+    one, other = (
+        dict(zip(zip(each.names, each.keys, strict=True), each.constraints, strict=True))
+        for each in (ahead, behind)
+    )
+    compared = set()
+    for name, key, slope in zip(here.names, here.keys, here.constraint_slopes @ way, strict=True):
+        if (name, key) in one and (name, key) in other:
+            expected = (one[name, key] - other[name, key]) / (2.0 * step)
+            assert slope == pytest.approx(expected, rel=2e-3, abs=2e-4), (name, key)
+            compared.add(name)
+    assert {"clearance", "mass", "case.output.off_axis", "case.output.sag"} <= compared
+
+
+def test_positions_of_supports_inputs_and_outputs_are_no_variables() -> None:
+    design = straight_crane()
+    width = design.problem.section.width
+    variables = variables_of(design, 0.4, (width, width))
+    assert variables.moves.all()
+    positions, widths = variables.geometry(np.ones(variables.count))
+    special = design.problem.special_nodes
+    assert np.array_equal(positions[special], design.problem.lattice.positions[special])
+    assert np.array_equal(widths, design.problem.beam_widths)
+    assert isinstance(design, Design)

@@ -1,0 +1,155 @@
+"""Refinement of designs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.model import Design, find_problem, gallery_design
+from bellcrank.part import PartSpec, frame_problem
+from bellcrank.refine import RefinementSettings, refine_design, specified
+from bellcrank.refine.gaps import nearest_points
+from bellcrank.refine.shape import SLENDERNESS, SMALLEST_ANGLE, shape_rows, volume_of
+from bellcrank.refine.steps import linear_step, merit_of
+from bellcrank.refine.variables import variables_of
+from bellcrank.task import find_task
+
+from .designs import straight_crane, unloaded_crane
+
+LONG = 600.0
+"""Seconds that no refinement of these tests takes: the steps bound them."""
+
+
+@pytest.fixture(scope="module")
+def refined() -> Design:
+    result = refine_design(unloaded_crane(), RefinementSettings(steps=20, seconds=LONG))
+    assert not result.before.met
+    assert result.after.met
+    assert result.after.objective > 2.5
+    return result.design
+
+
+def test_the_free_crane_becomes_straight(refined: Design) -> None:
+    """Its off-axis motion was 96 %, and it turned by 77 degrees."""
+    start = straight_crane()
+    assert np.array_equal(refined.mask, start.mask)
+    special = start.problem.special_nodes
+    moved = refined.problem.lattice.positions - start.problem.lattice.positions
+    assert not moved[special].any()
+    assert 0.05 < np.abs(moved).max() <= 0.45 + 1e-9
+
+
+def test_a_refined_geometry_can_be_printed(refined: Design) -> None:
+    rows = shape_rows(refined.problem, refined.mask, np.inf)
+    assert (rows.values <= 1e-2).all()
+    lengths = refined.problem.lattice.rest_length[refined.mask]
+    widths = refined.problem.beam_widths[refined.mask]
+    assert (lengths / widths).min() >= 0.99 * SLENDERNESS
+    PartSpec().of(refined).outline()
+    assert np.degrees(SMALLEST_ANGLE) == pytest.approx(20.0)
+
+
+def test_the_mass_may_be_kept() -> None:
+    start = straight_crane()
+    settings = RefinementSettings(steps=8, seconds=LONG, same_mass=True)
+    found = refine_design(start, settings)
+    before = volume_of(start.problem, start.mask)[0]
+    after = volume_of(found.design.problem, found.design.mask)[0]
+    assert after <= before * (1.0 + 1e-3)
+
+
+def test_symmetry_remains() -> None:
+    task = find_task("gripper")
+    assert task is not None
+    problem = task.problem
+    assert problem.specification is not None
+    assert problem.specification.symmetry
+    design = Design(problem, problem.initial)
+    width = problem.section.width
+    variables = variables_of(design, 0.3, (width, 2.0 * width))
+    rng = np.random.default_rng(0)
+    positions, widths = variables.geometry(0.05 * rng.normal(size=variables.count))
+    column = {"x": 0, "y": 1}[problem.specification.symmetry[0]]
+    first = problem.lattice.positions
+    ends = first[problem.lattice.beams[problem.designable]].reshape(-1, 2)
+    centre = 0.5 * (ends[:, column].min() + ends[:, column].max())
+
+    def mirrored(points: np.ndarray) -> np.ndarray:
+        image = points.copy()
+        image[:, column] = 2.0 * centre - image[:, column]
+        return image
+
+    partner = np.abs(first[:, None] - mirrored(first)[None]).sum(axis=2).argmin(axis=1)
+    assert positions == pytest.approx(mirrored(positions)[partner], abs=1e-12)
+    assert len(np.unique(widths.round(12))) > 10
+
+
+def test_a_problem_without_a_specification_gets_that_of_its_gain() -> None:
+    crane = frame_problem(find_problem("crane"), PartSpec())
+    given = specified(crane, 0.65).specification
+    assert given is not None
+    assert [item.quantity for item in given.items] == ["clearance", "strain"]
+    assert [each.quantity for each in given.maximise] == ["gain"]
+    task = straight_crane().problem
+    assert specified(task) is task
+
+
+def test_what_cannot_be_refined_is_refused() -> None:
+    springs = find_problem("crane").full_design()
+    with pytest.raises(InvalidSettings, match="expected a frame in the plane"):
+        refine_design(springs)
+    pliers = gallery_design("machine", "pliers")
+    assert pliers is not None
+    with pytest.raises(InvalidSettings, match="driven by forces"):
+        refine_design(pliers)
+
+
+def test_a_refinement_that_is_stopped_returns_the_best_design() -> None:
+    seen = []
+
+    def report(progress: object) -> bool:
+        seen.append(progress)
+        return len(seen) < 3
+
+    found = refine_design(straight_crane(), RefinementSettings(seconds=LONG), report)
+    assert len(seen) == 3
+    assert found.reason == "stopped"
+
+
+def test_nodes_move_no_farther_than_they_may() -> None:
+    design = straight_crane()
+    tiny = RefinementSettings(seconds=LONG, largest_move=1e-9)
+    found = refine_design(design, tiny)
+    moved = found.design.problem.lattice.positions - design.problem.lattice.positions
+    assert np.abs(moved).max() <= 1.1e-9
+
+
+def test_the_linear_step_solves_a_small_program() -> None:
+    from bellcrank.refine.rows import Rows
+
+    # Maximise x + y with x + 2 y <= 1 and both within 0.8: x = 0.8, y = 0.1.
+    rows = Rows(
+        np.array([0.0]), np.array([-1.0]), ("bound",), ((0,),), np.array([[1.0, 1.0]]),
+        np.array([[1.0, 2.0]]),
+    )  # fmt: skip
+    step = linear_step(rows, np.full(2, -0.8), np.full(2, 0.8), 1.0)
+    assert step is not None
+    assert step.change == pytest.approx([0.8, 0.1])
+    assert step.merit == pytest.approx(0.9)
+    assert merit_of(replace(rows, constraints=np.array([0.5])), 1.0) == pytest.approx(-10.0)
+
+
+def test_the_nearest_points_of_segments_are_found() -> None:
+    rng = np.random.default_rng(0)
+    for a, b, c, d in rng.normal(size=(30, 4, 2)):
+        s, t = nearest_points(a, b, c, d)
+        found = np.linalg.norm(a + s * (b - a) - c - t * (d - c))
+        share = np.linspace(0.0, 1.0, 101)
+        first = a + share[:, None] * (b - a)
+        second = c + share[:, None] * (d - c)
+        distance = np.linalg.norm(first[:, None] - second[None], axis=2).min()
+        crossing = distance < 0.02
+        assert crossing or found <= distance + 1e-9
