@@ -348,6 +348,9 @@ def _print_report(report: DesignReport) -> None:
     table.add_row("designs evaluated", f"{report.proposals}")
     table.add_row("results", plain(f"{report.folder}/"))
     results.print(table)
+    sheet = report.all_items.get("sheet", ())
+    if missed := [each.item.name for each in sheet if not each.met]:
+        notes.print(f"[bold yellow]warning:[/] in the sheet the design misses {', '.join(missed)}")
     if report.missed:
         first, *others = report.missed
         rest = f", then {', '.join(each.item.name for each in others)}" if others else ""

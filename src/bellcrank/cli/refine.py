@@ -24,7 +24,9 @@ def refine(
         Path | None,
         typer.Argument(metavar="FILE", help="File of the result; default: NAME-refined.json."),
     ] = None,
-    seconds: Annotated[float, typer.Option(help="Largest time.")] = 60.0,
+    evaluations: Annotated[
+        int, typer.Option(help="Largest number of geometries that are evaluated.")
+    ] = 1000,
     largest_move: Annotated[
         float, typer.Option(help="Largest change of a coordinate of a node, in beam lengths.")
     ] = 0.45,
@@ -34,8 +36,8 @@ def refine(
     ] = False,
 ) -> None:
     """Move the nodes of a design, so that it meets its specification and its gain grows."""
-    if not seconds > 0.0:
-        raise InvalidSettings(f"--seconds: expected a time above 0 s, got {seconds:g}")
+    if evaluations < 1:
+        raise InvalidSettings(f"--evaluations: expected at least 1, got {evaluations}")
     if not 0.0 < largest_move <= 0.5:
         raise InvalidSettings(
             f"--largest-move: expected above 0 and at most 0.5 beam lengths, got {largest_move:g}"
@@ -49,7 +51,9 @@ def refine(
     from bellcrank.refine import RefinementSettings
     from bellcrank.workflows.refinement import refine_file, refinement_rows
 
-    settings = RefinementSettings(seconds=seconds, largest_move=largest_move, same_mass=same_mass)
+    settings = RefinementSettings(
+        evaluations=evaluations, largest_move=largest_move, same_mass=same_mass
+    )
     announce_compilation()
     with stopping_on_interrupt() as stop:
 

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import ItemResult, tightened
+from bellcrank.mechanics import VERIFICATION_INCREMENT, ItemResult, tightened
 from bellcrank.model import Item, ObjectiveTerm, Specification
+from bellcrank.part.outline import room_for_fillet
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
 from bellcrank.refine.rows import RowEvaluator
 from bellcrank.refine.shape import shape_rows, volume_of
 from bellcrank.refine.variables import variables_of
-from bellcrank.search import HoppingSettings
+from bellcrank.search import HoppingSettings, SpecificationEvaluator
 from bellcrank.search.verification import Verifier
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -28,10 +29,17 @@ if TYPE_CHECKING:
     from bellcrank.refine.refinement import Progress
     from bellcrank.refine.variables import Variables
 
+    Sheet = Callable[[Design], Sequence[ItemResult] | None]
+    Correction = dict[int, float]
+
 RESERVE = 0.02
 """Part of their size by which bounds are tightened, so that more elements meet them too."""
 PRINTABLE = 1e-2
 """Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
+SHEET_ROUNDS = 3
+"""Number of times it is refined again after the sheet misses items."""
+SHEET_STEPS = 8
+"""Number of steps of each of these: the correction holds near the geometry it was computed for."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
 
@@ -48,11 +56,14 @@ class State:
         Items of the specification; empty if the response is not stable.
     met
         Whether all of them are met, and the geometry prints.
+    sheet
+        Items in the sheet; empty if they were not computed, or it is not stable.
     """
 
     objective: float
     items: tuple[ItemResult, ...]
     met: bool
+    sheet: tuple[ItemResult, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,12 +126,14 @@ def refine_design(
     settings: RefinementSettings | None = None,
     report: Callable[[Progress], bool] = lambda _progress: True,
     strain_limit: float = math.nan,
+    sheet: Sheet | None = None,
 ) -> Refinement:
     """Move the nodes of a design, and change the widths of its struts, to meet its specification.
 
-    The result is verified by frames with eight elements in each strut. Where it misses items that
-    the model of the refinement meets, bounds are corrected by the difference and the design is
-    refined again. A result that is no better than the given design is discarded.
+    The result is verified by frames with eight elements in each strut, and in the sheet if its
+    items are given. Where it misses items there that the model of the refinement meets, bounds are
+    corrected by the difference and the design is refined again. A result that is no better than
+    the given design is discarded.
 
     Parameters
     ----------
@@ -132,6 +145,8 @@ def refine_design(
         Called with each accepted step; the refinement stops if it returns False.
     strain_limit
         Largest strain for a problem without a specification.
+    sheet
+        Function from a design to its items in the sheet, None where it is not stable.
 
     Raises
     ------
@@ -145,51 +160,126 @@ def refine_design(
             f"problem {problem.name!r}: expected a frame in the plane; designs of springs and "
             "designs in space are not refined"
         )
-    wanted = specified(problem, strain_limit)
-    given = replace(design, problem=wanted)
-    width = problem.section.width
-    bounds = (settings.narrowest * width, settings.widest * width)
-    variables = variables_of(given, settings.largest_move, bounds)
-    volume = volume_of(wanted, design.mask)[0] if settings.same_mass else math.inf
-    before = state_of(wanted, design.mask)
-    best, chosen = before, np.zeros(variables.count)
-    vector = chosen
-    correction: dict[int, float] = {}
-    steps = evaluations = 0
-    reason = "the response of the design is not stable"
-    assert wanted.specification is not None
-    began = time.monotonic()
-    for _ in range(ROUNDS):
+    given = replace(design, problem=specified(problem, strain_limit))
+    job = _Job(given, settings, report)
+    job.by_frames()
+    if sheet is not None and job.goes_on:
+        job.by_sheet(sheet)
+    refined = design
+    if job.best is not job.before:
+        at = job.variables.problem_at(job.chosen)
+        refined = replace(design, problem=problem.with_geometry(at.lattice.positions, at.widths))
+    return Refinement(refined, job.before, job.best, job.steps, job.evaluations, job.reason)
+
+
+class _Job:
+    """Refinements of one design, each corrected by the result of the one before."""
+
+    def __init__(
+        self,
+        design: Design,
+        settings: RefinementSettings,
+        report: Callable[[Progress], bool],
+    ) -> None:
+        self.design, self.settings, self.report = design, settings, report
+        problem = design.problem
+        assert problem.section is not None
+        assert problem.specification is not None
+        self.items = problem.specification.items
+        width = problem.section.width
+        bounds = (settings.narrowest * width, settings.widest * width)
+        self.variables = variables_of(design, settings.largest_move, bounds)
+        self.volume = volume_of(problem, design.mask)[0] if settings.same_mass else math.inf
+        self.before = self.best = state_of(problem, design.mask)
+        self.chosen = np.zeros(self.variables.count)
+        self.steps = self.evaluations = 0
+        self.reason = "the response of the design is not stable"
+        self.goes_on = True
+        self.began = time.monotonic()
+
+    def by_frames(self) -> None:
+        """Refine until all items are met with eight elements."""
+        vector = self.chosen
+        correction: Correction = {}
+        for _ in range(ROUNDS):
+            found = self._refined(vector, correction, self.settings.steps)
+            if found is None:
+                return
+            state, vector = found
+            if _is_better(state, self.best):
+                self.best, self.chosen = state, vector
+            if state.met or not state.items or not self.goes_on:
+                return
+            correction = self._correction(vector, state.items)
+
+    def by_sheet(self, sheet: Sheet) -> None:
+        """Refine until all items are met in the sheet too; keeps the best in the sheet."""
+        if not self.best.met:
+            return
+        self.best = self._in_sheet(sheet, self.chosen, self.best)
+        vector, state = self.chosen, self.best
+        for _ in range(SHEET_ROUNDS):
+            if not state.sheet or all(item.met for item in state.sheet) or not self.goes_on:
+                return
+            correction = self._correction(vector, state.sheet)
+            found = self._refined(vector, correction, SHEET_STEPS)
+            if found is None or not found[0].met or not self.goes_on:
+                return
+            state, vector = found
+            state = self._in_sheet(sheet, vector, state)
+            if state.sheet and _missed(state.sheet) < _missed(self.best.sheet):
+                self.best, self.chosen = state, vector
+
+    def _refined(
+        self, vector: NDArray[np.float64], correction: Correction, steps: int
+    ) -> tuple[State, NDArray[np.float64]] | None:
+        """Refine with corrected bounds; None if the response is not stable."""
         items = [
             moved(tightened(item, RESERVE), correction.get(index, 0.0))
-            for index, item in enumerate(wanted.specification.items)
+            for index, item in enumerate(self.items)
         ]
-        rows = RowEvaluator(variables, design.mask, items, volume)
-        left = max(0.0, settings.seconds - (time.monotonic() - began))
-        path, goes_on = [], True
-        for progress in refine_rows(rows, replace(settings, seconds=left), vector):
+        rows = RowEvaluator(self.variables, self.design.mask, items, self.volume)
+        left = replace(
+            self.settings,
+            steps=steps,
+            evaluations=max(4 * SHEET_STEPS, self.settings.evaluations - self.evaluations),
+            seconds=self.settings.seconds - (time.monotonic() - self.began),
+        )
+        path = []
+        for progress in refine_rows(rows, left, vector):
             path.append(progress)
-            goes_on = report(progress)
-            if not goes_on:
+            self.goes_on = self.report(progress)
+            if not self.goes_on:
                 break
         if not path:
-            break
-        reason = path[-1].reason or "stopped"
-        steps, evaluations = steps + path[-1].step, evaluations + path[-1].evaluations
-        found, vector = _latest(variables, design.mask, [each.vector for each in path])
-        if _is_better(found, best):
-            best, chosen = found, vector
-        if found.met or not found.items or not goes_on:
-            break
-        correction = _differences(variables.problem_at(vector), design.mask, found)
-    refined = design
-    if best is not before:
-        positions, widths = variables.geometry(chosen)
-        same = bounds[0] == bounds[1] and problem.widths is None
-        refined = replace(
-            design, problem=problem.with_geometry(positions, None if same else widths)
-        )
-    return Refinement(refined, before, best, steps, evaluations, reason)
+            return None
+        last = path[-1]
+        self.reason = last.reason or "stopped"
+        self.steps, self.evaluations = self.steps + last.step, self.evaluations + last.evaluations
+        return _latest(self.variables, self.design.mask, [each.vector for each in path])
+
+    def _correction(self, vector: NDArray[np.float64], found: tuple[ItemResult, ...]) -> Correction:
+        """Return by how much items are higher in a better model than with one element."""
+        evaluator = SpecificationEvaluator(self.variables.problem_at(vector))
+        if not evaluator.evaluate(self.design.mask, VERIFICATION_INCREMENT).is_admissible:
+            return {}
+        out: Correction = {}
+        for index, (here, there) in enumerate(zip(evaluator.results(), found, strict=True)):
+            difference = there.value - here.value
+            given = here.item.quantity not in {"clearance", "stable_stroke", "mass"}
+            if given and math.isfinite(difference):
+                out[index] = difference
+        return out
+
+    def _in_sheet(self, sheet: Sheet, vector: NDArray[np.float64], state: State) -> State:
+        problem = self.variables.problem_at(vector)
+        found = sheet(replace(self.design, problem=problem))
+        return state if found is None else replace(state, sheet=tuple(found))
+
+
+def _missed(items: tuple[ItemResult, ...]) -> float:
+    """Return the sum of the violations of items; infinite without any."""
+    return sum(item.violation for item in items) if items else math.inf
 
 
 def _latest(
@@ -224,8 +314,19 @@ def state_of(problem: Problem, mask: NDArray[np.bool_]) -> State:
     objective = found.response.efficiency - found.response.penalty
     if found.fault is not None:
         objective = -sum(item.violation for item in found.items)
-    narrow = shape_rows(problem, mask, math.inf).values.max(initial=0.0)
-    return State(objective, found.items, met=found.fault is None and narrow < PRINTABLE)
+    return State(objective, found.items, met=found.fault is None and _prints(problem, mask))
+
+
+def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
+    """Whether all holes between the struts are open, and no strut or angle is too small."""
+    if shape_rows(problem, mask, math.inf).values.max(initial=0.0) > PRINTABLE:
+        return False
+    lattice = problem.lattice
+    try:
+        room_for_fillet(lattice.positions, lattice.beams[mask], float(problem.beam_widths.max()))
+    except InvalidSettings:
+        return False
+    return True
 
 
 def moved(item: Item, change: float) -> Item:
@@ -235,22 +336,6 @@ def moved(item: Item, change: float) -> Item:
         at_least=None if item.at_least is None else item.at_least - change,
         at_most=None if item.at_most is None else item.at_most - change,
     )
-
-
-def _differences(problem: Problem, mask: NDArray[np.bool_], found: State) -> dict[int, float]:
-    """Return by how much items are higher with eight elements than with one."""
-    from bellcrank.mechanics import VERIFICATION_INCREMENT
-    from bellcrank.search import SpecificationEvaluator
-
-    evaluator = SpecificationEvaluator(problem)
-    if not evaluator.evaluate(mask, VERIFICATION_INCREMENT).is_admissible:
-        return {}
-    out = {}
-    for index, (here, there) in enumerate(zip(evaluator.results(), found.items, strict=True)):
-        difference = there.value - here.value
-        if here.item.quantity not in {"clearance", "stable_stroke"} and math.isfinite(difference):
-            out[index] = difference
-    return out
 
 
 def _is_better(new: State, old: State) -> bool:

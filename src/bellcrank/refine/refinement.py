@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -37,8 +38,10 @@ class RefinementSettings:
     ----------
     steps
         Largest number of accepted steps.
+    evaluations
+        Largest number of evaluated geometries.
     seconds
-        Largest time.
+        Largest time. Unless it is infinite, results depend on the speed of the machine.
     largest_move
         Largest change of a coordinate of a node, in mean beam lengths.
     narrowest, widest
@@ -54,7 +57,8 @@ class RefinementSettings:
     """
 
     steps: int = 400
-    seconds: float = 60.0
+    evaluations: int = 400
+    seconds: float = math.inf
     largest_move: float = 0.45
     narrowest: float = 1.0
     widest: float = 1.0
@@ -145,21 +149,19 @@ class _Search:
 
     def reason(self) -> str:
         """Return why the refinement ends; empty if it goes on."""
-        settings = self.settings
-        past = settings.patience
-        if not self.variables.count:
-            return "no node may move and no width may change"
-        if self.step >= settings.steps:
-            return f"{settings.steps} steps"
-        if time.monotonic() - self.began > settings.seconds:
-            return f"{settings.seconds:g} s"
-        if self.region < settings.smallest_region:
-            return "no step improves the design"
-        if len(self.merits) > past and self.merits[-1] - self.merits[-1 - past] < (
-            settings.least_gain
-        ):
-            return f"less than {settings.least_gain:g} gained in {past} steps"
-        return ""
+        settings, past = self.settings, self.settings.patience
+        stalled = len(self.merits) > past and (
+            self.merits[-1] - self.merits[-1 - past] < settings.least_gain
+        )
+        ends = {
+            "no node may move and no width may change": not self.variables.count,
+            f"{settings.steps} steps": self.step >= settings.steps,
+            f"{settings.evaluations} geometries": self.evaluations >= settings.evaluations,
+            f"{settings.seconds:g} s": time.monotonic() - self.began > settings.seconds,
+            "no step improves the design": self.region < settings.smallest_region,
+            f"less than {settings.least_gain:g} gained in {past} steps": stalled,
+        }
+        return next((text for text, holds in ends.items() if holds), "")
 
     def advance(self) -> bool:
         """Try a step; whether it was accepted."""

@@ -18,6 +18,9 @@ SLENDERNESS = 1.5
 """Smallest length of a strut over its width."""
 SMALLEST_ANGLE = np.radians(20.0)
 """Smallest angle between struts that meet."""
+SMALLEST_HOLE = 0.75
+"""Smallest radius of the circle within a triangle of struts, over their mean width; below 0.5 the
+hole closes."""
 NEAR_ANGLE = np.radians(45.0)
 """Angles below which they are constraints."""
 
@@ -91,6 +94,16 @@ def shape_rows(problem: Problem, mask: NDArray[np.bool_], volume: float) -> Shap
             by_position += [
                 (row, other, -slope / SMALLEST_ANGLE), (row, node, slope / SMALLEST_ANGLE),
             ]  # fmt: skip
+    for nodes, ratio, rates, sides in _small_triangles(problem, beams):
+        row = len(values)
+        values.append(1.0 - ratio / SMALLEST_HOLE)
+        names.append("holes between struts")
+        keys.append(tuple(nodes))
+        by_position += [
+            (row, node, -rate / SMALLEST_HOLE) for node, rate in zip(nodes, rates, strict=True)
+        ]
+        mean = float(widths[sides].mean())
+        by_width += [(row, side, ratio / (3.0 * mean * SMALLEST_HOLE)) for side in sides]
     count = len(values) + bool(np.isfinite(volume))
     positions = np.zeros((count, *lattice.positions.shape))
     of_widths = np.zeros((count, lattice.beam_count))
@@ -128,4 +141,42 @@ def _narrow_angles(
             sine = np.sin(angle)
             slopes = ((cosine * a - b) / (sine * length_a), (cosine * b - a) / (sine * length_b))
             found.append((node, one, two, angle, slopes))
+    return found
+
+
+def _small_triangles(
+    problem: Problem, beams: NDArray[np.int64]
+) -> list[tuple[list[int], float, Values, list[int]]]:
+    """Return nodes, radius over width, its derivatives (3, 2) and beams of small triangles."""
+    lattice, widths = problem.lattice, problem.beam_widths
+    number = {}
+    others: dict[int, set[int]] = {}
+    for beam in beams.tolist():
+        first, second = lattice.beams[beam].tolist()
+        number[first, second] = number[second, first] = beam
+        others.setdefault(first, set()).add(second)
+        others.setdefault(second, set()).add(first)
+    found = []
+    for first, around in others.items():
+        for second, third in combinations(sorted(each for each in around if each > first), 2):
+            if third not in others[second]:
+                continue
+            nodes = [first, second, third]
+            points = lattice.positions[nodes]
+            edges = np.roll(points, -1, axis=0) - points
+            lengths = np.linalg.norm(edges, axis=1)
+            half = 0.5 * float(lengths.sum())
+            doubled = float(edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0])
+            area, side = 0.5 * abs(doubled), np.sign(doubled)
+            sides = [number[nodes[k], nodes[(k + 1) % 3]] for k in range(3)]
+            width = float(widths[sides].mean())
+            ratio = area / (half * width)
+            if ratio >= 2.0 * SMALLEST_HOLE:
+                continue
+            opposite = np.roll(edges, -1, axis=0)
+            of_area = 0.5 * side * np.column_stack([-opposite[:, 1], opposite[:, 0]])
+            units = edges / lengths[:, None]
+            of_half = 0.5 * (np.roll(units, 1, axis=0) - units)
+            rates = (of_area - area / half * of_half) / (half * width)
+            found.append((nodes, ratio, rates, sides))
     return found

@@ -64,7 +64,9 @@ class Variables:
 
     def problem_at(self, vector: NDArray[np.float64]) -> Problem:
         """Return the problem with the geometry of a vector."""
-        return self.problem.with_geometry(*self.geometry(vector))
+        positions, widths = self.geometry(vector)
+        same = self.problem.widths is None and self.moves.all()
+        return self.problem.with_geometry(positions, None if same else widths)
 
     def gradient(
         self, positions: NDArray[np.float64], widths: NDArray[np.float64]

@@ -254,7 +254,7 @@ def conclude(
     refinement = None
     if folder.provenance.get("refine"):
         selection, refinement = refine_selection(
-            selection, lambda _progress: stop is None or not stop.is_set()
+            selection, spec, lambda _progress: stop is None or not stop.is_set()
         )
         if stop is not None and stop.is_set():
             return None

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from bellcrank.fem.specification import sheet_items
 from bellcrank.mechanics import VERIFICATION_INCREMENT
 from bellcrank.provenance import provenance
 from bellcrank.refine import Refinement, RefinementSettings, refine_design, specified
@@ -15,20 +17,24 @@ from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.validation import spec_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from bellcrank.mechanics import ItemResult
     from bellcrank.model import Design
+    from bellcrank.part import PartSpec
     from bellcrank.refine.refinement import Progress
     from bellcrank.search import Selection
 
-SECONDS = 25.0
-"""Time for the refinement of the selected design of a job."""
+EVALUATIONS = 400
+"""Number of geometries that the refinement of the selected designs of a job evaluates."""
 MOST_REFINED = 3
 """Number of designs that are refined where none meets the specification."""
 
 
 def refine_selection(
-    selection: Selection, report: Callable[[Progress], bool] = lambda _progress: True
+    selection: Selection,
+    spec: PartSpec | None,
+    report: Callable[[Progress], bool] = lambda _progress: True,
 ) -> tuple[Selection, Refinement | None]:
     """Refine the selected design of a search; the nearest ones where none meets all.
 
@@ -51,12 +57,24 @@ def refine_selection(
             if each.design.mask_hex != selection.design.mask_hex
         ]
     designs = designs[:MOST_REFINED]
-    settings = RefinementSettings(seconds=SECONDS / len(designs))
-    results = [refine_design(design, settings, report) for design in designs]
+    settings = RefinementSettings(evaluations=EVALUATIONS // len(designs))
+    sheet = sheet_of(spec)
+    results = [refine_design(design, settings, report, sheet=sheet) for design in designs]
     best = max(results, key=lambda each: (each.after.met, each.after.objective))
     if best.design is selection.design:
         return selection, best
     return with_design(selection, best.design), best
+
+
+def sheet_of(spec: PartSpec | None) -> Callable[[Design], Sequence[ItemResult] | None] | None:
+    """Return a function from a design to its items in the sheet; None without NGSolve."""
+    if spec is None or find_spec("ngsolve") is None:
+        return None
+
+    def items(design: Design) -> Sequence[ItemResult] | None:
+        return sheet_items(spec.of(design))
+
+    return items
 
 
 def with_design(selection: Selection, design: Design) -> Selection:
@@ -87,6 +105,9 @@ def refinement_data(refinement: Refinement) -> dict[str, Any]:
         "objective_after": finite(refinement.after.objective),
         "met_before": refinement.before.met,
         "met_after": refinement.after.met,
+        "met_in_sheet": all(item.met for item in refinement.after.sheet)
+        if refinement.after.sheet
+        else None,
         "steps": refinement.steps,
         "evaluations": refinement.evaluations,
         "reason": refinement.reason,
@@ -118,7 +139,8 @@ def refine_file(
         As `bellcrank.refine.refine_design`.
     """
     limit = spec_for(design).registered_material.strain_limit
-    result = refine_design(design, settings, report, limit)
+    sheet = sheet_of(spec_for(design)) if design.problem.is_specified else None
+    result = refine_design(design, settings, report, limit, sheet)
     if result.design is design:
         return result
     notes = {**design.provenance, "refinement": refinement_data(result)}
@@ -136,5 +158,6 @@ def refinement_rows(design: Design, refinement: Refinement) -> list[list[str]]:
     """Return the items before and after as rows of texts, the first with the names of columns."""
     spec = spec_for(design)
     problem = specified(design.problem, spec.registered_material.strain_limit)
-    states = {"before": refinement.before.items, "after": refinement.after.items}
+    after = refinement.after
+    states = {"before": refinement.before.items, "after": after.items, "sheet": after.sheet}
     return item_rows(problem, spec, {name: items for name, items in states.items() if items})

@@ -101,6 +101,12 @@ class DesignReport:
         return known
 
     @property
+    def all_items(self) -> dict[str, Sequence[ItemResult]]:
+        """The same, with those in the sheet where they were computed."""
+        sheet = () if self.refinement is None else self.refinement.after.sheet
+        return {**self.items, **({"sheet": sheet} if sheet else {})}
+
+    @property
     def missed(self) -> list[ItemResult]:
         """Items that the design misses in the best model, the binding one first."""
         return binding(list(self.items.values())[-1]) if self.items else []
@@ -179,7 +185,7 @@ def _specification(report: DesignReport) -> dict[str, Any]:
     data: dict[str, Any] = {
         "met": not report.missed,
         "binding": report.missed[0].item.name if report.missed else None,
-        "items": item_data(problem, part, report.items),
+        "items": item_data(problem, part, report.all_items),
     }
     if report.selection.nearest:
         data["nearest"] = [
@@ -253,7 +259,8 @@ def item_table(report: DesignReport) -> list[list[str]]:
     """Return the items of the specification as rows of texts; empty without one."""
     if not report.items or report.part is None:
         return []
-    return item_rows(report.selection.design.problem, report.part, report.items)
+    decisive = list(report.items)[-1]
+    return item_rows(report.selection.design.problem, report.part, report.all_items, decisive)
 
 
 def nearest_table(report: DesignReport) -> list[list[str]]:

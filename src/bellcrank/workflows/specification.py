@@ -114,7 +114,10 @@ def _unit(item: Item) -> str:
 
 
 def item_rows(
-    problem: Problem, spec: PartSpec, results: Mapping[str, Sequence[ItemResult]]
+    problem: Problem,
+    spec: PartSpec,
+    results: Mapping[str, Sequence[ItemResult]],
+    decisive: str | None = None,
 ) -> list[list[str]]:
     """Return the items as rows of texts, the first one with the names of the columns.
 
@@ -125,19 +128,26 @@ def item_rows(
     spec
         Size and material of the part.
     results
-        Items by model, the last one being that which counts: margin and whether an item is met
-        are its own.
+        Items by model.
+    decisive
+        The model whose margins are shown and that determines whether an item is met; the last by
+        default. In others, missed items are marked.
     """
     units = units_of(problem, spec)
     rows = [["item", "wanted", *results, "margin", "met"]]
     columns = list(results.values())
+    chosen = len(columns) - 1 if decisive is None else list(results).index(decisive)
     for values in zip(*columns, strict=True):
-        item, last = values[0].item, values[-1]
+        item, last = values[0].item, values[chosen]
+        after = [" (NO)" if k > chosen and not each.met else "" for k, each in enumerate(values)]
         rows.append(
             [
                 item_label(item, problem),
                 wanted_text(item, units),
-                *(number_text(item, each.value, units) for each in values),
+                *(
+                    number_text(item, each.value, units) + mark
+                    for each, mark in zip(values, after, strict=True)
+                ),
                 f"{100.0 * last.margin:+.0f} %" if math.isfinite(last.margin) else "-",
                 "yes" if last.met else "NO",
             ]
