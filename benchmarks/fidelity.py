@@ -1,13 +1,15 @@
 """Agreement of the models of searches with finite elements: ``python -m benchmarks.fidelity``.
 
-Four studies, selected by ``--only correlate,search,levels,meshes``:
+Five studies, selected by ``--only correlate,search,levels,meshes,joints``:
 
 - correlate: compare the efficiencies of several hundred designs in the spring model, and as frames
   with one element in each beam as searches use them, with frames of 8 elements,
 - search: run `bellcrank design` with several seeds, and compare the efficiencies of its designs in
   the model of the search with those of frames of 8 elements,
 - levels: compute the efficiencies of the bundled designs at all levels of analysis,
-- meshes: compute the efficiency of the full crane in plane stress for several mesh sizes.
+- meshes: compute the efficiency of the full crane in plane stress for several mesh sizes,
+- joints: compare the energies of frames with joints of several sizes with those of the sheet in
+  the record of `levels`.
 
 Designs that lose stability in the frame analysis are counted and excluded from medians. Designs
 with contact are counted. The results are written to ``docs/validation/*.json`` and ``*.png``, and
@@ -66,6 +68,8 @@ SIZES = (2.0, 1.4, 1.0, 0.7, 0.5)
 """Largest sides of triangles, mm."""
 WIDTH = 2.0
 """Strut width, mm."""
+JOINTS = (0.0, 0.2, 0.3, 0.4)
+"""Lengths of the ends of struts that do not deform, in widths."""
 STEPS = 5_000
 """Steps of each chain that samples designs."""
 CHAINS = {"paper": 8, "basin-hopping": 4}
@@ -253,6 +257,28 @@ def level_study(pool: ProcessPoolExecutor) -> None:
     _write("levels", record)
 
 
+def analyse_joints(name: str) -> dict[str, float]:
+    """Return the energy of a bundled design as a frame by the size of its joints, in widths."""
+    found = {}
+    for size in JOINTS:
+        part = PartSpec(width=WIDTH, joint=size * WIDTH).of(find_design(name))
+        found[f"{size:g}"] = levels["frame"](part, FemSettings()).last.energy
+    return found
+
+
+def joint_study(pool: ProcessPoolExecutor) -> None:
+    """Compare frames with joints of several sizes with the sheet."""
+    sheets = json.loads((FOLDER / "levels.json").read_text(encoding="utf-8"))
+    names = [name for name in sheets if ":" in name]
+    record: dict[str, object] = {"width": WIDTH, "provenance": provenance()}
+    for name, found in zip(names, pool.map(analyse_joints, names), strict=True):
+        sheet = sheets[name]["plane, neo-hookean"]["energy_N_mm"]
+        ratios = {size: energy / sheet for size, energy in found.items()}
+        record[name] = {"sheet_energy_N_mm": sheet, "energy_ratio": ratios}
+        print(f"| `{name}` | {' | '.join(f'{each:.2f}' for each in ratios.values())} |", flush=True)
+    _write("joints", record)
+
+
 def analyse_mesh(size: float) -> dict[str, object]:
     """Analyse the full crane in plane stress with triangles of a largest side, mm."""
     part = PartSpec(width=WIDTH).of(find_problem("crane").full_design())
@@ -336,6 +362,7 @@ STUDIES = {
     "search": search_study,
     "levels": level_study,
     "meshes": mesh_study,
+    "joints": joint_study,
 }
 
 

@@ -88,6 +88,12 @@ def levels() -> Rows:
             yield row(f"`{name}`", *("-" if value is None else f"{value:.3f}" for value in found))
 
 
+def joints() -> Rows:
+    for name, told in read("validation/joints").items():
+        if ":" in name:
+            yield row(f"`{name}`", *(f"{each:.2f}" for each in told["energy_ratio"].values()))
+
+
 def meshes() -> Rows:
     for told in read("validation/meshes")["rows"]:
         size = f"{told['size']:g} mm" + (" (default)" if told["size"] == 1.0 else "")
@@ -251,7 +257,7 @@ def independent_simulation() -> Rows:
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (search_comparison, move_comparison),
     "goals": (goals,),
-    "validation": (levels, meshes, correlation, searched),
+    "validation": (levels, joints, meshes, correlation, searched),
     "machines": (bundled, contact, entries, lengths, two_ports),
     "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }
