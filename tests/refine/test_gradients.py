@@ -12,6 +12,7 @@ from bellcrank.mechanics.frames.geometry import beam_slopes, geometry_slopes
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 from bellcrank.model import Design, Problem
 from bellcrank.refine.rows import RowEvaluator
+from bellcrank.refine.shape import shape_rows
 from bellcrank.refine.variables import variables_of
 
 from .designs import random_design, straight_crane
@@ -127,6 +128,31 @@ def test_constraints_have_the_derivatives_of_differences(
             assert slope == pytest.approx(expected, rel=2e-3, abs=2e-4), (name, key)
             compared.add(name)
     assert {"clearance", "mass", "case.output.off_axis", "case.output.sag"} <= compared
+
+
+def test_constraints_on_the_shape_have_the_derivatives_of_differences(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Limits at which most struts, angles and triangles are constraints.
+    for name, value in (("SMALLEST_HOLE", 3.0), ("NEAR_ANGLE", 2.0), ("SLENDERNESS", 6.0)):
+        monkeypatch.setattr(f"bellcrank.refine.shape.{name}", value)
+    design = random_design(0)
+    problem, mask = design.problem, design.mask
+    rng = np.random.default_rng(1)
+    move = rng.normal(size=problem.lattice.positions.shape)
+    widen = rng.normal(size=problem.beam_widths.shape)
+
+    def at(step: float) -> np.ndarray:
+        positions = problem.lattice.positions + step * move
+        moved = problem.with_geometry(positions, problem.beam_widths + step * widen)
+        return shape_rows(moved, mask, 10.0).values
+
+    here = shape_rows(problem, mask, 10.0)
+    assert set(here.names) == {
+        "length of struts", "angle between struts", "holes between struts", "mass",
+    }  # fmt: skip
+    slope = (here.positions * move).sum(axis=(1, 2)) + here.widths @ widen
+    assert slope == pytest.approx(central(at, 1e-4), rel=1e-6, abs=1e-7)
 
 
 def test_positions_of_supports_inputs_and_outputs_are_no_variables() -> None:

@@ -19,6 +19,7 @@ from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 from bellcrank.mechanics.items import reduced, scale_of
 from bellcrank.refine.gaps import gaps_of
 from bellcrank.refine.shape import shape_rows
+from bellcrank.refine.stability import softest_states
 from bellcrank.search.clearance import printed_beams
 from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.stroke_states import fractions_of
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
-    from bellcrank.mechanics.frames.evaluator import FrameEvaluator
     from bellcrank.model import Item, Problem
     from bellcrank.refine.variables import Variables
 
@@ -46,10 +46,6 @@ GAP_STATES = 8
 STABLE = 0.3
 """Smallest lowest stiffness along the stroke, as a part of the smaller one near its ends. Paths on
 which it is below 0.2 count as unstable."""
-STABLE_STATES = 32
-"""States along the stroke at which the lowest stiffness is computed first."""
-HALVINGS = 2
-"""Number of times the distance of states about the softest one is halved."""
 GAP_REACH = 0.5
 """Gaps that are constraints, in widths of the section beyond the wanted one."""
 
@@ -300,39 +296,6 @@ class RowEvaluator:
         none = np.zeros((0, self.variables.count))
         by_vector = self.variables.gradient(found.positions, found.widths) if slopes else none
         return Rows(np.zeros(0), found.values, found.names, found.keys, none, by_vector)
-
-
-def softest_states(
-    frame: FrameEvaluator,
-) -> dict[float, tuple[Equilibrium, Measures]] | None:
-    """Return states along the stroke with their lowest stiffness; None if one is not found.
-
-    At equal fractions, and closer to each other about the softest one, since the lowest stiffness
-    falls and rises steeply near a bifurcation.
-    """
-    quantity, found = LOWEST_STIFFNESS, {}
-
-    def at(fraction: float) -> float:
-        if fraction not in found:
-            state = frame.end if fraction == 1.0 else frame.equilibrium(fraction)
-            if state is None:
-                return np.nan
-            found[fraction] = (state, quantity.measure(state))
-        return float(found[fraction][1].value[0])
-
-    values = {k / STABLE_STATES: at(k / STABLE_STATES) for k in range(1, STABLE_STATES + 1)}
-    if not all(value > 0.0 for value in values.values()):
-        return None
-    step = 1.0 / STABLE_STATES
-    for _ in range(HALVINGS):
-        step *= 0.5
-        lowest = min(values, key=values.__getitem__)
-        nearby = [each for each in (lowest - step, lowest + step) if 0.0 < each <= 1.0]
-        neighbours = {each: at(each) for each in nearby}
-        if not all(value > 0.0 for value in neighbours.values()):
-            return None
-        values |= neighbours
-    return found
 
 
 def _quantity_of(fields: Values) -> Quantity:
