@@ -175,7 +175,12 @@ def design(
         stop.hint = f"Stopped. To continue: {plain(command)}"
         with SearchProgress(read_settings(folder.settings)) as progress:
             report = complete_design(
-                folder, workers=workers, progress=progress, verifying=progress.verifying, stop=stop
+                folder,
+                workers=workers,
+                progress=progress,
+                verifying=progress.verifying,
+                refining=progress.refining,
+                stop=stop,
             )
         if report is None:
             stop.exit()  # a thread may still compute a block, which delays a usual exit

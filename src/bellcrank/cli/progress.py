@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import threading
 import time
+from typing import TYPE_CHECKING
 
 from rich.progress import TextColumn, TimeRemainingColumn
 
 from bellcrank.cli.live import Live
 from bellcrank.search import Progress as Step
 from bellcrank.search import SearchSettings
+
+if TYPE_CHECKING:
+    from bellcrank.refine.refinement import Progress as RefinementStep
 
 VIOLATED = -50.0
 """Score below which a design violates goals."""
@@ -54,6 +58,15 @@ class SearchProgress(Live):
         self._bar.update(self._task, description="verifying")
         figures = f"verified candidates: {done} of at most {total}"
         self._show(done, total, figures, figures)
+
+    def refining(self, step: RefinementStep) -> None:
+        """Show the objective of a refinement and what it violates."""
+        from bellcrank.workflows.refinement import EVALUATIONS
+
+        self._bar.update(self._task, description="refining ")
+        figures = f"objective {step.rows.objective:.3f}, violation {step.rows.violation:.3f}"
+        line = f"refining: step {step.step}, {figures}"
+        self._show(min(step.evaluations, EVALUATIONS), EVALUATIONS, figures, line)
 
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)

@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from bellcrank.refine.refinement import Progress as RefinementProgress
+
 
 def prepare(problem: Problem, settings: SearchSettings) -> None:
     """Compile the kernels of a search and check that it can start from the initial design.
@@ -135,6 +137,7 @@ def complete_design(
     workers: int | None = None,
     progress: Callable[[Progress], None] = lambda _progress: None,
     verifying: Callable[[int, int], None] = lambda _done, _total: None,
+    refining: Callable[[RefinementProgress], None] = lambda _progress: None,
     stop: threading.Event | None = None,
 ) -> DesignReport | None:
     """Run or resume a design job and write its results.
@@ -149,6 +152,8 @@ def complete_design(
         Called with the progress of a chain, from the thread of that chain.
     verifying
         For a frame: called with the number of candidates verified and the largest number.
+    refining
+        For a task with a specification: called with each accepted step of the refinement.
     stop
         Event that stops the search after the current block of steps; completed steps are stored.
 
@@ -168,7 +173,7 @@ def complete_design(
         try:
             done = run_chains(folder, settings, workers=workers, progress=progress, stop=stop)
             if done:
-                report = conclude(folder, settings, verifying, stop)
+                report = conclude(folder, settings, verifying, refining, stop)
                 if report is not None:
                     folder.finish()
                     return report
@@ -227,6 +232,7 @@ def conclude(
     folder: RunFolder,
     settings: SearchSettings,
     verifying: Callable[[int, int], None] = lambda _done, _total: None,
+    refining: Callable[[RefinementProgress], None] = lambda _progress: None,
     stop: threading.Event | None = None,
 ) -> DesignReport | None:
     """Select, clean, verify, refine and compare a design, and write the result files.
@@ -253,9 +259,12 @@ def conclude(
     selection = select_design(problem, candidates, settings, limit, verifying)
     refinement = None
     if folder.provenance.get("refine"):
-        selection, refinement = refine_selection(
-            selection, spec, lambda _progress: stop is None or not stop.is_set()
-        )
+
+        def report_step(step: RefinementProgress) -> bool:
+            refining(step)
+            return stop is None or not stop.is_set()
+
+        selection, refinement = refine_selection(selection, spec, report_step)
         if stop is not None and stop.is_set():
             return None
     elements = None if problem.section is None else ELEMENTS

@@ -7,6 +7,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from bellcrank.errors import InvalidSettings
 from bellcrank.fem.specification import sheet_items
 from bellcrank.mechanics import VERIFICATION_INCREMENT
 from bellcrank.provenance import provenance
@@ -72,7 +73,10 @@ def sheet_of(spec: PartSpec | None) -> Callable[[Design], Sequence[ItemResult] |
         return None
 
     def items(design: Design) -> Sequence[ItemResult] | None:
-        return sheet_items(spec.of(design))
+        try:
+            return sheet_items(spec.of(design))
+        except InvalidSettings:  # no outline: struts almost touch
+            return None
 
     return items
 
