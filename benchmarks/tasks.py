@@ -16,15 +16,22 @@ from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import NoDesignFound
+from bellcrank.errors import InvalidSettings, NoDesignFound
 from bellcrank.fem.specification import sheet_items
 from bellcrank.provenance import provenance
 from bellcrank.search import read_settings
 from bellcrank.task import Task, bundled_tasks, find_task
 from bellcrank.workflows import complete_design, start_design
+from bellcrank.workflows.refinement import refinement_data
 from bellcrank.workflows.specification import binding, item_data
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bellcrank.mechanics import ItemResult
+    from bellcrank.workflows import DesignReport
 
 RECORD = Path(__file__).parents[1] / "docs" / "tasks" / "runs.json"
 SEEDS = 5
@@ -73,7 +80,7 @@ def run(name: str, seed: int) -> dict[str, Any]:
     row["met"] = not missed
     row["binding"] = missed[0].item.name if missed else None
     started = time.perf_counter()
-    sheet = sheet_items(task.part.of(design))
+    sheet = _in_sheet(report, task)
     row["sheet_seconds"] = round(time.perf_counter() - started, 1)
     row["stable_in_sheet"] = sheet is not None
     row["met_in_sheet"] = sheet is not None and not binding(sheet)
@@ -86,9 +93,22 @@ def run(name: str, seed: int) -> dict[str, Any]:
     row["efficiency"] = min((gain for gain in gains if gain is not None), default=None)
     row["beams"] = design.beam_count
     row["mask"] = design.mask_hex
+    row["positions"] = design.problem.lattice.positions.round(5).tolist()
+    if report.refinement is not None:
+        row["refinement"] = refinement_data(report.refinement)
     row["proposals"] = report.proposals
     row["items"] = item_data(design.problem, task.part, models)
     return row
+
+
+def _in_sheet(report: DesignReport, task: Task) -> Sequence[ItemResult] | None:
+    """Return the items of a design in the sheet; None if it has no stable path or outline there."""
+    if report.refinement is not None and report.refinement.after.sheet:
+        return report.refinement.after.sheet
+    try:
+        return sheet_items(task.part.of(report.selection.design))
+    except InvalidSettings:
+        return None
 
 
 def write(rows: list[dict[str, Any]]) -> None:
