@@ -78,6 +78,7 @@ def test_a_design_in_a_file_is_refined(here: Path, runs: dict[str, tuple[Path, s
 def test_the_gain_of_a_free_design_grows(here: Path) -> None:
     outcome = call("refine", "machine:discs", "discs.json", "--evaluations", 80)
     assert outcome.code == 0, outcome.err
+    assert "off-axis motion" in outcome.out  # a gain alone would flatter
     start = find_design("machine:discs")
     after = read_design(here / "discs.json")
     assert after.efficiency is not None

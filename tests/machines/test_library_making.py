@@ -78,7 +78,9 @@ def test_each_task_makes_one_entry_and_leaves_nothing_else(whole: Path) -> None:
     assert light.provenance["settings"]["goals"][0] == "input-stiffness <= 0.1"
     begun = [chain["begun_with"] for chain in free.provenance["chains"]]
     assert begun == ["full", "lever"]
-    assert free.design.problem.section == light.design.problem.section == Section(0.2, 0.5, joint=0.06)
+    assert (
+        free.design.problem.section == light.design.problem.section == Section(0.2, 0.5, joint=0.06)
+    )
     assert not free.warnings
     assert free.efficiency == pytest.approx(
         model_evaluator(free.design.problem).evaluate(free.design.mask).efficiency,

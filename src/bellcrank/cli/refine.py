@@ -49,7 +49,7 @@ def refine(
     from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import write_design
     from bellcrank.refine import RefinementSettings
-    from bellcrank.workflows.refinement import refine_file, refinement_rows
+    from bellcrank.workflows.refinement import motion_rows, refine_file, refinement_rows
 
     settings = RefinementSettings(
         evaluations=evaluations, largest_move=largest_move, same_mass=same_mass
@@ -67,6 +67,7 @@ def refine(
 
         found = refine_file(chosen, settings, report)
     results.print(text_grid(refinement_rows(chosen, found)))
+    results.print(text_grid(motion_rows({"before": chosen, "after": found.design})))
     if found.design is chosen:
         notes.print(f"the design was not improved: {found.reason}")
         if stop.is_set():

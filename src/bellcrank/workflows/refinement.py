@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.specification import sheet_items
-from bellcrank.mechanics import VERIFICATION_INCREMENT
+from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.provenance import provenance
 from bellcrank.refine import Refinement, RefinementSettings, refine_design, specified
 from bellcrank.search import HoppingSettings, SpecificationEvaluator
@@ -18,7 +18,7 @@ from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.validation import spec_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from bellcrank.mechanics import ItemResult
     from bellcrank.model import Design
@@ -156,6 +156,26 @@ def refine_file(
     own = provenance(**{key: value for key, value in notes.items() if key not in provenance()})
     refined = replace(result.design, efficiency=efficiency, provenance=own)
     return replace(result, design=refined)
+
+
+def motion_rows(designs: Mapping[str, Design]) -> list[list[str]]:
+    """Return efficiency, off-axis motion and rotation of designs, by 8 elements, as rows of texts.
+
+    Of the first load case and its first output.
+    """
+    columns = []
+    for design in designs.values():
+        evaluator = FrameEvaluator(design.problem, elements=8)
+        efficiency = evaluator.evaluate(design.mask, VERIFICATION_INCREMENT).efficiency
+        motion = evaluator.output_motion()
+        columns.append(
+            (f"{efficiency:.3f}", f"{motion.off_axis:.1%}", f"{float(motion.rotation):.3g} deg")
+        )
+    names = ("efficiency", "off-axis motion", "rotation")
+    return [
+        ["8 elements", *designs],
+        *([name, *texts] for name, texts in zip(names, zip(*columns, strict=True), strict=True)),
+    ]
 
 
 def refinement_rows(design: Design, refinement: Refinement) -> list[list[str]]:
