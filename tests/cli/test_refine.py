@@ -82,7 +82,7 @@ def test_the_gain_of_a_free_design_grows(here: Path) -> None:
     start = find_design("machine:discs")
     after = read_design(here / "discs.json")
     assert after.efficiency is not None
-    assert after.efficiency > 8.9
+    assert after.efficiency > 20.0  # 8.9 before
     assert not np.array_equal(after.problem.lattice.positions, start.problem.lattice.positions)
 
 

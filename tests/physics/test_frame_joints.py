@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from bellcrank.mechanics.frames.beams import beam_stiffness, bow_coefficients
 from bellcrank.mechanics.frames.evaluator import FrameEvaluator
 from bellcrank.mechanics.frames.quantities import quantities
-from bellcrank.mechanics.frames.system import beam_stiffness, bow_coefficients
 from bellcrank.model import Elasticity, Lattice, Problem, Section, Supports, find_problem
 from bellcrank.model.conditions import Input, Output
 from bellcrank.part import PartSpec, frame_problem

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from bellcrank.mechanics import FrameEvaluator
+from bellcrank.mechanics.frames.beams import beam_stiffness
 from bellcrank.mechanics.frames.kernels.response import solve_fields
-from bellcrank.mechanics.frames.system import allocate_state, beam_stiffness
+from bellcrank.mechanics.frames.system import allocate_state
 from bellcrank.model import Problem, Section
 from tests.physics.frames import MATERIAL, random_frame
 

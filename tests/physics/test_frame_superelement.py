@@ -18,7 +18,7 @@ from bellcrank.mechanics import (
     free_nodes,
     uniform_motion,
 )
-from bellcrank.mechanics.frames.system import bow_coefficients
+from bellcrank.mechanics.frames.beams import bow_coefficients
 from bellcrank.model import Design, Elasticity, Output, Problem, Section, gallery_design
 from bellcrank.part import PartSpec, frame_problem
 

@@ -68,7 +68,7 @@ def refine(
         found = refine_file(chosen, settings, report)
     results.print(text_grid(refinement_rows(chosen, found)))
     results.print(text_grid(motion_rows({"before": chosen, "after": found.design})))
-    if found.design is chosen:
+    if not found.improved:
         notes.print(f"the design was not improved: {found.reason}")
         if stop.is_set():
             stop.exit()

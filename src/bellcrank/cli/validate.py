@@ -181,7 +181,7 @@ def _plan(
     """Return each level with each of its theories or laws, in order."""
     from bellcrank.fem import FemSettings, levels
     from bellcrank.fem.continuum.laws import laws
-    from bellcrank.mechanics.frames.system import theories
+    from bellcrank.mechanics.frames.beams import theories
     from bellcrank.part import read_length
 
     longest = None if size is None else read_length("size", size)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from bellcrank.errors import InvalidProblem
-from bellcrank.model.arrays import check_ids, real_array
+from bellcrank.model.arrays import check_ids, locked, real_array
 from bellcrank.model.conditions import ROLLERS, Aggregate
 from bellcrank.model.section import Elasticity, Section
 
@@ -51,6 +51,15 @@ def check_section(lattice: Lattice, section: object, material: object) -> None:
         )
 
 
+def check_frame_only(section: Section | None, loads: Loads, specification: object) -> None:
+    """Check that there is a section where there are loads or a specification."""
+    if section is None and (loads or specification is not None):
+        raise InvalidProblem(
+            "loads and specification: expected a problem with a section; the spring model has "
+            "neither"
+        )
+
+
 def check_widths(
     lattice: Lattice, section: Section | None, widths: ArrayLike | None
 ) -> NDArray[np.float64] | None:
@@ -67,7 +76,7 @@ def check_widths(
     if not (given > 0.0).all():
         wrong = int(np.argmin(given))
         raise InvalidProblem(f"widths[{wrong}]: expected a number above 0, got {given[wrong]:g}")
-    return given
+    return locked(given)
 
 
 def check_slender(

@@ -22,6 +22,7 @@ from bellcrank.model.arrays import (
 from bellcrank.model.checks import (
     check_connection,
     check_coordinates,
+    check_frame_only,
     check_regions,
     check_section,
     check_slender,
@@ -88,8 +89,7 @@ class Problem:
     specification
         What a design must meet, with further outputs and load cases; only for frames.
     widths : (M,) float64, lattice units
-        Width of each beam of a frame in the plane of the lattice, in space its diameter; None if
-        all have that of the section.
+        Width of each beam of a frame, in space its diameter; None for that of the section.
 
     Raises
     ------
@@ -144,11 +144,7 @@ class Problem:
         check_texts(self.name, self.aggregate, self.objective)
         check_section(lattice, self.section, self.material)
         outputs, loads = list(self.outputs.values()), self.loads
-        if self.section is None and (loads or self.specification is not None):
-            raise InvalidProblem(
-                "loads and specification: expected a problem with a section; the spring model has "
-                "neither"
-            )
+        check_frame_only(self.section, loads, self.specification)
         check_coordinates(lattice, self.supports, given, outputs, loads)
         supports = self.supports.merged(lattice.dimension)
         object.__setattr__(self, "supports", supports)
@@ -157,11 +153,11 @@ class Problem:
             check_connection(lattice, given, output)
         if self.section is not None and self.material is None:
             object.__setattr__(self, "material", DEFAULT_MATERIAL)
-        beam_count = self.lattice.beam_count
+        beam_count = lattice.beam_count
         initial = np.ones(beam_count, dtype=np.bool_) if self.initial is None else self.initial
         initial = boolean_mask("initial", initial, beam_count)
         if self.designable is None:
-            designable = self._default_designable()
+            designable = np.flatnonzero(~lattice.beams_touching(self.special_nodes_of_all_cases))
         else:
             designable = np.sort(id_list("designable", self.designable))
             check_ids("designable", id_list("designable", self.designable), beam_count, "beam")
@@ -172,23 +168,14 @@ class Problem:
             )
         object.__setattr__(self, "initial", locked(initial))
         object.__setattr__(self, "designable", locked(designable))
-        widths = check_widths(lattice, self.section, self.widths)
-        object.__setattr__(self, "widths", None if widths is None else locked(widths))
+        object.__setattr__(self, "widths", check_widths(lattice, self.section, self.widths))
         if self.section is not None:
-            possible = initial.copy()
-            possible[designable] = True
+            possible = initial | np.isin(np.arange(beam_count), designable)
             check_slender(lattice, self.section, self.beam_widths, possible)
         for case in () if self.specification is None else self.specification.cases:
             self._problem_of(case)
 
     __reduce__ = rebuild
-
-    def _default_designable(self) -> NDArray[np.int64]:
-        used = [self.special_nodes]
-        for case in () if self.specification is None else self.specification.cases:
-            used += [case.supports.nodes, case.input.nodes, case.loads.nodes]
-            used += [output.nodes for output in case.outputs.values()]
-        return np.flatnonzero(~self.lattice.beams_touching(np.unique(np.concatenate(used))))
 
     @property
     def is_specified(self) -> bool:
@@ -234,8 +221,17 @@ class Problem:
     def special_nodes(self) -> NDArray[np.int64]:
         """Nodes of supports, input, outputs and loads, sorted."""
         outputs = [output.nodes for output in self.outputs.values()]
-        regions = [self.supports.nodes, self.input.nodes, *outputs, self.loads.nodes]
-        return np.unique(np.concatenate(regions))
+        used = [self.supports.nodes, self.input.nodes, self.loads.nodes, *outputs]
+        return np.unique(np.concatenate(used))
+
+    @property
+    def special_nodes_of_all_cases(self) -> NDArray[np.int64]:
+        """The same of all load cases."""
+        used = [self.special_nodes]
+        for case in () if self.specification is None else self.specification.cases:
+            used += [case.supports.nodes, case.input.nodes, case.loads.nodes]
+            used += [output.nodes for output in case.outputs.values()]
+        return np.unique(np.concatenate(used))
 
     @property
     def outputs(self) -> dict[str, Output]:
@@ -393,15 +389,13 @@ def problem_to_dict(problem: Problem) -> dict[str, Any]:
         "output": output_data(problem.output),
         "aggregate": problem.aggregate,
     }
-    if problem.objective is not None:
-        data["objective"] = problem.objective
-    if problem.section is not None and problem.material is not None:
-        data["section"] = problem.section.to_dict()
-        data["material"] = asdict(problem.material)
-    if problem.widths is not None:
-        data["widths"] = problem.widths.tolist()
-    if problem.loads:
-        data["loads"] = problem.loads.to_dict()
-    if problem.specification is not None:
-        data["specification"] = specification_data(problem.specification, problem.lattice.dimension)
-    return data
+    wanted, dimension = problem.specification, problem.lattice.dimension
+    optional = {
+        "objective": problem.objective,
+        "section": problem.section and problem.section.to_dict(),
+        "material": problem.material and asdict(problem.material),
+        "widths": None if problem.widths is None else problem.widths.tolist(),
+        "loads": problem.loads.to_dict() if problem.loads else None,
+        "specification": wanted and specification_data(wanted, dimension),
+    }
+    return data | {key: value for key, value in optional.items() if value is not None}

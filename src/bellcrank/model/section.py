@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
 
 from bellcrank.errors import InvalidProblem
 from bellcrank.model.arrays import positive_number, real_array
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 Shape = Literal["rectangle", "round"]
 
@@ -95,9 +100,19 @@ class Section:
     @property
     def area(self) -> float:
         """Area A."""
+        return float(self.area_of(np.asarray(self.width)))
+
+    def area_of(self, width: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (...) the areas of sections of the same kind and other widths.
+
+        Examples
+        --------
+        >>> Section(2.0, 5.0).area_of(np.array([2.0, 3.0]))
+        array([10., 15.])
+        """
         if self.shape == "round":
-            return math.pi * self.width**2 / 4.0
-        return self.width * self.thickness
+            return np.asarray(math.pi * width**2 / 4.0)
+        return np.asarray(width * self.thickness)
 
     @property
     def inertia(self) -> float:

@@ -4,7 +4,7 @@ A search decides which beams there are. Refinement then moves the nodes of a des
 the widths of its struts, so that its specification is met and its objective grows. Objectives and
 constraints are those of the specification, gaps along the stroke, the stability of all paths, and
 what prints; all have adjoint gradients (`bellcrank.mechanics.frames.geometry`). Steps are linear
-programs within a region of trust.
+programs within a trust region.
 
 >>> from bellcrank.part import PartSpec, frame_problem
 >>> from bellcrank.model import human_design

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -73,14 +72,15 @@ class Refinement:
     Parameters
     ----------
     design
-        The design, whose problem has the positions and widths. It is the given one if no step
-        improved it.
+        The design, whose problem has the positions and widths.
     before, after
         States of the given design and of this one.
     steps, evaluations
         Number of accepted steps and of evaluated geometries.
     reason
         Why the refinement ended.
+    improved
+        Whether a better geometry was found; else `design` is the given one.
     """
 
     design: Design
@@ -89,6 +89,7 @@ class Refinement:
     steps: int
     evaluations: int
     reason: str
+    improved: bool
 
 
 def specified(problem: Problem, strain_limit: float = math.nan) -> Problem:
@@ -151,7 +152,8 @@ def refine_design(
     Raises
     ------
     InvalidSettings
-        If the design is in space, has no section, or has no stable response.
+        If the design is in space or has no section, or its problem has no specification and is
+        driven by forces.
     """
     settings = settings or RefinementSettings()
     problem = design.problem
@@ -166,10 +168,13 @@ def refine_design(
     if sheet is not None and job.goes_on:
         job.by_sheet(sheet)
     refined = design
-    if job.best is not job.before:
+    improved = bool(job.chosen.any())
+    if improved:
         at = job.variables.problem_at(job.chosen)
         refined = replace(design, problem=problem.with_geometry(at.lattice.positions, at.widths))
-    return Refinement(refined, job.before, job.best, job.steps, job.evaluations, job.reason)
+    return Refinement(
+        refined, job.before, job.best, job.steps, job.evaluations, job.reason, improved
+    )
 
 
 class _Job:
@@ -195,7 +200,6 @@ class _Job:
         self.steps = self.evaluations = 0
         self.reason = "the response of the design is not stable"
         self.goes_on = True
-        self.began = time.monotonic()
 
     def by_frames(self) -> None:
         """Refine until all items are met with eight elements."""
@@ -243,7 +247,6 @@ class _Job:
             self.settings,
             steps=steps,
             evaluations=max(4 * SHEET_STEPS, self.settings.evaluations - self.evaluations),
-            seconds=self.settings.seconds - (time.monotonic() - self.began),
         )
         path = []
         for progress in refine_rows(rows, left, vector):

@@ -20,7 +20,7 @@ class Gaps(NamedTuple):
     pairs: NDArray[np.int64]
     """(g, 2) the pieces of struts that are near each other."""
     value: NDArray[np.float64]
-    """(g,) gaps less than the reach, lattice units."""
+    """(g,) gaps, lattice units."""
     fields: NDArray[np.float64]
     """(g, N, 3) derivatives by displacements and rotations of the nodes."""
     widths: NDArray[np.float64]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,7 +25,7 @@ SHARE = 0.5
 SMALLEST_GAIN = 1e-9
 """Predicted improvement below which a step is not tried."""
 GOOD = 0.5
-"""Part of the predicted improvement from which the region of trust grows."""
+"""Part of the predicted improvement from which the trust region grows."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,14 +38,12 @@ class RefinementSettings:
         Largest number of accepted steps.
     evaluations
         Largest number of evaluated geometries.
-    seconds
-        Largest time. Unless it is infinite, results depend on the speed of the machine.
     largest_move
         Largest change of a coordinate of a node, in mean beam lengths.
     narrowest, widest
         Bounds of the widths, as factors of that of the section.
     first_region, smallest_region, largest_region
-        Sizes of the region of trust, in beam lengths.
+        Sizes of the trust region, in beam lengths.
     patience
         Number of steps in which the merit must grow by `least_gain`.
     least_gain
@@ -58,7 +54,6 @@ class RefinementSettings:
 
     steps: int = 400
     evaluations: int = 400
-    seconds: float = math.inf
     largest_move: float = 0.45
     narrowest: float = 1.0
     widest: float = 1.0
@@ -85,7 +80,7 @@ class Progress:
     rows
         Objectives and constraints.
     region
-        Size of the region of trust, beam lengths.
+        Size of the trust region, beam lengths.
     reason
         Why the refinement ended; empty while it goes on.
     """
@@ -104,7 +99,7 @@ def refine_rows(
     """Improve a geometry step by step; yield the initial state and each accepted one.
 
     A step is refused if a load case loses its stability, a strut gets too short, or the merit
-    grows by less than a part of what the linear model predicts; then the region of trust shrinks.
+    grows by less than a part of what the linear model predicts; then the trust region shrinks.
 
     Parameters
     ----------
@@ -135,7 +130,7 @@ class _Search:
         self, evaluator: RowEvaluator, settings: RefinementSettings, start: Values | None
     ) -> None:
         self.evaluator, self.settings = evaluator, settings
-        self.variables, self.began = evaluator.variables, time.monotonic()
+        self.variables = evaluator.variables
         self.vector = np.zeros(self.variables.count) if start is None else start
         self.rows = evaluator.evaluate(self.vector, slopes=True)
         self.step, self.evaluations, self.region = 0, 1, settings.first_region
@@ -157,7 +152,6 @@ class _Search:
             "no node may move and no width may change": not self.variables.count,
             f"{settings.steps} steps": self.step >= settings.steps,
             f"{settings.evaluations} geometries": self.evaluations >= settings.evaluations,
-            f"{settings.seconds:g} s": time.monotonic() - self.began > settings.seconds,
             "no step improves the design": self.region < settings.smallest_region,
             f"less than {settings.least_gain:g} gained in {past} steps": stalled,
         }
@@ -210,7 +204,7 @@ class _Search:
         return self.evaluator.evaluate(self.vector + change, slopes=slopes)
 
     def _refuse(self, *, unstable: bool) -> bool:
-        """Shrink the region of trust; after losses of stability other variables are tried too."""
+        """Shrink the trust region; after losses of stability other variables are tried too."""
         self.refused += unstable
         self.region *= 0.7 if unstable else 0.4
         return False

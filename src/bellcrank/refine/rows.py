@@ -255,35 +255,30 @@ class RowEvaluator:
     ) -> Rows | None:
         """Return the constraints on the lowest stiffness of a load case along the stroke."""
         case = evaluator.cases[name].evaluator
-        quantity = LOWEST_STIFFNESS
-        paths = {"": case.frame}
-        for item in self.items:
-            if item.case == name and item.quantity == "payload":
-                paths[item.output] = case.other("payload", item.output)
+        paths = [case.frame, *(case.other("payload", output) for output in case.payloads)]
         none = np.zeros((0, self.variables.count))
         constraints, gradients, keys = [np.zeros(0)], [none], []
-        for index, frame in enumerate(paths.values()):
+        for index, frame in enumerate(paths):
             found = softest_states(frame)
             if found is None:
                 return None
             values = {fraction: float(each.value[0]) for fraction, (_, each) in found.items()}
             end = min((min(values), max(values)), key=values.__getitem__)
             ratio = {fraction: value / values[end] for fraction, value in values.items()}
-            least = STABLE
-            near = [each for each in sorted(ratio) if each != end and ratio[each] < 3.0 * least]
-            constraints.append(1.0 - np.array([ratio[each] for each in near]) / least)
+            near = [each for each in sorted(ratio) if each != end and ratio[each] < 3.0 * STABLE]
+            constraints.append(1.0 - np.array([ratio[each] for each in near]) / STABLE)
             keys += [(index, round(1e6 * each)) for each in near]
             if not slopes or not near:
                 continue
-            rates = {}
+            rates, of_beams = {}, beam_slopes(frame)
             for fraction in (*near, end):
                 equilibrium, measures = found[fraction]
-                slope = geometry_slopes(equilibrium, [(quantity, measures)], beam_slopes(frame))
+                slope = geometry_slopes(equilibrium, [(LOWEST_STIFFNESS, measures)], of_beams)
                 if slope is None:
                     return None
                 rates[fraction] = self.variables.gradient(*slope[0])[0]
             gradients += [
-                -(rates[each] - ratio[each] * rates[end])[None] / (values[end] * least)
+                -(rates[each] - ratio[each] * rates[end])[None] / (values[end] * STABLE)
                 for each in near
             ]
         rows = np.concatenate(constraints)
@@ -347,8 +342,7 @@ def _jacobian(
 
     By central differences of both by the channels, whose own derivatives are given.
     """
-    sizes = {channel: value.size for channel, value in channels.items()}
-    total = sum(sizes.values())
+    total = sum(value.size for value in channels.values())
     steps = np.concatenate(
         [np.full(v.size, STEP * max(float(np.abs(v).max()), 1e-9)) for v in channels.values()]
     )
@@ -364,11 +358,13 @@ def _jacobian(
         (found[:total] - found[total:]) / (2.0 * steps[:, None]) if found.size else None
         for found in rows_at(moved)
     ]
-    rows: list[Values] = []
-    begin = 0
-    for channel, value in channels.items():
-        rows += [gradients[channel, row] for row in range(len(value))]
-    of_channels = np.concatenate(rows)
+    of_channels = np.concatenate(
+        [
+            gradients[channel, row]
+            for channel, value in channels.items()
+            for row in range(len(value))
+        ]
+    )
     none = np.zeros((0, of_channels.shape[1]))
     objective, constraint = (none if each is None else each.T @ of_channels for each in by_channel)
     return objective, constraint

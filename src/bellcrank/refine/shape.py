@@ -42,9 +42,8 @@ def volume_of(problem: Problem, mask: NDArray[np.bool_]) -> tuple[float, Values,
     """Return the volume of the struts, and its derivatives by positions (N, d) and widths (M,)."""
     section, lattice = problem.section, problem.lattice
     assert section is not None
-    ratio = problem.beam_widths / section.width
+    area = section.area_of(problem.beam_widths) * mask
     power = 2 if section.shape == "round" else 1
-    area = section.area * ratio**power * mask
     ends = lattice.positions[lattice.beams]
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=1)

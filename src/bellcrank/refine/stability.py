@@ -27,14 +27,14 @@ def softest_states(
     At equal fractions, and closer to each other about the softest one, since the lowest stiffness
     falls and rises steeply near a bifurcation.
     """
-    quantity, found = LOWEST_STIFFNESS, {}
+    found: dict[float, tuple[Equilibrium, Measures]] = {}
 
     def at(fraction: float) -> float:
         if fraction not in found:
             state = frame.end if fraction == 1.0 else frame.equilibrium(fraction)
             if state is None:
                 return np.nan
-            found[fraction] = (state, quantity.measure(state))
+            found[fraction] = (state, LOWEST_STIFFNESS.measure(state))
         return float(found[fraction][1].value[0])
 
     values = {k / STABLE_STATES: at(k / STABLE_STATES) for k in range(1, STABLE_STATES + 1)}

@@ -84,12 +84,7 @@ class Variables:
         return np.asarray((self.map.T @ whole.T).T)
 
 
-def variables_of(
-    design: Design,
-    largest_move: float,
-    widths: tuple[float, float],
-    origin: Problem | None = None,
-) -> Variables:
+def variables_of(design: Design, largest_move: float, widths: tuple[float, float]) -> Variables:
     """Return the variables of a design.
 
     Nodes of supports, inputs, outputs and loads of all load cases keep their positions.
@@ -99,24 +94,21 @@ def variables_of(
     design
         The design to refine.
     largest_move
-        Largest change of a coordinate from its value in `origin`, in mean beam lengths.
+        Largest change of a coordinate, in mean beam lengths.
     widths
         Smallest and largest width, lattice units; equal if widths do not change.
-    origin
-        Problem with the positions from which changes count; that of the design by default.
     """
     from scipy.sparse import csr_matrix
 
     problem, mask = design.problem, design.mask
     lattice = problem.lattice
     nodes, dimension = lattice.positions.shape
-    special = np.unique(np.concatenate([case.special_nodes for case in problem.cases.values()]))
     free = np.zeros(nodes, dtype=bool)
     free[lattice.beams[mask].ravel()] = True
-    free[special] = False
+    free[problem.special_nodes_of_all_cases] = False
     wanted = problem.specification
     axes = () if wanted is None else wanted.symmetry
-    images = _images(problem if origin is None else origin, axes)
+    images = _images(problem, axes)
     rows, columns, signs = [], [], []
     count = 0
     moves: list[bool] = []
@@ -150,9 +142,7 @@ def variables_of(
     moving, start = np.array(moves, dtype=bool), np.array(anchors, dtype=np.int64)
     low, high = np.zeros(count), np.zeros(count)
     reach = largest_move * float(np.mean(lattice.rest_length[mask]))
-    first = lattice.positions if origin is None else origin.lattice.positions
-    offset = (first - lattice.positions).ravel()
-    low[moving], high[moving] = (offset[start[moving]] + sign * reach for sign in (-1.0, 1.0))
+    low[moving], high[moving] = -reach, reach
     now = problem.beam_widths[start[~moving] - nodes * dimension]
     low[~moving], high[~moving] = widths[0] - now, widths[1] - now
     return Variables(problem, matrix, moving, np.minimum(low, 0.0), np.maximum(high, 0.0))

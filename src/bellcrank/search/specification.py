@@ -95,10 +95,7 @@ class SpecificationEvaluator:
         self.elements = elements
         section = problem.section
         assert section is not None
-        ratio = problem.beam_widths / section.width
-        round_section = section.shape == "round"
-        area = section.area * ratio * (ratio if round_section else 1.0)
-        self._volume = area * problem.lattice.rest_length
+        self._volume = section.area_of(problem.beam_widths) * problem.lattice.rest_length
         self.cases: dict[str, _Case] = {}
         for name, case in problem.cases.items():
             payloads = {

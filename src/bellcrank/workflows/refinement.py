@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.fem.results import finite
 from bellcrank.fem.specification import sheet_items
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.provenance import provenance
@@ -100,10 +100,6 @@ def with_design(selection: Selection, design: Design) -> Selection:
 
 def refinement_data(refinement: Refinement) -> dict[str, Any]:
     """Return how a design was refined, as plain data."""
-
-    def finite(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
     return {
         "objective_before": finite(refinement.before.objective),
         "objective_after": finite(refinement.after.objective),
@@ -121,7 +117,7 @@ def refinement_data(refinement: Refinement) -> dict[str, Any]:
 def refinement_text(refinement: Refinement) -> str:
     """Return how a design was refined, in one sentence."""
     before, after = refinement.before, refinement.after
-    if after is before:
+    if not refinement.improved:
         return f"no better geometry found in {refinement.steps} steps ({refinement.reason})"
     met = {True: "all items met", False: "items missed"}
     return (
@@ -145,7 +141,7 @@ def refine_file(
     limit = spec_for(design).registered_material.strain_limit
     sheet = sheet_of(spec_for(design)) if design.problem.is_specified else None
     result = refine_design(design, settings, report, limit, sheet)
-    if result.design is design:
+    if not result.improved:
         return result
     notes = {**design.provenance, "refinement": refinement_data(result)}
     efficiency = (

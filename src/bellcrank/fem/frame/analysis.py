@@ -14,7 +14,7 @@ from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import PathStatus, follow_path
 from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
 from bellcrank.mechanics.frames.analysis import without_ends
-from bellcrank.mechanics.frames.system import theories
+from bellcrank.mechanics.frames.beams import theories
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -13,13 +13,8 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.frame.sparse import Assembly, SparseFactor
 from bellcrank.fem.path import Linearisation, PathState
-from bellcrank.mechanics.frames.system import (
-    beam_stiffness,
-    drive_and_load,
-    held_unknowns,
-    spring_stiffness,
-    subdivided,
-)
+from bellcrank.mechanics.frames.beams import beam_stiffness, subdivided
+from bellcrank.mechanics.frames.system import drive_and_load, held_unknowns, spring_stiffness
 from bellcrank.model import Elasticity
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ import numpy as np
 from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.mechanics.evaluator import FlipPrediction, Response
 from bellcrank.mechanics.frames.analysis import orientation, strain_of_frame
+from bellcrank.mechanics.frames.beams import theories
 from bellcrank.mechanics.frames.equilibria import (
     Equilibrium,
     equilibrium_between,
@@ -24,7 +25,6 @@ from bellcrank.mechanics.frames.system import (
     allocate_state,
     allocate_structure,
     build_frame,
-    theories,
 )
 from bellcrank.mechanics.objectives import objective_of
 from bellcrank.mechanics.output import output_motion

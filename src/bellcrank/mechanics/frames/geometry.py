@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from bellcrank.mechanics.frames.beams import beam_stiffness, bow_coefficients
 from bellcrank.mechanics.frames.quantities.strain import strain_by_geometry
-from bellcrank.mechanics.frames.system import beam_stiffness, bow_coefficients
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics.frames.analysis import deformations, fibre_strain, stress_resultants
+from bellcrank.mechanics.frames.beams import reshaped
 from bellcrank.mechanics.frames.equilibria import moved_state
 from bellcrank.mechanics.frames.quantities.definition import (
     Measures,
@@ -14,7 +15,6 @@ from bellcrank.mechanics.frames.quantities.definition import (
     Slopes,
     quantities,
 )
-from bellcrank.mechanics.frames.system import reshaped
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
