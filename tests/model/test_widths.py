@@ -81,10 +81,19 @@ def test_widths_scale_with_another_part(crane: Problem) -> None:
     assert thin.beam_widths == pytest.approx(np.full(352, 0.15))
 
 
-def test_parts_of_different_widths_are_refused(crane: Problem) -> None:
-    wide = crane.with_geometry(crane.lattice.positions, np.full(352, 0.3))
-    with pytest.raises(InvalidSettings, match="struts of different widths"):
-        PartSpec().of(wide.full_design())
+def test_parts_keep_the_ratios_of_widths(crane: Problem) -> None:
+    widths = np.full(352, 0.2)
+    widths[7] = 0.3
+    design = crane.with_geometry(crane.lattice.positions, widths).full_design()
+    part = PartSpec(width=1.0).of(design)
+    assert part.widths[7] == pytest.approx(1.5)
+    assert np.delete(part.widths, 7) == pytest.approx(1.0)
+    assert PartSpec().of(crane.full_design()).widths == pytest.approx(2.0)
+    assert part.outline().area > PartSpec(width=1.0).of(crane.full_design()).outline().area
+    widths[7] = 0.6
+    slender = crane.with_geometry(crane.lattice.positions, widths).full_design()
+    with pytest.raises(InvalidSettings, match="struts 12 mm wide are not slender"):
+        PartSpec(width=4.0).of(slender)
 
 
 def test_a_joint_is_at_most_half_as_long_as_the_section_is_wide() -> None:

@@ -86,7 +86,7 @@ def check_print(what: Part | Export, rules: PrintRules | None = None) -> list[Pr
 @checks.register("struts")
 def check_struts(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check that struts consist of a whole number of lines, and of enough of them."""
-    width = part.section.width
+    width = float(part.widths.min())
     lines, least = rules.lines_in(width), rules.width_of(rules.min_lines)
     short = WIDTH_TOLERANCE * rules.bead_width
     bead = f"{rules.bead_width:g} mm beads in {rules.layer:g} mm layers"
@@ -97,8 +97,14 @@ def check_struts(part: Part, outline: Outline, rules: PrintRules) -> PrintWarnin
             f"{bead}; choose a width of at least {least:.2f} mm, or a smaller nozzle.",
         )
     off = width - rules.width_of(lines)
-    if abs(off) <= short:
+    if abs(off) <= short and part.widths.max() - width <= short:
         return None
+    if part.widths.max() - width > short:
+        return PrintWarning(
+            "struts",
+            f"Struts are {width:.2f} to {part.widths.max():.2f} mm wide, which are not all whole "
+            f"numbers of {bead}; slice with lines of variable width.",
+        )
     below = lines if off > 0.0 else lines - 1
     fitting = " or ".join(f"{rules.width_of(n):.2f}" for n in (below, below + 1) if n > 0)
     bead_width = (width - rules.overlap) / lines + rules.overlap
@@ -128,8 +134,8 @@ def check_gaps(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning 
     """Check that gaps between struts without a common node are wide enough to stay open."""
     import shapely
 
-    least, half = _smallest_gap(rules), 0.5 * part.section.width
-    struts = read_struts(part.positions, part.struts)
+    least, half = _smallest_gap(rules), 0.5 * float(part.widths.min())
+    struts = read_struts(part.positions, part.struts, part.widths)
     joins = find_joins(struts, half, half + 0.5 * least)
     width = 2.0 * (joins.bottlenecks - half)
     # Plates have no gaps.

@@ -15,7 +15,7 @@ from bellcrank.model.geometry import distances_to_segments, inner_distances
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 SAMPLES = 9
 """Points on the centre line of each strut at which contact is checked."""
@@ -91,13 +91,14 @@ def find_contacts(
     struts: NDArray[np.int64],
     rest: NDArray[np.float64],
     stroke: Iterable[tuple[float, NDArray[np.float64]]],
-    width: float,
+    width: ArrayLike,
 ) -> Contacts:
     """Find the struts that touch or cross in any of the states along a stroke.
 
     Struts overlap near a joint that they share, so a point on the centre line of one strut counts
     only if it was more than `CLEARANCE` widths away from the centre line of the other at rest. It
-    is in contact if it is now less than one width away; where centre lines cross, that is zero.
+    is in contact if it is now less than one width away, the mean of both; where centre lines
+    cross, the distance is zero.
 
     Parameters
     ----------
@@ -107,7 +108,7 @@ def find_contacts(
         Points along the centre lines at rest, which are straight, mm.
     stroke : iterable of (float, (s, k, d) float64)
         Fraction of the full input and the same points in that state, in order of the load.
-    width
+    width : float or (s,) array_like
         Width of the struts, in space their diameter, mm.
 
     Returns
@@ -124,8 +125,9 @@ def find_contacts(
     [{'beams': [7, 9], 'overlap_mm': 0.5, 'first_at': 0.5}]
     """
     found: dict[tuple[int, int], tuple[float, float]] = {}
+    widths = np.broadcast_to(np.asarray(width, dtype=np.float64), len(struts))
     for load, moved in stroke:
-        for one, other, depth in _overlaps(rest, moved, width):
+        for one, other, depth in _overlaps(rest, moved, widths):
             largest, onset = found.get((one, other), (0.0, load))
             found[one, other] = (max(largest, depth), onset)
     ordered = sorted(found.items())
@@ -135,10 +137,11 @@ def find_contacts(
 
 
 def _overlaps(
-    rest: NDArray[np.float64], moved: NDArray[np.float64], width: float
+    rest: NDArray[np.float64], moved: NDArray[np.float64], widths: NDArray[np.float64]
 ) -> list[tuple[int, int, float]]:
     """Return the pairs of struts in contact in one state, with their overlap in mm."""
-    one, part, other, piece = _near_segments(moved, width)
+    one, part, other, piece = _near_segments(moved, float(widths.max(initial=0.0)))
+    width = 0.5 * (widths[one] + widths[other])
     first = np.stack([moved[one, part], moved[one, part + 1]], axis=1)
     second = np.stack([moved[other, piece], moved[other, piece + 1]], axis=1)
     between, fraction = inner_distances(first, second)
@@ -152,9 +155,10 @@ def _overlaps(
         near = distance < width
         i, j, k, share = one[near], other[near], part[near], where[near, None]
         point = (1.0 - share) * rest[i, k] + share * rest[i, k + 1]
-        clear = distances_to_segments(point, rest[j, 0], rest[j, -1]) >= CLEARANCE * width
+        clear = distances_to_segments(point, rest[j, 0], rest[j, -1]) >= CLEARANCE * width[near]
         pairs = np.sort(np.column_stack([i, j])[clear], axis=1).tolist()
-        for (a, b), depth in zip(pairs, (width - distance[near][clear]).tolist(), strict=True):
+        depths = (width - distance)[near][clear].tolist()
+        for (a, b), depth in zip(pairs, depths, strict=True):
             found[a, b] = max(depth, found.get((a, b), 0.0))
     return [(*pair, depth) for pair, depth in found.items()]
 

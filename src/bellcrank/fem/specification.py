@@ -257,8 +257,9 @@ class _Sheet:
         wanted = {item.quantity: item.at_least or 0.0 for item in self.items}
         problem = self.part.design.problem
         assert problem.section is not None
-        length = problem.lattice.rest_length[self.part.design.mask].sum()
-        given = {"mass": problem.section.area * float(length)}
+        mask, length = self.part.design.mask, problem.lattice.rest_length
+        area = problem.section.area_of(problem.beam_widths)
+        given = {"mass": float((area * length)[mask].sum())}
         if "clearance" in wanted:
             given["clearance"] = self._gap(main, wanted["clearance"])
         if "stable_stroke" in wanted:
@@ -277,7 +278,7 @@ class _Sheet:
             (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
             for state, field in zip(main.states, main.fields, strict=True)
         )
-        least = part.section.width + bound * part.scale
+        least = part.widths + bound * part.scale
         beams = np.flatnonzero(part.design.mask)
         overlap = find_contacts(beams, lines, stroke, least).overlap
         return bound - float(overlap.max()) / part.scale if len(overlap) else math.inf

@@ -36,7 +36,8 @@ class Part:
     material
         Material of the struts.
     section
-        Cross-section of the struts, a rectangle; mm.
+        Cross-section of the struts, a rectangle; mm. If the struts of the design have different
+        widths, their ratios to that of the section of the problem are kept.
     scale
         Length of a lattice unit, mm.
     fillet
@@ -46,8 +47,7 @@ class Part:
     Raises
     ------
     InvalidSettings
-        If there are no beams, the struts are round or of different widths, or they are not
-        longer than wide.
+        If there are no beams, the struts are round, or they are not longer than wide.
     InvalidProblem
         If the problem is in space.
 
@@ -78,18 +78,14 @@ class Part:
             raise InvalidSettings(f"fillet: expected a radius of 0 mm or more, got {self.fillet!r}")
         if not 0.0 < self.scale < float("inf"):
             raise InvalidSettings(f"scale: expected a length above 0 mm, got {self.scale!r}")
-        if self.design.problem.widths is not None:
-            raise InvalidSettings(
-                "widths: parts with struts of different widths cannot be built yet; frames of them "
-                "can be evaluated"
-            )
         if not self.design.mask.any():
             raise InvalidSettings("the design has no beams")
-        shortest = float(self.design.problem.lattice.rest_length[self.design.mask].min())
-        if self.section.width >= shortest * self.scale:
+        length = self.design.problem.lattice.rest_length[self.design.mask] * self.scale
+        worst = int(np.argmax(self.widths / length))
+        if self.widths[worst] >= length[worst]:
             raise InvalidSettings(
-                f"width: struts {self.section.width:g} mm wide are not slender where the shortest "
-                f"is {shortest * self.scale:g} mm long; choose narrower struts or a larger scale"
+                f"width: struts {self.widths[worst]:g} mm wide are not slender where the shortest "
+                f"is {length[worst]:g} mm long; choose narrower struts or a larger scale"
             )
 
     @property
@@ -97,7 +93,7 @@ class Part:
         """Radius in the corners between struts, mm."""
         if self.fillet is not None:
             return self.fillet
-        room = room_for_fillet(self.positions, self.struts, self.section.width)
+        room = room_for_fillet(self.positions, self.struts, self.widths)
         return min(FILLET * self.section.width, ROOM * room)
 
     @property
@@ -110,6 +106,19 @@ class Part:
         """The two nodes of each present beam, (s, 2)."""
         return self.design.problem.lattice.beams[self.design.mask]
 
+    @property
+    def width_ratios(self) -> NDArray[np.float64]:
+        """Width of each strut over that of the section, (s,)."""
+        problem = self.design.problem
+        if problem.widths is None or problem.section is None:
+            return np.ones(np.count_nonzero(self.design.mask))
+        return problem.widths[self.design.mask] / problem.section.width
+
+    @property
+    def widths(self) -> NDArray[np.float64]:
+        """Width of each strut, (s,), mm."""
+        return self.section.width * self.width_ratios
+
     def outline(self) -> Outline:
         """Return the planar outline that is meshed, printed and cut.
 
@@ -118,7 +127,7 @@ class Part:
         InvalidSettings
             If struts or fillets close holes between struts.
         """
-        return strut_outline(self.positions, self.struts, self.section.width, self.fillet_radius)
+        return strut_outline(self.positions, self.struts, self.widths, self.fillet_radius)
 
     @property
     def stroke(self) -> float:

@@ -46,6 +46,14 @@ class Panel:
         """Width of a strut, points."""
         return max(STRUT * spacing(self.problem) * self.points, 0.6)
 
+    def struts(self, beams: NDArray[np.int64], multiple: float = 1.0) -> NDArray[np.float64]:
+        """Return (n,) widths of the struts of beams, points, in the ratios of the problem."""
+        points = np.full(len(beams), multiple * self.strut)
+        if self.problem.widths is not None and self.problem.section is not None:
+            points *= self.problem.widths[beams] / self.problem.section.width
+        points[points < 0.6] = 0.6
+        return points
+
 
 def add_panel(
     figure: Figure,
@@ -103,7 +111,7 @@ def add_struts(
             LineCollection(
                 list(positions[panel.problem.lattice.beams[beams]]),
                 colors=colour,
-                linewidths=width * panel.strut,
+                linewidths=panel.struts(beams, width),
                 capstyle="round",
                 zorder=level,
             ),

@@ -65,8 +65,8 @@ class StressedPart:
         Vertices of beam elements or of triangles.
     stress : (c,) or (n,)
         Von Mises stress of elements or vertices, MPa.
-    width
-        Width of the struts, lattice units.
+    widths : (c,)
+        Widths of the beam elements, lattice units; empty for triangles.
     note
         Text above the drawing.
     curve
@@ -77,7 +77,7 @@ class StressedPart:
     displacement: NDArray[np.float64]
     cells: NDArray[np.int64]
     stress: NDArray[np.float64]
-    width: float
+    widths: NDArray[np.float64]
     note: str
     curve: StrokeCurve
 
@@ -170,7 +170,7 @@ def _add_stressed(
     if part.cells.shape[1] == 2:
         lines = LineCollection(
             list(points[part.cells]),
-            linewidths=part.width * panel.points,
+            linewidths=part.widths * panel.points,
             capstyle="round",
             **options,
         )

@@ -69,7 +69,7 @@ def smallest_gap(case: CaseEvaluator, design: NDArray[np.bool_], bound: float) -
         for fraction in (np.arange(1, STATES + 1) / STATES).tolist()
         if (found := case.state(fraction)) is not None
     ]
-    overlap = find_contacts(
-        frame.beams[chosen], rest[chosen], stroke, float(case.problem.beam_widths.max()) + bound
-    ).overlap
+    beams = frame.beams[chosen]
+    least = case.problem.beam_widths[beams] + bound
+    overlap = find_contacts(beams, rest[chosen], stroke, least).overlap
     return bound - float(overlap.max()) if len(overlap) else math.inf

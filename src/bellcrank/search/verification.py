@@ -168,12 +168,12 @@ class Verifier:
 
     def _contacts(self) -> Contacts:
         """Return the beams that touch in states along the stroke."""
-        section = self.problem.section
-        assert section is not None
         rest, _ = centre_lines(self._frame, self._frame.state)
         stroke = [
             (fraction, centre_lines(self._frame, found.state)[1])
             for fraction in (np.arange(1, STATES + 1) / STATES).tolist()
             if (found := self._frame.equilibrium(fraction)) is not None
         ]
-        return find_contacts(self._frame.beams, rest, stroke, section.width)
+        return find_contacts(
+            self._frame.beams, rest, stroke, self.problem.beam_widths[self._frame.beams]
+        )

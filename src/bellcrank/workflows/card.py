@@ -127,7 +127,7 @@ def _part_table(bundle: Export, part: Part) -> Table:
     mass = volume * part.material.density / 1000.0
     rows = [
         ("size", f"{right - left:.1f} x {top - bottom:.1f} x {bundle.thickness:.2f} mm"),
-        ("struts", f"{part.section.width:g} mm wide, fillets {part.fillet_radius:.2f} mm"),
+        ("struts", f"{_widths(part)} mm wide, fillets {part.fillet_radius:.2f} mm"),
         ("spacing", f"{part.scale:g} mm"),
         ("material", f"{part.material.name}, E {part.material.young:g} MPa"),
         ("volume", f"{volume / 1000.0:.2f} cm3"),
@@ -210,3 +210,9 @@ def _footer(design: Design) -> str:
     now = provenance()
     commit = str(now["commit"] or "")[:9]
     return f"bellcrank {now['version']} {commit} · {now['time']} · {design.mask_hex[:96]}"
+
+
+def _widths(part: Part) -> str:
+    """Return the width of the struts, or the least and the largest one, as text."""
+    low, high = float(part.widths.min()), float(part.widths.max())
+    return f"{low:g}" if high - low < 1e-9 * high else f"{low:.2f} to {high:.2f}"

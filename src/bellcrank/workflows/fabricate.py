@@ -73,17 +73,18 @@ class Grips:
         """
         problem = part.design.problem
         positions, beams = part.positions, part.struts
-        width, fillet = part.section.width, part.fillet_radius
+        width, fillet = part.widths, part.fillet_radius
         shown, drawn = positions, beams
         if self.pointer:
             node = self._outermost(part)
             direction = problem.output.direction[problem.output.nodes.tolist().index(node)]
             shown, drawn = with_pointer(positions, beams, node, direction, self.pointer)
+            width = np.append(width, part.section.width)
         outline = strut_outline(shown, drawn, width, fillet)
         if self.plate:
-            outline = filled(outline, shown, drawn, problem.supports.nodes)
+            outline = filled(outline, shown, drawn, problem.supports.nodes, width)
         if self.pad:
-            outline = filled(outline, shown, drawn, problem.input.nodes)
+            outline = filled(outline, shown, drawn, problem.input.nodes, width)
         if self.screws:
             points = screw_positions(
                 outline, shown, problem.supports.nodes, self.screws, self.screw_diameter, self.wall
@@ -159,7 +160,7 @@ def print_warnings(bundle: Export, profile: PrintProfile) -> list[str]:
         for load, displacement in evaluator.displacements(part.design.mask)
     )
     beams, rest = np.flatnonzero(part.design.mask), centre_lines(part.positions[part.struts])
-    contacts = find_contacts(beams, rest, stroke, part.section.width)
+    contacts = find_contacts(beams, rest, stroke, part.widths)
     if len(contacts.pairs):
         sentences.append(contacts.message)
     return sentences

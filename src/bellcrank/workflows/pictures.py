@@ -254,12 +254,15 @@ def stressed_part(analysis: Analysis) -> StressedPart:
         known += f", {analysis.status.value} at {analysis.last.load:.0%} of the stroke"
     theory = analysis.theory + (", linear" if analysis.linear else "")
     field = analysis.field
+    widths = np.empty(0)
+    if field.cells.shape[1] == 2:
+        widths = np.repeat(part.widths, len(field.cells) // len(part.widths))
     return StressedPart(
         rest=field.rest[:, :2] / part.scale,
         displacement=field.displacement[:, :2] / part.scale,
         cells=field.cells,
         stress=field.stress,
-        width=part.section.width / part.scale,
+        widths=widths / part.scale,
         note=f"{known} · {analysis.level}, {theory}",
         curve=StrokeCurve(
             stroke=load * part.stroke if by_motion else force,

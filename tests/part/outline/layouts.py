@@ -9,7 +9,7 @@ import shapely
 from scipy.spatial import Delaunay
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Layout = tuple[NDArray[np.float64], NDArray[np.int64]]
 
@@ -61,12 +61,14 @@ def random_layout(kind: str, seed: int) -> Layout:
 
 
 def filled_by_polygons(
-    layout: Layout, width: float, fillet: float, segments: int
+    layout: Layout, width: ArrayLike, fillet: float, segments: int
 ) -> shapely.Geometry:
     """What a disc of radius `fillet` outside the struts cannot cover, with polygons for arcs."""
     positions, beams = layout
     struts = shapely.linestrings(positions[beams])
-    swollen = shapely.union_all(shapely.buffer(struts, 0.5 * width + fillet, quad_segs=segments))
+    swollen = shapely.union_all(
+        shapely.buffer(struts, 0.5 * np.asarray(width) + fillet, quad_segs=segments)
+    )
     if fillet == 0.0:
         return swollen
     # Each side of the polygon by itself: buffers of whole polygons are simplified first.

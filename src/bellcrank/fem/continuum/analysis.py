@@ -130,7 +130,7 @@ def _contacts_of(part: Part, response: ContinuumResponse) -> Contacts:
         for state, field in zip(response.states, response.fields, strict=True)
     )
     beams = np.flatnonzero(part.design.mask)
-    return find_contacts(beams, lines, stroke, part.section.width)
+    return find_contacts(beams, lines, stroke, part.widths)
 
 
 def interpolator(

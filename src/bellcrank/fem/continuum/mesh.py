@@ -13,7 +13,7 @@ from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.part.outline import Loop
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.part.outline import Outline
     from bellcrank.part.part import Part
@@ -123,7 +123,7 @@ def plane_mesh(part: Part, size: float | None = None, angles: ArcAngles = CURVED
     part
         Part to be meshed.
     size
-        Largest edge of the triangles, mm; half the strut width by default.
+        Largest edge of the triangles, mm; half the least strut width by default.
     angles
         Largest angles of arcs along one edge.
 
@@ -132,10 +132,11 @@ def plane_mesh(part: Part, size: float | None = None, angles: ArcAngles = CURVED
     InvalidSettings
         If there is no valid outline, the size is not positive or two hubs touch.
     """
-    size = SIZE * part.section.width if size is None else size
-    nodes, radius = hub_nodes(part), HUB * part.section.width
+    size = SIZE * float(part.widths.min()) if size is None else size
+    nodes, widest = hub_nodes(part), np.zeros(len(part.positions))
+    np.maximum.at(widest, part.struts, part.widths[:, None])
     hubs = dict(zip(nodes.tolist(), part.positions[nodes], strict=True))
-    mesh = triangulated(part.outline(), hubs, radius, size, angles)
+    mesh = triangulated(part.outline(), hubs, HUB * widest[nodes], size, angles)
     mesh.Curve(2)
     return ContinuumMesh(
         mesh, nodes, part.design.problem.lattice.node_count, part.section.thickness
@@ -145,7 +146,7 @@ def plane_mesh(part: Part, size: float | None = None, angles: ArcAngles = CURVED
 def triangulated(
     outline: Outline,
     hubs: dict[int, NDArray[np.float64]],
-    radius: float,
+    radius: ArrayLike,
     size: float,
     angles: ArcAngles = CURVED,
 ) -> Any:
@@ -157,7 +158,7 @@ def triangulated(
         Outline to be meshed.
     hubs
         Centre (2,) of the hub of each lattice node, mm.
-    radius
+    radius : float or (h,) array_like
         Radius of the hubs, mm.
     size
         Largest edge of the triangles, mm.
@@ -169,27 +170,31 @@ def triangulated(
     module = ngsolve()
     from netgen.geom2d import SplineGeometry
 
-    check_apart(hubs, radius)
+    radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(hubs))
+    check_apart(hubs, radii)
     geometry = SplineGeometry()
     for loop in (*outline.outer, *outline.holes):
         add_loop(geometry, loop, 1, 0, angles.outline)
     geometry.SetMaterial(1, "strut")
     for domain, (node, centre) in enumerate(hubs.items(), start=2):
-        ends = centre + np.array([[-radius, 0.0], [radius, 0.0]])
+        ends = centre + radii[domain - 2] * np.array([[-1.0, 0.0], [1.0, 0.0]])
         add_loop(geometry, Loop(ends, np.ones(2)), domain, 1, angles.hub)
         geometry.SetMaterial(domain, f"hub{node}")
     return module.Mesh(geometry.GenerateMesh(maxh=size, **NETGEN))
 
 
-def check_apart(hubs: dict[int, NDArray[np.float64]], radius: float) -> None:
+def check_apart(hubs: dict[int, NDArray[np.float64]], radii: NDArray[np.float64]) -> None:
     """Raise InvalidSettings if two hubs touch."""
     if len(hubs) < 2:
         return
     nodes, centres = list(hubs), np.array(list(hubs.values()))
     from scipy.spatial import cKDTree
 
-    close = cKDTree(centres).query_pairs(2.2 * radius)
+    close = cKDTree(centres).query_pairs(2.2 * float(radii.max()))
     for first, second in sorted(close):
+        away = float(np.linalg.norm(centres[first] - centres[second]))
+        if away > 1.1 * (radii[first] + radii[second]):
+            continue
         raise InvalidSettings(
             f"nodes {nodes[first]} and {nodes[second]} are so close to each other that their hubs "
             "touch; choose narrower struts or a larger scale"

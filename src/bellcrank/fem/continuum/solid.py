@@ -41,7 +41,7 @@ def solid_mesh(part: Part, size: float | None = None, layers: int = 1) -> Contin
     """
     if layers < 1:
         raise InvalidSettings(f"layers: expected at least 1 across the thickness, got {layers}")
-    size = SIZE * part.section.width if size is None else size
+    size = SIZE * float(part.widths.min()) if size is None else size
     plane = plane_mesh(part, size, STRAIGHT_EDGES)
     vertices = raised(plane.vertices, part.section.thickness, layers)
     elements = tetrahedra(plane.elements, len(plane.vertices), layers)

@@ -121,8 +121,9 @@ def fibre_stress_and_strain(
     section, young = part.section, part.material.young
     length = np.linalg.norm(frame.rest, axis=1)[:, None]
     moment = np.abs(without_ends(state.resultants[:, 1:], frame.rigid / length)).max(axis=1)
-    bending = moment * section.width / (2.0 * young * section.inertia)
-    axial = state.resultants[:, 0] / (young * section.area)
+    ratio = np.repeat(part.width_ratios, len(frame.elements) // len(frame.struts))
+    bending = moment * section.width / (2.0 * young * section.inertia * ratio**2)
+    axial = state.resultants[:, 0] / (young * section.area * ratio)
     # Compression in one direction is extension across it.
     across = part.material.poisson * (bending - axial)
     return young * (np.abs(axial) + bending), np.maximum(axial + bending, across)
@@ -132,7 +133,7 @@ def contacts_of(part: Part, frame: PartFrame, states: Sequence[FrameState]) -> C
     """Find the struts that touch in any equilibrium of the path."""
     rest = frame.positions[frame.lines]
     stroke = ((state.load, rest + state.displacement[frame.lines, :2]) for state in states)
-    return find_contacts(frame.struts, rest, stroke, part.section.width)
+    return find_contacts(frame.struts, rest, stroke, part.widths)
 
 
 def field_of(part: Part, frame: PartFrame, state: FrameState) -> Field:

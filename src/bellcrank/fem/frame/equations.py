@@ -97,9 +97,10 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
     if elements < 1:
         raise InvalidSettings(f"elements: expected at least 1 in each strut, got {elements}")
     problem, material = part.design.problem, part.material
-    struts, joint = part.struts.astype(np.int64), part.section.joint
+    struts, joint = part.struts.astype(np.int64), part.section.joint * part.width_ratios
     positions, ends, rigid = subdivided(part.positions, struts, elements, joint)
     length = np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1)
+    ratio = np.repeat(part.width_ratios, elements)
     elasticity = Elasticity(material.young, material.poisson)
     drive, load = drive_and_load(problem, len(positions), 3)
     absent = np.ones(len(positions), dtype=bool)
@@ -110,7 +111,7 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
         elements=ends,
         struts=np.flatnonzero(part.design.mask),
         rigid=rigid,
-        stiffness=beam_stiffness(part.section, elasticity, length, theory, 2, rigid),
+        stiffness=beam_stiffness(part.section, elasticity, length, theory, 2, rigid, ratio),
         held=held_unknowns(problem, len(positions), 3) | ~there,
         drive=part.scale * drive * there,
         load=part.stiffness_unit * part.scale * load * there,

@@ -1,9 +1,10 @@
 """The exact boundary of all points within a distance (reach) of a set of struts.
 
-It consists of lines parallel to struts and of arcs around nodes. The points of such a line or
-circle that are covered by another strut form a single interval, which has a closed form: the set of
-points within reach of a strut is convex, and the covered angles of a circle of the same radius are
-those of a disc that slides along the strut. The boundary is what no interval covers.
+The reach of a wider strut is larger by its `extra`, that of a node is the largest of its struts.
+The boundary consists of lines parallel to struts and of arcs around nodes. The points of such a
+line that another strut covers form an interval, since the set of points within reach of a strut is
+convex; those of such a circle form intervals between its intersections with the lines and circles
+of the other strut. The boundary is what no interval covers.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ MIN_EDGE = 1e-5
 class Border:
     """The boundary of all points within reach of struts, as edges in the order of its loops.
 
-    The material is to the left. The edge e runs from ``foot[e, 0] + reach * normal[e, 0]`` to
-    ``foot[e, 1] + reach * normal[e, 1]``.
+    The material is to the left. The edge e runs from ``foot[e, 0] + r * normal[e, 0]`` to
+    ``foot[e, 1] + r * normal[e, 1]``, where r is ``reach + extra[e]``.
 
     Parameters
     ----------
@@ -38,6 +39,8 @@ class Border:
         Points of the centre lines nearest to start and end of each edge.
     normal : (E, 2, 2) float64
         Outward unit normals at start and end of each edge.
+    extra : (E,) float64, mm
+        Reach of each edge beyond that of the narrowest struts.
     turn : (E,) float64
         Angle by which each edge turns: 0 along a strut, positive around a node.
     sizes : tuple of int
@@ -48,6 +51,7 @@ class Border:
 
     foot: Reals
     normal: Reals
+    extra: Reals
     turn: Reals
     sizes: tuple[int, ...]
     gap: float
@@ -61,28 +65,28 @@ def border(struts: Struts, reach: float, width: float) -> Border:
     struts
         The struts.
     reach : float, mm
-        Half the strut width plus the fillet radius.
+        Half the width of the narrowest struts plus the fillet radius.
     width : float, mm
-        Strut width, which determines the length of the shortest edges (`MIN_EDGE`).
+        Width of the narrowest struts, which determines the length of the shortest edges (`MIN_EDGE`).
     """
     sides = _sides(struts, reach, MIN_EDGE * width)
     rounds = _rounds(struts, reach, 2.0 * MIN_EDGE)
-    foot, normal, turn = (np.concatenate(both) for both in zip(sides, rounds, strict=True))
-    starts, ends = (foot + reach * normal).transpose(1, 0, 2)
+    foot, normal, extra, turn = (np.concatenate(both) for both in zip(sides, rounds, strict=True))
+    starts, ends = (foot + (reach + extra)[:, None, None] * normal).transpose(1, 0, 2)
     following, gap = _followers(starts, ends)
     order, sizes = _cycles(following)
-    return Border(foot[order], normal[order], turn[order], sizes, gap)
+    return Border(foot[order], normal[order], extra[order], turn[order], sizes, gap)
 
 
-def _sides(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, Reals]:
-    """Return foot, normal and turn of all lines of the boundary."""
-    count = len(struts.beams)
+def _sides(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, Reals, Reals]:
+    """Return foot, normal, extra and turn of all lines of the boundary."""
+    count, own = len(struts.beams), reach + struts.extra
     start, end = struts.positions[struts.beams[:, 0]], struts.positions[struts.beams[:, 1]]
     length = np.linalg.norm(end - start, axis=1)
     along = (end - start) / length[:, None]
-    near, other = struts.tree.query(struts.tree.geometries, "dwithin", 2.0 * reach)
+    near, other = struts.tree.query(struts.tree.geometries, "dwithin", own + own.max())
     near, other = near[near != other], other[near != other]
-    foot, normal = [], []
+    foot, normal, extra = [], [], []
     # The right-hand side of a strut, and of the reversed strut.
     for ends, begin, axis in (
         (struts.beams, start, along),
@@ -90,15 +94,16 @@ def _sides(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, Re
     ):
         right = np.column_stack([axis[:, 1], -axis[:, 0]])
         low, high = _covered_lines(
-            begin + reach * right, axis, length, ends, near, other, struts, reach
+            begin + own[:, None] * right, axis, length, ends, near, other, struts, own
         )
         line, low, high = _uncovered(near, low, high, np.zeros(count), length)
         long_enough = high - low > least
         line, span = line[long_enough], np.column_stack([low, high])[long_enough]
         foot.append(begin[line, None] + span[:, :, None] * axis[line, None])
         normal.append(np.repeat(right[line, None], 2, axis=1))
+        extra.append(struts.extra[line])
     feet = np.concatenate(foot)
-    return feet, np.concatenate(normal), np.zeros(len(feet))
+    return feet, np.concatenate(normal), np.concatenate(extra), np.zeros(len(feet))
 
 
 def _covered_lines(
@@ -109,9 +114,10 @@ def _covered_lines(
     near: Ids,
     other: Ids,
     struts: Struts,
-    reach: float,
+    reach: Reals,
 ) -> tuple[Reals, Reals]:
     """Return the interval of the line along strut `near` that strut `other` covers."""
+    wide = reach[other]
     tail = struts.positions[struts.beams[other, 0]]
     head = struts.positions[struts.beams[other, 1]]
     span = length[other]
@@ -119,7 +125,7 @@ def _covered_lines(
     ahead = axis[near]
     offset = origin[near] - tail
     across, slope = _cross(forward, offset), _cross(forward, ahead)
-    low, high = _between(across, slope, -reach, reach)
+    low, high = _between(across, slope, -wide, wide)
     bottom, top = _between(_dot(forward, offset), _dot(forward, ahead), 0.0, span)
     low, high = np.maximum(low, bottom), np.minimum(high, top)
     empty = low >= high
@@ -127,42 +133,46 @@ def _covered_lines(
     for column, centre in enumerate((tail, head)):
         towards = centre - origin[near]
         off = np.abs(_cross(ahead, towards))
-        square = (reach - off) * (reach + off)
+        square = (wide - off) * (wide + off)
         node = struts.beams[other, column]
-        # The circle around a node of the strut itself is tangent to the line at its end.
+        # A circle of the same radius around a node of the strut itself is tangent to the line.
         own = (node == ends[near, 0]) | (node == ends[near, 1])
-        covers = ~own & (square > 0.0)
+        covers = (~own | (wide > reach[near])) & (square > 0.0)
         half, middle = np.sqrt(np.where(covers, square, 0.0)), _dot(ahead, towards)
         low = np.where(covers, np.minimum(low, middle - half), low)
         high = np.where(covers, np.maximum(high, middle + half), high)
     return low, high
 
 
-def _rounds(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, Reals]:
-    """Return foot, normal and turn of all arcs of the boundary."""
+def _rounds(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, Reals, Reals]:
+    """Return foot, normal, extra and turn of all arcs of the boundary."""
     import shapely
 
-    count = len(struts.positions)
+    count, extra = len(struts.positions), struts.extra_of_nodes
+    radii, widths = reach + extra, reach + struts.extra
     points = shapely.points(struts.positions)
-    node, strut = struts.tree.query(points, "dwithin", 2.0 * reach)
+    node, strut = struts.tree.query(points, "dwithin", radii + widths.max())
     first, second = (struts.positions[struts.beams[strut, end]] for end in (0, 1))
     centre = struts.positions[node]
     begins, stops = struts.beams[strut, 0] == node, struts.beams[strut, 1] == node
-    middle, low, high = _covered_circles(centre, first, second, reach)
-    # A strut that ends at the node covers exactly the half circle on its side.
-    away = np.where(begins[:, None], second - first, first - second)
-    own = begins | stops
-    middle = np.where(own, np.arctan2(away[:, 1], away[:, 0]), middle)
-    low, high = np.where(own, -0.5 * np.pi, low), np.where(own, 0.5 * np.pi, high)
+    # One of the widest struts that end at the node covers exactly the half circle on its side.
+    half = (begins | stops) & (struts.extra[strut] == extra[node])
+    away = np.where(begins[:, None], second - first, first - second)[half]
+    middle = np.arctan2(away[:, 1], away[:, 0])
+    low, high = _covered_circles(
+        centre[~half], radii[node[~half]], first[~half], second[~half], widths[strut[~half]]
+    )
     # Angles are measured from one of these struts, so that no arc contains the angle 0.
     zero = np.zeros(count)
-    zero[node[own]] = middle[own]
-    middle = np.mod(middle - zero[node], 2.0 * np.pi)
-    turns = 2.0 * np.pi * np.array([[-1.0], [0.0], [1.0]])
+    zero[node[half]] = middle
+    arcs = np.concatenate([node[half], np.repeat(node[~half], low.shape[1])])
+    low = np.concatenate([middle - 0.5 * np.pi, low.ravel()]) - zero[arcs]
+    high = np.concatenate([middle + 0.5 * np.pi, high.ravel()]) - zero[arcs]
+    shift = 2.0 * np.pi * (np.array([[-1.0], [0.0], [1.0]]) - np.floor(low / (2.0 * np.pi)))
     arc, low, high = _uncovered(
-        np.tile(node, 3),
-        (middle + low + turns).ravel(),
-        (middle + high + turns).ravel(),
+        np.tile(arcs, 3),
+        (low + shift).ravel(),
+        (high + shift).ravel(),
         np.full(count, 0.5 * np.pi),
         np.full(count, 1.5 * np.pi),
     )
@@ -171,45 +181,46 @@ def _rounds(struts: Struts, reach: float, least: float) -> tuple[Reals, Reals, R
     turn = angle[:, 1] - angle[:, 0]
     angle += zero[arc, None]
     foot = np.repeat(struts.positions[arc, None], 2, axis=1)
-    return foot, np.stack([np.cos(angle), np.sin(angle)], axis=2), turn
+    return foot, np.stack([np.cos(angle), np.sin(angle)], axis=2), extra[arc], turn
 
 
 def _covered_circles(
-    centre: Reals, first: Reals, second: Reals, reach: float
-) -> tuple[Reals, Reals, Reals]:
-    """Return the angles of circles of radius `reach` that struts cover, one strut per circle.
+    centre: Reals, radius: Reals, first: Reals, second: Reals, wide: Reals
+) -> tuple[Reals, Reals]:
+    """Return the angles of circles that are within reach of struts, one strut for each circle.
+
+    Parameters
+    ----------
+    centre, radius : (n, 2), (n,) float64
+        The circles.
+    first, second, wide : (n, 2), (n, 2), (n,) float64
+        Ends and reach of the struts.
 
     Returns
     -------
-    middle, low, high : (n,) float64
-        Direction towards the line of the strut, and the limits of the interval relative to it.
+    low, high : (n, 8) float64
+        Limits of intervals, both 0 if the interval is not covered.
     """
     axis = second - first
-    axis /= np.linalg.norm(axis, axis=1)[:, None]
-    right = np.column_stack([axis[:, 1], -axis[:, 0]])
-    height = _dot(right, first - centre)
-    # Direction towards the strut, and positions of its ends along it.
-    front = np.where(height[:, None] >= 0.0, right, -right)
-    sideways = np.where(height >= 0.0, 1.0, -1.0)
-    height = np.abs(height)
-    low, high = np.full(len(height), np.inf), np.full(len(height), -np.inf)
-    left_end = sideways * _dot(axis, first - centre)
-    right_end = sideways * _dot(axis, second - centre)
-    for end in (left_end, right_end):
-        distance = np.hypot(end, height)
-        covers = distance < 2.0 * reach
-        half = np.arccos(np.minimum(0.5 * distance / reach, 1.0))
-        angle = np.arctan2(end, height)
-        low = np.where(covers, np.minimum(low, angle - half), low)
-        high = np.where(covers, np.maximum(high, angle + half), high)
-    half = np.arccos(np.minimum(height / reach - 1.0, 1.0))
-    for angle in (-half, half):
-        offset = reach * np.sin(angle)
-        covers = (height < 2.0 * reach) & (offset >= np.minimum(left_end, right_end))
-        covers &= offset <= np.maximum(left_end, right_end)
-        low = np.where(covers, np.minimum(low, angle), low)
-        high = np.where(covers, np.maximum(high, angle), high)
-    return np.arctan2(front[:, 1], front[:, 0]), low, high
+    length = np.linalg.norm(axis, axis=1)
+    axis /= length[:, None]
+    along, across = _dot(axis, centre - first), _cross(axis, centre - first)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sides = [np.arcsin((side * wide - across) / radius) for side in (1.0, -1.0)]
+        crossings = [*sides, *(np.pi - side for side in sides)]
+        for end in (along, along - length):
+            distance = np.hypot(end, across)
+            towards = np.arctan2(-across, -end)
+            half = np.arccos((radius**2 + distance**2 - wide**2) / (2.0 * radius * distance))
+            crossings += [towards - half, towards + half]
+    angle = np.sort(np.mod(np.nan_to_num(np.stack(crossings, axis=1)), 2.0 * np.pi), axis=1)
+    following = np.column_stack([angle[:, 1:], angle[:, :1] + 2.0 * np.pi])
+    middle = 0.5 * (angle + following)
+    beyond = along[:, None] + radius[:, None] * np.cos(middle)
+    beyond -= np.clip(beyond, 0.0, length[:, None])
+    within = np.hypot(beyond, across[:, None] + radius[:, None] * np.sin(middle)) < wide[:, None]
+    turned = np.arctan2(axis[:, 1], axis[:, 0])[:, None]
+    return np.where(within, angle + turned, 0.0), np.where(within, following + turned, 0.0)
 
 
 def _uncovered(

@@ -26,8 +26,17 @@ def filled(struts: Struts, width: float, fillet: float) -> Outline:
     """Return the outline of struts with fillets, without checking whether holes close.
 
     A point is outside the part if it is inside a disc of radius `fillet` that touches no strut. The
-    centres of such discs are the points farther than ``width / 2 + fillet`` from the centre lines.
-    Each corner of their boundary gives an arc of the outline around that corner.
+    centres of such discs are the points farther from the centre lines than half the width of the
+    struts plus `fillet`. Each corner of their boundary gives an arc of the outline around it.
+
+    Parameters
+    ----------
+    struts
+        The struts.
+    width : float, mm
+        Width of the narrowest of them.
+    fillet : float, mm
+        Fillet radius.
 
     Raises
     ------
@@ -41,7 +50,7 @@ def filled(struts: Struts, width: float, fillet: float) -> Outline:
             f"width: at {width:g} mm with fillets of {fillet:g} mm the outline does not close, "
             "since surfaces of struts almost touch; choose a slightly different width"
         )
-    points, bulge, loop = _surface(edges, 0.5 * width, reach, MIN_EDGE * width)
+    points, bulge, loop = _surface(edges, 0.5 * width, fillet, MIN_EDGE * width)
     points, bulge, loop = _without_flat_corners(points, bulge, loop, 1e-3 * MIN_EDGE * width)
     limits = np.searchsorted(loop, np.arange(len(edges.sizes) + 1)).tolist()
     outer, holes = [], []
@@ -58,10 +67,10 @@ def filled(struts: Struts, width: float, fillet: float) -> Outline:
 
 
 def _surface(
-    edges: Border, half: float, reach: float, least: float
+    edges: Border, half: float, radius: float, least: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Return corners, bulges and loop numbers of the surface, with one arc for each fillet."""
-    surface = edges.foot + half * edges.normal
+    surface = edges.foot + (half + edges.extra)[:, None, None] * edges.normal
     count = len(surface)
     sizes = np.array(edges.sizes)
     loop = np.repeat(np.arange(len(sizes)), sizes)
@@ -72,7 +81,7 @@ def _surface(
     cross = leaving[:, 0] * entering[:, 1] - leaving[:, 1] * entering[:, 0]
     fillet = np.arctan2(-cross, np.sum(leaving * entering, axis=1))
     gap = np.linalg.norm(surface[onward, 0] - surface[:, 1], axis=1)
-    filled_corner = (gap > least) & (fillet > 0.0) & (reach > half)
+    filled_corner = (gap > least) & (fillet > 0.0) & (radius > 0.0)
     # Edges without a fillet between them share one corner.
     joint = np.where(
         filled_corner[:, None], surface[:, 1], 0.5 * (surface[:, 1] + surface[onward, 0])

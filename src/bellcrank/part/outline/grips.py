@@ -13,6 +13,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.part.outline.curves import Loop, Outline
+from bellcrank.part.outline.struts import read_widths
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -24,7 +25,13 @@ _CLOSE = 1e-6
 """Relative tolerance of equal distances."""
 
 
-def filled(outline: Outline, positions: ArrayLike, beams: ArrayLike, nodes: ArrayLike) -> Outline:
+def filled(
+    outline: Outline,
+    positions: ArrayLike,
+    beams: ArrayLike,
+    nodes: ArrayLike,
+    width: ArrayLike = 0.0,
+) -> Outline:
     """Return an outline without the holes between given nodes.
 
     A hole is filled, with its content, if every strut around it connects two of the nodes.
@@ -39,6 +46,8 @@ def filled(outline: Outline, positions: ArrayLike, beams: ArrayLike, nodes: Arra
         The two nodes of each strut.
     nodes : (k,) array_like of int
         Nodes of the block, for example all supports.
+    width : float or (M,) array_like, mm
+        Width of the struts, needed where they differ.
 
     Raises
     ------
@@ -67,12 +76,16 @@ def filled(outline: Outline, positions: ArrayLike, beams: ArrayLike, nodes: Arra
     hole = np.repeat(np.arange(len(probes)), [len(probe) for probe in probes])
     points = shapely.points(np.concatenate(probes))
     tree = shapely.STRtree(shapely.linestrings(places[pairs]))
-    found, distance = tree.query_nearest(points, all_matches=False, return_distance=True)
-    reach = np.empty(len(points))
-    reach[found[0]] = distance * (1.0 + _CLOSE)
-    probe, strut = tree.query(points, "dwithin", reach)
+    half = 0.5 * read_widths(width, len(pairs))
+    _, nearest = tree.query_nearest(points, all_matches=False, return_distance=True)
+    probe, strut = tree.query(points, "dwithin", nearest * (1.0 + _CLOSE) + np.ptp(half))
+    distance = shapely.distance(points[probe], tree.geometries[strut])
+    beyond = distance - half[strut]
+    least = np.full(len(points), np.inf)
+    np.minimum.at(least, probe, beyond)
+    bounds = beyond <= least[probe] + _CLOSE * distance
     gone = np.ones(len(probes), dtype=np.bool_)
-    gone[hole[probe[~inner[strut]]]] = False
+    gone[hole[probe[bounds & ~inner[strut]]]] = False
     return _without_holes(outline, gone)
 
 

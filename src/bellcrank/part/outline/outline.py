@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 def strut_outline(
     positions: ArrayLike,
     beams: ArrayLike,
-    width: float,
+    width: ArrayLike,
     fillet: float,
     *,
     keep_holes: bool = True,
 ) -> Outline:
     """Return the outline of struts with round ends and filled corners.
 
-    The part is the set of all points within half a width of the centre lines. Corners between
+    The part is the set of all points within half the width of a strut from its centre line. Corners between
     struts are filled where a disc of radius `fillet` does not reach. Lines and arcs are exact.
     They are tangent to each other if `fillet` is above 0.
 
@@ -38,8 +38,8 @@ def strut_outline(
         Nodes. Nodes without beams are ignored.
     beams : (M, 2) array_like of int
         The two nodes of each strut. Struts may cross and overlap.
-    width : float, mm
-        Strut width.
+    width : float or (M,) array_like, mm
+        Strut width, one for all or one for each strut.
     fillet : float, mm
         Fillet radius; 0 for sharp corners.
     keep_holes
@@ -63,9 +63,9 @@ def strut_outline(
     >>> round(outline.area, 6), len(outline.outer[0].points)
     (23.141593, 4)
     """
-    check_sizes(width, fillet)
-    struts = read_struts(positions, beams)
-    half, reach = 0.5 * width, 0.5 * width + fillet
+    narrowest = check_sizes(width, fillet)
+    struts = read_struts(positions, beams, width)
+    half, reach = 0.5 * narrowest, 0.5 * narrowest + fillet
     limits = find_limits(struts, reach) if keep_holes else find_joins(struts, half, reach)
-    check_room(limits, width, fillet)
-    return filled(struts, width, fillet)
+    check_room(limits, narrowest, fillet)
+    return filled(struts, narrowest, fillet)

@@ -2,9 +2,10 @@
 
 No hole closes or splits, and no struts without a common node join.
 
-Consider the distance of a point to the nearest centre line. When the width of all struts increases,
-the topology of the outline changes only at half-widths equal to the values of this distance at its
-maxima and saddle points. At a maximum a hole closes. At a saddle point, midway between a node and
+Consider the distance of a point to the nearest centre line, for a wider strut less its `extra`.
+When the width of all struts increases by the same length, the topology of the outline changes only
+at half-widths of the narrowest struts equal to the values of this distance at its maxima and saddle
+points. At a maximum a hole closes. At a saddle point, midway between a node and
 the node or strut opposite to it and with no strut nearer, two surfaces meet: a hole splits, or a
 new one is enclosed. Below these widths fillets of different corners do not touch either, since
 touching fillets would enclose a new hole.
@@ -13,7 +14,7 @@ touching fillets would enclose a new hole.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,7 +38,7 @@ _MARGIN = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Half-widths of struts at which holes close or surfaces meet.
+    """Half-widths of the narrowest struts at which holes close or surfaces meet.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ class Limits:
         return float(min(self.depths.min(initial=np.inf), self.bottlenecks.min(initial=np.inf)))
 
 
-def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> float:
+def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: ArrayLike) -> float:
     """Return the largest fillet radius at which no hole closes, splits or is added.
 
     Parameters
@@ -69,7 +70,7 @@ def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> flo
         Nodes.
     beams : (M, 2) array_like of int
         The two nodes of each strut.
-    width : float, mm
+    width : float or (M,) array_like, mm
         Width of the struts.
 
     Returns
@@ -92,19 +93,22 @@ def room_for_fillet(positions: ArrayLike, beams: ArrayLike, width: float) -> flo
     >>> round(room_for_fillet(*triangle, width=2.0), 2)
     2.46
     """
-    struts = read_struts(positions, beams)
-    check_sizes(width, 0.0)
+    narrowest = check_sizes(width, 0.0)
+    struts = read_struts(positions, beams, width)
     limits = find_limits(struts)
-    check_room(limits, width, 0.0)
-    return _allowed(limits.least) - 0.5 * width
+    check_room(limits, narrowest, 0.0)
+    return _allowed(limits.least) - 0.5 * narrowest
 
 
-def check_sizes(width: float, fillet: float) -> None:
-    """Check that a width is above 0 and a fillet radius is not negative."""
-    if not 0.0 < width < math.inf:
-        raise InvalidSettings(f"width: expected a length above 0 mm, got {width!r}")
+def check_sizes(width: ArrayLike, fillet: float) -> float:
+    """Check that widths are above 0 and a fillet radius is not negative; return the least width."""
+    widths = np.asarray(width, dtype=np.float64)
+    for each in widths.ravel().tolist():
+        if not 0.0 < each < math.inf:
+            raise InvalidSettings(f"width: expected a length above 0 mm, got {each!r}")
     if not 0.0 <= fillet < math.inf:
         raise InvalidSettings(f"fillet: expected a radius of 0 mm or more, got {fillet!r}")
+    return float(widths.min(initial=math.inf))
 
 
 def check_room(limits: Limits, width: float, fillet: float) -> None:
@@ -115,7 +119,7 @@ def check_room(limits: Limits, width: float, fillet: float) -> None:
     limits
         Half-widths at which the topology changes.
     width, fillet : float, mm
-        Width of the struts and radius of the fillets.
+        Width of the narrowest struts and radius of the fillets.
 
     Raises
     ------
@@ -124,6 +128,10 @@ def check_room(limits: Limits, width: float, fillet: float) -> None:
     """
     half, most = 0.5 * width, _allowed(limits.least)
     if half >= most:
+        if most <= 0.0:
+            raise InvalidSettings(
+                f"width: struts of these widths would {_change(limits, half)}; choose narrower ones"
+            )
         raise InvalidSettings(
             f"width: struts {width:g} mm wide would {_change(limits, half)}; "
             f"choose at most {_floored(2.0 * most)} mm"
@@ -179,10 +187,19 @@ def _depths(struts: Struts) -> NDArray[np.float64]:
 
     hair = _HAIR * struts.extent
     outline = filled(struts, 2.0 * hair, 0.0)
+    if struts.extra.any():
+        same = filled(replace(struts, extra=np.zeros(len(struts.beams))), 2.0 * hair, 0.0)
+        if (same.piece_count, same.hole_count) != (outline.piece_count, outline.hole_count):
+            raise InvalidSettings(
+                "width: struts of these widths close holes or join, however narrow the narrowest "
+                "is; choose widths that differ less"
+            )
     polygons = np.array(
         [shapely.Polygon(loop.flattened(0.1 * hair)) for loop in outline.holes], object
     )
-    if outline.piece_count > 1 and len(polygons):
+    if not len(polygons):
+        return np.empty(0)
+    if outline.piece_count > 1:
         # A piece inside a hole of another covers a part of it.
         pieces = np.array([shapely.Polygon(loop.flattened(0.1 * hair)) for loop in outline.outer])
         around, within = shapely.STRtree(pieces).query(polygons, "contains")
@@ -192,11 +209,24 @@ def _depths(struts: Struts) -> NDArray[np.float64]:
     # Area divided by length is a lower bound of the radius in a convex hole.
     fine = 2e-4 * shapely.area(polygons) / shapely.length(polygons)
     circles = shapely.maximum_inscribed_circle(polygons, fine)
-    centres = shapely.points(shapely.get_coordinates(shapely.get_point(circles, 0)) - struts.origin)
-    depths: NDArray[np.float64] = struts.tree.query_nearest(
-        centres, all_matches=False, return_distance=True
-    )[1]
-    return depths
+    return _distances(
+        struts, shapely.get_coordinates(shapely.get_point(circles, 0)) - struts.origin
+    )
+
+
+def _distances(struts: Struts, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of (n, 2) points from the nearest centre line, less its `extra`."""
+    import shapely
+
+    places = shapely.points(points)
+    which, nearest = struts.tree.query_nearest(places, all_matches=False, return_distance=True)
+    widest = float(struts.extra.max())
+    distances: NDArray[np.float64] = nearest - struts.extra[which[1]]
+    if widest > 0.0:
+        point, strut = struts.tree.query(places, "dwithin", nearest + widest)
+        away = shapely.distance(places[point], struts.tree.geometries[strut])
+        np.minimum.at(distances, point, away - struts.extra[strut])
+    return distances
 
 
 def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -204,24 +234,27 @@ def _bottlenecks(struts: Struts, limit: float) -> tuple[NDArray[np.float64], NDA
     import shapely
     from scipy.spatial import cKDTree
 
-    nodes = struts.positions
-    points = shapely.points(nodes)
-    node, strut = struts.tree.query(points, "dwithin", 2.0 * limit)
+    nodes, extra = struts.positions, struts.extra_of_nodes
+    points, furthest = shapely.points(nodes), 2.0 * (limit + float(extra.max()))
+    node, strut = struts.tree.query(points, "dwithin", furthest)
     tail, head = nodes[struts.beams[strut, 0]], nodes[struts.beams[strut, 1]]
     axis = head - tail
     share = np.sum((nodes[node] - tail) * axis, axis=1) / np.sum(axis * axis, axis=1)
     facing = (share > 0.0) & (share < 1.0) & ~np.any(struts.beams[strut] == node[:, None], axis=1)
     across = (tail + share[:, None] * axis)[facing]
-    pairs = cKDTree(nodes).query_pairs(2.0 * limit, output_type="ndarray")
+    pairs = cKDTree(nodes).query_pairs(furthest, output_type="ndarray")
     one = np.concatenate([nodes[node[facing]], nodes[pairs[:, 0]]])
     two = np.concatenate([across, nodes[pairs[:, 1]]])
-    half, middle = 0.5 * np.linalg.norm(two - one, axis=1), 0.5 * (one + two)
-    _, distance = struts.tree.query_nearest(
-        shapely.points(middle), all_matches=False, return_distance=True
-    )
-    # Points nearer than this are the same point, except for rounding errors.
-    apart = (half > _HAIR * struts.extent) & (half <= limit)
-    found = np.flatnonzero(apart & (distance > (1.0 - 1e-9) * half))
+    near = np.concatenate([extra[node[facing]], extra[pairs[:, 0]]])
+    far = np.concatenate([struts.extra[strut[facing]], extra[pairs[:, 1]]])
+    gap = np.linalg.norm(two - one, axis=1)
+    half = 0.5 * (gap - near - far)
+    # Points nearer than this are the same point, except for rounding errors. Of struts that share
+    # a node, one may lie within the round end of the other.
+    apart = (gap > 2.0 * _HAIR * struts.extent) & (half <= limit) & (half + near > 0.0)
+    one, two, gap, near, half = (each[apart] for each in (one, two, gap, near, half))
+    middle = one + ((near + half) / gap)[:, None] * (two - one)
+    found = np.flatnonzero(_distances(struts, middle) > half - 1e-9 * gap)
     found = found[np.argsort(half[found], kind="stable")]
     return half[found], middle[found] + struts.origin
 

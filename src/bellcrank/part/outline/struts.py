@@ -30,6 +30,8 @@ class Struts:
         Nodes relative to `origin`; each has a strut.
     beams : (M, 2) int64
         The two nodes of each strut.
+    extra : (M,) float64, mm
+        Half the width of each strut less that of the narrowest given one.
     tree
         Spatial index of the centre lines, in the order of `beams`.
     origin : (2,) float64, mm
@@ -40,18 +42,28 @@ class Struts:
 
     positions: NDArray[np.float64]
     beams: NDArray[np.int64]
+    extra: NDArray[np.float64]
     tree: STRtree
     origin: NDArray[np.float64]
     extent: float
 
+    @property
+    def extra_of_nodes(self) -> NDArray[np.float64]:
+        """Return (N,) the largest `extra` of the struts of each node, mm."""
+        largest = np.zeros(len(self.positions))
+        np.maximum.at(largest, self.beams, self.extra[:, None])
+        return largest
 
-def read_struts(positions: ArrayLike, beams: ArrayLike) -> Struts:
+
+def read_struts(positions: ArrayLike, beams: ArrayLike, width: ArrayLike = 0.0) -> Struts:
     """Validate nodes and beams, remove nodes without beams, and divide beams at nodes.
 
     Parameters
     ----------
     positions : (N, 2) array_like, mm
     beams : (M, 2) array_like of int
+    width : float or (M,) array_like, mm
+        Width of the struts. Where struts overlap, the largest counts.
 
     Raises
     ------
@@ -62,6 +74,7 @@ def read_struts(positions: ArrayLike, beams: ArrayLike) -> Struts:
     import shapely
 
     nodes, pairs = _read_positions(positions), _read_beams(beams)
+    half = 0.5 * read_widths(width, len(pairs))
     bad = np.argwhere((pairs < 0) | (pairs >= len(nodes)))
     if len(bad):
         row, column = bad[0]
@@ -82,9 +95,23 @@ def read_struts(positions: ArrayLike, beams: ArrayLike) -> Struts:
         )
     _, first = np.unique(label, return_index=True)
     nodes = nodes[first] - origin
-    pairs = _cut_at_nodes(nodes, label[pairs], _COINCIDENT * extent)
+    pairs, extra = _cut_at_nodes(nodes, label[pairs], half - half.min(), _COINCIDENT * extent)
     tree = shapely.STRtree(shapely.linestrings(nodes[pairs]))
-    return Struts(nodes, pairs, tree, origin, extent)
+    return Struts(nodes, pairs, extra, tree, origin, extent)
+
+
+def read_widths(width: ArrayLike, count: int) -> NDArray[np.float64]:
+    """Return (count,) the widths of struts, from one for all or one for each.
+
+    Raises
+    ------
+    InvalidSettings
+        If their number is wrong.
+    """
+    given = np.asarray(width, dtype=np.float64)
+    if given.shape not in ((), (count,)):
+        raise InvalidSettings(f"width: expected one, or {count}, got shape {given.shape}")
+    return np.broadcast_to(given, (count,))
 
 
 def pieces_of(beams: NDArray[np.int64], node_count: int) -> NDArray[np.int64]:
@@ -125,9 +152,12 @@ def expected_holes(positions: ArrayLike, beams: ArrayLike) -> int:
 
 
 def _cut_at_nodes(
-    nodes: NDArray[np.float64], pairs: NDArray[np.int64], tolerance: float
-) -> NDArray[np.int64]:
-    """Return the distinct struts between neighbouring nodes along each strut."""
+    nodes: NDArray[np.float64],
+    pairs: NDArray[np.int64],
+    extra: NDArray[np.float64],
+    tolerance: float,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the distinct struts between neighbouring nodes along each strut, and their `extra`."""
     import shapely
 
     tree = shapely.STRtree(shapely.linestrings(nodes[pairs]))
@@ -140,8 +170,12 @@ def _cut_at_nodes(
     position = np.sum((nodes[node] - tail) * (head - tail), axis=1)
     order = np.lexsort((position, strut))
     strut, node = strut[order], node[order]
-    parts = np.column_stack([node[:-1], node[1:]])[strut[:-1] == strut[1:]]
-    return np.unique(np.sort(parts, axis=1), axis=0)
+    same = strut[:-1] == strut[1:]
+    parts = np.column_stack([node[:-1], node[1:]])[same]
+    distinct, which = np.unique(np.sort(parts, axis=1), axis=0, return_inverse=True)
+    largest = np.zeros(len(distinct))
+    np.maximum.at(largest, which.ravel(), extra[strut[:-1][same]])
+    return distinct, largest
 
 
 def _coincident(nodes: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:

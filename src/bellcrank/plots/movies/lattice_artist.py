@@ -133,8 +133,10 @@ class LatticeArtist:
         loaded = loaded[np.argsort(energy[loaded], kind="stable")]
         self._loaded.set_array(energy[loaded])
         self._loaded.set_segments(list(moved[self._beams[loaded]]))
+        self._loaded.set_linewidth(self._panel.struts(loaded).tolist())
         unloaded = np.flatnonzero(self._free & ~sequence.load_bearing)
         self._unloaded.set_segments(list(moved[self._beams[unloaded]]))
+        self._unloaded.set_linewidth(self._panel.struts(unloaded, 0.55).tolist())
         nodes = sequence.problem.output.nodes
         path = self._moved[: state + 1]
         rest = sequence.problem.lattice.positions[None]
