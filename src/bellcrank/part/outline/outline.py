@@ -24,9 +24,9 @@ def strut_outline(
 ) -> Outline:
     """Return the outline of struts with round ends and filled corners.
 
-    The part is the set of all points within half the width of a strut from its centre line. Corners between
-    struts are filled where a disc of radius `fillet` does not reach. Lines and arcs are exact.
-    They are tangent to each other if `fillet` is above 0.
+    The part is the set of all points within half the width of a strut from its centre line. Corners
+    between struts are filled where a disc of radius `fillet` does not reach. Lines and arcs are
+    exact. They are tangent to each other if `fillet` is above 0.
 
     Lines and arcs shorter than 1e-5 of the width are left out, which moves the ends of their
     neighbours by at most this length. Nodes closer than 1e-8 of the size of the part coincide.
