@@ -67,7 +67,7 @@ def border(struts: Struts, reach: float, width: float) -> Border:
     reach : float, mm
         Half the width of the narrowest struts plus the fillet radius.
     width : float, mm
-        Width of the narrowest struts, which determines the length of the shortest edges (`MIN_EDGE`).
+        Width of the narrowest struts; the shortest edges are `MIN_EDGE` times as long.
     """
     sides = _sides(struts, reach, MIN_EDGE * width)
     rounds = _rounds(struts, reach, 2.0 * MIN_EDGE)
