@@ -19,6 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings, NoDesignFound
+from bellcrank.fem.continuum.mesh import COARSE
 from bellcrank.fem.specification import sheet_items
 from bellcrank.provenance import provenance
 from bellcrank.search import read_settings
@@ -94,6 +95,7 @@ def run(name: str, seed: int) -> dict[str, Any]:
     row["beams"] = design.beam_count
     row["mask"] = design.mask_hex
     row["positions"] = design.problem.lattice.positions.round(5).tolist()
+    row["widths"] = design.problem.beam_widths.round(5).tolist()
     if report.refinement is not None:
         row["refinement"] = refinement_data(report.refinement)
     row["proposals"] = report.proposals
@@ -106,7 +108,7 @@ def _in_sheet(report: DesignReport, task: Task) -> Sequence[ItemResult] | None:
     if report.refinement is not None and report.refinement.after.sheet:
         return report.refinement.after.sheet
     try:
-        return sheet_items(task.part.of(report.selection.design))
+        return sheet_items(task.part.of(report.selection.design), fineness=COARSE)
     except InvalidSettings:
         return None
 

@@ -93,6 +93,7 @@ def test_the_gain_of_a_free_design_grows(here: Path) -> None:
         (("machine:pliers",), "driven by forces"),
         (("machine:crane", "--evaluations", "0"), "--evaluations: expected at least 1, got 0"),
         (("machine:crane", "--largest-move", "0.9"), "--largest-move: expected above 0"),
+        (("machine:crane", "--widest", "0.5"), "--widest: expected a number from 1 to 4, got 0.5"),
     ],
 )
 def test_what_cannot_be_refined_is_refused(

@@ -30,18 +30,24 @@ def refine(
     largest_move: Annotated[
         float, typer.Option(help="Largest change of a coordinate of a node, in beam lengths.")
     ] = 0.45,
+    widest: Annotated[
+        float,
+        typer.Option(help="Largest width of a strut over that of the section; 1 for no change."),
+    ] = 1.8,
     same_mass: Annotated[bool, typer.Option("--same-mass", help="The mass may not grow.")] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an existing file.")
     ] = False,
 ) -> None:
-    """Move the nodes of a design, so that it meets its specification and its gain grows."""
+    """Move nodes and widen struts, so that a design meets its specification and its gain grows."""
     if evaluations < 1:
         raise InvalidSettings(f"--evaluations: expected at least 1, got {evaluations}")
     if not 0.0 < largest_move <= 0.5:
         raise InvalidSettings(
             f"--largest-move: expected above 0 and at most 0.5 beam lengths, got {largest_move:g}"
         )
+    if not 1.0 <= widest <= 4.0:
+        raise InvalidSettings(f"--widest: expected a number from 1 to 4, got {widest:g}")
     chosen = design_named(design)
     target = out or Path(f"{Path(chosen.problem.name).name}-refined.json")
     if target.exists() and not overwrite:
@@ -52,7 +58,7 @@ def refine(
     from bellcrank.workflows.refinement import motion_rows, refine_file, refinement_rows
 
     settings = RefinementSettings(
-        evaluations=evaluations, largest_move=largest_move, same_mass=same_mass
+        evaluations=evaluations, largest_move=largest_move, widest=widest, same_mass=same_mass
     )
     announce_compilation()
     with stopping_on_interrupt() as stop:

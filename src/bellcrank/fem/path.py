@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-SMALLEST_STEP = 1e-4
 LARGEST_DEPARTURE = 0.1
 """Largest departure of a step from the mean of the tangents at its ends, as a part of the motion.
 On a smooth path it is of third order in the step."""
@@ -175,27 +174,28 @@ class StepControl:
 
     Parameters
     ----------
-    first, largest
-        First and largest step, as fractions of the full input.
+    first, largest, smallest
+        First, largest and smallest step, as fractions of the full input.
     iterations
         Newton iterations after which a step is halved.
 
     Raises
     ------
     InvalidSettings
-        If a step is not above `SMALLEST_STEP` and at most 1.
+        If the first or the largest step is not above the smallest one and at most 1.
     """
 
     first: float = 1.0 / 16.0
     largest: float = 1.0 / 8.0
+    smallest: float = 1e-4
     iterations: int = 15
 
     def __post_init__(self) -> None:
         for name in ("first", "largest"):
             step = getattr(self, name)
-            if not SMALLEST_STEP < step <= 1.0:
+            if not self.smallest < step <= 1.0:
                 raise InvalidSettings(
-                    f"{name}: expected a fraction of the stroke above {SMALLEST_STEP:g} and at "
+                    f"{name}: expected a fraction of the stroke above {self.smallest:g} and at "
                     f"most 1, got {step!r}"
                 )
 
@@ -251,7 +251,7 @@ class _Continuation:
             slope = None if found is None else self._joined_rate(found[0], found[2], here, rate)
             if found is None or slope is None:
                 step = (load - here.load) / 2.0
-                if step < SMALLEST_STEP:
+                if step < self.control.smallest:
                     loss = self._kind_of_loss(tangent, rate, initial_stiffness)
                     lost = unstable or loss is not None
                     status = PathStatus.SNAPPED if lost else PathStatus.UNCONVERGED

@@ -13,7 +13,7 @@ from bellcrank.fem.contact import centre_lines, find_contacts
 from bellcrank.fem.continuum.analysis import interpolator
 from bellcrank.fem.continuum.equations import ContinuumEquations
 from bellcrank.fem.continuum.fields import stress_field
-from bellcrank.fem.continuum.mesh import plane_mesh
+from bellcrank.fem.continuum.mesh import FINE, plane_mesh
 from bellcrank.fem.continuum.response import complete_state, hub_displacements
 from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.path import PathState, PathStatus, StepControl, follow_path
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.fem.continuum.mesh import ContinuumMesh
+    from bellcrank.fem.continuum.mesh import ContinuumMesh, Fineness
     from bellcrank.fem.continuum.response import ContinuumState
     from bellcrank.fem.path import EquilibriumPath
     from bellcrank.fem.results import Field
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-STEPS = StepControl(first=0.125, largest=0.125)
+STEPS = StepControl(first=0.125, largest=0.125, smallest=1e-3)
 STATES = 16
 """Number of states along the stroke at which items are evaluated; between the computed ones,
 channels are interpolated by a cubic spline."""
@@ -69,6 +69,7 @@ def sheet_items(
     part: Part,
     size: float | None = None,
     report: Callable[[str, float], None] = lambda _case, _load: None,
+    fineness: Fineness = FINE,
 ) -> list[ItemResult] | None:
     """Return the items of the specification of a part in the sheet.
 
@@ -77,9 +78,11 @@ def sheet_items(
     part
         Part whose problem has a specification.
     size
-        Largest edge of the triangles, mm; half the strut width by default.
+        Largest edge of the triangles, mm; that of `fineness` by default.
     report
         Called with the name of the load case and the fraction of the stroke reached.
+    fineness
+        How fine the mesh is.
 
     Returns
     -------
@@ -93,7 +96,7 @@ def sheet_items(
     """
     wanted = part.design.problem.specification
     assert wanted is not None
-    mesh = plane_mesh(part, size)
+    mesh = plane_mesh(part, size, fineness)
     records = {}
     for name, case in part.design.problem.cases.items():
         items = [item for item in wanted.items if item.case == name]

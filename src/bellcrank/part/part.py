@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 FILLET = 0.25
 """Default fillet radius as a fraction of the strut width."""
-ROOM = 0.5
+ROOM = 0.9
 """Largest default fillet radius as a fraction of the radius at which holes close."""
 
 

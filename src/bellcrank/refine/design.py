@@ -13,7 +13,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, ItemResult, tightened
 from bellcrank.model import Item, ObjectiveTerm, Specification
 from bellcrank.part.outline import room_for_fillet
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
-from bellcrank.refine.rows import RowEvaluator
+from bellcrank.refine.rows import STABLE, RowEvaluator
 from bellcrank.refine.shape import shape_rows, volume_of
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import HoppingSettings, SpecificationEvaluator
@@ -31,14 +31,18 @@ if TYPE_CHECKING:
     Sheet = Callable[[Design], Sequence[ItemResult] | None]
     Correction = dict[int, float]
 
-RESERVE = 0.02
-"""Part of their size by which bounds are tightened, so that more elements meet them too."""
+RESERVE = 0.05
+"""Part of their size by which bounds are tightened, so that more elements and the sheet meet them
+too."""
 PRINTABLE = 1e-2
 """Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
-SHEET_ROUNDS = 3
-"""Number of times it is refined again after the sheet misses items."""
+SHEETS = 4
+"""Largest number of geometries that are computed in the sheet: it takes a minute."""
 SHEET_STEPS = 8
-"""Number of steps of each of these: the correction holds near the geometry it was computed for."""
+"""Largest number of steps after the sheet misses items. It ends where the corrected bounds are met,
+since the correction holds near the geometry it was computed for."""
+MET = 1e-3
+"""Sum of violations at which they are."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
 
@@ -162,7 +166,10 @@ def refine_design(
             f"problem {problem.name!r}: expected a frame in the plane; designs of springs and "
             "designs in space are not refined"
         )
-    given = replace(design, problem=specified(problem, strain_limit))
+    wanted = specified(problem, strain_limit)
+    given = replace(
+        design, problem=_with_mass(wanted, design.mask) if settings.same_mass else wanted
+    )
     job = _Job(given, settings, report)
     job.by_frames()
     if sheet is not None and job.goes_on:
@@ -175,6 +182,16 @@ def refine_design(
     return Refinement(
         refined, job.before, job.best, job.steps, job.evaluations, job.reason, improved
     )
+
+
+def _with_mass(problem: Problem, mask: NDArray[np.bool_]) -> Problem:
+    """Return a problem whose specification limits the mass to that of a design."""
+    wanted = problem.specification
+    assert wanted is not None
+    item = Item(
+        quantity="mass", case=next(iter(problem.cases)), at_most=volume_of(problem, mask)[0]
+    )
+    return replace(problem, specification=replace(wanted, items=(*wanted.items, item)))
 
 
 class _Job:
@@ -194,7 +211,6 @@ class _Job:
         width = problem.section.width
         bounds = (settings.narrowest * width, settings.widest * width)
         self.variables = variables_of(design, settings.largest_move, bounds)
-        self.volume = volume_of(problem, design.mask)[0] if settings.same_mass else math.inf
         self.before = self.best = state_of(problem, design.mask)
         self.chosen = np.zeros(self.variables.count)
         self.steps = self.evaluations = 0
@@ -203,63 +219,94 @@ class _Job:
 
     def by_frames(self) -> None:
         """Refine until all items are met with eight elements."""
-        vector = self.chosen
+        vector, stable = self.chosen, STABLE
         correction: Correction = {}
         for _ in range(ROUNDS):
-            found = self._refined(vector, correction, self.settings.steps)
+            least = self.settings.evaluations // 4
+            found = self._refined(vector, correction, stable, self.settings.steps, least)
             if found is None:
                 return
-            state, vector = found
+            state, vector, is_last = found
             if _is_better(state, self.best):
                 self.best, self.chosen = state, vector
-            if state.met or not state.items or not self.goes_on:
+            if not state.items or not self.goes_on or (state.met and is_last):
                 return
-            correction = self._correction(vector, state.items)
+            if state.met:
+                # Eight elements lose their stability, or touch, before one element does.
+                stable *= 1.5
+            else:
+                correction = self._correction(vector, state.items)
 
     def by_sheet(self, sheet: Sheet) -> None:
         """Refine until all items are met in the sheet too; keeps the best in the sheet."""
         if not self.best.met:
             return
-        self.best = self._in_sheet(sheet, self.chosen, self.best)
-        vector, state = self.chosen, self.best
-        for _ in range(SHEET_ROUNDS):
-            if not state.sheet or all(item.met for item in state.sheet) or not self.goes_on:
+        stable = STABLE
+        vector, state = self.chosen, self._in_sheet(sheet, self.chosen, self.best)
+        self.best = state
+        for _ in range(SHEETS - 1):
+            if not self.goes_on or (state.sheet and all(item.met for item in state.sheet)):
                 return
-            correction = self._correction(vector, state.sheet)
-            found = self._refined(vector, correction, SHEET_STEPS)
+            correction: Correction = {}
+            if _is_stable(state.sheet):
+                correction = self._correction(vector, state.sheet)
+            else:
+                stable *= 1.5
+            found = self._refined(
+                vector, correction, stable, SHEET_STEPS, 4 * SHEET_STEPS, until_met=True
+            )
             if found is None or not found[0].met or not self.goes_on:
                 return
-            state, vector = found
+            state, vector, _ = found
             state = self._in_sheet(sheet, vector, state)
-            if state.sheet and _missed(state.sheet) < _missed(self.best.sheet):
+            if _missed(state.sheet) < _missed(self.best.sheet):
                 self.best, self.chosen = state, vector
 
     def _refined(
-        self, vector: NDArray[np.float64], correction: Correction, steps: int
-    ) -> tuple[State, NDArray[np.float64]] | None:
-        """Refine with corrected bounds; None if the response is not stable."""
+        self,
+        vector: NDArray[np.float64],
+        correction: Correction,
+        stable: float,
+        steps: int,
+        least: int,
+        *,
+        until_met: bool = False,
+    ) -> tuple[State, NDArray[np.float64], bool] | None:
+        """Refine with corrected bounds.
+
+        Returns
+        -------
+        tuple of State, (n,) and bool, or None
+            State and vector of the last geometry that meets all with eight elements, and whether
+            it is the last one of all. None if the response is not stable.
+        """
         items = [
-            moved(tightened(item, RESERVE), correction.get(index, 0.0))
+            moved(
+                tightened(item, 0.0 if item.quantity == "mass" else RESERVE),
+                correction.get(index, 0.0),
+            )
             for index, item in enumerate(self.items)
         ]
-        rows = RowEvaluator(self.variables, self.design.mask, items, self.volume)
+        rows = RowEvaluator(self.variables, self.design.mask, items, stable)
         left = replace(
             self.settings,
             steps=steps,
-            evaluations=max(4 * SHEET_STEPS, self.settings.evaluations - self.evaluations),
+            evaluations=max(least, self.settings.evaluations - self.evaluations),
         )
         path = []
         for progress in refine_rows(rows, left, vector):
             path.append(progress)
             self.goes_on = self.report(progress)
-            if not self.goes_on:
+            if not self.goes_on or (until_met and progress.rows.violation < MET):
                 break
         if not path:
             return None
         last = path[-1]
         self.reason = last.reason or "stopped"
         self.steps, self.evaluations = self.steps + last.step, self.evaluations + last.evaluations
-        return _latest(self.variables, self.design.mask, [each.vector for each in path])
+        vectors = [each.vector for each in path]
+        state, number = _latest(self.variables, self.design.mask, vectors)
+        return state, vectors[number], number == len(vectors) - 1
 
     def _correction(self, vector: NDArray[np.float64], found: tuple[ItemResult, ...]) -> Correction:
         """Return by how much items are higher in a better model than with one element."""
@@ -269,7 +316,10 @@ class _Job:
         out: Correction = {}
         for index, (here, there) in enumerate(zip(evaluator.results(), found, strict=True)):
             difference = there.value - here.value
-            given = here.item.quantity not in {"clearance", "stable_stroke", "mass"}
+            if here.item.quantity == "clearance":
+                # Gaps are known where they are small; the refined geometry is at the bound.
+                difference = min(there.value - (there.item.at_least or 0.0), 0.0)
+            given = here.item.quantity not in {"stable_stroke", "mass"}
             if given and math.isfinite(difference):
                 out[index] = difference
         return out
@@ -280,6 +330,11 @@ class _Job:
         return state if found is None else replace(state, sheet=tuple(found))
 
 
+def _is_stable(items: tuple[ItemResult, ...]) -> bool:
+    """Whether the response in the sheet is stable, under a payload too."""
+    return bool(items) and all(not math.isnan(item.value) for item in items)
+
+
 def _missed(items: tuple[ItemResult, ...]) -> float:
     """Return the sum of the violations of items; infinite without any."""
     return sum(item.violation for item in items) if items else math.inf
@@ -287,22 +342,21 @@ def _missed(items: tuple[ItemResult, ...]) -> float:
 
 def _latest(
     variables: Variables, mask: NDArray[np.bool_], path: list[NDArray[np.float64]]
-) -> tuple[State, NDArray[np.float64]]:
-    """Return the state and the vector of the last geometry that meets all with eight elements.
+) -> tuple[State, int]:
+    """Return state and number of the last geometry of a path that meets all with eight elements.
 
-    The later ones may be too close to a loss of stability. That of the last geometry, if none is
-    found among a few.
+    The later ones may be too close to a loss of stability. The last geometry, if none is found
+    among a few.
     """
-    last = state_of(variables.problem_at(path[-1]), mask)
-    if last.met:
-        return last, path[-1]
     low, high = 0, len(path) - 1
-    found = last, path[-1]
+    found = state_of(variables.problem_at(path[high]), mask), high
+    if found[0].met:
+        return found
     while high - low > 1:
         middle = (low + high) // 2
         state = state_of(variables.problem_at(path[middle]), mask)
         if state.met:
-            low, found = middle, (state, path[middle])
+            low, found = middle, (state, middle)
         else:
             high = middle
     return found
@@ -326,7 +380,7 @@ def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
         return False
     lattice = problem.lattice
     try:
-        room_for_fillet(lattice.positions, lattice.beams[mask], float(problem.beam_widths.max()))
+        room_for_fillet(lattice.positions, lattice.beams[mask], problem.beam_widths[mask])
     except InvalidSettings:
         return False
     return True

@@ -1,4 +1,4 @@
-"""Gaps between struts in an equilibrium, and their derivatives."""
+"""Gaps between struts, and their derivatives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bellcrank.mechanics import bent_pieces, near_pairs
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics.frames.equilibria import Equilibrium
+    from bellcrank.model import Problem
 
 
 class Gaps(NamedTuple):
@@ -27,23 +27,24 @@ class Gaps(NamedTuple):
     """(g, M) derivatives by the widths of the beams."""
 
 
-def gaps_of(equilibrium: Equilibrium, beams: NDArray[np.int64], reach: float) -> Gaps:
+def gaps_of(
+    problem: Problem, beams: NDArray[np.int64], u: NDArray[np.float64], reach: float
+) -> Gaps:
     """Return the gaps between struts without a common node that are below a reach, in the plane.
 
     Struts are bent as in `bellcrank.mechanics.bent_pieces`: two straight pieces each.
 
     Parameters
     ----------
-    equilibrium
-        With one element in each beam.
     beams : (n,) int64
         The struts.
+    u : (N, 3) float64
+        Displacements and rotations of the nodes.
     reach
-        Largest gap that is returned.
+        Largest gap that is returned, lattice units.
     """
-    problem, count = equilibrium.problem, len(beams)
-    width = problem.beam_widths[beams]
-    points, pieces = bent_pieces(problem, beams, equilibrium.state.u)
+    count, width = len(beams), problem.beam_widths[beams]
+    points, pieces = bent_pieces(problem, beams, u)
     pairs, distance = near_pairs(points, pieces, float(width.max()) + reach)
     strut = pairs % count
     gap = distance - 0.5 * width[strut].sum(axis=1)
@@ -53,7 +54,7 @@ def gaps_of(equilibrium: Equilibrium, beams: NDArray[np.int64], reach: float) ->
     chosen = np.flatnonzero((gap < reach) & apart_at_rest)
     chosen = chosen[np.lexsort((pairs[chosen, 1], pairs[chosen, 0]))]
     nodes = problem.lattice.node_count
-    fields = np.zeros((len(chosen), len(equilibrium.frame.positions), 3))
+    fields = np.zeros((len(chosen), nodes, 3))
     widths = np.zeros((len(chosen), problem.lattice.beam_count))
     for row, index in enumerate(chosen.tolist()):
         (a, b), (c, d) = (points[pieces[piece]] for piece in pairs[index])
@@ -69,21 +70,21 @@ def gaps_of(equilibrium: Equilibrium, beams: NDArray[np.int64], reach: float) ->
                 if point < nodes:
                     fields[row, point, :2] += vector
                 else:
-                    _add_middle(equilibrium, int(beams[point - nodes]), vector, fields[row])
+                    _add_middle(problem, u, int(beams[point - nodes]), vector, fields[row])
         widths[row, beams[strut[index]]] = -0.5
     return Gaps(pairs[chosen], gap[chosen], fields, widths)
 
 
 def _add_middle(
-    equilibrium: Equilibrium,
+    problem: Problem,
+    u: NDArray[np.float64],
     beam: int,
     vector: NDArray[np.float64],
     field: NDArray[np.float64],
 ) -> None:
     """Add the derivatives of the motion of the middle of a bent strut along a vector."""
-    first, second = equilibrium.problem.lattice.beams[beam].tolist()
-    u = equilibrium.state.u
-    positions = equilibrium.problem.lattice.positions
+    first, second = problem.lattice.beams[beam].tolist()
+    positions = problem.lattice.positions
     chord = positions[second] + u[second, :2] - positions[first] - u[first, :2]
     bend = (u[first, 2] - u[second, 2] + np.pi) % (2.0 * np.pi) - np.pi
     # The middle is that of the chord, and the chord turned by 90 degrees times bend / 8.

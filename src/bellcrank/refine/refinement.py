@@ -56,7 +56,7 @@ class RefinementSettings:
     evaluations: int = 400
     largest_move: float = 0.45
     narrowest: float = 1.0
-    widest: float = 1.0
+    widest: float = 1.8
     first_region: float = 0.02
     smallest_region: float = 1e-5
     largest_region: float = 0.1
@@ -177,6 +177,7 @@ class _Search:
             return False
         predicted = found.merit - now
         change, after = found.change, self._evaluate(found.change)
+        first = after
         gained = -np.inf if after is None else merit_of(after, size) - now
         if after is not None and gained < GOOD * predicted:
             again = linear_step(corrected(rows, after, change), low, high, size)
@@ -186,6 +187,9 @@ class _Search:
                 if better > gained:
                     change, gained = again.change, better
         if gained < ACCEPTED * predicted:
+            if first is not None and not set(first.keys) <= set(rows.keys):
+                # States that are soft there are constraints here from now on.
+                self.rows = self.evaluator.evaluate(self.vector, slopes=True)
             return self._refuse(unstable=after is None)
         after = self._evaluate(change, slopes=True)
         if after is None:

@@ -43,9 +43,11 @@ STEP = 1e-6
 """Step in central differences by channels, as a part of their size."""
 GAP_STATES = 8
 """States along the stroke at which gaps are computed."""
-STABLE = 0.3
+STABLE = 0.5
 """Smallest lowest stiffness along the stroke, as a part of the smaller one near its ends. Paths on
 which it is below 0.2 count as unstable."""
+SOFT = 1.2
+"""Lowest stiffness, over its bound, below which a state is a constraint."""
 GAP_REACH = 0.5
 """Gaps that are constraints, in widths of the section beyond the wanted one."""
 
@@ -99,8 +101,8 @@ class RowEvaluator:
     items
         What a geometry must meet. Items on the stability of the path are not constraints: every
         path must be stable.
-    volume
-        Largest volume of the struts, cubed lattice units; infinite without a limit.
+    stable
+        Smallest lowest stiffness along a path over the smaller one near its ends.
     """
 
     def __init__(
@@ -108,13 +110,15 @@ class RowEvaluator:
         variables: Variables,
         mask: NDArray[np.bool_],
         items: Sequence[Item],
-        volume: float = np.inf,
+        stable: float = STABLE,
     ) -> None:
         self.variables = variables
         self.mask = mask
         self.items = tuple(items)
+        self.stable = stable
+        self.soft: dict[tuple[str, int], set[float]] = {}
         bounds = [item.at_most for item in self.items if item.quantity == "mass"]
-        self.volume = min([volume, *(bound for bound in bounds if bound is not None)])
+        self.volume = min((bound for bound in bounds if bound is not None), default=np.inf)
 
     def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
         """Return the rows of a geometry; None if a response is not stable, or a strut too short.
@@ -232,7 +236,8 @@ class RowEvaluator:
             state = case.state(k / GAP_STATES)
             if state is None:
                 return None
-            found = gaps_of(state, np.flatnonzero(printed), bound + GAP_REACH * width)
+            reach = bound + GAP_REACH * width
+            found = gaps_of(problem, np.flatnonzero(printed), state.state.u, reach)
             values.append((bound - found.value) / width)
             keys += [(k, *pair) for pair in found.pairs.tolist()]
             if of_beams is None or not len(found.value):
@@ -259,14 +264,17 @@ class RowEvaluator:
         none = np.zeros((0, self.variables.count))
         constraints, gradients, keys = [np.zeros(0)], [none], []
         for index, frame in enumerate(paths):
-            found = softest_states(frame)
+            soft = self.soft.setdefault((name, index), set())
+            found = softest_states(frame, soft)
             if found is None:
                 return None
             values = {fraction: float(each.value[0]) for fraction, (_, each) in found.items()}
             end = min((min(values), max(values)), key=values.__getitem__)
             ratio = {fraction: value / values[end] for fraction, value in values.items()}
-            near = [each for each in sorted(ratio) if each != end and ratio[each] < 3.0 * STABLE]
-            constraints.append(1.0 - np.array([ratio[each] for each in near]) / STABLE)
+            # States that were soft in one geometry remain constraints in all others.
+            soft |= {each for each in ratio if ratio[each] < SOFT * self.stable and each != end}
+            near = sorted(soft - {end})
+            constraints.append(1.0 - np.array([ratio[each] for each in near]) / self.stable)
             keys += [(index, round(1e6 * each)) for each in near]
             if not slopes or not near:
                 continue
@@ -278,7 +286,7 @@ class RowEvaluator:
                     return None
                 rates[fraction] = self.variables.gradient(*slope[0])[0]
             gradients += [
-                -(rates[each] - ratio[each] * rates[end])[None] / (values[end] * STABLE)
+                -(rates[each] - ratio[each] * rates[end])[None] / (values[end] * self.stable)
                 for each in near
             ]
         rows = np.concatenate(constraints)

@@ -1,13 +1,16 @@
-"""Constraints on the geometry at rest: slender struts, angles that print, and the volume."""
+"""Constraints on the geometry at rest: struts, angles, holes and gaps that print; the volume."""
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from bellcrank.refine.gaps import gaps_of
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
@@ -21,6 +24,10 @@ SMALLEST_ANGLE = np.radians(20.0)
 SMALLEST_HOLE = 0.75
 """Smallest radius of the circle within a triangle of struts, over their mean width; below 0.5 the
 hole closes."""
+SMALLEST_GAP = 0.6
+"""Smallest gap between struts without a common node, over the width of the section."""
+MASS_WEIGHT = 20.0
+"""Weight of the mass against other constraints, so that it does not grow where these are missed."""
 NEAR_ANGLE = np.radians(45.0)
 """Angles below which they are constraints."""
 
@@ -64,118 +71,146 @@ def shape_rows(problem: Problem, mask: NDArray[np.bool_], volume: float) -> Shap
     volume
         Largest volume of its struts, cubed lattice units; infinite without a limit.
     """
-    lattice, widths = problem.lattice, problem.beam_widths
     beams = np.flatnonzero(mask)
-    along = lattice.positions[lattice.beams[beams, 1]] - lattice.positions[lattice.beams[beams, 0]]
-    length = np.linalg.norm(along, axis=1)
-    unit = along / length[:, None]
-    values: list[float] = []
-    names: list[str] = []
-    keys: list[tuple[int, ...]] = []
-    by_position: list[tuple[int, int, Values]] = []
-    by_width: list[tuple[int, int, float]] = []
-    for k in np.flatnonzero(length < 2.0 * SLENDERNESS * widths[beams]).tolist():
-        beam, row = int(beams[k]), len(values)
-        values.append(SLENDERNESS - length[k] / widths[beam])
-        names.append("length of struts")
-        keys.append((beam,))
-        slope = unit[k] / widths[beam]
-        by_position += [
-            (row, int(lattice.beams[beam, 1]), -slope), (row, int(lattice.beams[beam, 0]), slope),
-        ]  # fmt: skip
-        by_width.append((row, beam, length[k] / widths[beam] ** 2))
-    for node, one, two, angle, slopes in _narrow_angles(problem, beams, unit, length):
-        row = len(values)
-        values.append((SMALLEST_ANGLE - angle) / SMALLEST_ANGLE)
-        names.append("angle between struts")
-        keys.append((node, one, two))
-        for other, slope in zip((one, two), slopes, strict=True):
-            by_position += [
-                (row, other, -slope / SMALLEST_ANGLE), (row, node, slope / SMALLEST_ANGLE),
-            ]  # fmt: skip
-    for nodes, ratio, rates, sides in _small_triangles(problem, beams):
-        row = len(values)
-        values.append(1.0 - ratio / SMALLEST_HOLE)
-        names.append("holes between struts")
-        keys.append(tuple(nodes))
-        by_position += [
-            (row, node, -rate / SMALLEST_HOLE) for node, rate in zip(nodes, rates, strict=True)
-        ]
-        mean = float(widths[sides].mean())
-        by_width += [(row, side, ratio / (3.0 * mean * SMALLEST_HOLE)) for side in sides]
-    count = len(values) + bool(np.isfinite(volume))
-    positions = np.zeros((count, *lattice.positions.shape))
-    of_widths = np.zeros((count, lattice.beam_count))
-    for row, node, rate in by_position:
-        positions[row, node] += rate
-    for row, beam, wide in by_width:
-        of_widths[row, beam] += wide
+    parts = [rows(problem, beams) for rows in (_length_rows, _angle_rows, _hole_rows, _gap_rows)]
     if np.isfinite(volume):
         whole, moved, wider = volume_of(problem, mask)
-        values.append(whole / volume - 1.0)
-        names.append("mass")
-        keys.append(())
-        positions[-1], of_widths[-1] = moved / volume, wider / volume
+        scale = volume / MASS_WEIGHT
+        value = np.array([(whole - volume) / scale])
+        parts.append(ShapeRows(value, ("mass",), ((),), moved[None] / scale, wider[None] / scale))
     return ShapeRows(
-        np.array(values, dtype=np.float64), tuple(names), tuple(keys), positions, of_widths
+        np.concatenate([part.values for part in parts]),
+        tuple(name for part in parts for name in part.names),
+        tuple(key for part in parts for key in part.keys),
+        np.concatenate([part.positions for part in parts]),
+        np.concatenate([part.widths for part in parts]),
     )
 
 
-def _narrow_angles(
-    problem: Problem, beams: NDArray[np.int64], unit: Values, length: Values
-) -> list[tuple[int, int, int, float, tuple[Values, Values]]]:
-    """Return node, other ends, angle and its derivatives by them of struts that meet narrowly."""
-    lattice, found = problem.lattice, []
-    at: dict[int, list[tuple[int, Values, float]]] = {}
-    for k, beam in enumerate(beams.tolist()):
-        first, second = lattice.beams[beam].tolist()
-        at.setdefault(first, []).append((second, unit[k], float(length[k])))
-        at.setdefault(second, []).append((first, -unit[k], float(length[k])))
-    for node, others in at.items():
-        for (one, a, length_a), (two, b, length_b) in combinations(others, 2):
-            cosine = float(np.clip(a @ b, -1.0, 1.0))
-            angle = float(np.arccos(cosine))
-            if angle >= NEAR_ANGLE or angle < 1e-6:
-                continue
-            sine = np.sin(angle)
-            slopes = ((cosine * a - b) / (sine * length_a), (cosine * b - a) / (sine * length_b))
-            found.append((node, one, two, angle, slopes))
-    return found
+def _rows_of(
+    problem: Problem,
+    name: str,
+    values: Values,
+    keys: NDArray[np.int64],
+    by_position: Sequence[tuple[NDArray[np.int64], Values]],
+    by_width: Sequence[tuple[NDArray[np.int64], Values]] = (),
+) -> ShapeRows:
+    """Return constraints, one for each row of `keys`.
+
+    Their derivatives are given for one node (r,) or one beam (r,) of each at a time.
+    """
+    count, every = len(values), np.arange(len(values))
+    positions = np.zeros((count, *problem.lattice.positions.shape))
+    widths = np.zeros((count, problem.lattice.beam_count))
+    for nodes, rates in by_position:
+        positions[every, nodes] += rates
+    for beams, rates in by_width:
+        widths[every, beams] += rates
+    return ShapeRows(values, (name,) * count, tuple(map(tuple, keys.tolist())), positions, widths)
 
 
-def _small_triangles(
-    problem: Problem, beams: NDArray[np.int64]
-) -> list[tuple[list[int], float, Values, list[int]]]:
-    """Return nodes, radius over width, its derivatives (3, 2) and beams of small triangles."""
-    lattice, widths = problem.lattice, problem.beam_widths
-    number = {}
-    others: dict[int, set[int]] = {}
-    for beam in beams.tolist():
-        first, second = lattice.beams[beam].tolist()
-        number[first, second] = number[second, first] = beam
-        others.setdefault(first, set()).add(second)
-        others.setdefault(second, set()).add(first)
-    found = []
-    for first, around in others.items():
-        for second, third in combinations(sorted(each for each in around if each > first), 2):
-            if third not in others[second]:
-                continue
-            nodes = [first, second, third]
-            points = lattice.positions[nodes]
-            edges = np.roll(points, -1, axis=0) - points
-            lengths = np.linalg.norm(edges, axis=1)
-            half = 0.5 * float(lengths.sum())
-            doubled = float(edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0])
-            area, side = 0.5 * abs(doubled), np.sign(doubled)
-            sides = [number[nodes[k], nodes[(k + 1) % 3]] for k in range(3)]
-            width = float(widths[sides].mean())
-            ratio = area / (half * width)
-            if ratio >= 2.0 * SMALLEST_HOLE:
-                continue
-            opposite = np.roll(edges, -1, axis=0)
-            of_area = 0.5 * side * np.column_stack([-opposite[:, 1], opposite[:, 0]])
-            units = edges / lengths[:, None]
-            of_half = 0.5 * (np.roll(units, 1, axis=0) - units)
-            rates = (of_area - area / half * of_half) / (half * width)
-            found.append((nodes, ratio, rates, sides))
-    return found
+def _length_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
+    """Return the constraints on the slenderness of struts."""
+    lattice, width = problem.lattice, problem.beam_widths[beams]
+    first, second = lattice.beams[beams].T
+    along = lattice.positions[second] - lattice.positions[first]
+    length = np.linalg.norm(along, axis=1)
+    short = length < 2.0 * SLENDERNESS * width
+    beams, first, second, along, length, width = (
+        each[short] for each in (beams, first, second, along, length, width)
+    )
+    slope = along / (length * width)[:, None]
+    return _rows_of(
+        problem, "length of struts", SLENDERNESS - length / width, beams[:, None],
+        [(second, -slope), (first, slope)], [(beams, length / width**2)],
+    )  # fmt: skip
+
+
+def _angle_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
+    """Return the constraints on the angles between neighbouring struts of each node."""
+    positions, ends = problem.lattice.positions, problem.lattice.beams[beams]
+    node, other = np.concatenate([ends, ends[:, ::-1]]).T
+    along = positions[other] - positions[node]
+    direction = np.arctan2(along[:, 1], along[:, 0])
+    order = np.lexsort((direction, node))
+    node, other, along, direction = (each[order] for each in (node, other, along, direction))
+    # The next strut of the same node, counterclockwise.
+    begin = np.searchsorted(node, node)
+    last = np.searchsorted(node, node, side="right") - 1
+    here = np.arange(len(node))
+    following = np.where(here == last, begin, here + 1)
+    angle = np.mod(direction[following] - direction, 2.0 * np.pi)
+    near = np.flatnonzero((angle > 1e-6) & (angle < NEAR_ANGLE))
+    after = following[near]
+    square = np.sum(along**2, axis=1)[:, None] * SMALLEST_ANGLE
+    turned = np.column_stack([-along[:, 1], along[:, 0]]) / square
+    return _rows_of(
+        problem, "angle between struts", 1.0 - angle[near] / SMALLEST_ANGLE,
+        np.column_stack([node[near], other[near], other[after]]),
+        [
+            (other[near], turned[near]), (other[after], -turned[after]),
+            (node[near], turned[after] - turned[near]),
+        ],
+    )  # fmt: skip
+
+
+def _hole_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
+    """Return the constraints on the radius of the circle within triangles, over their width."""
+    lattice = problem.lattice
+    corners, sides = _triangles(lattice.beams, beams)
+    points = lattice.positions[corners]
+    edges = np.roll(points, -1, axis=1) - points
+    lengths = np.linalg.norm(edges, axis=2)
+    half = 0.5 * lengths.sum(axis=1)
+    doubled = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    width = problem.beam_widths[sides].mean(axis=1)
+    ratio = 0.5 * np.abs(doubled) / (half * width)
+    small = ratio < 2.0 * SMALLEST_HOLE
+    corners, sides, edges, lengths, half, doubled, width, ratio = (
+        each[small] for each in (corners, sides, edges, lengths, half, doubled, width, ratio)
+    )
+    opposite = np.roll(edges, -1, axis=1)
+    of_area = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
+    of_area *= 0.5 * np.sign(doubled)[:, None, None]
+    units = edges / lengths[..., None]
+    of_half = 0.5 * (np.roll(units, 1, axis=1) - units)
+    rates = of_area / (half * width)[:, None, None] - (ratio / half)[:, None, None] * of_half
+    by_width = ratio / (3.0 * width * SMALLEST_HOLE)
+    return _rows_of(
+        problem, "holes between struts", 1.0 - ratio / SMALLEST_HOLE, corners,
+        [(corners[:, k], -rates[:, k] / SMALLEST_HOLE) for k in range(3)],
+        [(sides[:, k], by_width) for k in range(3)],
+    )  # fmt: skip
+
+
+def _triangles(
+    ends: NDArray[np.int64], beams: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return (t, 3) the nodes and (t, 3) the beams of all triangles of beams."""
+    number = {tuple(sorted(ends[beam].tolist())): beam for beam in beams.tolist()}
+    higher: dict[int, set[int]] = {}
+    for low, high in number:
+        higher.setdefault(low, set()).add(high)
+    nodes = [
+        (low, middle, high)
+        for low, middle in number
+        for high in higher[low] & higher.get(middle, set())
+    ]
+    sides = [(number[a, b], number[b, c], number[a, c]) for a, b, c in nodes]
+    return (
+        np.array(nodes, dtype=np.int64).reshape(-1, 3),
+        np.array(sides, dtype=np.int64).reshape(-1, 3),
+    )
+
+
+def _gap_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
+    """Return the constraints on the gaps between struts without a common node."""
+    assert problem.section is not None
+    least = SMALLEST_GAP * problem.section.width
+    found = gaps_of(problem, beams, np.zeros((problem.lattice.node_count, 3)), 2.0 * least)
+    count = len(found.value)
+    return ShapeRows(
+        1.0 - found.value / least, ("gaps between struts",) * count,
+        tuple(map(tuple, found.pairs.tolist())), -found.fields[..., :2] / least,
+        -found.widths / least,
+    )  # fmt: skip

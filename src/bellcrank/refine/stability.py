@@ -9,6 +9,8 @@ import numpy as np
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.mechanics.frames.evaluator import FrameEvaluator
     from bellcrank.mechanics.frames.quantities import Measures
@@ -16,37 +18,49 @@ if TYPE_CHECKING:
 STABLE_STATES = 32
 """States along the stroke at which the lowest stiffness is computed first."""
 HALVINGS = 2
-"""Number of times the distance of states about the softest one is halved."""
+"""Number of times the distance of states about a soft one is halved."""
+SOFT = 2.0
+"""Lowest stiffness over the smallest one up to which a local minimum is searched more closely."""
 
 
 def softest_states(
-    frame: FrameEvaluator,
+    frame: FrameEvaluator, fractions: Iterable[float] = ()
 ) -> dict[float, tuple[Equilibrium, Measures]] | None:
     """Return states along the stroke with their lowest stiffness; None if one is not found.
 
-    At equal fractions, and closer to each other about the softest one, since the lowest stiffness
+    At equal fractions, and closer to each other about the local minima, since the lowest stiffness
     falls and rises steeply near a bifurcation.
+
+    Parameters
+    ----------
+    fractions
+        Fractions of the stroke at which it is computed besides.
     """
     found: dict[float, tuple[Equilibrium, Measures]] = {}
 
     def at(fraction: float) -> float:
-        if fraction not in found:
-            state = frame.end if fraction == 1.0 else frame.equilibrium(fraction)
-            if state is None:
-                return np.nan
-            found[fraction] = (state, LOWEST_STIFFNESS.measure(state))
+        state = frame.end if fraction == 1.0 else frame.equilibrium(fraction)
+        if state is None:
+            return np.nan
+        found[fraction] = (state, LOWEST_STIFFNESS.measure(state))
         return float(found[fraction][1].value[0])
 
-    values = {k / STABLE_STATES: at(k / STABLE_STATES) for k in range(1, STABLE_STATES + 1)}
-    if not all(value > 0.0 for value in values.values()):
-        return None
+    grid = {k / STABLE_STATES for k in range(1, STABLE_STATES + 1)}
+    values = {each: at(each) for each in sorted(grid.union(fractions))}
     step = 1.0 / STABLE_STATES
     for _ in range(HALVINGS):
-        step *= 0.5
-        lowest = min(values, key=values.__getitem__)
-        nearby = [each for each in (lowest - step, lowest + step) if 0.0 < each <= 1.0]
-        neighbours = {each: at(each) for each in nearby}
-        if not all(value > 0.0 for value in neighbours.values()):
+        if not all(value > 0.0 for value in values.values()):
             return None
-        values |= neighbours
-    return found
+        step *= 0.5
+        nearby = {each + move for each in _local_minima(values) for move in (-step, step)}
+        values |= {each: at(each) for each in nearby if 0.0 < each <= 1.0 and each not in values}
+    return found if all(value > 0.0 for value in values.values()) else None
+
+
+def _local_minima(values: dict[float, float]) -> list[float]:
+    """Return the fractions at which the lowest stiffness is smaller than at both neighbours."""
+    fractions = sorted(values)
+    padded = np.array([np.inf, *(values[each] for each in fractions), np.inf])
+    inner = padded[1:-1]
+    is_low = (inner <= padded[:-2]) & (inner <= padded[2:]) & (inner < SOFT * inner.min())
+    return [each for each, low in zip(fractions, is_low.tolist(), strict=True) if low]

@@ -7,6 +7,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.fem.continuum.mesh import COARSE
 from bellcrank.fem.results import finite
 from bellcrank.fem.specification import sheet_items
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
@@ -74,7 +75,7 @@ def sheet_of(spec: PartSpec | None) -> Callable[[Design], Sequence[ItemResult] |
 
     def items(design: Design) -> Sequence[ItemResult] | None:
         try:
-            return sheet_items(spec.of(design))
+            return sheet_items(spec.of(design), fineness=COARSE)
         except InvalidSettings:  # no outline: struts almost touch
             return None
 

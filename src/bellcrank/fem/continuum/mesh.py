@@ -20,30 +20,35 @@ if TYPE_CHECKING:
 
 HUB = 0.35
 """Radius of a hub as a fraction of the strut width, so small that hubs are within the material."""
-SIZE = 0.5
-"""Default edge length of triangles as a fraction of the strut width."""
 
 
 @dataclass(frozen=True, slots=True)
-class ArcAngles:
-    """Largest angle of an arc along the edge of one triangle, rad.
+class Fineness:
+    """How fine a mesh of triangles is.
 
     Parameters
     ----------
+    size
+        Largest edge, over the least strut width.
     outline
-        Arcs of the outline. Edges are parabolas; with 40 degrees the relative error of the area of
-        the crane is 2e-5.
+        Largest angle of an arc of the outline along one edge, rad. Edges are parabolas; with 40
+        degrees the relative error of the area of the crane is 2e-5.
     hub
-        Circles of hubs.
+        The same for circles of hubs.
+    grading
+        How fast triangles grow away from small edges, 0 to 1.
     """
 
+    size: float = 0.5
     outline: float = math.radians(40.0)
     hub: float = math.radians(60.0)
+    grading: float = 0.5
 
 
-CURVED = ArcAngles()
-NETGEN = {"grading": 0.5, "curvaturesafety": 1.0}
-"""Triangles grow fast away from small edges; arcs are divided here and not by Netgen."""
+FINE = Fineness()
+COARSE = Fineness(size=1.0, outline=math.radians(60.0), grading=0.9)
+"""Half of the triangles. On a refined design with small fillets motions differ by 1 % from those of
+a fine mesh, strains by 5 % and the payload by 7 %."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +120,7 @@ def hub_nodes(part: Part) -> NDArray[np.int64]:
     return nodes
 
 
-def plane_mesh(part: Part, size: float | None = None, angles: ArcAngles = CURVED) -> ContinuumMesh:
+def plane_mesh(part: Part, size: float | None = None, fineness: Fineness = FINE) -> ContinuumMesh:
     """Mesh a part in the plane with triangles.
 
     Parameters
@@ -123,20 +128,20 @@ def plane_mesh(part: Part, size: float | None = None, angles: ArcAngles = CURVED
     part
         Part to be meshed.
     size
-        Largest edge of the triangles, mm; half the least strut width by default.
-    angles
-        Largest angles of arcs along one edge.
+        Largest edge of the triangles, mm; that of `fineness` by default.
+    fineness
+        How fine the mesh is.
 
     Raises
     ------
     InvalidSettings
         If there is no valid outline, the size is not positive or two hubs touch.
     """
-    size = SIZE * float(part.widths.min()) if size is None else size
+    size = fineness.size * float(part.widths.min()) if size is None else size
     nodes, widest = hub_nodes(part), np.zeros(len(part.positions))
     np.maximum.at(widest, part.struts, part.widths[:, None])
     hubs = dict(zip(nodes.tolist(), part.positions[nodes], strict=True))
-    mesh = triangulated(part.outline(), hubs, HUB * widest[nodes], size, angles)
+    mesh = triangulated(part.outline(), hubs, HUB * widest[nodes], size, fineness)
     mesh.Curve(2)
     return ContinuumMesh(
         mesh, nodes, part.design.problem.lattice.node_count, part.section.thickness
@@ -148,7 +153,7 @@ def triangulated(
     hubs: dict[int, NDArray[np.float64]],
     radius: ArrayLike,
     size: float,
-    angles: ArcAngles = CURVED,
+    fineness: Fineness = FINE,
 ) -> Any:
     """Return NGSolve's mesh of an outline with hubs, with straight edges.
 
@@ -162,8 +167,8 @@ def triangulated(
         Radius of the hubs, mm.
     size
         Largest edge of the triangles, mm.
-    angles
-        Largest angles of arcs along one edge.
+    fineness
+        Angles of arcs along one edge, and the growth of the triangles.
     """
     if not 0.0 < size < math.inf:
         raise InvalidSettings(f"size: expected a length above 0 mm, got {size!r}")
@@ -174,13 +179,15 @@ def triangulated(
     check_apart(hubs, radii)
     geometry = SplineGeometry()
     for loop in (*outline.outer, *outline.holes):
-        add_loop(geometry, loop, 1, 0, angles.outline)
+        add_loop(geometry, loop, 1, 0, fineness.outline)
     geometry.SetMaterial(1, "strut")
     for domain, (node, centre) in enumerate(hubs.items(), start=2):
         ends = centre + radii[domain - 2] * np.array([[-1.0, 0.0], [1.0, 0.0]])
-        add_loop(geometry, Loop(ends, np.ones(2)), domain, 1, angles.hub)
+        add_loop(geometry, Loop(ends, np.ones(2)), domain, 1, fineness.hub)
         geometry.SetMaterial(domain, f"hub{node}")
-    return module.Mesh(geometry.GenerateMesh(maxh=size, **NETGEN))
+    # Arcs are divided here and not by Netgen.
+    grown = {"grading": fineness.grading, "curvaturesafety": 1.0}
+    return module.Mesh(geometry.GenerateMesh(maxh=size, **grown))
 
 
 def check_apart(hubs: dict[int, NDArray[np.float64]], radii: NDArray[np.float64]) -> None:

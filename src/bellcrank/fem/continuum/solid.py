@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.continuum.backend import ngsolve
-from bellcrank.fem.continuum.mesh import ArcAngles, ContinuumMesh, plane_mesh
+from bellcrank.fem.continuum.mesh import ContinuumMesh, Fineness, plane_mesh
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SIZE = 1.0
 """Default edge length of triangles as a fraction of the strut width."""
-STRAIGHT_EDGES = ArcAngles(outline=math.radians(60.0), hub=math.radians(90.0))
+STRAIGHT_EDGES = Fineness(outline=math.radians(60.0), hub=math.radians(90.0))
 
 
 def solid_mesh(part: Part, size: float | None = None, layers: int = 1) -> ContinuumMesh:
