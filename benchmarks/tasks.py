@@ -26,7 +26,7 @@ from bellcrank.provenance import provenance
 from bellcrank.search import read_settings
 from bellcrank.task import Task, bundled_tasks, find_task
 from bellcrank.workflows import complete_design, start_design
-from bellcrank.workflows.refinement import refinement_data
+from bellcrank.workflows.refinement import BEFORE_REFINEMENT, refinement_data
 from bellcrank.workflows.specification import binding, item_data
 
 if TYPE_CHECKING:
@@ -76,7 +76,10 @@ def run(name: str, seed: int) -> dict[str, Any]:
     started, used = time.perf_counter(), core_seconds()
     with TemporaryDirectory() as temporary:
         folder = start_design(
-            task.problem, read_settings({"seed": seed}), Path(temporary) / "run", task.part
+            task.problem,
+            read_settings({**BEFORE_REFINEMENT, "seed": seed}),
+            Path(temporary) / "run",
+            task.part,
         )
         try:
             report = complete_design(folder, workers=CORES)

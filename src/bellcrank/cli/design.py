@@ -35,7 +35,8 @@ def design(
         str | None, typer.Argument(help="Bundled task or problem, or a file of one.")
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(help="Number of proposals per chain. [25000]")
+        int | None,
+        typer.Option(help="Number of proposals per chain. [25000; 8000 before a refinement]"),
     ] = None,
     chains: Annotated[int | None, typer.Option(help="Number of independent chains. [2]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers. [0]")] = None,
@@ -156,7 +157,10 @@ def design(
     if resume is None:
         task, part = _in_model(_design(problem, str(begin)), model, wanted)
     from bellcrank.search import read_settings
+    from bellcrank.workflows.refinement import BEFORE_REFINEMENT
 
+    if refine and task is not None and task.is_specified:
+        chosen = {**BEFORE_REFINEMENT, **chosen}
     method = "paper" if paper else search or "basin-hopping"
     settings = read_settings({"search": method, **chosen})
     from bellcrank.cli.progress import SearchProgress

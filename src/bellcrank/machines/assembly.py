@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from bellcrank.machines.placement import Part
     from bellcrank.machines.plan import Plan
+    from bellcrank.model import Section
 
 END_INSET = 1e-6
 """Fraction of its length by which each beam is shortened at both ends before crossings are
@@ -96,6 +97,7 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
     parts = place_parts(plan, find)
     nodes, positions = merge_nodes(plan, parts)
     beams, numbers, present = _merge_beams(plan, parts, nodes, positions)
+    widths = _merge_widths(parts, numbers, len(beams))
     count = len(beams)
     positions, beams = _add_bridges(plan, parts, nodes, positions, beams)
     present = np.concatenate([present, np.ones(len(beams) - count, np.bool_)])
@@ -114,6 +116,7 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
             stiffness=model.stiffness,
             section=model.section,
             material=model.material,
+            widths=_with_bridges(widths, model.section, len(beams)),
             initial=present,
             designable=designable_beams(plan, parts, nodes, beams, (supports, given, wanted)),
         )
@@ -193,6 +196,36 @@ def _merge_beams(
             f"({x:.4g}, {y:.4g})"
         )
     return beams, numbers, present
+
+
+def _merge_widths(
+    parts: dict[str, Part], numbers: dict[str, NDArray[np.int64]], count: int
+) -> NDArray[np.float64] | None:
+    """Return (count,) the widths of the beams; None if all have that of the section.
+
+    A beam that is present in two parts has the larger of its widths.
+    """
+    problems = {name: part.design.problem for name, part in parts.items()}
+    if all(problem.widths is None for problem in problems.values()):
+        return None
+    section = next(iter(problems.values())).section
+    assert section is not None
+    widths = np.zeros(count)
+    for name, part in parts.items():
+        mask = part.design.mask
+        own = numbers[name][mask]
+        widths[own] = np.maximum(widths[own], problems[name].beam_widths[mask])
+    return np.where(widths > 0.0, widths, section.width)
+
+
+def _with_bridges(
+    widths: NDArray[np.float64] | None, section: Section | None, count: int
+) -> NDArray[np.float64] | None:
+    """Return widths (count,) with those of bridges, which have that of the section, appended."""
+    if widths is None:
+        return None
+    assert section is not None
+    return np.concatenate([widths, np.full(count - len(widths), section.width)])
 
 
 def _add_bridges(

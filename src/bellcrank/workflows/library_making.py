@@ -27,6 +27,7 @@ from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows import reopen_design, start_design
 from bellcrank.workflows.design import accepted_candidates
 from bellcrank.workflows.library_measurement import measure
+from bellcrank.workflows.refinement import refine_selection, refinement_data
 
 if TYPE_CHECKING:
     import threading
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from bellcrank.machines.library.entry import Entry
     from bellcrank.machines.library.tasks import EntryTask, MakeSettings
     from bellcrank.model import Problem
+    from bellcrank.refine.refinement import Progress as RefinementProgress
     from bellcrank.search import Candidate, Progress, SearchSettings, Selection
     from bellcrank.storage import RunFolder
 
@@ -188,7 +190,7 @@ def _search(
         progress = partial(report, task)
         if not run_chains(runs[-1], own, workers=workers, progress=progress, stop=stop):
             return None
-    return _select(task.problem(), runs, search)
+    return _select(task.problem(), runs, search, stop)
 
 
 def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
@@ -207,9 +209,19 @@ def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
 
 
 def _select(
-    problem: Problem, runs: Sequence[RunFolder], settings: SearchSettings
-) -> tuple[Selection, dict[str, Any]]:
-    """Select and clean the best design of the searches of a task; also return its provenance."""
+    problem: Problem,
+    runs: Sequence[RunFolder],
+    settings: SearchSettings,
+    stop: threading.Event | None,
+) -> tuple[Selection, dict[str, Any]] | None:
+    """Select, clean and refine the best design of the searches of a task.
+
+    Also return its provenance. None if the refinement was stopped.
+    """
+
+    def report(_progress: RefinementProgress) -> bool:
+        return stop is None or not stop.is_set()
+
     candidates: list[Candidate] = []
     chains: list[dict[str, Any]] = []
     for run in runs:
@@ -224,6 +236,11 @@ def _select(
         chosen = select_design(problem, candidates, settings, limit)
     except InvalidSettings as error:
         raise _NoUsableDesign(str(error)) from None
+    refinement = None
+    if problem.is_specified:
+        chosen, refinement = refine_selection(chosen, None, report)
+        if stop is not None and stop.is_set():
+            return None
     assert chosen.verification is not None
     if chosen.verification.fault is not None:
         raise _NoUsableDesign(f"no design without a fault: {chosen.verification.fault}")
@@ -235,5 +252,8 @@ def _select(
         "step": chosen.found.step,
         "efficiency_before_cleaning": chosen.efficiency_before,
         "refused": chosen.refused,
+        **({} if refinement is None else {"refinement": refinement_data(refinement)}),
     }
-    return chosen, notes
+    # Its items are those of the kind, and its figures are measured.
+    alone = replace(chosen.design, problem=replace(chosen.design.problem, specification=None))
+    return replace(chosen, design=alone), notes

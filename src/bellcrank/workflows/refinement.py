@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 EVALUATIONS = 400
 """Number of geometries that the refinement of the selected designs of a job evaluates."""
+BEFORE_REFINEMENT = {"steps": 8_000}
+"""Settings of a search whose design is refined: a longer search gains less than the refinement."""
 MOST_REFINED = 3
 """Number of designs that are refined where none meets the specification."""
 

@@ -53,6 +53,9 @@ class Kind:
         output.
     goals
         Constraints that the search kept.
+    specified
+        Whether it is searched and refined to the specification of a straight motion
+        (`bellcrank.machines.library.tasks.straight_motion`).
 
     Examples
     --------
@@ -64,6 +67,7 @@ class Kind:
     about: str
     spring: float | None = None
     goals: tuple[str, ...] = ()
+    specified: bool = False
 
 
 kinds: Registry[Kind] = Registry("kind of actuator")
@@ -76,6 +80,9 @@ kinds.register("light")(
         # The lower bound excludes mechanisms, whose input stiffness is zero.
         goals=("input-stiffness <= 0.1", "input-stiffness >= 0.001"),
     )
+)
+kinds.register("straight")(
+    Kind("straight motion", "along its direction, without rotation or sag", specified=True)
 )
 
 

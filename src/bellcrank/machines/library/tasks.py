@@ -13,12 +13,55 @@ from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.machines.library.entry import kinds, stem
 from bellcrank.machines.library.lever import plain_lever
 from bellcrank.mechanics import Status, model_evaluator
+from bellcrank.model import Item, ObjectiveTerm, Specification
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import HoppingSettings
+from bellcrank.task.units import units_of
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
     from bellcrank.search import SearchSettings
+
+
+OFF_AXIS, ROTATION, SAG = 0.1, 5.0, 0.1
+"""Largest off-axis motion and sag of a straight motion, as parts of the travel, and its largest
+rotation in degrees."""
+
+
+def straight_motion(problem: Problem) -> Problem:
+    """Return the frame of the default part with the specification of a straight motion.
+
+    The gain is maximised. The output is free, and no struts touch.
+
+    Examples
+    --------
+    >>> wanted = EntryTask("left", 7, "straight").problem().specification
+    >>> [item.name for item in wanted.items][:3]
+    ['case.output.off_axis', 'case.output.rotation', 'case.output.sag']
+    """
+    spec = PartSpec()
+    case, output = "case", "output"
+    off_axis = Item(quantity="off_axis", case=case, output=output, at_most=OFF_AXIS)
+    rotation = Item(
+        quantity="rotation", case=case, output=output, start=0.0, at_least=-ROTATION,
+        at_most=ROTATION,
+    )  # fmt: skip
+    items = (
+        off_axis,
+        rotation,
+        Item(quantity="sag", case=case, output=output, at_most=SAG),
+        Item(
+            quantity="strain",
+            case=case,
+            start=0.0,
+            at_most=spec.registered_material.strain_limit,
+        ),
+        Item(quantity="clearance", case=case, at_least=0.0),
+    )
+    weight = units_of(problem, spec).weight * np.array([0.0, -1.0])
+    gain = ObjectiveTerm(quantity="gain", case=case, output=output)
+    wanted = Specification(items=items, maximise=(gain,), weight=weight)
+    return replace(problem, specification=wanted)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +95,8 @@ class EntryTask:
         """
         made = elementary(self.columns, self.direction, kinds[self.kind].spring)
         given = frame_problem(made, PartSpec())
+        if kinds[self.kind].specified:
+            given = straight_motion(given)
         lattice = given.lattice
         held = np.isin(lattice.beams, given.supports.nodes).all(axis=1)
         at_ports = lattice.beams_touching(np.concatenate([given.input.nodes, given.output.nodes]))
@@ -61,9 +106,12 @@ class EntryTask:
         """Return the initial designs of the searches, each with a number of chains.
 
         Half of the chains start from the full lattice, half from the plain lever if there is
-        one. Designs near the lever are hard to reach from the full lattice.
+        one. Designs near the lever are hard to reach from the full lattice. Searches to a
+        specification start from the full lattice.
         """
         problem = self.problem()
+        if problem.is_specified:
+            return {"full": (problem, chains)}
         for goals in (kinds[self.kind].goals, ()):
             with contextlib.suppress(InvalidSettings):
                 lever = plain_lever(problem, goals)
@@ -100,7 +148,7 @@ class MakeSettings:
     Examples
     --------
     >>> len(MakeSettings().tasks)
-    72
+    96
     """
 
     directions: tuple[str, ...] = tuple(DIRECTIONS)
