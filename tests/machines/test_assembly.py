@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from bellcrank.machines.elementary import elementary
 from bellcrank.machines.plan import MachineTable, PortName, plan_of, read_plan
 from bellcrank.mechanics import SpringEvaluator
 from bellcrank.model import Stiffness, Supports
+from bellcrank.part import PartSpec, frame_problem
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -118,6 +120,32 @@ def test_masks_of_parts_become_the_mask_of_the_machine() -> None:
     assert np.array_equal(
         machine.nodes["b"][elementary(7, "down").lattice.beams], beams[machine.beams["b"]]
     )
+
+
+def test_widths_of_parts_become_those_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A strut of two parts has the larger width; bridges have that of the section."""
+    given = frame_problem(elementary(7, "down"), PartSpec())
+    assert given.section is not None
+    width = given.section.width
+    rng = np.random.default_rng(0)
+    several = width * rng.uniform(1.0, 1.8, given.lattice.beam_count)
+    designs = {
+        "full": given.full_design(),
+        "wide": given.with_geometry(given.lattice.positions, several).full_design(),
+    }
+    monkeypatch.setattr(sys.modules[__name__], "find", designs.__getitem__)
+    machine = build({"a": {"entry": "wide"}, "b": {"entry": "full", "join": "a.output"}})
+    widths = machine.design.problem.beam_widths
+    assert widths[machine.beams["a"]] == pytest.approx(several)
+    alone = np.setdiff1d(machine.beams["b"], machine.beams["a"])
+    assert (widths[alone] == width).all()
+    parts = {"a": {"entry": "full"}, "b": {"entry": "wide", "at": [-13.0, 0.0]}}
+    machine = build(parts, [{"from": "a.output", "to": "b.input", "kind": "bridge"}])
+    widths = machine.design.problem.beam_widths
+    assert len(machine.bridges)
+    assert (widths[machine.bridges] == width).all()
+    assert widths[machine.beams["b"]] == pytest.approx(several)
+    assert build(PAIR).design.problem.widths is None
 
 
 def test_a_bridge_joins_ports_that_are_apart() -> None:

@@ -68,6 +68,39 @@ def told(folder: Path) -> dict[str, object]:
 
 
 @pytest.mark.slow
+def test_entries_of_straight_motions_are_refined(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bellcrank.workflows.refinement.EVALUATIONS", 60)
+    settings = MakeSettings(
+        directions=("left",), columns=(7,), kinds=("straight",), steps=2000, chains=1
+    )
+    (made,) = make(settings, tmp_path, workers=1)
+    entry = made.entry
+    assert entry is not None
+    assert entry.provenance["refinement"]["met_after"]
+    assert not entry.design.problem.is_specified
+    task = EntryTask("left", 7, "straight").problem()
+    moved = entry.design.problem.lattice.positions - task.lattice.positions
+    assert np.abs(moved).max() > 0.01
+    assert not moved[task.special_nodes].any()
+    figures = entry.figures
+    off_axis, rotation = figures["off_axis"], figures["rotation_deg"]
+    sag, travel = figures["sag_mm"], figures["travel_mm"]
+    assert off_axis is not None
+    assert rotation is not None
+    assert sag is not None
+    assert travel is not None
+    assert off_axis <= 0.1
+    assert abs(rotation) <= 5.0
+    assert sag <= 0.1 * travel
+    found = Library((tmp_path,)).find("left-7-straight")
+    assert found.design.problem.lattice.positions == pytest.approx(
+        entry.design.problem.lattice.positions
+    )
+
+
+@pytest.mark.slow
 def test_each_task_makes_one_entry_and_leaves_nothing_else(whole: Path) -> None:
     names = sorted(path.name for path in whole.iterdir())
     assert len(names) == 2
