@@ -1,0 +1,251 @@
+"""What refinement gains: ``python -m benchmarks.refinement``.
+
+Three comparisons, by frames with eight elements in each strut and in the sheet:
+
+- ``mass``: the free actuators of the library and the bundled parts, refined at equal mass, equal
+  least width and without contact; gain before and after.
+- ``straight``: crane and anti-parallel with an off-axis motion of at most 2 % and a rotation of at
+  most 2 degrees, from the bundled design and from searches with several seeds.
+- ``exact``: the slider with a gain of 3.0 within 0.1 %, an off-axis motion below 1 % and a rotation
+  below 0.5 degrees, from searches with several seeds.
+
+Each run is added to ``docs/refinement/runs.json`` as soon as it is done; runs that are in the
+record are not repeated. Times are those of one core. ``--only mass`` makes one comparison.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from bellcrank.errors import InvalidSettings, NoDesignFound
+from bellcrank.fem.continuum.mesh import COARSE
+from bellcrank.fem.specification import sheet_items
+from bellcrank.machines.library import Library
+from bellcrank.machines.library.catalogue import bundled_folder
+from bellcrank.model import Design, Item, gallery_design
+from bellcrank.part import PartSpec, models
+from bellcrank.provenance import provenance
+from bellcrank.refine import RefinementSettings, refine_design, specified
+from bellcrank.search import read_settings
+from bellcrank.task import find_task
+from bellcrank.workflows import complete_design, start_design
+from bellcrank.workflows.refinement import BEFORE_REFINEMENT, EVALUATIONS, sheet_of
+
+from .tasks import CORES, core_seconds
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from bellcrank.mechanics import ItemResult
+    from bellcrank.model import Problem
+
+RECORD = Path(__file__).parents[1] / "docs" / "refinement" / "runs.json"
+PARTS = ("crane", "anti-parallel", "discs", "pliers", "scaling-8")
+SEEDS = 8
+"""Number of searches of each straight or exact motion."""
+BUNDLED = "bundled"
+"""In place of a seed: from the bundled design."""
+
+
+def at_equal_mass(name: str) -> dict[str, Any]:
+    """Refine an actuator of the library, or a bundled part, for its gain."""
+    design = gallery_design("machine", name)
+    if design is None:
+        design = Library((bundled_folder(),)).find(name).design
+    spec = PartSpec()
+    problem = specified(
+        models["frames"](design.problem, spec), spec.registered_material.strain_limit
+    )
+    wanted = problem.specification
+    assert wanted is not None
+    gain = Item(quantity="gain", case=wanted.case, output=wanted.output, at_least=0.0)
+    problem = replace(problem, specification=replace(wanted, items=(*wanted.items, gain)))
+    given = Design(problem, design.mask)
+    settings = RefinementSettings(evaluations=EVALUATIONS, same_mass=True)
+    used = core_seconds()
+    found = refine_design(given, settings)
+    seconds = round(core_seconds() - used, 1)
+    row = {
+        "seconds": seconds,
+        "gain_before": _value(found.before.items, "gain"),
+        "gain": _value(found.after.items, "gain"),
+        "met_before": found.before.met,
+        "met": found.after.met,
+        "reason": found.reason,
+    }
+    for key, each in (("sheet_before", given), ("sheet", found.design)):
+        row[f"gain_{key}"] = _value(_in_sheet(spec, each) or (), "gain")
+    return row
+
+
+def straight_problem(problem: Problem) -> Problem:
+    """Return a problem of a straight motion with tighter bounds, for a free output."""
+    return _bounded(
+        problem, {"off_axis": (None, 0.02), "rotation": (-2.0, 2.0)}, dropped={"payload", "sag"}
+    )
+
+
+def exact_problem(problem: Problem) -> Problem:
+    """Return the slider with a given gain in place of the largest one."""
+    bounds = {"gain": (2.997, 3.003), "off_axis": (None, 0.01), "rotation": (-0.5, 0.5)}
+    exact = _bounded(problem, bounds, dropped=set())
+    assert exact.specification is not None
+    return replace(exact, specification=replace(exact.specification, maximise=()))
+
+
+def _bounded(
+    problem: Problem, bounds: dict[str, tuple[float | None, float]], dropped: set[str]
+) -> Problem:
+    """Return a problem with other bounds of its items, and without some of them."""
+    wanted = problem.specification
+    assert wanted is not None
+    items = []
+    for item in wanted.items:
+        low, high = bounds.get(item.quantity, (item.at_least, item.at_most))
+        if item.quantity not in dropped:
+            items.append(replace(item, at_least=low, at_most=high))
+    return replace(problem, specification=replace(wanted, items=tuple(items)))
+
+
+def from_bundled(task: str, problem: Problem, spec: PartSpec) -> dict[str, Any]:
+    """Refine the bundled design of a problem to a specification."""
+    design = gallery_design("machine", task.removeprefix("straight-"))
+    assert design is not None
+    used = core_seconds()
+    found = refine_design(
+        Design(problem, design.mask), RefinementSettings(evaluations=EVALUATIONS),
+        sheet=sheet_of(spec),
+    )  # fmt: skip
+    return {
+        "seconds": round(core_seconds() - used, 1),
+        "gain": found.after.objective,
+        "met": found.after.met,
+        "met_in_sheet": bool(found.after.sheet) and all(each.met for each in found.after.sheet),
+        **_values(found.after.items, "frame"),
+        **_values(found.after.sheet, "sheet"),
+        "reason": found.reason,
+    }
+
+
+def from_search(problem: Problem, spec: PartSpec, seed: int) -> dict[str, Any]:
+    """Search and refine a design with a seed."""
+    used = core_seconds()
+    with TemporaryDirectory() as temporary:
+        settings = read_settings({**BEFORE_REFINEMENT, "seed": seed})
+        folder = start_design(problem, settings, Path(temporary) / "run", spec)
+        try:
+            report = complete_design(folder, workers=CORES)
+        except NoDesignFound as error:
+            return {"met": False, "error": str(error)}
+    assert report is not None
+    assert report.refinement is not None
+    after = report.refinement.after
+    return {
+        "seconds": round(core_seconds() - used, 1),
+        "gain_before": report.refinement.before.objective,
+        "gain": after.objective,
+        "met": after.met,
+        "met_in_sheet": bool(after.sheet) and all(each.met for each in after.sheet),
+        **_values(after.items, "frame"),
+        **_values(after.sheet, "sheet"),
+        "reason": report.refinement.reason,
+    }
+
+
+def _in_sheet(spec: PartSpec, design: Design) -> Sequence[ItemResult] | None:
+    try:
+        return sheet_items(spec.of(design), fineness=COARSE)
+    except InvalidSettings:
+        return None
+
+
+def _value(items: Sequence[ItemResult], quantity: str) -> float | None:
+    """Return the value of an item; None if there is none."""
+    return next((each.value for each in items if each.item.quantity == quantity), None)
+
+
+def _values(items: Sequence[ItemResult], model: str) -> dict[str, float]:
+    """Return the values of all items, with the model after the name."""
+    return {f"{each.item.quantity}_{model}": each.value for each in items}
+
+
+def runs() -> dict[str, Callable[[], dict[str, Any]]]:
+    """Return all runs by name."""
+    names = [name for name in Library((bundled_folder(),)).names() if "-free-" in name]
+    out: dict[str, Callable[[], dict[str, Any]]] = {}
+    for name in (*PARTS, *names):
+        out[f"mass {name}"] = lambda name=name: at_equal_mass(name)
+    cases = [("straight-crane", straight_problem), ("straight-anti-parallel", straight_problem)]
+    for seed in (BUNDLED, *range(SEEDS)):
+        for name, changed in (*cases, ("slider", exact_problem)):
+            task = find_task(name)
+            assert task is not None
+            problem, spec = changed(task.problem), task.part
+            kind = "exact" if name == "slider" else "straight"
+            if isinstance(seed, int):
+                out[f"{kind} {name} {seed}"] = lambda problem=problem, spec=spec, seed=seed: (
+                    from_search(problem, spec, seed)
+                )
+            elif kind == "straight":
+                out[f"{kind} {name} {seed}"] = lambda name=name, problem=problem, spec=spec: (
+                    from_bundled(name, problem, spec)
+                )
+    return out
+
+
+def _group(name: str) -> str:
+    """Return the comparison that a run belongs to, with its problem where there are seeds."""
+    kind, *others = name.split()
+    return kind if kind == "mass" else " ".join((kind, *others[:-1]))
+
+
+def main() -> None:
+    """Run what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", default="mass,straight,exact")
+    given = parser.parse_args()
+    rows: dict[str, dict[str, Any]] = {}
+    if RECORD.exists():
+        rows = json.loads(RECORD.read_text(encoding="utf-8"))["runs"]
+    for name, job in runs().items():
+        if name in rows or name.split()[0] not in given.only.split(","):
+            continue
+        rows[name] = job()
+        RECORD.parent.mkdir(exist_ok=True)
+        data = {"provenance": provenance(), "runs": dict(sorted(rows.items()))}
+        RECORD.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        print(name, rows[name], flush=True)
+    for line in summary(rows):
+        print(line)
+
+
+def summary(rows: dict[str, dict[str, Any]]) -> list[str]:
+    """Return the medians of each comparison."""
+    lines = []
+    for kind in sorted({_group(name) for name in rows}):
+        own = [row for name, row in rows.items() if _group(name) == kind]
+        gains = [row["gain"] for row in own if row.get("gain") is not None]
+        text = f"{kind}: {len(own)} runs, {sum(bool(row['met']) for row in own)} met"
+        if kind == "mass":
+            grown = [row["gain"] / row["gain_before"] - 1.0 for row in own if row["gain_before"]]
+            sheet = [
+                row["gain_sheet"] / row["gain_sheet_before"] - 1.0
+                for row in own
+                if row["gain_sheet"] and row["gain_sheet_before"]
+            ]
+            text += f"; grown by {median(grown):.0%}, in the sheet by {median(sheet):.0%}"
+        else:
+            in_sheet = sum(bool(row.get("met_in_sheet")) for row in own)
+            text += f", {in_sheet} in the sheet; gain {median(gains):.2f}"
+        lines.append(f"{text}; {median(row.get('seconds', 0.0) for row in own):.0f} s")
+    return lines
+
+
+if __name__ == "__main__":
+    main()
