@@ -39,8 +39,7 @@ PRINTABLE = 1e-2
 SHEETS = 4
 """Largest number of geometries that are computed in the sheet: it takes a minute."""
 SHEET_STEPS = 8
-"""Largest number of steps after the sheet misses items. It ends where the corrected bounds are met,
-since the correction holds near the geometry it was computed for."""
+"""Largest number of steps after the sheet misses items; fewer if the corrected bounds are met."""
 MET = 1e-3
 """Sum of violations at which they are."""
 ROUNDS = 3
@@ -397,6 +396,4 @@ def moved(item: Item, change: float) -> Item:
 
 def _is_better(new: State, old: State) -> bool:
     """Whether a state meets more, or has the larger objective."""
-    if not new.items:
-        return False
-    return (new.met, new.objective) > (old.met, old.objective)
+    return bool(new.items) and (new.met, new.objective) > (old.met, old.objective)

@@ -6,7 +6,7 @@ search. Bounds that hold along the stroke are one constraint at each state.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ from bellcrank.mechanics import Channel, Status, StrokeRecord, channels_of, quan
 from bellcrank.mechanics.frames.geometry import BeamSlopes, beam_slopes, geometry_slopes
 from bellcrank.mechanics.frames.quantities.definition import Measures, Quantity, Slopes, vector
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
-from bellcrank.mechanics.items import reduced, scale_of
+from bellcrank.refine.channels import bounded, jacobian, stacked
 from bellcrank.refine.gaps import gaps_of
 from bellcrank.refine.shape import shape_rows
 from bellcrank.refine.stability import softest_states
@@ -25,22 +25,21 @@ from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.stroke_states import fractions_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.model import Item, Problem
+    from bellcrank.refine.gaps import Gaps
     from bellcrank.refine.variables import Variables
 
     Values = NDArray[np.float64]
-    RowsAt = Callable[[Mapping[Channel, Values]], tuple[Values, Values]]
     Gradients = dict[tuple[Channel, int], Values]
+    States = dict[float, tuple[Equilibrium, Measures]]
 
 LARGEST_INCREMENT = 1.0 / 16.0
 """Largest increment of the load: larger ones may end on another branch near a bifurcation."""
-STEP = 1e-6
-"""Step in central differences by channels, as a part of their size."""
 GAP_STATES = 8
 """States along the stroke at which gaps are computed."""
 STABLE = 0.5
@@ -89,6 +88,18 @@ class Rows:
         return float(np.maximum(self.constraints, 0.0).sum())
 
 
+@dataclass(slots=True, eq=False)
+class _Geometry:
+    """Responses of one geometry, and what was computed from them by load case."""
+
+    vector: Values
+    problem: Problem
+    evaluator: SpecificationEvaluator
+    channels: dict[str, dict[Channel, Values]] = field(default_factory=dict)
+    softest: dict[tuple[str, int], States] = field(default_factory=dict)
+    gaps: dict[tuple[str, int], Gaps] = field(default_factory=dict)
+
+
 class RowEvaluator:
     """Objectives and constraints of the geometries of one design.
 
@@ -117,11 +128,14 @@ class RowEvaluator:
         self.items = tuple(items)
         self.stable = stable
         self.soft: dict[tuple[str, int], set[float]] = {}
+        self._last: _Geometry | None = None
         bounds = [item.at_most for item in self.items if item.quantity == "mass"]
         self.volume = min((bound for bound in bounds if bound is not None), default=np.inf)
 
     def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
         """Return the rows of a geometry; None if a response is not stable, or a strut too short.
+
+        Responses of the geometry that was evaluated last are not computed again.
 
         Parameters
         ----------
@@ -130,6 +144,23 @@ class RowEvaluator:
         slopes
             Compute the derivatives too.
         """
+        if self._last is None or not np.array_equal(vector, self._last.vector):
+            self._last = self._responses(vector)
+        here = self._last
+        if here is None:
+            return None
+        parts = []
+        for name in here.evaluator.cases:
+            found = self._channel_rows(here, name, slopes=slopes)
+            gaps = self._gap_rows(here, name, slopes=slopes)
+            stable = self._stability_rows(here, name, slopes=slopes)
+            if found is None or gaps is None or stable is None:
+                return None
+            parts += [found, gaps, stable]
+        return self._joined([*parts, self._shape_rows(here.problem, slopes=slopes)])
+
+    def _responses(self, vector: Values) -> _Geometry | None:
+        """Compute the responses of a geometry; None if one is not stable, or a strut too short."""
         try:
             problem = self.variables.problem_at(vector)
         except InvalidProblem:
@@ -139,15 +170,7 @@ class RowEvaluator:
             response = case.evaluator.respond(self.mask, LARGEST_INCREMENT)
             if response.status is not Status.CONVERGED:
                 return None
-        parts = []
-        for name in evaluator.cases:
-            found = self._channel_rows(evaluator, name, slopes=slopes)
-            gaps = self._gap_rows(evaluator, name, slopes=slopes)
-            stable = self._stability_rows(evaluator, name, slopes=slopes)
-            if found is None or gaps is None or stable is None:
-                return None
-            parts += [found, gaps, stable]
-        return self._joined([*parts, self._shape_rows(problem, slopes=slopes)])
+        return _Geometry(vector.copy(), problem, evaluator)
 
     def _joined(self, parts: list[Rows]) -> Rows:
         return Rows(
@@ -159,15 +182,15 @@ class RowEvaluator:
             np.concatenate([part.constraint_slopes for part in parts]),
         )
 
-    def _channel_rows(
-        self, evaluator: SpecificationEvaluator, name: str, *, slopes: bool
-    ) -> Rows | None:
+    def _channel_rows(self, here: _Geometry, name: str, *, slopes: bool) -> Rows | None:
         """Return the rows of a load case that follow from its channels."""
-        case = evaluator.cases[name]
+        evaluator, case = here.evaluator, here.evaluator.cases[name]
         own = [item for item in self.items if item.case == name]
         items = [item for item in own if channels_of(item.quantity, item.output)]
         fractions = fractions_of(own, verified=True)
-        channels = case.evaluator.values(case.channels, fractions.tolist())
+        if name not in here.channels:
+            here.channels[name] = case.evaluator.values(case.channels, fractions.tolist())
+        channels = here.channels[name]
         record = StrokeRecord(fractions, channels, payloads=case.evaluator.payloads)
         wanted = [each for each in evaluator.objectives if each.case == name]
 
@@ -177,14 +200,14 @@ class RowEvaluator:
                 quantity_values(now, each.quantity, each.output)[..., -1:] / each.scale
                 for each in wanted
             ]
-            bounds = _stacked([_bounded(item, now) for item in items])
+            bounds = stacked([bounded(item, now) for item in items])
             # Without objectives, the smallest margin is improved.
-            return (_stacked(found) if evaluator.objectives else -bounds), bounds
+            return (stacked(found) if evaluator.objectives else -bounds), bounds
 
         objectives, constraints = rows_at(channels)
         if not (np.isfinite(objectives).all() and np.isfinite(constraints).all()):
             return None
-        names = [item.name for item in items for _ in _bounded(item, record)]
+        names = [item.name for item in items for _ in bounded(item, record)]
         keys = tuple((k,) for k in range(len(names)))
         none = np.zeros((0, self.variables.count))
         if not slopes:
@@ -192,7 +215,7 @@ class RowEvaluator:
         gradients = self._channel_gradients(evaluator, name)
         if gradients is None:
             return None
-        slopes_by = _jacobian(channels, rows_at, gradients)
+        slopes_by = jacobian(channels, rows_at, gradients)
         return Rows(objectives, constraints, tuple(names), keys, *slopes_by)
 
     def _channel_gradients(self, evaluator: SpecificationEvaluator, name: str) -> Gradients | None:
@@ -215,11 +238,9 @@ class RowEvaluator:
                 out[each] = by_measure
         return out
 
-    def _gap_rows(
-        self, evaluator: SpecificationEvaluator, name: str, *, slopes: bool
-    ) -> Rows | None:
+    def _gap_rows(self, here: _Geometry, name: str, *, slopes: bool) -> Rows | None:
         """Return the constraints on the gaps of a load case along the stroke."""
-        case = evaluator.cases[name].evaluator
+        case = here.evaluator.cases[name].evaluator
         problem = case.problem
         assert problem.section is not None
         bounds = [
@@ -237,7 +258,10 @@ class RowEvaluator:
             if state is None:
                 return None
             reach = bound + GAP_REACH * width
-            found = gaps_of(problem, np.flatnonzero(printed), state.state.u, reach)
+            if (name, k) not in here.gaps:
+                beams = np.flatnonzero(printed)
+                here.gaps[name, k] = gaps_of(problem, beams, state.state.u, reach)
+            found = here.gaps[name, k]
             values.append((bound - found.value) / width)
             keys += [(k, *pair) for pair in found.pairs.tolist()]
             if of_beams is None or not len(found.value):
@@ -255,19 +279,19 @@ class RowEvaluator:
             np.zeros(0), constraints, names, tuple(keys), gradients[0], np.concatenate(gradients)
         )
 
-    def _stability_rows(
-        self, evaluator: SpecificationEvaluator, name: str, *, slopes: bool
-    ) -> Rows | None:
+    def _stability_rows(self, here: _Geometry, name: str, *, slopes: bool) -> Rows | None:
         """Return the constraints on the lowest stiffness of a load case along the stroke."""
-        case = evaluator.cases[name].evaluator
+        case = here.evaluator.cases[name].evaluator
         paths = [case.frame, *(case.other("payload", output) for output in case.payloads)]
         none = np.zeros((0, self.variables.count))
         constraints, gradients, keys = [np.zeros(0)], [none], []
         for index, frame in enumerate(paths):
             soft = self.soft.setdefault((name, index), set())
-            found = softest_states(frame, soft)
-            if found is None:
+            state = frame.equilibrium if index else case.state
+            states = here.softest.get((name, index)) or softest_states(state, soft)
+            if states is None:
                 return None
+            found = here.softest[name, index] = states
             values = {fraction: float(each.value[0]) for fraction, (_, each) in found.items()}
             end = min((min(values), max(values)), key=values.__getitem__)
             ratio = {fraction: value / values[end] for fraction, value in values.items()}
@@ -311,68 +335,3 @@ def _quantity_of(fields: Values) -> Quantity:
         return Slopes(fields)
 
     return Quantity(measure, slopes, combine=vector)
-
-
-def _bounded(item: Item, record: StrokeRecord) -> Values:
-    """Return (..., q) the constraints of an item: its bounds, at each state where they hold."""
-    if item.quantity == "payload" and item.at_least and item.at_most is None:
-        # The payload is infinite where a load changes nothing; its inverse is smooth.
-        payload = quantity_values(record, item.quantity, item.output)
-        return item.at_least / payload - 1.0
-    values = quantity_values(record, item.quantity, item.output, item.path)
-    if item.quantity == "off_axis":
-        motion = record.of("motion", item.output)
-        normal = np.linalg.norm(motion[..., 1:], axis=-1)
-        values = normal / np.abs(motion[..., -1:, 0])
-    elif item.of != "every":
-        values = np.stack([reduced(item, record)[0]], axis=-1)
-    elif values.shape[-1] == len(record.fractions):
-        chosen = (record.fractions >= item.start - 1e-9) & (record.fractions <= item.stop + 1e-9)
-        values = values[..., chosen]
-    scale = scale_of(item)
-    sides = []
-    if item.at_most is not None:
-        sides.append((values - item.at_most) / scale)
-    if item.at_least is not None:
-        sides.append((item.at_least - values) / scale)
-    return np.concatenate(sides, axis=-1)
-
-
-def _stacked(rows: list[Values]) -> Values:
-    """Return rows (..., q) side by side."""
-    return np.concatenate(rows, axis=-1) if rows else np.zeros(0)
-
-
-def _jacobian(
-    channels: Mapping[Channel, Values], rows_at: RowsAt, gradients: Gradients
-) -> tuple[Values, Values]:
-    """Return the derivatives of objectives and constraints by the variables.
-
-    By central differences of both by the channels, whose own derivatives are given.
-    """
-    total = sum(value.size for value in channels.values())
-    steps = np.concatenate(
-        [np.full(v.size, STEP * max(float(np.abs(v).max()), 1e-9)) for v in channels.values()]
-    )
-    moved, begin = {}, 0
-    for channel, value in channels.items():
-        many = np.repeat(value[None], 2 * total, axis=0).reshape(2 * total, -1)
-        own = np.arange(begin, begin + value.size)
-        many[own, own - begin] += steps[own]
-        many[total + own, own - begin] -= steps[own]
-        moved[channel] = many.reshape(2 * total, *value.shape)
-        begin += value.size
-    by_channel = [
-        (found[:total] - found[total:]) / (2.0 * steps[:, None]) if found.size else None
-        for found in rows_at(moved)
-    ]
-    of_channels = np.concatenate(
-        [
-            gradients[channel, row]
-            for channel, value in channels.items()
-            for row in range(len(value))
-        ]
-    )
-    none = np.zeros((0, of_channels.shape[1]))
-    objective, constraint = (none if each is None else each.T @ of_channels for each in by_channel)
-    return objective, constraint

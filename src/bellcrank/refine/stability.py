@@ -9,22 +9,21 @@ import numpy as np
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
-    from bellcrank.mechanics.frames.evaluator import FrameEvaluator
     from bellcrank.mechanics.frames.quantities import Measures
 
-STABLE_STATES = 32
+STABLE_STATES = 16
 """States along the stroke at which the lowest stiffness is computed first."""
-HALVINGS = 2
+HALVINGS = 3
 """Number of times the distance of states about a soft one is halved."""
 SOFT = 2.0
 """Lowest stiffness over the smallest one up to which a local minimum is searched more closely."""
 
 
 def softest_states(
-    frame: FrameEvaluator, fractions: Iterable[float] = ()
+    state: Callable[[float], Equilibrium | None], fractions: Iterable[float] = ()
 ) -> dict[float, tuple[Equilibrium, Measures]] | None:
     """Return states along the stroke with their lowest stiffness; None if one is not found.
 
@@ -33,16 +32,18 @@ def softest_states(
 
     Parameters
     ----------
+    state
+        Function from a fraction of the stroke to the equilibrium there.
     fractions
         Fractions of the stroke at which it is computed besides.
     """
     found: dict[float, tuple[Equilibrium, Measures]] = {}
 
     def at(fraction: float) -> float:
-        state = frame.end if fraction == 1.0 else frame.equilibrium(fraction)
-        if state is None:
+        here = state(fraction)
+        if here is None:
             return np.nan
-        found[fraction] = (state, LOWEST_STIFFNESS.measure(state))
+        found[fraction] = (here, LOWEST_STIFFNESS.measure(here))
         return float(found[fraction][1].value[0])
 
     grid = {k / STABLE_STATES for k in range(1, STABLE_STATES + 1)}
