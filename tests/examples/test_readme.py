@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 from bellcrank.cli import main
+from bellcrank.cli.app import NOT_MET
 from bellcrank.model import human_design, read_design, write_design
 
 README = Path(__file__).parents[2] / "README.md"
-START = "pip install . && bellcrank design crane"
+START = "pip install . && bellcrank design straight-crane"
 TEST = "pip install '.[test]' && pytest"
 
 
@@ -25,13 +26,18 @@ def blocks(language: str) -> list[str]:
     return [code for named, code in found if named == language]
 
 
-def run(command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
+def run(
+    command: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    codes: tuple[int | None, ...] = (0, None),
+) -> str:
     """Run a command line in this process; return what it printed."""
     monkeypatch.setattr(sys, "argv", shlex.split(command))
     with pytest.raises(SystemExit) as left:
         main()
     printed = capsys.readouterr()
-    assert left.value.code in (0, None), printed.err
+    assert left.value.code in codes, printed.err
     return printed.out
 
 
@@ -47,11 +53,14 @@ def test_the_start_leaves_what_the_readme_says(
     run(START.partition(" && ")[2], monkeypatch, capsys)
     table = "".join(re.findall(r"^\| `.*$", README.read_text(encoding="utf-8"), re.MULTILINE))
     promised = set(re.findall(r"`([\w-]+\.\w+)`", table))
-    assert promised == {path.name for path in Path("crane").iterdir()}
-    design = read_design("crane/design.json")
-    human = json.loads(Path("crane/summary.json").read_text())["human_efficiency"]
+    folder = Path("straight-crane")
+    assert promised == {path.name for path in folder.iterdir()}
+    design = read_design(folder / "design.json")
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["refinement"]["met_after"]
+    human = summary["human_efficiency"]
     assert design.efficiency is not None
-    assert design.efficiency > 2.0 * human
+    assert design.efficiency > 5.0 * human
 
 
 def test_a_part_of_ones_own_is_designed_and_exported(
@@ -62,7 +71,8 @@ def test_a_part_of_ones_own_is_designed_and_exported(
     [task] = blocks("toml")
     Path("lift.toml").write_text(task)
     search, export, film = blocks("")[2].strip().splitlines()
-    run(f"{search} --chains 2 --steps 1500", monkeypatch, capsys)
+    # So short a search may miss items of the specification, which has its own exit code.
+    run(f"{search} --steps 1500 --no-refine", monkeypatch, capsys, (0, None, NOT_MET))
     summary = json.loads(Path("lift/summary.json").read_text())
     assert summary["as_part"]["status"] == "converged"
     assert summary["as_part"]["efficiency"] > 1.0
@@ -84,10 +94,16 @@ def test_the_part_of_the_readme_is_that_of_its_record() -> None:
     assert f"efficiency {record['efficiency']:.2f} by frames of 8 elements" in text
     assert f"{record['search_efficiency']:.2f} in the search" in text
     eight = record["figures"][1]
-    assert f"sideways, by {eight['off_axis']:.0%}".replace("%", " %") in text
+    assert f"sideways by {eight['off_axis']:.0%}".replace("%", " %") in text
     assert f"turns by {abs(eight['output_rotation_deg']):.0f} degrees" in text
     assert (part["status"], part["contacts"], part["part"]["width"]) == ("converged", [], 2.0)
-    assert f"3 mm down, output {3.0 * part['efficiency']:.0f} mm up" in text
+    assert f"4 mm down, output {4.0 * part['efficiency']:.1f} mm up" in text
+    (figures,) = record["part_figures"]
+    assert f"{figures['efficiency_half']:.2f} at half of the stroke" in text
+    assert f"sags by {figures['sag_mm']:.1f} mm" in text
+    sheet = json.loads((README.parent / "docs" / "start" / "validation.json").read_text())
+    (plane,) = [each for each in sheet["results"] if each["level"] == "plane"]
+    assert f"it moves {plane['mean_output_displacement_mm'][1]:.1f} mm up" in text
 
 
 def test_every_command_is_known_with_all_its_options(
