@@ -15,6 +15,7 @@ from bellcrank.machines import TwoPort
 from bellcrank.machines.bundled import bundled_machines, find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder
+from benchmarks.tasks import summary
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -254,10 +255,15 @@ def independent_simulation() -> Rows:
     )  # fmt: skip
 
 
+def tasks() -> Rows:
+    yield from summary(read("tasks/runs")["runs"])
+
+
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (search_comparison, move_comparison),
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
+    "tasks": (tasks,),
     "machines": (bundled, contact, entries, lengths, two_ports),
     "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }
