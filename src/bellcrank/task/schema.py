@@ -198,6 +198,8 @@ class InputSection(Table):
     """Displacement of each node."""
     force: Force | None = None
     """Total force."""
+    during: Annotated[tuple[Ratio, Ratio], BeforeValidator(_as_tuple)] | None = None
+    """Fractions of the stroke between which it moves from rest to its full displacement."""
 
 
 class LoadSection(Table):

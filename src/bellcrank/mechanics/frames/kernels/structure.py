@@ -18,7 +18,12 @@ from bellcrank.mechanics.frames.kernels.arrays import (
 )
 from bellcrank.mechanics.frames.kernels.beams import dimension
 from bellcrank.mechanics.frames.kernels.factor import couple, entry_of, fill_in
-from bellcrank.mechanics.frames.kernels.state import copy_state, matrix_of, point_state
+from bellcrank.mechanics.frames.kernels.state import (
+    copy_state,
+    drive_share,
+    matrix_of,
+    point_state,
+)
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import CONVERGED, KEEP, MECHANISM, PRUNE_ALL
 from bellcrank.mechanics.kernels.core import keep_core, other_end
@@ -165,7 +170,7 @@ def classify_piece(
     """Return MECHANISM for a driven piece that is not held.
 
     A piece without load that only the drive holds, and that the drive moves as a whole in one
-    direction, follows without rotation: its nodes are marked as not active.
+    direction and at one time, follows without rotation: its nodes are marked as not active.
     """
     order, size = structure.order, len(frame.unit)
     driver = -1
@@ -184,6 +189,8 @@ def classify_piece(
             if driver >= 0:
                 for axis in range(3):
                     follows &= frame.drive[node, axis] == frame.drive[driver, axis]
+                for end in range(2):
+                    follows &= frame.ramp[node, end] == frame.ramp[driver, end]
             driver = node
     if rigid_motions_are_prevented(frame, structure, first, last, memory):
         return CONVERGED
@@ -324,8 +331,9 @@ def place_rest(
                     state.q[node, axis] = 0.0
             if frame.prescribed[node]:
                 reached[node] = 1
+                share = drive_share(frame, node, fraction)
                 for axis in range(3):
-                    state.u[node, axis] = fraction * frame.drive[node, axis]
+                    state.u[node, axis] = share * frame.drive[node, axis]
     place_followers(frame, mask, state, memory)
 
 
