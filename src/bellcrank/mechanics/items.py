@@ -162,7 +162,10 @@ def _ratio(numerator: Values, denominator: Values) -> Values:
 
 
 def path_error(
-    fractions: NDArray[np.float64], displacement: Values, path: Values, kinks: tuple[float, ...] = ()
+    fractions: NDArray[np.float64],
+    displacement: Values,
+    path: Values,
+    kinks: tuple[float, ...] = (),
 ) -> Values:
     """Return the root mean square distance of a motion from a wanted path, over its length.
 

@@ -20,7 +20,7 @@ WHOLE = (0.0, 1.0)
 SHORTEST = 0.01
 """Smallest length of a range, as a part of the stroke."""
 DIGITS = 6
-"""Decimals to which the ends of ranges are rounded, so that ends that are nearly equal are equal."""
+"""Decimals to which the ends of ranges are rounded, so that nearly equal ones are equal."""
 
 
 def stroke_range(name: str, values: ArrayLike) -> tuple[float, float]:
@@ -111,7 +111,7 @@ def share_at(ranges: NDArray[np.float64], fraction: float) -> NDArray[np.float64
     array([1. , 0.5])
     """
     begin, end = ranges.T
-    return np.clip((fraction - begin) / (end - begin), 0.0, 1.0)
+    return np.asarray(np.clip((fraction - begin) / (end - begin), 0.0, 1.0))
 
 
 def rate_at(ranges: NDArray[np.float64], fraction: float, toward: float) -> NDArray[np.float64]:

@@ -169,9 +169,7 @@ class RowEvaluator:
         kinks = case.evaluator.problem.input.kinks
         fractions = fractions_of(own, kinks, verified=True)
         channels = case.evaluator.values(case.channels, fractions.tolist())
-        record = StrokeRecord(
-            fractions, channels, payloads=case.evaluator.payloads, kinks=kinks
-        )
+        record = StrokeRecord(fractions, channels, payloads=case.evaluator.payloads, kinks=kinks)
         wanted = [each for each in evaluator.objectives if each.case == name]
 
         def rows_at(channels: Mapping[Channel, Values]) -> tuple[Values, Values]:

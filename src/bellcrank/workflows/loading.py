@@ -142,7 +142,7 @@ def _response_on_path(
     """Yield equilibria of the path of the full input, the last stable one beyond its end."""
     problem = design.problem
     evaluator = FrameEvaluator(problem, objective)
-    response = _checked(evaluator.evaluate(design.mask, VERIFICATION_INCREMENT), problem)
+    _checked(evaluator.evaluate(design.mask, VERIFICATION_INCREMENT), problem)
     nodes, dimension = problem.lattice.positions.shape
     efficiency = quantities["efficiency"]
     for share in shares:

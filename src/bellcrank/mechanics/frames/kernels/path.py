@@ -266,20 +266,21 @@ def next_end(frame: Frame, fraction: float, quarter: int) -> float:
 @kernel
 def begin_anew(
     frame: Frame, structure: Structure, load: float, end: float, state: State, memory: Memory
-) -> bool:
-    """Begin the path at a kink, without the states before it; False if the state is unstable.
+) -> float:
+    """Begin the path at a kink, without the states before it.
 
-    The tangent and the change of the axial forces are those up to `end`.
+    The tangent and the change of the axial forces become those up to `end`. Returns the next
+    increment; 0 if the state is unstable.
     """
     if not stiffness_is_definite(frame, structure, load, state, memory):
-        return False
+        return 0.0
     find_tangent(frame, structure, state, 0.5 * (load + end), memory.tangent, memory)
     copy(memory.tangent, memory.last_tangent)
     begin_tension(frame, structure, memory)
     for index in range(structure.sizes[1]):
         beam = structure.beam[index]
         memory.path_tension[0, beam] = memory.tension[beam]
-    return True
+    return LARGEST_INCREMENT
 
 
 @inlined
@@ -376,8 +377,7 @@ def follow_path(
     begin_tension(frame, structure, memory)
     memory.count[0] = memory.count[1] = 0
     keep_mode(0, stiffness, memory)
-    fraction = 0.0
-    quarter = 1
+    fraction, quarter = 0.0, 1
     increment = last_increment = min(LARGEST_INCREMENT, largest)
     smallest = SMALLEST_INCREMENT * (0.25 if largest <= FINE_VERIFICATION else 1.0)
     while fraction < 1.0 and increment >= smallest:
@@ -405,15 +405,12 @@ def follow_path(
             else:
                 copy_row(memory.tension, memory.point_tension[POINTS])
                 keep_mode(memory.count[0] + 1, now, memory)
-            if frame.has_ramps:
+            if frame.has_ramps and end == target:
+                # A short remainder does not shorten the increment after it.
+                following = max(following, wanted)
                 if is_kink(frame, end):
-                    following = 1.0
-                    if not begin_anew(
-                        frame, structure, end, next_end(frame, end, quarter), state, memory
-                    ):
-                        break
-                elif end == target:  # a short remainder does not shorten the increment after it
-                    following = max(following, wanted)
+                    target = next_end(frame, end, quarter)
+                    following = begin_anew(frame, structure, end, target, state, memory)
             increment = min(following, LARGEST_INCREMENT, largest)
         else:
             copy_state(previous, state)

@@ -169,7 +169,8 @@ def is_next(
 ) -> bool:
     """Whether a state follows from the one before; computes its tangent in `memory.next_tangent`.
 
-    `before` and `load` are the loads of both, and `state` is that at full load. The current factor must be that of the state otherwise.
+    `before` and `load` are the loads of both, and `state` is that at full load. The current factor
+    must be that of the state otherwise.
     """
     start = memory.previous
     set_to_rest(start)

@@ -150,10 +150,10 @@ def drive_rate(frame: Frame, node: int, within: float) -> float:
 @kernel
 def is_kink(frame: Frame, load: float) -> bool:
     """Whether a node of the drive starts or stops at a load."""
+    found = False
     for kink in frame.kinks:
-        if kink == load:
-            return True
-    return False
+        found |= kink == load
+    return found
 
 
 @kernel

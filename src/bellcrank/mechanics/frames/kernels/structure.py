@@ -164,6 +164,17 @@ def is_positive(gram: Floats) -> bool:
 
 
 @kernel
+def moves_alike(frame: Frame, node: int, other: int) -> bool:
+    """Whether the drive moves two nodes by the same displacement, at the same time."""
+    same = True
+    for axis in range(3):
+        same &= frame.drive[node, axis] == frame.drive[other, axis]
+    for end in range(2):
+        same &= frame.ramp[node, end] == frame.ramp[other, end]
+    return same
+
+
+@kernel
 def classify_piece(
     frame: Frame, structure: Structure, first: int, last: int, memory: Memory
 ) -> int:
@@ -187,10 +198,7 @@ def classify_piece(
             follows &= frame.ground[node, axis, axis] == 0.0
         if frame.prescribed[node]:
             if driver >= 0:
-                for axis in range(3):
-                    follows &= frame.drive[node, axis] == frame.drive[driver, axis]
-                for end in range(2):
-                    follows &= frame.ramp[node, end] == frame.ramp[driver, end]
+                follows &= moves_alike(frame, node, driver)
             driver = node
     if rigid_motions_are_prevented(frame, structure, first, last, memory):
         return CONVERGED
