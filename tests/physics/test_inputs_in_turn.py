@@ -211,18 +211,19 @@ def test_the_sheet_turns_at_the_same_corner() -> None:
 
     task = task_of(*TASK_TURNS)
     problem = task.problem
-    mask = diluted(problem, 1)
+    mask = diluted(problem, 4, absent=30)
     part = task.part.of(problem.full_design().with_mask(mask))
     evaluator = FrameEvaluator(problem, "displacement", elements=8)
     evaluator.evaluate(mask, VERIFICATION_INCREMENT)
     states = {state.load: state for state in solve_plane(part, size=1.0).states}
-    nodes = problem.output.nodes
+    nodes, amount = problem.output.nodes, problem.input.amount
     for load in (0.5, 1.0):
         found = evaluator.end if load == 1.0 else evaluator.equilibrium(load)
         assert found is not None
-        expected = found.state.u[nodes, :2].mean(axis=0)
-        moved = states[load].motion[nodes].mean(axis=0) / part.scale
-        assert np.linalg.norm(moved - expected) < 0.05 * np.linalg.norm(expected)
+        expected = found.state.u[nodes, :2]
+        moved = states[load].motion[nodes] / part.scale
+        # Frames and the sheet differ by a few per cent of the input without a kink, too.
+        assert np.linalg.norm(moved - expected) < 0.05 * amount
         driven = states[load].motion[problem.input.nodes] / part.scale
         held = found.state.u[problem.input.nodes, :2]
         assert driven == pytest.approx(held, abs=1e-4)
