@@ -16,7 +16,7 @@ from bellcrank.refine.rows import RowEvaluator
 from bellcrank.refine.shape import shape_rows
 from bellcrank.refine.variables import variables_of
 
-from .designs import random_design, straight_crane
+from .designs import random_design, stable_corner, straight_crane
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
@@ -133,6 +133,31 @@ def test_constraints_have_the_derivatives_of_differences(
             assert slope == pytest.approx(expected, rel=2e-3, abs=2e-4), (name, key)
             compared.add(name)
     assert {"clearance", "mass", "case.output.off_axis", "case.output.sag"} <= compared
+
+
+def test_the_error_of_a_path_with_a_corner_has_the_derivative_of_differences() -> None:
+    # Two inputs, one after the other.
+    design = stable_corner()
+    wanted = design.problem.specification
+    assert wanted is not None
+    items = [item for item in wanted.items if item.quantity == "path_error"]
+    variables = variables_of(design, 0.4, (0.1, 0.3))
+    rows = RowEvaluator(variables, design.mask, items)
+    rng = np.random.default_rng(3)
+    start, way = 0.01 * rng.normal(size=(2, variables.count))
+    here = rows.evaluate(start, slopes=True)
+    step = 1e-4
+    ahead, behind = (rows.evaluate(start + sign * step * way) for sign in (1.0, -1.0))
+    assert here is not None
+    assert ahead is not None
+    assert behind is not None
+    (index,) = [k for k, name in enumerate(here.names) if name.endswith("path_error")]
+    (one, other) = (
+        each.constraints[[name.endswith("path_error") for name in each.names]][0]
+        for each in (ahead, behind)
+    )
+    slope = here.constraint_slopes[index] @ way
+    assert slope == pytest.approx((one - other) / (2.0 * step), rel=1e-4)
 
 
 def test_constraints_on_the_shape_have_the_derivatives_of_differences(

@@ -6,6 +6,9 @@ another path, and if stability is lost, so that the load at which this happens i
 mode there shows what kind of loss it is: if the load does work along the mode, the path turns back
 at a limit point and the part snaps through; if not, another path branches off at a bifurcation and
 the part buckles.
+
+Where an input starts or stops, the path has a kink: a step ends there, and the next one begins as
+at rest.
 """
 
 from __future__ import annotations
@@ -114,12 +117,22 @@ class Equations(Protocol):
         """Number of unknowns."""
         ...
 
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Loads between 0 and 1 at which the load derivative changes suddenly, ascending."""
+        ...
+
     def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearisation:
         """Linearise the equations; raises RuntimeError if the stiffness is singular."""
         ...
 
-    def load_derivative(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
-        """Return (f,) the derivative of the residual with respect to the load."""
+    def load_derivative(
+        self, unknowns: NDArray[np.float64], load: float, toward: float = 1.0
+    ) -> NDArray[np.float64]:
+        """Return (f,) the derivative of the residual with respect to the load.
+
+        At a kink, on the side of the load `toward`.
+        """
         ...
 
     def distance(self, change: NDArray[np.float64]) -> float:
@@ -237,12 +250,12 @@ class _Continuation:
             return EquilibriumPath(states, PathStatus.MECHANISM, self.factorisations)
         tangent = start.stiffness
         initial_stiffness = softest_mode(tangent, self.equations.count)[0]
-        rate = self._rate(tangent, here)
+        rate = self._rate(tangent, here, 1.0)
         step = min(self.control.first, self.control.largest)
         unstable = False
         before: tuple[PathState, NDArray[np.float64]] | None = None
         while here.load < 1.0:
-            load = min(1.0, here.load + step)
+            load = self._end_of_step(here.load, step)
             predicted = self._predict(load, here, rate, before)
             found = self._correct(load, here.unknowns + predicted)
             # An unstable equilibrium shows that the path ends with a loss of stability, even if
@@ -262,9 +275,15 @@ class _Continuation:
             states.append(here)
             self.report(here)
             rate = slope
+            if here.load in self.equations.kinks:
+                before, rate = None, self._rate(tangent, here, 1.0)
             if iterations <= FEW_ITERATIONS:
                 step = min(self.control.largest, step * 2.0)
         return EquilibriumPath(states, PathStatus.CONVERGED, self.factorisations)
+
+    def _end_of_step(self, load: float, step: float) -> float:
+        """Return the load at the end of a step, at most the next kink."""
+        return min(load + step, *(each for each in (*self.equations.kinks, 1.0) if each > load))
 
     def _correct(
         self, load: float, guess: NDArray[np.float64]
@@ -290,9 +309,11 @@ class _Continuation:
                 return PathState(load, unknowns, tangent.negative_eigenvalues), iteration, tangent
         return None
 
-    def _rate(self, tangent: FactorisedStiffness, state: PathState) -> NDArray[np.float64]:
-        """Return (f,) the derivative of the unknowns with respect to the load."""
-        return -tangent.solve(self.equations.load_derivative(state.unknowns, state.load))
+    def _rate(
+        self, tangent: FactorisedStiffness, state: PathState, toward: float
+    ) -> NDArray[np.float64]:
+        """Return (f,) the derivative of the unknowns with respect to the load, on one side."""
+        return -tangent.solve(self.equations.load_derivative(state.unknowns, state.load, toward))
 
     def _predict(
         self,
@@ -334,7 +355,7 @@ class _Continuation:
         """
         if state.negative_eigenvalues:
             return None
-        slope = self._rate(tangent, state)
+        slope = self._rate(tangent, state, here.load)
         motion = state.unknowns - here.unknowns
         mean = 0.5 * (state.load - here.load) * (rate + slope)
         departure = self.equations.distance(motion - mean)

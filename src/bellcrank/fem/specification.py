@@ -21,6 +21,7 @@ from bellcrank.mechanics import Channel, StrokeRecord, channels_of, item_results
 from bellcrank.mechanics.frames.case import with_output, with_payload
 from bellcrank.mechanics.frames.stroke import with_held_output
 from bellcrank.mechanics.output import best_fit_rotation, motion_weights
+from bellcrank.mechanics.splines import stroke_spline
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 STEPS = StepControl(first=0.125, largest=0.125, smallest=1e-3)
 STATES = 16
 """Number of states along the stroke at which items are evaluated; between the computed ones,
-channels are interpolated by a cubic spline."""
+channels are interpolated by a cubic spline in each part of the stroke without a kink."""
 LAW = "neo-hookean"
 
 
@@ -129,14 +130,15 @@ class _Sheet:
         if main is None:
             return None
         ends = [end for item in self.items for end in (item.start, item.stop) if end > 0.0]
-        fractions = np.unique(np.concatenate([np.arange(1, STATES + 1) / STATES, ends]))
+        kinks = self.case.input.kinks
+        fractions = np.unique(np.concatenate([np.arange(1, STATES + 1) / STATES, ends, kinks]))
         needed = [
             channel for item in self.items for channel in channels_of(item.quantity, item.output)
         ]
         channels = {
             channel: self._channel(channel, main, fractions) for channel in dict.fromkeys(needed)
         }
-        return StrokeRecord(fractions, channels, self._given(main), self._payloads())
+        return StrokeRecord(fractions, channels, self._given(main), self._payloads(), kinks)
 
     def _payloads(self) -> dict[str, float]:
         return {
@@ -170,10 +172,8 @@ class _Sheet:
         }  # fmt: skip
         if channel.name in single:
             return single[channel.name](main, problem, channel.output)
-        from scipy.interpolate import CubicSpline
-
-        values: Values = CubicSpline(main.loads, self._along(channel, main, problem))(fractions)
-        return values
+        values = self._along(channel, main, problem)
+        return stroke_spline(main.loads, values, self.case.input.kinks, fractions)
 
     def _along(self, channel: Channel, main: SheetPath, problem: Problem) -> Values:
         """Return (S,) or (S, c) a channel at the states of a path."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidFile
 from bellcrank.machines.plan import welded_ports
+from bellcrank.machines.ports import check_one_motion
 from bellcrank.model import Input, Output, Supports
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ def machine_input(plan: Plan, parts: dict[str, Part], nodes: dict[str, NDArray[n
     table = plan.table.input
     ids, directions = _region(plan.inputs, parts, nodes, table.direction)
     first = parts[plan.inputs[0].part]
+    check_one_motion(first.design.problem)
     own = first.design.problem.input
     drive = table.drive or own.drive
     if table.amount is None and drive != own.drive:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics import UnloadedBeams
-    from bellcrank.model import Design, Input, Output
+    from bellcrank.model import Design, Input, Output, Problem
 
 INPUT, OUTPUT = 0, 1
 """Coordinates of `mean_ports`."""
@@ -64,6 +64,21 @@ def ports_of(design: Design) -> tuple[Port, Port]:
     return given, wanted
 
 
+def check_one_motion(problem: Problem) -> None:
+    """Check that the nodes of the input move together.
+
+    Raises
+    ------
+    InvalidSettings
+        If they move in parts of the stroke (`Input.during`).
+    """
+    if problem.input.during is not None:
+        raise InvalidSettings(
+            f"problem {problem.name!r}: expected an input whose nodes move together, got "
+            "input.during; a port has one coordinate"
+        )
+
+
 def mean_ports(design: Design, unloaded_beams: UnloadedBeams = "keep") -> Superelement:
     """Return the superelement of a design with the coordinates u_in and u_out.
 
@@ -79,7 +94,8 @@ def mean_ports(design: Design, unloaded_beams: UnloadedBeams = "keep") -> Supere
     Raises
     ------
     InvalidSettings
-        If the input meets no resistance, or rotates about a single node.
+        If the input meets no resistance, rotates about a single node, or its nodes do not move
+        together.
 
     Examples
     --------
@@ -88,6 +104,7 @@ def mean_ports(design: Design, unloaded_beams: UnloadedBeams = "keep") -> Supere
     >>> len(element.measures), element.reached.all()
     (2, np.True_)
     """
+    check_one_motion(design.problem)
     given, wanted = design.problem.input, design.problem.output
     if given.drive == "displacement":
         entry, weights = uniform_motion(given.nodes, given.direction), np.ones(1)

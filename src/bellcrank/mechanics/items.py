@@ -7,12 +7,12 @@ responses of many flips.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from bellcrank.mechanics.frames.case import Channel
+from bellcrank.mechanics.splines import STEPS, spline_basis
 from bellcrank.model import QUANTITIES
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ TWO_SIDED = 4.0
 LARGER_RESERVE = {"strain": 4.0, "clearance": 4.0}
 """The same for quantities that one element in each beam, and few states along the stroke, show
 less accurately."""
-PATH_POINTS = 48
+PATH_POINTS = STEPS
 """Number of points at which a path is compared with the wanted one."""
 LARGEST_EXCESS = 1e3
 """Largest ratio of an excess to its scale, that of values that are infinite or unknown."""
@@ -73,12 +73,15 @@ class StrokeRecord:
         Values of quantities that do not follow from channels: clearance, stable stroke, mass.
     payloads
         Forces under which the loaded motion of outputs was measured.
+    kinks
+        Fractions within the stroke, among those above, at which an input starts or stops.
     """
 
     fractions: NDArray[np.float64]
     channels: Mapping[Channel, Values]
     given: Mapping[str, Values | float] = field(default_factory=dict)
     payloads: Mapping[str, float] = field(default_factory=dict)
+    kinks: tuple[float, ...] = ()
 
     def of(self, name: str, output: str = "") -> Values:
         """Return a channel."""
@@ -123,7 +126,8 @@ def quantity_values(
         return np.asarray(record.given[quantity], dtype=np.float64)[..., None]
     if quantity == "path_error":
         assert path is not None
-        return path_error(record.fractions, record.of("displacement", output), path)[..., None]
+        motion = record.of("displacement", output)
+        return path_error(record.fractions, motion, path, record.kinks)[..., None]
     own = channels_of(quantity, output)
     if "motion" not in CHANNELS_OF[quantity]:
         return record.channels[own[0]]
@@ -157,7 +161,12 @@ def _ratio(numerator: Values, denominator: Values) -> Values:
     return np.asarray(np.divide(numerator, denominator, out=infinite, where=~small))
 
 
-def path_error(fractions: NDArray[np.float64], displacement: Values, path: Values) -> Values:
+def path_error(
+    fractions: NDArray[np.float64],
+    displacement: Values,
+    path: Values,
+    kinks: tuple[float, ...] = (),
+) -> Values:
     """Return the root mean square distance of a motion from a wanted path, over its length.
 
     A cubic spline through the states is compared with the path at equal fractions of the lengths
@@ -171,6 +180,8 @@ def path_error(fractions: NDArray[np.float64], displacement: Values, path: Value
         Displacement there.
     path : (k, 2)
         Corners of the path, relative to the first one.
+    kinks
+        Fractions at which the motion may turn sharply.
 
     Returns
     -------
@@ -191,7 +202,8 @@ def path_error(fractions: NDArray[np.float64], displacement: Values, path: Value
     wanted = np.stack([np.interp(share, at, path[:, axis]) for axis in range(2)], axis=-1)
     points = np.asarray(displacement)
     start = np.zeros((*points.shape[:-2], 1, 2))
-    fine = spline_basis(tuple(fractions.tolist())) @ np.concatenate([start, points], axis=-2)
+    basis = spline_basis(tuple(fractions.tolist()), kinks)
+    fine = basis @ np.concatenate([start, points], axis=-2)
     moved = np.linalg.norm(np.diff(fine, axis=-2), axis=-1)
     reached = np.concatenate([np.zeros((*moved.shape[:-1], 1)), np.cumsum(moved, axis=-1)], axis=-1)
     total = reached[..., -1:]
@@ -205,27 +217,13 @@ def path_error(fractions: NDArray[np.float64], displacement: Values, path: Value
     with np.errstate(invalid="ignore", divide="ignore"):
         along = reached / total
     # The piece of the spline in which each share of its length lies, and where in it.
-    piece = np.minimum((along[..., None, 1:] < share[:, None] - 1e-12).sum(-1), PATH_POINTS - 1)
+    piece = np.minimum((along[..., None, 1:] < share[:, None] - 1e-12).sum(-1), len(basis) - 2)
     low, high = (np.take_along_axis(along, piece + k, axis=-1) for k in (0, 1))
     part = np.divide(share - low, high - low, out=np.zeros_like(low), where=high > low)
     ends = [np.take_along_axis(fine, (piece + k)[..., None], axis=-2) for k in (0, 1)]
     there = ends[0] + part[..., None] * (ends[1] - ends[0])
     error = np.sqrt(((there - wanted) ** 2).sum(axis=-1).mean(axis=-1)) / length
     return np.where(np.isfinite(total[..., 0]) & (total[..., 0] > 0.0), error, np.inf)
-
-
-@lru_cache(maxsize=64)
-def spline_basis(fractions: tuple[float, ...]) -> Values:
-    """Return (m + 1, F + 1) the values of a cubic spline at m equal steps of the stroke.
-
-    Its knots are the state at rest and those at the fractions.
-    """
-    from scipy.interpolate import CubicSpline
-
-    knots = np.array([0.0, *fractions])
-    spline = CubicSpline(knots, np.eye(len(knots)))
-    values: Values = spline(np.arange(PATH_POINTS + 1) / PATH_POINTS)
-    return values
 
 
 def scale_of(item: Item) -> float:

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics.evaluator import VERIFICATION_INCREMENT
 from bellcrank.mechanics.frames.evaluator import FrameEvaluator
 
@@ -25,12 +26,24 @@ STATES = 8
 def at_fraction(problem: Problem, fraction: float) -> Problem:
     """Return a problem with a fraction of its input.
 
+    Raises
+    ------
+    InvalidSettings
+        If an input moves in a part of the stroke (`Input.during`): inputs then have different
+        fractions of their displacements. Equilibria of the whole stroke show those at a fraction
+        (`FrameEvaluator.equilibrium`).
+
     Examples
     --------
     >>> from bellcrank.model import find_problem
     >>> round(at_fraction(find_problem("crane"), 0.5).input.amount, 3)
     0.217
     """
+    if problem.input.during is not None and fraction != 1.0:
+        raise InvalidSettings(
+            f"problem {problem.name!r}: expected inputs that move along the whole stroke, got "
+            "input.during; a fraction of such a stroke is not a problem with a smaller input"
+        )
     return replace(problem, input=replace(problem.input, amount=fraction * problem.input.amount))
 
 

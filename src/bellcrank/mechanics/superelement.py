@@ -217,7 +217,7 @@ class Superelement:
         self.design = design
         self.unloaded_beams: UnloadedBeams = unloaded_beams
         self._boundary = _checked(np.concatenate([each.nodes for each in couplings]), design)
-        undriven = replace(problem, input=replace(problem.input, drive="force"))
+        undriven = replace(problem, input=replace(problem.input, drive="force", during=None))
         held = _held_unknowns(design, couplings)
         free = replace(design, problem=undriven)
         self.model: Condensation = (

@@ -51,8 +51,18 @@ def check_section(lattice: Lattice, section: object, material: object) -> None:
         )
 
 
-def check_frame_only(section: Section | None, loads: Loads, specification: object) -> None:
-    """Check that there is a section where there are loads or a specification."""
+def check_frame_only(
+    section: Section | None, inputs: Input, loads: Loads, specification: object
+) -> None:
+    """Check that there is a section where only frames can be computed.
+
+    Because of loads, a specification, or an input that moves in a part of the stroke.
+    """
+    if section is None and inputs.during is not None:
+        raise InvalidProblem(
+            "input.during: expected a problem with a section; in the spring model all inputs move "
+            "along the whole stroke"
+        )
     if section is None and (loads or specification is not None):
         raise InvalidProblem(
             "loads and specification: expected a problem with a section; the spring model has "

@@ -10,6 +10,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidProblem
 from bellcrank.model.arrays import id_list, locked, positive_number, real_array, rebuild
+from bellcrank.model.stroke_ranges import WHOLE, kinks_of, stroke_ranges
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -130,12 +131,16 @@ class Input:
         ``"force"`` applies it as a force to each node.
     amount
         Displacement (lattice units) or force on each node, greater than zero.
+    during : (n, 2) float64, optional
+        Fractions of the stroke between which each node moves from rest to its full displacement;
+        before it rests, and after it is held. A single pair is used for all nodes. None if all
+        nodes move during the whole stroke.
 
     Raises
     ------
     InvalidProblem
-        If there is no node, a direction is not a unit vector, or the drive or the amount is
-        invalid.
+        If there is no node, a direction is not a unit vector, the drive or the amount is
+        invalid, or `during` is given with a force or does not cover the stroke.
 
     Examples
     --------
@@ -149,6 +154,7 @@ class Input:
     direction: NDArray[np.float64]
     drive: Drive
     amount: float
+    during: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         nodes = node_region("input.nodes", self.nodes)
@@ -160,6 +166,26 @@ class Input:
         object.__setattr__(self, "nodes", locked(nodes))
         object.__setattr__(self, "direction", locked(direction))
         object.__setattr__(self, "amount", positive_number("input.amount", self.amount))
+        if self.during is not None:
+            if self.drive == "force":
+                raise InvalidProblem(
+                    "input.during: expected an input driven by a displacement, got a force; "
+                    "forces grow along the whole stroke"
+                )
+            during = stroke_ranges("input.during", self.during, len(nodes))
+            object.__setattr__(self, "during", during)
+
+    @property
+    def ranges(self) -> NDArray[np.float64]:
+        """(n, 2) fractions of the stroke between which each node moves."""
+        if self.during is None:
+            return np.tile(WHOLE, (len(self.nodes), 1))
+        return self.during
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Fractions within the stroke at which a node starts or stops, ascending."""
+        return () if self.during is None else kinks_of(self.during)
 
     __reduce__ = rebuild
 

@@ -22,12 +22,15 @@ def supports_data(supports: Supports, dimension: int) -> dict[str, Any]:
 
 def input_data(given: Input) -> dict[str, Any]:
     """Return an input."""
-    return {
+    data = {
         "nodes": given.nodes.tolist(),
         "direction": _one_or_each(given.direction),
         "drive": given.drive,
         "amount": given.amount,
     }
+    if given.during is not None:
+        data["during"] = _one_or_each(given.during)
+    return data
 
 
 def output_data(output: Output) -> dict[str, Any]:

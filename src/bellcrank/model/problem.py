@@ -144,7 +144,7 @@ class Problem:
         check_texts(self.name, self.aggregate, self.objective)
         check_section(lattice, self.section, self.material)
         outputs, loads = list(self.outputs.values()), self.loads
-        check_frame_only(self.section, loads, self.specification)
+        check_frame_only(self.section, self.input, loads, self.specification)
         check_coordinates(lattice, self.supports, given, outputs, loads)
         supports = self.supports.merged(lattice.dimension)
         object.__setattr__(self, "supports", supports)

@@ -24,6 +24,8 @@ number. Both forms can be combined.
     direction = [0, -1]             # one unit vector, or one for each node; in space [0, 0, -1]
     drive = "displacement"          # or "force"
     amount = 0.1                    # lattice units, at most the size of the lattice
+    during = [[0, 0.5], [0.5, 1]]   # fractions of the stroke between which the nodes move, one
+                                    # pair or one for each node; optional, with a section
 
     [output]
     nodes = [{ row = -1, leftmost = 2 }]
@@ -177,6 +179,7 @@ def _input(lattice: Lattice, table: InputTable) -> Input:
         direction=table.direction,  # type: ignore[arg-type]  # checked there
         drive=table.drive,
         amount=table.amount,
+        during=table.during,  # type: ignore[arg-type]  # checked there
     )
 
 

@@ -33,6 +33,7 @@ class InputTable(Table):
     direction: list[Any]
     drive: Literal["displacement", "force"]
     amount: float
+    during: list[Any] | None = None
 
 
 class OutputTable(Table):

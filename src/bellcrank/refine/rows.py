@@ -187,11 +187,12 @@ class RowEvaluator:
         evaluator, case = here.evaluator, here.evaluator.cases[name]
         own = [item for item in self.items if item.case == name]
         items = [item for item in own if channels_of(item.quantity, item.output)]
-        fractions = fractions_of(own, verified=True)
+        kinks = case.evaluator.problem.input.kinks
+        fractions = fractions_of(own, kinks, verified=True)
         if name not in here.channels:
             here.channels[name] = case.evaluator.values(case.channels, fractions.tolist())
         channels = here.channels[name]
-        record = StrokeRecord(fractions, channels, payloads=case.evaluator.payloads)
+        record = StrokeRecord(fractions, channels, payloads=case.evaluator.payloads, kinks=kinks)
         wanted = [each for each in evaluator.objectives if each.case == name]
 
         def rows_at(channels: Mapping[Channel, Values]) -> tuple[Values, Values]:

@@ -114,7 +114,7 @@ class SpecificationEvaluator:
             channels = list(dict.fromkeys(c for pair in needed for c in channels_of(*pair)))
             used = [self.items[k] for k in chosen]
             cheap = [channel for channel in channels if channel.name in CHEAP]
-            fractions = fractions_of(used, verified=False)
+            fractions = fractions_of(used, case.input.kinks, verified=False)
             self.cases[name] = _Case(evaluator, chosen, channels, cheap, fractions)
         self.records: dict[str, StrokeRecord] = {}
         self.violations = np.ones(len(self.items))
@@ -184,9 +184,13 @@ class SpecificationEvaluator:
         for name, case in self.cases.items():
             fractions = case.fractions
             if verified:
-                fractions = fractions_of([self.items[k] for k in case.items], verified=True)
+                items = [self.items[k] for k in case.items]
+                fractions = fractions_of(items, case.evaluator.problem.input.kinks, verified=True)
             channels = case.evaluator.values(case.cheap, fractions.tolist(), at_end)
-            records[name] = StrokeRecord(fractions, channels, structural, case.evaluator.payloads)
+            records[name] = StrokeRecord(
+                fractions, channels, structural, case.evaluator.payloads,
+                case.evaluator.problem.input.kinks,
+            )  # fmt: skip
         yield records
         for name, case in self.cases.items():
             now = records[name]
@@ -360,9 +364,7 @@ class SpecificationEvaluator:
             }
             mass = volume + self.groups.total(sign * self._volume[members])
             given = {key: np.full(count, value) for key, value in now.given.items()}
-            records[name] = StrokeRecord(
-                now.fractions, channels, {**given, "mass": mass}, now.payloads
-            )
+            records[name] = replace(now, channels=channels, given={**given, "mass": mass})
         before = self._scores(self.records, self._extremes(self.records))
         with np.errstate(invalid="ignore"):
             score = self._scores(records, self._extremes(records))

@@ -21,8 +21,12 @@ VERIFIED_STATES = 16
 """The same for designs that are verified."""
 
 
-def fractions_of(items: Sequence[Item], *, verified: bool) -> NDArray[np.float64]:
+def fractions_of(
+    items: Sequence[Item], kinks: Sequence[float] = (), *, verified: bool
+) -> NDArray[np.float64]:
     """Return the fractions of the stroke at which items are evaluated.
+
+    Those at which an input starts or stops, the kinks, are among them.
 
     Examples
     --------
@@ -36,7 +40,7 @@ def fractions_of(items: Sequence[Item], *, verified: bool) -> NDArray[np.float64
     if verified:
         states = VERIFIED_STATES
     ends = [end for item in items for end in (item.start, item.stop) if end > 0.0]
-    return np.unique(np.concatenate([np.arange(1, states + 1) / states, ends]))
+    return np.unique(np.concatenate([np.arange(1, states + 1) / states, ends, kinks]))
 
 
 def _varies(item: Item) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidProblem
 from bellcrank.model import Case, Input, Loads, NodeForce, NodeSpring, Output, Supports
+from bellcrank.model.stroke_ranges import WHOLE, check_cover, stroke_range
 from bellcrank.task.shapes import nodes_at
 
 if TYPE_CHECKING:
@@ -129,12 +130,32 @@ class CaseReader:
                     f"{key}.inputs[{k}]: expected the same displacement as that of the first "
                     "input, or the same force on each node; give another force as a load"
                 )
+        during = np.concatenate(
+            [
+                np.tile(self._range(section, each, f"{key}.inputs[{k}]"), (len(each.nodes), 1))
+                for k, (section, each) in enumerate(zip(case.inputs, parts, strict=True))
+            ]
+        )
+        check_cover(f"{key}.inputs.during", during)
         return Input(
             nodes=np.concatenate([each.nodes for each in parts]),
             direction=np.concatenate([each.direction for each in parts]),
             drive=first.drive,
             amount=first.amount,
+            during=during if first.drive == "displacement" else None,
         )
+
+    @staticmethod
+    def _range(section: InputSection, given: Input, key: str) -> tuple[float, float]:
+        """Return the fractions of the stroke between which an input moves."""
+        if section.during is None:
+            return WHOLE
+        if given.drive == "force":
+            raise InvalidProblem(
+                f"{key}.during: expected an input with a displacement, got one with a force; "
+                "forces grow along the whole stroke"
+            )
+        return stroke_range(f"{key}.during", section.during)
 
     def _one_input(self, section: InputSection, key: str) -> Input:
         base = None if self.base is None else self.base.input

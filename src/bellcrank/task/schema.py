@@ -52,6 +52,12 @@ def _as_tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
+def _as_range(value: Any) -> Any:
+    if value is None or (isinstance(value, list | tuple) and len(value) == 2):
+        return _as_tuple(value)
+    raise PydanticCustomError("range", "two fractions of the stroke like ['0%', '50%']")
+
+
 def _as_points(value: Any) -> Any:
     return [_as_tuple(each) for each in value] if isinstance(value, list) else value
 
@@ -198,6 +204,8 @@ class InputSection(Table):
     """Displacement of each node."""
     force: Force | None = None
     """Total force."""
+    during: Annotated[tuple[Ratio, Ratio] | None, BeforeValidator(_as_range)] = None
+    """Fractions of the stroke between which it moves from rest to its full displacement."""
 
 
 class LoadSection(Table):

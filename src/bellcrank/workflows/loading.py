@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import Status, at_fraction, increment_at, model_evaluator
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    FrameEvaluator,
+    Response,
+    Status,
+    at_fraction,
+    increment_at,
+    model_evaluator,
+)
+from bellcrank.mechanics.frames.analysis import strain_of_frame
+from bellcrank.mechanics.frames.quantities import quantities
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
-    from bellcrank.model import Design
+    from bellcrank.mechanics import Strain
+    from bellcrank.model import Design, Problem
 
 SMALL = 1e-3
 """Fraction of the stroke at which the efficiency at rest is evaluated."""
@@ -55,6 +67,8 @@ def loading_path(
 ) -> LoadingPath:
     """Compute the responses of a design at fractions of its stroke, each from rest.
 
+    Where inputs move in parts of the stroke, they are equilibria of one path.
+
     Parameters
     ----------
     design
@@ -83,19 +97,59 @@ def loading_path(
     energy = np.zeros((states, problem.lattice.beam_count))
     efficiency, force = np.zeros(states), np.zeros(states)
     snapped = np.zeros(states, dtype=bool)
-    for k, fraction in enumerate(fractions.tolist()):
-        share = max(fraction, SMALL)
-        evaluator = model_evaluator(at_fraction(problem, share), objective)
-        response = evaluator.evaluate(design.mask, increment_at(share))
-        if response.status not in {Status.CONVERGED, Status.SNAPPED}:
-            raise InvalidSettings(f"{problem.name}: no motion to show: {response.status.message}")
+    respond = _response_on_path if problem.input.during is not None else _response_from_rest
+    shares = np.maximum(fractions, SMALL).tolist()
+    for k, (fraction, (response, strain)) in enumerate(
+        zip(fractions.tolist(), respond(design, shares, objective), strict=True)
+    ):
         efficiency[k] = response.efficiency
         snapped[k] = response.status is Status.SNAPPED
         if fraction > 0.0:
-            strain = evaluator.strain()
             displacement[k] = response.displacement
             energy[k], force[k] = strain.energy, strain.input_force
         report(k + 1)
     # A single state before a snapped one may be marked by chance: only what stays is kept.
     snapped = np.logical_and.accumulate(snapped[::-1])[::-1]
     return LoadingPath(fractions, displacement, energy, efficiency, force, snapped)
+
+
+def _checked(response: Response, problem: Problem) -> Response:
+    """Return a response that has an equilibrium.
+
+    Raises
+    ------
+    InvalidSettings
+        If it has none.
+    """
+    if response.status not in {Status.CONVERGED, Status.SNAPPED}:
+        raise InvalidSettings(f"{problem.name}: no motion to show: {response.status.message}")
+    return response
+
+
+def _response_from_rest(
+    design: Design, shares: list[float], objective: str | None
+) -> Iterator[tuple[Response, Strain]]:
+    """Yield responses to fractions of the input, each from rest."""
+    for share in shares:
+        evaluator = model_evaluator(at_fraction(design.problem, share), objective)
+        response = _checked(evaluator.evaluate(design.mask, increment_at(share)), design.problem)
+        yield response, evaluator.strain()
+
+
+def _response_on_path(
+    design: Design, shares: list[float], objective: str | None
+) -> Iterator[tuple[Response, Strain]]:
+    """Yield equilibria of the path of the full input, the last stable one beyond its end."""
+    problem = design.problem
+    evaluator = FrameEvaluator(problem, objective)
+    _checked(evaluator.evaluate(design.mask, VERIFICATION_INCREMENT), problem)
+    nodes, dimension = problem.lattice.positions.shape
+    efficiency = quantities["efficiency"]
+    for share in shares:
+        found = evaluator.equilibrium(share)
+        status = Status.SNAPPED if found is None else Status.CONVERGED
+        here = evaluator.end if found is None else found
+        value = math.nan if found is None else efficiency.value(here)
+        moved = here.state.u[:nodes, :dimension].copy()
+        strain = strain_of_frame(evaluator, here)
+        yield Response(status, value, math.nan, moved), strain

@@ -1,9 +1,10 @@
 """Equilibrium equations of continua.
 
 The functional that is stationary is the elastic energy plus, for each constraint on the mean
-displacement m of a hub, k q (m - t g) - k^2 q^2 / 2 s. Here q is the multiplier of the constraint:
-its force on the part is -k q, and k = E times thickness makes q a length. t is the load, g the
-prescribed displacement and s the stiffness of the spring. For an exact constraint the last term
+displacement m of a hub, k q (m - r(t) g) - k^2 q^2 / 2 s. Here q is the multiplier of the
+constraint: its force on the part is -k q, and k = E times thickness makes q a length. t is the
+load, g the prescribed displacement at full stroke, r(t) the part of it that is reached, from 0 to
+1, and s the stiffness of the spring. For an exact constraint the last term
 vanishes, but a very small one is kept in the stiffness, which is then quasi-definite and is
 factorised without pivoting.
 """
@@ -20,6 +21,7 @@ from bellcrank.fem.continuum.backend import ngsolve, threads
 from bellcrank.fem.continuum.stability import count_negative, extreme_compliances
 from bellcrank.fem.continuum.system import MEAN_ORDER, integration
 from bellcrank.fem.path import Linearisation
+from bellcrank.model.stroke_ranges import kinks_of, rate_at, share_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -104,8 +106,26 @@ class ContinuumEquations:
         return {int(node): sizes[names.index(f"hub{node}")] for node in system.mesh.hubs}
 
     @cached_property
+    def kinks(self) -> tuple[float, ...]:
+        """Fractions within the stroke at which a prescribed displacement starts or stops."""
+        return kinks_of(self._ranges)
+
+    @cached_property
+    def _ranges(self) -> NDArray[np.float64]:
+        """(g, 2) fractions of the stroke between which the prescribed displacements grow."""
+        means = self.system.boundary.means
+        return np.array([constraint.during for constraint in means]).reshape(-1, 2)
+
+    def _load_at(self, load: float) -> NDArray[np.float64]:
+        """Return (F,) the part of the residual that depends on the load."""
+        count = len(self._ranges)
+        total = load * self.load
+        total[len(total) - count :] = self.load[len(total) - count :] * share_at(self._ranges, load)
+        return total
+
+    @cached_property
     def load(self) -> NDArray[np.float64]:
-        """(F,) derivative of the residual with respect to the load, for all degrees of freedom."""
+        """(F,) change of the residual by the full load, for all degrees of freedom."""
         system = self.system
         boundary = system.boundary
         form = self._hub_load(boundary.loaded, boundary.force)
@@ -164,9 +184,19 @@ class ContinuumEquations:
         self.factorise(here)
         return Linearisation(residual, tolerance, TangentFactor(self, here))
 
-    def load_derivative(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:  # noqa: ARG002
-        """Return (f,) the derivative of the residual with respect to the load, a constant."""
-        return self.load[self.free]
+    def load_derivative(
+        self,
+        unknowns: NDArray[np.float64],  # noqa: ARG002
+        load: float,
+        toward: float = 1.0,
+    ) -> NDArray[np.float64]:
+        """Return (f,) the derivative of the residual with respect to the load.
+
+        It is constant between kinks.
+        """
+        count, rate = len(self._ranges), self.load.copy()
+        rate[len(rate) - count :] *= rate_at(self._ranges, load, toward)
+        return rate[self.free]
 
     def distance(self, change: NDArray[np.float64]) -> float:
         """Return the largest component of a change of the displacements, mm."""
@@ -203,7 +233,7 @@ class ContinuumEquations:
         largest = max(float(np.abs(forces[: self.displacements.ndof]).max()), float(multipliers))
         moved = float(np.abs(unknowns).max(initial=0.0))
         rounding = 100.0 * float(np.finfo(float).eps) * self.system.unit * moved
-        residual = forces + load * self.load
+        residual = forces + self._load_at(load)
         return residual[self.free], TOLERANCE * largest + rounding
 
     def potential(self, unknowns: NDArray[np.float64], load: float) -> float:
@@ -215,7 +245,7 @@ class ContinuumEquations:
         stored += (
             0.5 * self.system.unit * float((self.compliance * multipliers**2)[self.exact].sum())
         )
-        return stored + load * float(self.load[self.free] @ unknowns)
+        return stored + float(self._load_at(load)[self.free] @ unknowns)
 
     def factorise(self, unknowns: NDArray[np.float64]) -> None:
         """Factorise the stiffness of a state, unless that array was factorised last."""

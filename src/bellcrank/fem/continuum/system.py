@@ -14,6 +14,7 @@ import numpy as np
 
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.fem.continuum.laws import lame_of, laws
+from bellcrank.model.stroke_ranges import WHOLE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,12 +47,15 @@ class MeanConstraint:
     spring
         Stiffness of a spring between the hub and the prescribed displacement, N / mm; inf for a
         displacement that is prescribed exactly.
+    during
+        Fractions of the stroke between which the prescribed displacement grows.
     """
 
     node: int
     direction: tuple[float, ...]
     motion: float = 0.0
     spring: float = math.inf
+    during: tuple[float, float] = WHOLE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,9 +109,13 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
     total = np.zeros((len(problem.lattice.positions), 2))
     if given.drive == "displacement":
         full = given.amount * part.scale * given.direction[present]
-        for node, motion in zip(given.nodes[present].tolist(), full.tolist(), strict=True):
+        ranges = given.ranges[present].tolist()
+        for node, motion, during in zip(
+            given.nodes[present].tolist(), full.tolist(), ranges, strict=True
+        ):
             means += [
-                MeanConstraint(node, axis, move) for axis, move in zip(axes, motion, strict=False)
+                MeanConstraint(node, axis, move, during=tuple(during))
+                for axis, move in zip(axes, motion, strict=False)
             ]
             means += [MeanConstraint(node, axis) for axis in axes[2:]]
     else:

@@ -14,8 +14,14 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.fem.frame.sparse import Assembly, SparseFactor
 from bellcrank.fem.path import Linearisation, PathState
 from bellcrank.mechanics.frames.beams import beam_stiffness, subdivided
-from bellcrank.mechanics.frames.system import drive_and_load, held_unknowns, spring_stiffness
+from bellcrank.mechanics.frames.system import (
+    drive_and_load,
+    drive_ramps,
+    held_unknowns,
+    spring_stiffness,
+)
 from bellcrank.model import Elasticity
+from bellcrank.model.stroke_ranges import kinks_of, rate_at, share_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,6 +53,8 @@ class PartFrame:
         Unknowns that supports and the drive prescribe, and all those of nodes without struts.
     drive : (n, 3) float64
         Prescribed displacements at the full stroke, mm.
+    ramps : (n, 2) float64
+        Fractions of the stroke between which nodes of the drive move.
     load : (n, 3) float64
         Forces at the full stroke, N.
     springs : (n, 2, 2) float64
@@ -60,6 +68,7 @@ class PartFrame:
     stiffness: NDArray[np.float64]
     held: NDArray[np.bool_]
     drive: NDArray[np.float64]
+    ramps: NDArray[np.float64]
     load: NDArray[np.float64]
     springs: NDArray[np.float64]
 
@@ -114,6 +123,7 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
         stiffness=beam_stiffness(part.section, elasticity, length, theory, 2, rigid, ratio),
         held=held_unknowns(problem, len(positions), 3) | ~there,
         drive=part.scale * drive * there,
+        ramps=drive_ramps(problem, len(positions)),
         load=part.stiffness_unit * part.scale * load * there,
         springs=(part.stiffness_unit * spring_stiffness(problem, len(positions)))[:, :2, :2]
         * there[:, :, None],
@@ -166,9 +176,14 @@ class FrameEquations:
         """Number of unknowns."""
         return len(self.free)
 
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Fractions within the stroke at which an input starts or stops."""
+        return kinks_of(self.frame.ramps)
+
     def displacement(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
         """Return (n, 3) the displacements of all nodes."""
-        whole = load * self.frame.drive
+        whole = share_at(self.frame.ramps, load)[:, None] * self.frame.drive
         whole.ravel()[self.free] = unknowns
         return whole
 
@@ -181,11 +196,14 @@ class FrameEquations:
         tolerance = self._residual_tolerance(displacement, magnitude)
         return Linearisation(residual, tolerance, self._factor(tangent))
 
-    def load_derivative(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
+    def load_derivative(
+        self, unknowns: NDArray[np.float64], load: float, toward: float = 1.0
+    ) -> NDArray[np.float64]:
         """Return (f,) the derivative of the residual with respect to the load."""
         _, tangent = self._beams(self.displacement(unknowns, load))
-        force = self._linear_force(tangent, self.frame.drive)
-        return (self._sum(force, self.frame.drive) - self.frame.load).ravel()[self.free]
+        drive = rate_at(self.frame.ramps, load, toward)[:, None] * self.frame.drive
+        force = self._linear_force(tangent, drive)
+        return (self._sum(force, drive) - self.frame.load).ravel()[self.free]
 
     def distance(self, change: NDArray[np.float64]) -> float:
         """Return the largest component of a change of the displacements, mm."""

@@ -165,9 +165,12 @@ def without_ends(moments: Floats, share: Floats) -> Floats:
     return inner
 
 
-def strain_of_frame(evaluator: ComputedFrame) -> Strain:
-    """Return the energy of each beam and the input forces in the response computed last."""
-    frame, end = evaluator.frame, evaluator.end
+def strain_of_frame(evaluator: ComputedFrame, equilibrium: Equilibrium | None = None) -> Strain:
+    """Return the energy of each beam and the input forces in the response computed last.
+
+    At its end, or at one of its equilibria.
+    """
+    frame, end = evaluator.frame, equilibrium or evaluator.end
     beams = np.arange(len(frame.beams))
     d = deformations(frame, beams, *end.ends(beams))
     energy = 0.5 * (stress_resultants(frame, beams, d) * d).sum(axis=1)

@@ -12,6 +12,7 @@ from bellcrank.mechanics.frames.system import allocate_memory, allocate_structur
 from bellcrank.mechanics.objectives import objective_of
 from bellcrank.mechanics.ordering import elimination_order
 from bellcrank.mechanics.status import Status
+from bellcrank.model.stroke_ranges import WHOLE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -138,6 +139,9 @@ def _bounded(problem: Problem, held: NDArray[np.bool_]) -> Frame:
         partly=partly.astype(np.uint8),
         block=elimination_order(frame.beams, fully, springs=False),
         drive=np.zeros_like(frame.drive),
+        ramp=np.tile(WHOLE, (len(frame.ramp), 1)),
+        has_ramps=False,
+        kinks=np.zeros(0),
         load=np.zeros_like(frame.load),
         ground=np.zeros_like(frame.ground),
     )

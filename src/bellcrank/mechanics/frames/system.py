@@ -24,6 +24,7 @@ from bellcrank.mechanics.frames.kernels.arrays import (
 )
 from bellcrank.mechanics.ordering import elimination_order, factor_capacity
 from bellcrank.mechanics.system import EFFICIENCY_TOLERANCE, incident_beams
+from bellcrank.model.stroke_ranges import WHOLE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -154,6 +155,13 @@ def drive_and_load(problem: Problem, nodes: int, size: int) -> tuple[Floats, Flo
     return drive, load
 
 
+def drive_ramps(problem: Problem, nodes: int) -> Floats:
+    """Return (nodes, 2) the fractions of the load between which nodes of the drive move."""
+    ramps = np.tile(WHOLE, (nodes, 1))
+    ramps[problem.input.nodes] = problem.input.ranges
+    return ramps
+
+
 def spring_stiffness(problem: Problem, nodes: int) -> Floats:
     """Return (nodes, 3, 3) the stiffness of the springs at outputs and at other nodes."""
     ground = np.zeros((nodes, 3, 3))
@@ -264,6 +272,9 @@ def build_frame(
         partly=(any_held & ~all_held).astype(np.uint8),
         block=elimination_order(beams, all_held, springs=False),
         drive=drive,
+        ramp=drive_ramps(problem, nodes),
+        has_ramps=problem.input.during is not None,
+        kinks=np.array(problem.input.kinks, dtype=np.float64),
         load=load,
         weight=of_beam,
         has_weight=weight is not None,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.mechanics import at_fraction
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,7 +77,8 @@ def at_strokes(
     Raises
     ------
     InvalidSettings
-        If the numbers of targets and strokes differ, or the input is a force.
+        If the numbers of targets and strokes differ, the input is a force, or a stroke is shorter
+        and inputs move in parts of it.
 
     Examples
     --------
@@ -94,9 +96,7 @@ def at_strokes(
     cases = []
     for index in sorted(range(len(strokes)), key=lambda index: -strokes[index]):
         amount = strokes[index] * problem.input.amount
-        part = problem
-        if strokes[index] != 1.0:
-            part = replace(problem, input=replace(problem.input, amount=amount))
+        part = at_fraction(problem, strokes[index]) if strokes[index] != 1.0 else problem
         cases.append(LoadCase(part, target=None if targets is None else targets[index] / amount))
     return cases
 

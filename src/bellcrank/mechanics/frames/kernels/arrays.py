@@ -65,6 +65,12 @@ class Frame(Bundle):
     """(N,) elimination index of a free node, -1 for a fully held one."""
     drive: Floats
     """(N, b) prescribed motion at full load."""
+    ramp: Floats
+    """(N, 2) fractions of the load between which a node of the drive moves."""
+    has_ramps: bool
+    """Whether these differ from 0 and 1."""
+    kinks: Floats
+    """Fractions within the load at which a node of the drive starts or stops, ascending."""
     load: Floats
     """(N, b) force and moment at full load."""
     weight: Floats

@@ -20,7 +20,7 @@ from bellcrank.mechanics.frames.kernels.plane import (
     add_plane_stiffness,
     plane_stiffness,
 )
-from bellcrank.mechanics.frames.kernels.state import move_node
+from bellcrank.mechanics.frames.kernels.state import drive_rate, move_node
 from bellcrank.mechanics.kernels._compile import inlined, kernel
 
 if TYPE_CHECKING:
@@ -339,7 +339,9 @@ def stiffness_is_definite(
 
 
 @kernel
-def add_driven_rate(frame: Frame, state: State, beam: int, rate: Floats, memory: Memory) -> None:
+def add_driven_rate(
+    frame: Frame, state: State, beam: int, within: float, rate: Floats, memory: Memory
+) -> None:
     """Add the forces of a beam per unit of load by the motion of its driven ends."""
     size, tangent = len(frame.unit), memory.tangent_block
     tension = axial_force(frame, state, beam, memory)
@@ -349,17 +351,21 @@ def add_driven_rate(frame: Frame, state: State, beam: int, rate: Floats, memory:
         for other in range(2):
             moved = frame.beams[beam, other]
             if frame.prescribed[moved]:
+                speed = drive_rate(frame, moved, within)
                 for a in range(size):
                     for b in range(size):
-                        force = tangent[size * end + a, size * other + b] * frame.drive[moved, b]
-                        rate[node, a] += force
+                        motion = speed * frame.drive[moved, b]
+                        rate[node, a] += tangent[size * end + a, size * other + b] * motion
 
 
 @kernel
 def find_load_rate(
-    frame: Frame, structure: Structure, state: State, rate: Floats, memory: Memory
+    frame: Frame, structure: Structure, state: State, within: float, rate: Floats, memory: Memory
 ) -> None:
-    """Compute (N, b) the derivative of the gradient by the load, at fixed free unknowns."""
+    """Compute (N, b) the derivative of the gradient by the load, at fixed free unknowns.
+
+    `within` is a load on the side of the derivative, up to the next kink.
+    """
     size = len(frame.unit)
     for node in range(len(rate)):
         for axis in range(size):
@@ -373,9 +379,10 @@ def find_load_rate(
                 rate[second, axis] -= 0.5 * frame.weight[beam, axis]
         if not (frame.prescribed[first] or frame.prescribed[second]):
             continue
-        add_driven_rate(frame, state, beam, rate, memory)
+        add_driven_rate(frame, state, beam, within, rate, memory)
     for node in frame.spring_nodes:
         if frame.prescribed[node]:
+            speed = drive_rate(frame, node, within)
             for i in range(3):
                 for j in range(3):
-                    rate[node, i] += frame.ground[node, i, j] * frame.drive[node, j]
+                    rate[node, i] += frame.ground[node, i, j] * (speed * frame.drive[node, j])

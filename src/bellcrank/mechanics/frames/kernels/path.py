@@ -22,6 +22,8 @@ from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.state import (
     copy_state,
     difference,
+    drive_rate,
+    is_kink,
     move,
     move_held_nodes,
     point_state,
@@ -48,6 +50,9 @@ REMAINDER = 1e-9
 LARGEST_DEPARTURE = 0.2
 """Departure of an increment from the mean of the tangents at its ends, as a part of the movement,
 above which the path bends too much to be followed, or jumps."""
+SMALL_MOVEMENT = 1e-4
+"""Movement in an increment, in lattice units, below which a departure may be an error of the
+equilibria."""
 LARGEST_SOFTENING = 0.5
 """Ratio of the lowest stiffness at the ends of an increment, in either direction, below which
 smaller increments are needed, down to `FINE_INCREMENT`."""
@@ -71,17 +76,26 @@ SWEEPS = 2
 
 @kernel
 def find_tangent(
-    frame: Frame, structure: Structure, state: State, tangent: Floats, memory: Memory
+    frame: Frame,
+    structure: Structure,
+    state: State,
+    within: float,
+    tangent: Floats,
+    memory: Memory,
 ) -> None:
-    """Compute the motion of an equilibrium per unit of load; the factor must be that of it."""
-    find_load_rate(frame, structure, state, tangent, memory)
+    """Compute the motion of an equilibrium per unit of load; the factor must be that of it.
+
+    `within` is a load on the side of the tangent, up to the next kink.
+    """
+    find_load_rate(frame, structure, state, within, tangent, memory)
     set_right_side(frame, structure, tangent, -1.0, memory)
     solve_step(structure, frame, memory)
     spread_step(frame, tangent, memory)
     for node in range(len(tangent)):
+        speed = drive_rate(frame, node, within)
         for axis in range(len(frame.unit)):
             if frame.held[node, axis]:
-                tangent[node, axis] = frame.drive[node, axis]
+                tangent[node, axis] = speed * frame.drive[node, axis]
 
 
 @kernel
@@ -117,12 +131,18 @@ def lowest_stiffness(
 
 @kernel
 def departure_of(
-    structure: Structure, motion: Floats, first: Floats, last: Floats, increment: float
+    frame: Frame,
+    structure: Structure,
+    motion: Floats,
+    first: Floats,
+    last: Floats,
+    increment: float,
 ) -> float:
     """Return the departure of a motion from the mean of the tangents at its two ends.
 
-    As a part of the movement. On a smooth path it is of third order in the increment; a jump to
-    another branch is in neither tangent.
+    As a part of the movement, which is at least `SMALL_MOVEMENT` where inputs rest for a part of
+    the load. On a smooth path it is of third order in the increment; a jump to another branch is in
+    neither tangent.
     """
     departure = movement = 0.0
     for index in range(structure.sizes[0]):
@@ -131,7 +151,7 @@ def departure_of(
             mean = 0.5 * increment * (first[node, axis] + last[node, axis])
             departure = max(departure, abs(motion[node, axis] - mean))
             movement = max(movement, abs(motion[node, axis]))
-    return departure / max(movement, 1e-300)
+    return departure / max(movement, SMALL_MOVEMENT if frame.has_ramps else 1e-300)
 
 
 @kernel
@@ -186,13 +206,13 @@ def extrapolate(state: State, increment: float, last_increment: float, memory: M
 
 @kernel
 def departure_to(
-    frame: Frame, structure: Structure, increment: float, state: State, memory: Memory
+    frame: Frame, structure: Structure, increment: float, end: float, state: State, memory: Memory
 ) -> float:
     """Compute the tangent at the end of an increment; return the departure of the increment."""
-    find_tangent(frame, structure, state, memory.next_tangent, memory)
+    find_tangent(frame, structure, state, end - 0.5 * increment, memory.next_tangent, memory)
     difference(memory.previous, state, memory.difference)
     return departure_of(
-        structure, memory.difference, memory.tangent, memory.next_tangent, increment
+        frame, structure, memory.difference, memory.tangent, memory.next_tangent, increment
     )
 
 
@@ -233,6 +253,36 @@ def begin_tension(frame: Frame, structure: Structure, memory: Memory) -> None:
         memory.path_tension[1, beam] = frame.section[beam, 0] * rate
 
 
+@kernel
+def next_end(frame: Frame, fraction: float, quarter: int) -> float:
+    """Return where increments from a load on end: at the next quarter of the load or kink."""
+    target = quarter / QUARTERS
+    for kink in frame.kinks:
+        if fraction < kink < target:
+            return float(kink)
+    return target
+
+
+@kernel
+def begin_anew(
+    frame: Frame, structure: Structure, load: float, end: float, state: State, memory: Memory
+) -> float:
+    """Begin the path at a kink, without the states before it.
+
+    The tangent and the change of the axial forces become those up to `end`. Returns the next
+    increment; 0 if the state is unstable.
+    """
+    if not stiffness_is_definite(frame, structure, load, state, memory):
+        return 0.0
+    find_tangent(frame, structure, state, 0.5 * (load + end), memory.tangent, memory)
+    copy(memory.tangent, memory.last_tangent)
+    begin_tension(frame, structure, memory)
+    for index in range(structure.sizes[1]):
+        beam = structure.beam[index]
+        memory.path_tension[0, beam] = memory.tension[beam]
+    return LARGEST_INCREMENT
+
+
 @inlined
 def correct(
     frame: Frame,
@@ -255,14 +305,14 @@ def correct(
     now, departure = 0.0, math.inf
     if newton(frame, structure, end, state, memory, tolerance, LONGEST_STEP) == CONVERGED:
         now = lowest_stiffness(frame, structure, memory.mode, SWEEPS, memory)
-        departure = departure_to(frame, structure, increment, state, memory)
+        departure = departure_to(frame, structure, increment, end, state, memory)
         # The factor is that of a state some steps before. Slender beams may turn by too much from
         # there for an accurate tangent, and near a loss of stability the tensions decide.
         if departure > DOUBTFUL or now < soft:
             if not stiffness_is_definite(frame, structure, end, state, memory):
                 return 0.0, math.inf
             now = lowest_stiffness(frame, structure, memory.mode, FEW_SWEEPS, memory)
-            departure = departure_to(frame, structure, increment, state, memory)
+            departure = departure_to(frame, structure, increment, end, state, memory)
     return now, departure
 
 
@@ -304,7 +354,8 @@ def follow_path(
     """Load from rest in increments that stay on one stable path.
 
     An increment is accepted only if it ends at a stable equilibrium that is connected to the one
-    before; otherwise it is shortened. SNAPPED means that even the smallest increment fails: the
+    before; otherwise it is shortened. Where an input starts or stops, the path has a kink, at which
+    an increment ends. SNAPPED means that even the smallest increment fails: the
     state is then the last stable one; or that the stiffness falls so low that a small imperfection
     is enough to snap.
 
@@ -321,21 +372,20 @@ def follow_path(
     if not stiffness_is_definite(frame, structure, 0.0, state, memory):
         return UNCONVERGED
     at_rest = softest = stiffness = lowest_stiffness(frame, structure, mode, 4 * SWEEPS, memory)
-    find_tangent(frame, structure, state, memory.tangent, memory)
+    find_tangent(frame, structure, state, 0.5 * next_end(frame, 0.0, 1), memory.tangent, memory)
     copy(memory.tangent, memory.last_tangent)
     begin_tension(frame, structure, memory)
     memory.count[0] = memory.count[1] = 0
     keep_mode(0, stiffness, memory)
-    fraction = 0.0
-    quarter = 1
+    fraction, quarter = 0.0, 1
     increment = last_increment = min(LARGEST_INCREMENT, largest)
     smallest = SMALLEST_INCREMENT * (0.25 if largest <= FINE_VERIFICATION else 1.0)
     while fraction < 1.0 and increment >= smallest:
-        # Equal increments lead to the next quarter of the load.
-        target = quarter / QUARTERS
+        # Equal increments lead to the next quarter of the load, or kink.
+        target = next_end(frame, fraction, quarter)
         parts = math.ceil((target - fraction) / increment - REMAINDER)
         end = target if parts <= 1 else fraction + (target - fraction) / parts
-        increment = end - fraction
+        wanted, increment = increment, end - fraction
         copy_state(state, previous)
         extrapolate(state, increment, last_increment, memory)
         soft = SOFT * at_rest
@@ -348,13 +398,19 @@ def follow_path(
             copy(memory.next_tangent, memory.tangent)
             keep_tension(structure, increment, memory)
             softest = min(softest, now)
-            if end == target:
+            if end == quarter / QUARTERS:
                 quarter += 1
             if end < 1.0:
                 keep_point(frame, end, now, state, memory)
             else:
                 copy_row(memory.tension, memory.point_tension[POINTS])
                 keep_mode(memory.count[0] + 1, now, memory)
+            if frame.has_ramps and end == target:
+                # A short remainder does not shorten the increment after it.
+                following = max(following, wanted)
+                if is_kink(frame, end):
+                    target = next_end(frame, end, quarter)
+                    following = begin_anew(frame, structure, end, target, state, memory)
             increment = min(following, LARGEST_INCREMENT, largest)
         else:
             copy_state(previous, state)

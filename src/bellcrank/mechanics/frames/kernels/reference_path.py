@@ -24,6 +24,7 @@ from bellcrank.mechanics.frames.kernels.path import (
 from bellcrank.mechanics.frames.kernels.state import (
     copy_state,
     difference,
+    is_kink,
     move,
     move_held_nodes,
     point_state,
@@ -83,13 +84,15 @@ def follows_reference(  # noqa: PLR0911 - one test after the other
     if not is_near(frame, structure, reference, last, reference.state, state, memory):
         return False
     begin_changes(structure, reference, memory)
-    find_tangent(frame, structure, state, memory.last_tangent, memory)
+    before = reference.load[last - 2] if last > 1 else 0.0
+    find_tangent(frame, structure, state, 0.5 * (before + 1.0), memory.last_tangent, memory)
     rest = memory.previous
     set_to_rest(rest)
     if not stiffness_is_definite(frame, structure, 0.0, rest, memory):
         return False
     find_softest(frame, structure, reference, 0, memory)
-    find_tangent(frame, structure, rest, memory.tangent, memory)
+    following = reference.load[0] if last > 1 else 1.0
+    find_tangent(frame, structure, rest, 0.5 * following, memory.tangent, memory)
     least = CLEAR_DIP * min(memory.point_stiffness[0], memory.point_stiffness[last])
     before = 0.0
     for index in range(1, last + 1):
@@ -101,19 +104,31 @@ def follows_reference(  # noqa: PLR0911 - one test after the other
                 return False
         if memory.point_stiffness[index] < least:
             return False
-        if not is_next(frame, structure, index, load - before, state, memory):
+        if not is_next(frame, structure, index, before, load, state, memory):
             return False
         copy(memory.next_tangent, memory.tangent)
+        if is_kink(frame, load):
+            following = reference.load[index] if index + 1 < last else 1.0
+            turn_tangent(frame, structure, index, 0.5 * (load + following), memory)
         before = load
-    return lowest_between(memory) > CLEAR_KINK / CLEAR_DIP * least
+    return lowest_between(frame, memory) > CLEAR_KINK / CLEAR_DIP * least
 
 
 @kernel
-def lowest_between(memory: Memory) -> float:
+def turn_tangent(
+    frame: Frame, structure: Structure, index: int, within: float, memory: Memory
+) -> None:
+    """Compute the tangent at a state beyond its kink; the current factor must be its own."""
+    u, q = point_state(frame, memory.points, index - 1)
+    find_tangent(frame, structure, State(u, q), within, memory.tangent, memory)
+
+
+@kernel
+def lowest_between(frame: Frame, memory: Memory) -> float:
     """Estimate the lowest stiffness between the states in `memory.points`.
 
     In each interval, the straight lines through the two states before and the two after it are
-    extrapolated to where they meet. At rest and at full load, both are equally steep.
+    extrapolated to where they meet. At rest, at full load and at kinks, both are equally steep.
     """
     value, load, last = memory.point_stiffness, memory.load, memory.count[0]
     lowest = math.inf
@@ -121,17 +136,19 @@ def lowest_between(memory: Memory) -> float:
         left = load[index - 1] if index > 0 else 0.0
         right = load[index] if index < last else 1.0
         falling, rising = -math.inf, math.inf
-        if index > 0:
+        begins = index == 0 or is_kink(frame, left)
+        ends = index == last or is_kink(frame, right)
+        if not begins:
             falling = (value[index] - value[index - 1]) / (
                 left - (load[index - 2] if index > 1 else 0.0)
             )
-        if index < last:
+        if not ends:
             rising = (value[index + 2] - value[index + 1]) / (
                 (load[index + 1] if index + 1 < last else 1.0) - right
             )
-        if index == 0:
+        if begins:
             falling = -rising
-        if index == last:
+        if ends:
             rising = -falling
         if falling < 0.0 < rising < math.inf:
             gap = value[index + 1] - rising * (right - left) - value[index]
@@ -142,11 +159,18 @@ def lowest_between(memory: Memory) -> float:
 
 @kernel
 def is_next(
-    frame: Frame, structure: Structure, index: int, increment: float, state: State, memory: Memory
+    frame: Frame,
+    structure: Structure,
+    index: int,
+    before: float,
+    load: float,
+    state: State,
+    memory: Memory,
 ) -> bool:
     """Whether a state follows from the one before; computes its tangent in `memory.next_tangent`.
 
-    `state` is that at full load. The current factor must be that of the state otherwise.
+    `before` and `load` are the loads of both, and `state` is that at full load. The current factor
+    must be that of the state otherwise.
     """
     start = memory.previous
     set_to_rest(start)
@@ -160,13 +184,13 @@ def is_next(
         u, q = point_state(frame, memory.points, index - 1)
         here = State(u, q)
         difference(start, here, memory.difference)
-        find_tangent(frame, structure, here, memory.next_tangent, memory)
+        find_tangent(frame, structure, here, 0.5 * (before + load), memory.next_tangent, memory)
     departure = departure_of(
-        structure, memory.difference, memory.tangent, memory.next_tangent, increment
+        frame, structure, memory.difference, memory.tangent, memory.next_tangent, load - before
     )
-    before, after = memory.point_stiffness[index - 1], memory.point_stiffness[index]
-    followed = after > SOFTENING * before and before > SOFTENING * after
-    return departure <= DEPARTURE and (followed or is_fine(increment))
+    first, second = memory.point_stiffness[index - 1], memory.point_stiffness[index]
+    followed = second > SOFTENING * first and first > SOFTENING * second
+    return departure <= DEPARTURE and (followed or is_fine(load - before))
 
 
 @kernel

@@ -130,6 +130,33 @@ def difference(start: State, end: State, out: Floats) -> None:
 
 
 @kernel
+def drive_share(frame: Frame, node: int, fraction: float) -> float:
+    """Return the part of its full motion that a node of the drive has at a load."""
+    if not frame.has_ramps:
+        return fraction
+    begin, end = frame.ramp[node, 0], frame.ramp[node, 1]
+    return min(1.0, max(0.0, (fraction - begin) / (end - begin)))
+
+
+@kernel
+def drive_rate(frame: Frame, node: int, within: float) -> float:
+    """Return the derivative of `drive_share` by the load; `within` is between two kinks."""
+    if not frame.has_ramps:
+        return 1.0
+    begin, end = frame.ramp[node, 0], frame.ramp[node, 1]
+    return 1.0 / (end - begin) if begin < within < end else 0.0
+
+
+@kernel
+def is_kink(frame: Frame, load: float) -> bool:
+    """Whether a node of the drive starts or stops at a load."""
+    found = False
+    for kink in frame.kinks:
+        found |= kink == load
+    return found
+
+
+@kernel
 def move_held_nodes(frame: Frame, fraction: float, state: State) -> None:
     """Set held unknowns to the values that supports and drive prescribe at a load.
 
@@ -137,14 +164,15 @@ def move_held_nodes(frame: Frame, fraction: float, state: State) -> None:
     """
     held, drive = frame.held, frame.drive
     for node in range(len(held)):
+        share = drive_share(frame, node, fraction)
         for axis in range(3):
             if held[node, axis]:
-                state.u[node, axis] = fraction * drive[node, axis]
+                state.u[node, axis] = share * drive[node, axis]
         if len(state.q) and held[node, 3]:
             state.q[node, 0] = 1.0
             for axis in range(1, 4):
                 state.q[node, axis] = 0.0
             rotate(
-                state.q, node, fraction * drive[node, 3], fraction * drive[node, 4],
-                fraction * drive[node, 5],
+                state.q, node, share * drive[node, 3], share * drive[node, 4],
+                share * drive[node, 5],
             )  # fmt: skip

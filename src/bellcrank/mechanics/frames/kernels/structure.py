@@ -18,7 +18,12 @@ from bellcrank.mechanics.frames.kernels.arrays import (
 )
 from bellcrank.mechanics.frames.kernels.beams import dimension
 from bellcrank.mechanics.frames.kernels.factor import couple, entry_of, fill_in
-from bellcrank.mechanics.frames.kernels.state import copy_state, matrix_of, point_state
+from bellcrank.mechanics.frames.kernels.state import (
+    copy_state,
+    drive_share,
+    matrix_of,
+    point_state,
+)
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.arrays import CONVERGED, KEEP, MECHANISM, PRUNE_ALL
 from bellcrank.mechanics.kernels.core import keep_core, other_end
@@ -159,13 +164,24 @@ def is_positive(gram: Floats) -> bool:
 
 
 @kernel
+def moves_alike(frame: Frame, node: int, other: int) -> bool:
+    """Whether the drive moves two nodes by the same displacement, at the same time."""
+    same = True
+    for axis in range(3):
+        same &= frame.drive[node, axis] == frame.drive[other, axis]
+    for end in range(2):
+        same &= frame.ramp[node, end] == frame.ramp[other, end]
+    return same
+
+
+@kernel
 def classify_piece(
     frame: Frame, structure: Structure, first: int, last: int, memory: Memory
 ) -> int:
     """Return MECHANISM for a driven piece that is not held.
 
     A piece without load that only the drive holds, and that the drive moves as a whole in one
-    direction, follows without rotation: its nodes are marked as not active.
+    direction and at one time, follows without rotation: its nodes are marked as not active.
     """
     order, size = structure.order, len(frame.unit)
     driver = -1
@@ -182,8 +198,7 @@ def classify_piece(
             follows &= frame.ground[node, axis, axis] == 0.0
         if frame.prescribed[node]:
             if driver >= 0:
-                for axis in range(3):
-                    follows &= frame.drive[node, axis] == frame.drive[driver, axis]
+                follows &= moves_alike(frame, node, driver)
             driver = node
     if rigid_motions_are_prevented(frame, structure, first, last, memory):
         return CONVERGED
@@ -324,8 +339,9 @@ def place_rest(
                     state.q[node, axis] = 0.0
             if frame.prescribed[node]:
                 reached[node] = 1
+                share = drive_share(frame, node, fraction)
                 for axis in range(3):
-                    state.u[node, axis] = fraction * frame.drive[node, axis]
+                    state.u[node, axis] = share * frame.drive[node, axis]
     place_followers(frame, mask, state, memory)
 
 
