@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 STRUT = re.compile(r"strut-([3-9]|[1-3][0-9])")
 LISTED = ("strut-3", "strut-4", "strut-6", "strut-9")
-LOADS = {"free": "free stroke", "light": "low input force", "loaded": "loaded output"}
+LOADS = {
+    "free": "free stroke", "light": "low input force", "loaded": "loaded output",
+    "straight": "straight motion",
+}  # fmt: skip
 """Names of the kinds of entries."""
 
 
