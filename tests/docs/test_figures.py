@@ -168,6 +168,19 @@ def entries() -> Rows:
         )
 
 
+def straight_entries() -> Rows:
+    library = Library((bundled_folder(),))
+    for name in library.names():
+        if "-straight-" in name:
+            each = library.find(name)
+            own = {key: value or 0.0 for key, value in each.figures.items()}
+            yield row(
+                each.direction, each.columns, f"{own['efficiency']:.2f}",
+                f"{own['efficiency_half']:.2f}", f"{100.0 * own['off_axis']:.1f} %",
+                f"{own['rotation_deg']:.1f}", f"{own['sag_mm']:.2f} mm",
+            )  # fmt: skip
+
+
 def lengths() -> Rows:
     for told in read("machines/factorisation")["rows"]:
         yield row(
@@ -264,7 +277,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),
-    "machines": (bundled, contact, entries, lengths, two_ports),
+    "machines": (bundled, contact, entries, straight_entries, lengths, two_ports),
     "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }
 
