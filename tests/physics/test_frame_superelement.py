@@ -217,7 +217,7 @@ def driven(problem: Problem, motion: np.ndarray) -> Equilibrium:
             grounded=grounded,
             drive=drive,
             load=np.zeros_like(whole.load),
-            bow=bow_coefficients(whole.rest_length, 0.0),
+            bow=bow_coefficients(whole.rest_length, np.zeros((len(whole.rest_length), 2))),
         )
     )
 

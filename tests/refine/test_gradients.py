@@ -10,6 +10,7 @@ import pytest
 
 from bellcrank.mechanics.frames.case import CHANNELS, CaseEvaluator, Channel
 from bellcrank.mechanics.frames.geometry import beam_slopes, geometry_slopes
+from bellcrank.mechanics.frames.joints import joint_lengths, joint_slopes, with_joints
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 from bellcrank.model import Item
 from bellcrank.refine.rows import RowEvaluator
@@ -52,10 +53,36 @@ def central(function: object, step: float) -> np.ndarray:
     return (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * step)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_channels_have_the_derivatives_of_differences(seed: int) -> None:
+def test_joints_have_the_derivatives_of_differences() -> None:
+    design = random_design(0)
+    problem, mask = design.problem, design.mask
+    positions, widths = problem.lattice.positions, problem.beam_widths
+    rng = np.random.default_rng(0)
+    move, widen = rng.normal(size=positions.shape), rng.normal(size=widths.shape)
+    # Nodes on a straight line stay there: joints have no derivative at opposite beams.
+    move[problem.special_nodes] = 0.0
+
+    def at(step: float) -> np.ndarray:
+        return joint_lengths(
+            problem.with_geometry(positions + step * move, widths + step * widen), mask
+        )
+
+    slopes = joint_slopes(problem, mask) @ np.concatenate([move.ravel(), widen])
+    assert slopes.reshape(-1, 2) == pytest.approx(central(at, 1e-5), abs=1e-8)
+    assert np.abs(slopes).max() > 0.1
+
+
+# Seeds with which no two of the most strained beams change their order within the differences.
+@pytest.mark.parametrize(
+    ("seed", "joints"),
+    [(seed, "of the section") for seed in (0, 1, 2, 3)]
+    + [(seed, "of the design") for seed in (0, 2, 3, 4)],
+)
+def test_channels_have_the_derivatives_of_differences(seed: int, joints: str) -> None:
     design = random_design(seed)
     problem, mask = design.problem, design.mask
+    if joints == "of the design":
+        problem = with_joints(problem, mask)
     positions, widths = problem.lattice.positions, problem.beam_widths
     rng = np.random.default_rng(seed)
     move = rng.normal(size=positions.shape)
@@ -65,11 +92,15 @@ def test_channels_have_the_derivatives_of_differences(seed: int) -> None:
 
     def at(step: float) -> dict[tuple[Channel, int], np.ndarray]:
         moved = problem.with_geometry(positions + step * move, widths + step * widen)
+        if joints == "of the design":
+            moved = with_joints(moved, mask)
         return measures(case_of(moved, mask))
 
     nearby = {step: at(step * 1e-4) for step in (-2, -1, 1, 2)}
     for point in case.merged_points():
-        found = geometry_slopes(point.equilibrium, point.measured, beam_slopes(point.evaluator))
+        found = geometry_slopes(
+            point.equilibrium, point.measured, beam_slopes(point.evaluator, mask)
+        )
         assert found is not None
         for key, slope in zip(point.channels, found, strict=True):
             given = (slope.positions * move).sum(axis=(1, 2)) + slope.widths @ widen
@@ -93,7 +124,7 @@ def test_the_lowest_stiffness_has_the_derivative_of_differences() -> None:
 
     frame = case_of(problem, mask).frame
     measured = [(LOWEST_STIFFNESS, LOWEST_STIFFNESS.measure(frame.end))]
-    found = geometry_slopes(frame.end, measured, beam_slopes(frame))
+    found = geometry_slopes(frame.end, measured, beam_slopes(frame, mask))
     assert found is not None
     given = (found[0].positions * move).sum(axis=(1, 2))
     assert given == pytest.approx(central(at, 1e-5), rel=1e-5)

@@ -25,6 +25,7 @@ from bellcrank.machines.node_merging import merge_nodes, unique_rows
 from bellcrank.machines.placement import place_parts
 from bellcrank.machines.plan import PORTS, PortName
 from bellcrank.machines.ports import mean_ports
+from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Design, Lattice, Problem
 
 if TYPE_CHECKING:
@@ -122,6 +123,8 @@ def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
         )
     except InvalidProblem as error:
         raise InvalidFile(f"{plan.source}: {error}") from None
+    if any(part.design.problem.joints is not None for part in parts.values()):
+        problem = with_joints(problem, present)
     origin = {"plan": plan.table.model_dump(by_alias=True, exclude_defaults=True)}
     return Machine(
         plan, parts, Design(problem, present, provenance=origin), nodes, numbers,

@@ -89,6 +89,25 @@ def check_widths(
     return locked(given)
 
 
+def check_joints(lattice: Lattice, joints: ArrayLike | None) -> NDArray[np.float64] | None:
+    """Return the lengths (M, 2) of the joints of beams, if any are given."""
+    if joints is None:
+        return None
+    given = real_array("joints", joints)
+    if given.shape != (lattice.beam_count, 2):
+        raise InvalidProblem(
+            f"joints: expected shape ({lattice.beam_count}, 2), two for each beam, got {given.shape}"
+        )
+    wrong = (given < 0.0).any(axis=1) | (given.sum(axis=1) >= lattice.rest_length)
+    if wrong.any():
+        beam = int(np.argmax(wrong))
+        raise InvalidProblem(
+            f"joints[{beam}]: expected lengths from 0, together less than that of the beam, "
+            f"{lattice.rest_length[beam]:g}, got {given[beam].tolist()}"
+        )
+    return locked(given)
+
+
 def check_slender(
     lattice: Lattice, section: Section, widths: NDArray[np.float64], possible: NDArray[np.bool_]
 ) -> None:

@@ -23,6 +23,7 @@ from bellcrank.model.checks import (
     check_connection,
     check_coordinates,
     check_frame_only,
+    check_joints,
     check_regions,
     check_section,
     check_slender,
@@ -90,6 +91,9 @@ class Problem:
         What a design must meet, with further outputs and load cases; only for frames.
     widths : (M,) float64, lattice units
         Width of each beam of a frame, in space its diameter; None for that of the section.
+    joints : (M, 2) float64, lattice units
+        Length of both ends of each beam that do not bend; None for those of the section, in
+        proportion to the width.
 
     Raises
     ------
@@ -138,6 +142,7 @@ class Problem:
     loads: Loads = Loads()  # noqa: RUF009 - frozen, so it is safe to share
     specification: Specification | None = None
     widths: NDArray[np.float64] | None = None
+    joints: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         lattice, given = self.lattice, self.input
@@ -169,6 +174,7 @@ class Problem:
         object.__setattr__(self, "initial", locked(initial))
         object.__setattr__(self, "designable", locked(designable))
         object.__setattr__(self, "widths", check_widths(lattice, self.section, self.widths))
+        object.__setattr__(self, "joints", check_joints(lattice, self.joints))
         if self.section is not None:
             possible = initial | np.isin(np.arange(beam_count), designable)
             check_slender(lattice, self.section, self.beam_widths, possible)
@@ -190,6 +196,15 @@ class Problem:
             return self.widths
         assert self.section is not None
         return np.full(self.lattice.beam_count, self.section.width)
+
+    @property
+    def beam_joints(self) -> NDArray[np.float64]:
+        """Lengths of both ends of each beam that do not bend, (M, 2), lattice units."""
+        if self.joints is not None:
+            return self.joints
+        assert self.section is not None
+        each = self.section.joint / self.section.width * self.beam_widths
+        return np.stack([each, each], axis=1)
 
     def with_geometry(
         self, positions: NDArray[np.float64], widths: NDArray[np.float64] | None
@@ -215,7 +230,8 @@ class Problem:
         >>> wide.beam_widths[:2]
         array([0.25, 0.25])
         """
-        return replace(self, lattice=replace(self.lattice, positions=positions), widths=widths)
+        lattice = replace(self.lattice, positions=positions)
+        return replace(self, lattice=lattice, widths=widths, joints=None)
 
     @property
     def special_nodes(self) -> NDArray[np.int64]:
@@ -395,6 +411,7 @@ def problem_to_dict(problem: Problem) -> dict[str, Any]:
         "section": problem.section and problem.section.to_dict(),
         "material": problem.material and asdict(problem.material),
         "widths": None if problem.widths is None else problem.widths.tolist(),
+        "joints": None if problem.joints is None else problem.joints.tolist(),
         "loads": problem.loads.to_dict() if problem.loads else None,
         "specification": wanted and specification_data(wanted, dimension),
     }

@@ -160,6 +160,7 @@ def _build(table: ProblemTable) -> Problem:
         loads=_loads(lattice, table.loads, "loads"),
         specification=_specification(lattice, table.specification),
         widths=table.widths,  # type: ignore[arg-type]  # checked there
+        joints=table.joints,  # type: ignore[arg-type]  # checked there
     )
     return _freeze(problem, table)
 

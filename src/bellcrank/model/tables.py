@@ -153,3 +153,4 @@ class ProblemTable(Table):
     loads: LoadsTable = LoadsTable()
     specification: SpecificationTable | None = None
     widths: list[float] | None = None
+    joints: list[list[float]] | None = None

@@ -59,10 +59,12 @@ def frame_problem(problem: Problem, spec: PartSpec) -> Problem:
     _check_slender(problem, spec)
     section = frame_section(spec, problem.lattice.dimension)
     material = frame_elasticity(problem.lattice, section, spec, problem.stiffness)
-    widths = problem.widths
-    if widths is not None and problem.section is not None:
-        widths = widths * (section.width / problem.section.width)
-    return replace(problem, section=section, material=material, widths=widths)
+    widths, joints = problem.widths, problem.joints
+    if problem.section is not None:
+        ratio = section.width / problem.section.width
+        widths = None if widths is None else widths * ratio
+        joints = None if joints is None or spec.joint is not None else joints * ratio
+    return replace(problem, section=section, material=material, widths=widths, joints=joints)
 
 
 def frame_section(spec: PartSpec, dimension: int) -> Section:
@@ -125,7 +127,7 @@ def spring_problem(problem: Problem) -> Problem:
     True
     """
     require_plane(problem, "spring model")
-    return replace(problem, section=None, material=None, widths=None)
+    return replace(problem, section=None, material=None, widths=None, joints=None)
 
 
 @models.register("springs")

@@ -119,6 +119,15 @@ class Part:
         """Width of each strut, (s,), mm."""
         return self.section.width * self.width_ratios
 
+    @property
+    def joints(self) -> NDArray[np.float64]:
+        """Length of the ends of each strut that do not bend, (s, 2), mm."""
+        problem = self.design.problem
+        if problem.joints is None or problem.section is None:
+            return np.repeat((self.section.joint * self.width_ratios)[:, None], 2, axis=1)
+        ratio = self.section.width / problem.section.width
+        return ratio * problem.joints[self.design.mask]
+
     def outline(self) -> Outline:
         """Return the planar outline that is meshed, printed and cut.
 

@@ -81,9 +81,12 @@ class PartSpec:
             length = getattr(self, name)
             if not 0.0 < length < math.inf:
                 raise InvalidSettings(f"{name}: expected a length above 0 mm, got {length:g}")
-        section, modelled = self.section(2), design.problem.section
+        section, problem = self.section(2), design.problem
+        modelled = problem.section
         if self.joint is None and modelled is not None:
             section = replace(section, joint=modelled.joint / modelled.width * self.width)
+        elif problem.joints is not None:
+            design = replace(design, problem=replace(problem, joints=None))
         return Part(design, self.registered_material, section, self.scale, self.fillet)
 
     def section(self, dimension: int) -> Section:

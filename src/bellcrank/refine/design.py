@@ -10,6 +10,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, ItemResult, tightened
+from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Item, ObjectiveTerm, Specification
 from bellcrank.part.outline import room_for_fillet
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
@@ -165,7 +166,7 @@ def refine_design(
             f"problem {problem.name!r}: expected a frame in the plane; designs of springs and "
             "designs in space are not refined"
         )
-    wanted = specified(problem, strain_limit)
+    wanted = with_joints(specified(problem, strain_limit), design.mask)
     given = replace(
         design, problem=_with_mass(wanted, design.mask) if settings.same_mass else wanted
     )
@@ -177,7 +178,8 @@ def refine_design(
     improved = bool(job.chosen.any())
     if improved:
         at = job.variables.problem_at(job.chosen)
-        refined = replace(design, problem=problem.with_geometry(at.lattice.positions, at.widths))
+        moved_problem = problem.with_geometry(at.lattice.positions, at.widths)
+        refined = replace(design, problem=with_joints(moved_problem, design.mask))
     return Refinement(
         refined, job.before, job.best, job.steps, job.evaluations, job.reason, improved
     )

@@ -226,7 +226,7 @@ class RowEvaluator:
         for point in evaluator.cases[name].evaluator.merged_points():
             key = id(point.evaluator)
             if key not in known:
-                known[key] = beam_slopes(point.evaluator)
+                known[key] = beam_slopes(point.evaluator, self.mask)
             found = geometry_slopes(point.equilibrium, point.measured, known[key])
             if found is None:
                 return None
@@ -253,7 +253,7 @@ class RowEvaluator:
         printed = printed_beams(problem, self.mask, case.frame.structure.present != 0)
         values, gradients = [np.zeros(0)], [np.zeros((0, self.variables.count))]
         keys: list[tuple[int, ...]] = []
-        of_beams = beam_slopes(case.frame) if slopes else None
+        of_beams = beam_slopes(case.frame, self.mask) if slopes else None
         for k in range(1, GAP_STATES + 1):
             state = case.state(k / GAP_STATES)
             if state is None:
@@ -303,7 +303,7 @@ class RowEvaluator:
             keys += [(index, round(1e6 * each)) for each in near]
             if not slopes or not near:
                 continue
-            rates, of_beams = {}, beam_slopes(frame)
+            rates, of_beams = {}, beam_slopes(frame, self.mask)
             for fraction in (*near, end):
                 equilibrium, measures = found[fraction]
                 slope = geometry_slopes(equilibrium, [(LOWEST_STIFFNESS, measures)], of_beams)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.search.mirror import AXES
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ class Variables:
     ----------
     problem
         Problem with the initial geometry.
+    mask : (M,) bool
+        The design.
     map : (P, n) sparse
         From the vector to the changes of all positions (N d), then of all widths (M).
     moves : (n,) bool
@@ -41,6 +44,7 @@ class Variables:
     """
 
     problem: Problem
+    mask: NDArray[np.bool_]
     map: csr_matrix
     moves: NDArray[np.bool_]
     low: NDArray[np.float64]
@@ -63,10 +67,11 @@ class Variables:
         )
 
     def problem_at(self, vector: NDArray[np.float64]) -> Problem:
-        """Return the problem with the geometry of a vector."""
+        """Return the problem with the geometry of a vector, and with its joints."""
         positions, widths = self.geometry(vector)
         same = self.problem.widths is None and self.moves.all()
-        return self.problem.with_geometry(positions, None if same else widths)
+        problem = self.problem.with_geometry(positions, None if same else widths)
+        return problem if self.problem.joints is None else with_joints(problem, self.mask)
 
     def gradient(
         self, positions: NDArray[np.float64], widths: NDArray[np.float64]
@@ -145,7 +150,7 @@ def variables_of(design: Design, largest_move: float, widths: tuple[float, float
     low[moving], high[moving] = -reach, reach
     now = problem.beam_widths[start[~moving] - nodes * dimension]
     low[~moving], high[~moving] = widths[0] - now, widths[1] - now
-    return Variables(problem, matrix, moving, np.minimum(low, 0.0), np.maximum(high, 0.0))
+    return Variables(problem, mask, matrix, moving, np.minimum(low, 0.0), np.maximum(high, 0.0))
 
 
 def _images(problem: Problem, axes: Sequence[str]) -> list[tuple[NDArray[np.int64], int]]:

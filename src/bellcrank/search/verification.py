@@ -21,6 +21,7 @@ from bellcrank.mechanics import (
     output_motion,
 )
 from bellcrank.mechanics.frames.analysis import centre_lines
+from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
 from bellcrank.search.evaluator import verification_evaluator
@@ -113,9 +114,14 @@ class Verifier:
 
     def verify(self, mask: NDArray[np.bool_]) -> Verification:
         """Verify a design."""
+        if self.problem.is_specified:
+            problem = self.problem
+            if problem.joints is None:
+                problem = with_joints(problem, mask)
+            specified = SpecificationEvaluator(problem, self.elements)
+            response = specified.evaluate(mask, VERIFICATION_INCREMENT)
+            return self._by_items(mask, response, specified)
         response = self._evaluator.evaluate(mask, VERIFICATION_INCREMENT)
-        if isinstance(self._evaluator, SpecificationEvaluator):
-            return self._by_items(mask, response, self._evaluator)
         moved = self._frame.evaluate(mask, VERIFICATION_INCREMENT).displacement
         found = Verification(
             elements=self.elements,

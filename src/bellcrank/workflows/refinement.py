@@ -11,6 +11,7 @@ from bellcrank.fem.continuum.mesh import COARSE
 from bellcrank.fem.results import finite
 from bellcrank.fem.specification import sheet_items
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
+from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.provenance import provenance
 from bellcrank.refine import Refinement, RefinementSettings, refine_design, specified
 from bellcrank.search import HoppingSettings, SpecificationEvaluator
@@ -52,8 +53,10 @@ def refine_selection(
     problem = selection.design.problem
     if not problem.is_specified or problem.lattice.dimension == 3:
         return selection, None
-    designs = [selection.design]
     found = selection.verification
+    given = replace(selection.design, problem=with_joints(problem, selection.design.mask))
+    selection = replace(selection, design=given)
+    designs = [given]
     if found is None or found.fault is not None:
         designs += [
             each.design

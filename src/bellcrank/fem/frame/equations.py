@@ -106,8 +106,8 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
     if elements < 1:
         raise InvalidSettings(f"elements: expected at least 1 in each strut, got {elements}")
     problem, material = part.design.problem, part.material
-    struts, joint = part.struts.astype(np.int64), part.section.joint * part.width_ratios
-    positions, ends, rigid = subdivided(part.positions, struts, elements, joint)
+    struts = part.struts.astype(np.int64)
+    positions, ends, rigid = subdivided(part.positions, struts, elements, part.joints)
     length = np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1)
     ratio = np.repeat(part.width_ratios, elements)
     elasticity = Elasticity(material.young, material.poisson)

@@ -80,7 +80,7 @@ def deformations(frame: Frame, beams: Ints, start: State, end: State) -> Floats:
 
 def _bowing(bow: Floats, one: Floats, two: Floats) -> Floats:
     """Return (m,) the elongation by end rotations, if the frame includes it."""
-    elongation: Floats = bow[:, 0] * (one * one + two * two) + bow[:, 1] * one * two
+    elongation: Floats = bow[:, 0] * one * one + bow[:, 1] * one * two + bow[:, 2] * two * two
     return elongation
 
 
@@ -136,7 +136,7 @@ def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats
     radius, nu = 0.5 * frame.width[beams], problem.material.poisson
     length, rigid = frame.rest_length[beams], frame.rigid[beams]
     # From the stiffness of each beam, which may be a part of that of its section.
-    extensional = frame.section[beams, 0] * (length - rigid.sum(axis=1))
+    extensional = frame.section[beams, 0] * length
     axial = resultants[:, 0] / extensional
     shear = np.zeros(len(beams))
     # Moments vary linearly along a beam.

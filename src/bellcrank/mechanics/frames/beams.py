@@ -38,8 +38,8 @@ def subdivided(
 
     Parameters
     ----------
-    joint : float or (M,)
-        Length of each end of a beam that does not deform. It belongs to the first and to the last
+    joint : float, (M,) or (M, 2)
+        Length of each end of a beam that does not bend. It belongs to the first and to the last
         element; what lies between is divided equally.
 
     Returns
@@ -49,18 +49,21 @@ def subdivided(
     beams : (M elements, 2) int64
         The elements of each beam in order.
     rigid : (M elements, 2)
-        Lengths of their ends that do not deform.
+        Lengths of their ends that do not bend.
     """
     count, inner = len(positions), elements - 1
     start, end = positions[beams[:, 0]], positions[beams[:, 1]]
-    ratio = np.asarray(joint / np.linalg.norm(end - start, axis=1))[:, None]
-    fraction = ratio + (1.0 - 2.0 * ratio) * np.arange(1, elements) / elements
+    given = np.asarray(joint, dtype=np.float64)
+    joints = np.broadcast_to(given if given.ndim == 2 else given[..., None], (len(beams), 2))
+    ratio = joints / np.linalg.norm(end - start, axis=1)[:, None]
+    bending = 1.0 - ratio.sum(axis=1, keepdims=True)
+    fraction = ratio[:, :1] + bending * np.arange(1, elements) / elements
     between = start[:, None] + fraction[:, :, None] * (end - start)[:, None]
     numbers = count + np.arange(len(beams) * inner).reshape(len(beams), inner)
     along = np.column_stack([beams[:, 0], numbers, beams[:, 1]])
     ends = np.stack([along[:, :-1], along[:, 1:]], axis=-1).reshape(-1, 2)
     rigid = np.zeros((len(beams), elements, 2))
-    rigid[:, 0, 0] = rigid[:, -1, 1] = joint
+    rigid[:, 0, 0], rigid[:, -1, 1] = joints.T
     inner_nodes = between.reshape(-1, positions.shape[1])
     return np.concatenate([positions, inner_nodes]), ends, rigid.reshape(-1, 2)
 
@@ -100,7 +103,7 @@ def beam_stiffness(
     theory
         Name in the registry of theories.
     rigid : (m, 2), optional
-        Lengths of their ends that do not deform.
+        Lengths of their ends that do not bend or twist; they stretch like the rest.
     ratio : (m,), optional
         Width of each beam over that of the section; 1 by default.
 
@@ -111,15 +114,15 @@ def beam_stiffness(
     """
     flexibility = theories[theory](section, material)
     ends = np.zeros((len(length), 2)) if rigid is None else rigid
-    length = length - ends.sum(axis=1)
+    whole_length, length = length, length - ends.sum(axis=1)
     # The thickness of a rectangle is the same for all widths, a round section has no other size.
     both = ratio if section.shape == "round" else 1.0
-    columns = [material.young * section.area * ratio * both / length]
+    columns = [material.young * section.area * ratio * both / whole_length]
     bending = [section.inertia * ratio**3 * both]
     if dimension == 3:
         columns.append(material.shear_modulus * section.torsion_constant * ratio**4 / length)
         bending.append(section.inertia_out_of_plane * ratio * both**3)
-    # Rotations of the ends of the part that deforms, relative to its own chord.
+    # Rotations of the ends of the part that bends, relative to its own chord.
     (one, two) = (ends / length[:, None]).T
     for inertia in bending:
         rigidity = material.young * inertia
@@ -135,22 +138,32 @@ def beam_stiffness(
     return np.stack(columns, axis=1)
 
 
-def bow_coefficients(length: Floats | Complex, joint: Floats | Complex | float) -> Any:
-    """Return (m, 2) the coefficients p and q of the shortening of bent beams.
+def bow_coefficients(length: Floats | Complex, rigid: Floats | Complex) -> Any:
+    """Return (m, 3) the coefficients p, q and r of the shortening of bent beams.
 
-    Half the integral of the squared slope along a beam of rigid ends and a cubic between them is
-    p (a^2 + b^2) + q a b for end rotations a and b relative to its chord. Without rigid ends p is
-    L / 15 and q is -L / 30.
+    Half the integral of the squared slope along a beam of straight ends and a cubic between them
+    is p a^2 + q a b + r b^2 for end rotations a and b relative to its chord. Without straight ends
+    p and r are L / 15 and q is -L / 30.
+
+    Parameters
+    ----------
+    length : (m,)
+    rigid : (m, 2)
+        Lengths of the ends that do not bend.
     """
-    inner = length - 2.0 * joint
-    ratio = joint / inner
-    chord = 0.5 * inner * ratio**2
-    own = 0.5 * joint + chord + inner / 30.0 * (2.0 + 3.0 * ratio * (1.0 + ratio))
-    other = 2.0 * chord + inner / 30.0 * (6.0 * ratio * (1.0 + ratio) - 1.0)
-    return np.stack([own, other], axis=1)
+    inner = length - rigid.sum(axis=1)
+    one, two = (rigid / inner[:, None]).T
+    columns = [
+        0.5 * joint + 0.5 * inner * ratio**2 + inner / 30.0 * (2.0 + 3.0 * ratio * (1.0 + ratio))
+        for joint, ratio in ((rigid[:, 0], one), (rigid[:, 1], two))
+    ]
+    both = inner * one * two + inner / 30.0 * (3.0 * (one + two) + 6.0 * one * two - 1.0)
+    return np.stack([columns[0], both, columns[1]], axis=1)
 
 
-def reshaped(problem: Problem, frame: Frame, beams: Ints, chord: Floats, width: Floats) -> Frame:
+def reshaped(
+    problem: Problem, frame: Frame, beams: Ints, chord: Floats, width: Floats, rigid: Floats
+) -> Frame:
     """Return a frame with other beams, each like one of a frame but of another shape.
 
     Parameters
@@ -160,12 +173,13 @@ def reshaped(problem: Problem, frame: Frame, beams: Ints, chord: Floats, width: 
     chord : (m, 3)
         Vectors from their first to their second end.
     width : (m,)
+    rigid : (m, 2)
+        Lengths of their joints.
     """
     assert problem.section is not None
     assert problem.material is not None
     length = np.linalg.norm(chord, axis=1)
     ratio = width / problem.section.width
-    rigid = np.repeat((problem.section.joint * ratio)[:, None], 2, axis=1)
     bowed = np.asarray(frame.bow[beams] != 0.0).max(axis=1, keepdims=True)
     return replace(
         frame,
@@ -175,7 +189,7 @@ def reshaped(problem: Problem, frame: Frame, beams: Ints, chord: Floats, width: 
             problem.section, problem.material, length, "euler-bernoulli",
             problem.lattice.dimension, rigid, ratio,
         ),
-        bow=bow_coefficients(length, rigid[:, 0]) * bowed,
+        bow=bow_coefficients(length, rigid) * bowed,
         width=width,
         rigid=rigid,
     )  # fmt: skip

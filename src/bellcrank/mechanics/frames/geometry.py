@@ -12,17 +12,19 @@ and widths.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bellcrank.mechanics.frames.beams import beam_stiffness, bow_coefficients
+from bellcrank.mechanics.frames.joints import joint_slopes
 from bellcrank.mechanics.frames.quantities.strain import strain_by_geometry
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+    from scipy.sparse import csr_matrix
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.mechanics.frames.evaluator import FrameEvaluator
@@ -44,35 +46,50 @@ class GeometrySlopes(NamedTuple):
 
 
 class BeamSlopes(NamedTuple):
-    """Derivatives of the properties of beams by length and by width."""
+    """Derivatives of the properties of beams by length, width, and the length of both joints."""
 
     section: Floats
-    """(2, M, c) of their stiffness."""
+    """(4, M, c) of their stiffness."""
     bow: Floats
-    """(2, M, 2) of the coefficients of their shortening."""
+    """(4, M, 3) of the coefficients of their shortening."""
+    joints: csr_matrix
+    """(2 M, N d + M) of the lengths of joints by positions and widths."""
 
 
-def beam_slopes(evaluator: FrameEvaluator) -> BeamSlopes:
-    """Return the derivatives of the properties of all beams, by complex steps."""
+def beam_slopes(evaluator: FrameEvaluator, mask: NDArray[np.bool_]) -> BeamSlopes:
+    """Return the derivatives of the properties of all beams, by complex steps.
+
+    Joints follow the geometry of the design `mask` (M,) if the problem has joints of its own; else
+    they are in proportion to the width.
+    """
+    from scipy.sparse import csr_matrix
+
     problem, frame = evaluator.problem, evaluator.frame
     assert problem.section is not None
     assert problem.material is not None
     given, dimension = problem.section, problem.lattice.dimension
     section, bow = [], []
-    for name in ("length", "width"):
-        length = frame.rest_length + (1j * COMPLEX_STEP if name == "length" else 0.0)
-        width = frame.width + (1j * COMPLEX_STEP if name == "width" else 0.0)
-        ratio = width / given.width
-        joint = given.joint * ratio
+    bowed = evaluator.elements is None
+    for row in range(4):
+        length, width, first, second = 1j * COMPLEX_STEP * np.eye(4)[row]
+        rigid = frame.rigid + np.array([first, second])
         stiffness = beam_stiffness(
-            given, problem.material, length, evaluator.theory, dimension,
-            np.stack([joint, joint], axis=1), ratio,
+            given, problem.material, frame.rest_length + length, evaluator.theory, dimension,
+            rigid, (frame.width + width) / given.width,
         )  # fmt: skip
         section.append(stiffness.imag / COMPLEX_STEP)
-        coefficients = bow_coefficients(length, joint)
-        bowed = evaluator.elements is None
+        coefficients = bow_coefficients(frame.rest_length + length, rigid)
         bow.append(coefficients.imag / COMPLEX_STEP * bowed)
-    return BeamSlopes(np.stack(section), np.stack(bow))
+    if problem.joints is not None:
+        joints = joint_slopes(problem, mask)
+    else:
+        beams = problem.lattice.beam_count
+        columns = problem.lattice.positions.size + np.repeat(np.arange(beams), 2)
+        joints = csr_matrix(
+            (np.full(2 * beams, given.joint / given.width), (np.arange(2 * beams), columns)),
+            shape=(2 * beams, problem.lattice.positions.size + beams),
+        )
+    return BeamSlopes(np.stack(section), np.stack(bow), joints)
 
 
 def geometry_slopes(
@@ -111,28 +128,42 @@ def geometry_slopes(
     found, begin_motion = [], int(counts[-1])
     for index, (_, measures) in enumerate(measured):
         own = slice(int(counts[index]), int(counts[index + 1]))
-        positions, widths = -direct.positions[own], -direct.widths[own]
+        positions, widths, joints = (-each[own] for each in direct)
         by_motion = slopes[index].by_motion
         if by_motion is not None:
             motion_adjoints = adjoints[begin_motion : begin_motion + len(by_motion)]
             begin_motion += len(by_motion)
             if measures.motion is not None:
                 second = _stiffness_products(equilibrium, motion_adjoints, measures.motion, beams)
-                positions, widths = positions - second.positions, widths - second.widths
+                positions, widths, joints = (
+                    one - two for one, two in zip((positions, widths, joints), second, strict=True)
+                )
         if measures.beams is not None:
-            by_chord, by_width = strain_by_geometry(equilibrium, measures.beams)
+            by_chord, by_width, by_joint = strain_by_geometry(equilibrium, measures.beams)
             row = np.arange(len(by_chord))
             first_node, second_node = equilibrium.frame.beams[measures.beams].T
             positions[row, second_node] += by_chord
             positions[row, first_node] -= by_chord
             widths[row, measures.beams] += by_width
-        found.append(GeometrySlopes(positions, widths))
+            joints[row, measures.beams] += by_joint
+        by_joints = (beams.joints.T @ joints.reshape(len(joints), -1).T).T
+        coordinates = positions[0].size
+        positions = positions + by_joints[:, :coordinates].reshape(positions.shape)
+        found.append(GeometrySlopes(positions, widths + by_joints[:, coordinates:]))
     return found
+
+
+class _Products(NamedTuple):
+    """Derivatives by positions (k, N, d), widths (k, M) and joints (k, M, 2), each alone."""
+
+    positions: NDArray[np.float64]
+    widths: NDArray[np.float64]
+    joints: NDArray[np.float64]
 
 
 def _products(
     equilibrium: Equilibrium, adjoints: NDArray[np.float64], beams: BeamSlopes
-) -> GeometrySlopes:
+) -> _Products:
     """Return the products of adjoints (k, N, b) with the derivatives of the residual."""
     from bellcrank.mechanics.frames.kernels.geometry import geometry_products
 
@@ -140,12 +171,13 @@ def _products(
     dimension = equilibrium.problem.lattice.dimension
     positions = np.zeros((len(adjoints), len(frame.positions), dimension))
     widths = np.zeros((len(adjoints), len(frame.beams)))
+    joints = np.zeros((*widths.shape, 2))
     geometry_products(
         frame, equilibrium.structure, equilibrium.fraction, equilibrium.state,
         np.ascontiguousarray(adjoints), beams.section, beams.bow, positions, widths,
-        equilibrium.memory,
+        joints, equilibrium.memory,
     )  # fmt: skip
-    return GeometrySlopes(positions, widths)
+    return _Products(positions, widths, joints)
 
 
 def _stiffness_products(
@@ -153,18 +185,18 @@ def _stiffness_products(
     adjoints: NDArray[np.float64],
     motion: NDArray[np.float64],
     beams: BeamSlopes,
-) -> GeometrySlopes:
+) -> _Products:
     """Return the products of adjoints with the derivatives of the stiffness times a motion.
 
     By central differences of fourth order along the motion.
     """
     step = MOTION_STEP / max(float(np.abs(motion).max()), 1e-300)
-    positions: NDArray[np.float64] | float = 0.0
-    widths: NDArray[np.float64] | float = 0.0
+    total: list[Any] = [0.0, 0.0, 0.0]
     for shift, weight in ((1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)):
         for sign in (1.0, -1.0):
             moved = equilibrium.moved(sign * shift * step * motion)
             found = _products(moved, adjoints, beams)
-            positions = positions + sign * weight / step * found.positions
-            widths = widths + sign * weight / step * found.widths
-    return GeometrySlopes(np.asarray(positions), np.asarray(widths))
+            total = [
+                now + sign * weight / step * each for now, each in zip(total, found, strict=True)
+            ]
+    return _Products(*total)

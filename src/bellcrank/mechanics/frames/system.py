@@ -221,9 +221,9 @@ def build_frame(
     chosen = lattice.beams if mask is None else lattice.beams[mask]
     wide = problem.beam_widths if mask is None else problem.beam_widths[mask]
     ratio = wide / problem.section.width
+    joints = problem.beam_joints if mask is None else problem.beam_joints[mask]
     positions, beams, rigid = subdivided(
-        np.array(lattice.positions), chosen.astype(np.int64), elements or 1,
-        problem.section.joint * ratio,
+        np.array(lattice.positions), chosen.astype(np.int64), elements or 1, joints
     )  # fmt: skip
     ratio = np.repeat(ratio, elements or 1)
     nodes = len(positions)
@@ -258,9 +258,7 @@ def build_frame(
         rest=rest,
         rest_length=length,
         section=section,
-        bow=bow_coefficients(length, rigid[:, 0])
-        if elements is None
-        else np.zeros((len(length), 2)),
+        bow=bow_coefficients(length, rigid) if elements is None else np.zeros((len(length), 3)),
         width=problem.section.width * ratio,
         rigid=rigid,
         incident_start=incident_start,

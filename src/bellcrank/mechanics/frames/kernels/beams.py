@@ -122,10 +122,10 @@ def elongation(frame: Frame, beam: int, d: Floats) -> float:
     """Return the elongation of a beam, with the shortening by bending, from its deformations."""
     stretched, bow = d[0], frame.bow[beam]
     if len(frame.unit) == 3:
-        return stretched + bow[0] * (d[1] * d[1] + d[2] * d[2]) + bow[1] * d[1] * d[2]
+        return stretched + bow[0] * d[1] * d[1] + bow[1] * d[1] * d[2] + bow[2] * d[2] * d[2]
     for k in range(2, 4):
         a, b = d[k], d[k + 2]
-        stretched += bow[0] * (a * a + b * b) + bow[1] * a * b
+        stretched += bow[0] * a * a + bow[1] * a * b + bow[2] * b * b
     return stretched
 
 

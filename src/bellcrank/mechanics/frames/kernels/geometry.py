@@ -1,4 +1,4 @@
-"""Derivatives of the forces of beams by the positions of their nodes and by their widths."""
+"""Derivatives of the forces of beams by the positions of their nodes, widths and joints."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, State, Structure
     from bellcrank.mechanics.kernels.arrays import Floats
 
-LENGTH, WIDTH = 0, 1
-"""Rows of the derivatives of the stiffness and of the shortening of a beam."""
+LENGTH, WIDTH, JOINTS = 0, 1, 2
+"""Rows of the derivatives of the stiffness and of the shortening of a beam; the joint of its second
+end has the last row."""
+PARAMETERS = 4
 
 
 @kernel
@@ -26,29 +28,29 @@ def plane_parameter_force(
     shortened: float,
     out: Floats,
 ) -> None:
-    """Compute the derivative (6,) of the end forces of a beam by its length or width alone.
+    """Compute the derivative (6,) of the end forces of a beam by one parameter alone.
 
     Parameters
     ----------
     section_slope, bow_slope
-        (4,) and (2,) derivatives of its stiffness and of the coefficients of its shortening.
+        (4,) and (3,) derivatives of its stiffness and of the coefficients of its shortening.
     shortened
-        Derivative of its elongation: -1 for the length at rest, 0 for the width.
+        Derivative of its elongation: -1 for the length at rest, 0 for the others.
     """
     first, second = frame.beams[beam, 0], frame.beams[beam, 1]
     elongation, a, b, _, _, _ = plane_deformations(
         frame.rest[beam, 0], frame.rest_length[beam], state.u[first], state.u[second]
     )
     section, bow = frame.section[beam], frame.bow[beam]
-    stretched = elongation + bow[0] * (a * a + b * b) + bow[1] * a * b
-    changed = shortened + bow_slope[0] * (a * a + b * b) + bow_slope[1] * a * b
+    stretched = elongation + bow[0] * a * a + bow[1] * a * b + bow[2] * b * b
+    changed = shortened + bow_slope[0] * a * a + bow_slope[1] * a * b + bow_slope[2] * b * b
     # Derivative of the energy by the parameter, differentiated by elongation and end rotations.
     axial = section_slope[0] * stretched + section[0] * changed
     force = section[0] * stretched
     moment1 = axial * (2.0 * bow[0] * a + bow[1] * b)
-    moment2 = axial * (2.0 * bow[0] * b + bow[1] * a)
+    moment2 = axial * (2.0 * bow[2] * b + bow[1] * a)
     moment1 += force * (2.0 * bow_slope[0] * a + bow_slope[1] * b)
-    moment2 += force * (2.0 * bow_slope[0] * b + bow_slope[1] * a)
+    moment2 += force * (2.0 * bow_slope[2] * b + bow_slope[1] * a)
     moment1 += section_slope[1] * a + section_slope[2] * b
     moment2 += section_slope[2] * a + section_slope[3] * b
     result = plane_beam_of(frame, state, beam)
@@ -69,6 +71,7 @@ def geometry_products(
     bow_slope: Floats,
     by_position: Floats,
     by_width: Floats,
+    by_joint: Floats,
     memory: Memory,
 ) -> None:
     """Add products of adjoints with the derivatives of the forces of beams, in the plane.
@@ -82,10 +85,10 @@ def geometry_products(
     adjoints
         (k, N, b)
     section_slope, bow_slope
-        (2, M, 4) and (2, M, 2) derivatives of the stiffness of beams and of the coefficients of
-        their shortening, by length and by width.
-    by_position, by_width
-        (k, N, d) and (k, M) results.
+        (4, M, 4) and (4, M, 3) derivatives of the stiffness of beams and of the coefficients of
+        their shortening, by length, width, and the length of each of both joints.
+    by_position, by_width, by_joint
+        (k, N, d), (k, M) and (k, M, 2) results.
     """
     tangent, explicit = memory.tangent_block, memory.work[0]
     for index in range(structure.sizes[1]):
@@ -95,7 +98,7 @@ def geometry_products(
         beam_tangent(frame.unit, frame, state, beam, tension, 1.0, memory)
         length = frame.rest_length[beam]
         c, s = frame.rest[beam, 0, 0] / length, frame.rest[beam, 0, 1] / length
-        for row in range(2):
+        for row in range(PARAMETERS):
             plane_parameter_force(
                 frame, state, beam, section_slope[row, beam], bow_slope[row, beam],
                 -1.0 if row == LENGTH else 0.0, explicit[row],
@@ -112,6 +115,8 @@ def geometry_products(
                     turn += weight * (tangent[row, 2] + tangent[row, 5])
                     lengthened += weight * explicit[LENGTH, row]
                     widened += weight * explicit[WIDTH, row]
+                    by_joint[k, beam, 0] += weight * explicit[JOINTS, row]
+                    by_joint[k, beam, 1] += weight * explicit[JOINTS + 1, row]
             x += lengthened * c - turn * s / length
             y += lengthened * s + turn * c / length
             by_position[k, second, 0] += x

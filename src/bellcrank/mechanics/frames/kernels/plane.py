@@ -120,12 +120,14 @@ def plane_beam(
         (4,) stiffness: axial, bending of the first end by its own and by the other rotation, and
         of the second end by its own.
     bow
-        (2,) coefficients p and q of the shortening of a bent beam, or zeros.
+        (3,) coefficients of the shortening of a bent beam by the square of the rotation of its first
+        end, by the product of both, and by the square of that of its second end; or zeros.
     """
     elongation, one, two, inverse, c, s = plane_deformations(rest, rest_length, first, second)
-    p, q = bow[0], bow[1]
-    axial = section[0] * (elongation + p * (one * one + two * two) + q * one * two)
-    bow1, bow2 = 2.0 * p * one + q * two, 2.0 * p * two + q * one
+    shortening = bow[0] * one * one + bow[1] * one * two + bow[2] * two * two
+    axial = section[0] * (elongation + shortening)
+    bow1 = 2.0 * bow[0] * one + bow[1] * two
+    bow2 = 2.0 * bow[2] * two + bow[1] * one
     moment1 = section[1] * one + section[2] * two + axial * bow1
     moment2 = section[2] * one + section[3] * two + axial * bow2
     turn = (bow1 + bow2) * inverse
@@ -150,7 +152,7 @@ def plane_stiffness(
     """
     inverse, c, s = beam.inverse, beam.cosine, beam.sine
     axial = softening * tension
-    own1, own2 = section[1] + 2.0 * bow[0] * axial, section[3] + 2.0 * bow[0] * axial
+    own1, own2 = section[1] + 2.0 * bow[0] * axial, section[3] + 2.0 * bow[2] * axial
     other = section[2] + bow[1] * axial
     # Displacements: b t t' + e (n t' + t n') + a g g', with the derivative g of the axial force.
     a = section[0]

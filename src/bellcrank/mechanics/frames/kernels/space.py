@@ -101,7 +101,7 @@ def space_force(
         (8,) stiffness: axial, torsion, bending about t3 of the first end by its own and by the
         other rotation and of the second end by its own, the same three about t2.
     bow
-        (2,) coefficients of the shortening of a bent beam, as in the plane, or zeros.
+        (3,) coefficients of the shortening of a bent beam, as in the plane, or zeros.
     shift
         (3,) displacement of the second end relative to the first.
     rotation1, rotation2
@@ -118,8 +118,8 @@ def space_force(
     stretched = d[0]
     for k in range(2, 4):
         a, b = d[k], d[k + 2]
-        stretched += bow[0] * (a * a + b * b) + bow[1] * a * b
-        slope[k], slope[k + 2] = 2.0 * bow[0] * a + bow[1] * b, 2.0 * bow[0] * b + bow[1] * a
+        stretched += bow[0] * a * a + bow[1] * a * b + bow[2] * b * b
+        slope[k], slope[k + 2] = 2.0 * bow[0] * a + bow[1] * b, 2.0 * bow[2] * b + bow[1] * a
     q[0], q[1] = section[0] * stretched, section[1] * d[1]
     for k in range(2):
         own1, other, own2 = section[2 + 3 * k], section[3 + 3 * k], section[4 + 3 * k]
@@ -223,14 +223,14 @@ def add_stiffness(
     section: Floats, bow: Floats, tension: float, gradient: Floats, matrix: Floats
 ) -> None:
     """Add the stiffness of the deformations to the matrix."""
-    bowing = 2.0 * bow[0] * tension
+    bowing1, bowing2 = 2.0 * bow[0] * tension, 2.0 * bow[2] * tension
     for i in range(9):
         for j in range(9):
             value = section[0] * gradient[6, i] * gradient[6, j]
             value += section[1] * gradient[1, i] * gradient[1, j]
             for k in range(2):
                 a, b = gradient[2 + k], gradient[4 + k]
-                own1, own2 = section[2 + 3 * k] + bowing, section[4 + 3 * k] + bowing
+                own1, own2 = section[2 + 3 * k] + bowing1, section[4 + 3 * k] + bowing2
                 other = section[3 + 3 * k] + bow[1] * tension
                 value += own1 * a[i] * a[j] + own2 * b[i] * b[j]
                 value += other * (a[i] * b[j] + b[i] * a[j])

@@ -81,7 +81,7 @@ def _slope_by_deformation(equilibrium: Equilibrium, beams: Ints, deformation: Fl
     return slope
 
 
-def strain_by_geometry(equilibrium: Equilibrium, beams: Ints) -> tuple[Floats, Floats]:
+def strain_by_geometry(equilibrium: Equilibrium, beams: Ints) -> tuple[Floats, Floats, Floats]:
     """Return the derivatives of the strains of beams by their shape, at fixed motions of the ends.
 
     By central differences.
@@ -91,25 +91,30 @@ def strain_by_geometry(equilibrium: Equilibrium, beams: Ints) -> tuple[Floats, F
     by_chord : (m, d)
         By the vector from the first to the second end at rest.
     by_width : (m,)
+    by_joint : (m, 2)
     """
     frame, dimension = equilibrium.frame, equilibrium.problem.lattice.dimension
     count = len(beams)
-    changes = np.zeros((1 + dimension, 2, count, 4))
-    for row in range(1 + dimension):
-        changes[row, 0, :, row] = SHAPE_STEP * frame.width[beams]
+    parameters = [0, *range(1, 1 + dimension), 4, 5]
+    changes = np.zeros((len(parameters), 2, count, 6))
+    for row, column in enumerate(parameters):
+        changes[row, 0, :, column] = SHAPE_STEP * frame.width[beams]
         changes[row, 1] = -changes[row, 0]
-    flat = changes.reshape(-1, 4)
-    many = np.tile(beams, 2 * (1 + dimension))
+    flat = changes.reshape(-1, 6)
+    many = np.tile(beams, 2 * len(parameters))
     chord = frame.rest[many, 0].copy()
     chord[:, :dimension] += flat[:, 1 : 1 + dimension]
-    varied = reshaped(equilibrium.problem, frame, many, chord, frame.width[many] + flat[:, 0])
+    varied = reshaped(
+        equilibrium.problem, frame, many, chord, frame.width[many] + flat[:, 0],
+        frame.rigid[many] + flat[:, 4:],
+    )  # fmt: skip
     local = np.arange(len(many))
     deformation = deformations(varied, local, *equilibrium.ends(many))
     resultants = stress_resultants(varied, local, deformation)
     strains = fibre_strain(varied, equilibrium.problem, local, resultants)
-    ahead, behind = np.moveaxis(strains.reshape(1 + dimension, 2, count), 1, 0)
+    ahead, behind = np.moveaxis(strains.reshape(len(parameters), 2, count), 1, 0)
     slope = (ahead - behind) / (2.0 * SHAPE_STEP * frame.width[beams])
-    return np.ascontiguousarray(slope[1:].T), slope[0]
+    return np.ascontiguousarray(slope[1:-2].T), slope[0], np.ascontiguousarray(slope[-2:].T)
 
 
 def _largest(strains: Values) -> Values:
