@@ -44,7 +44,7 @@ def response(
     ends: Array, rest: Array, section: Array, u: Array, rotation: Array, bow: Array | None = None
 ) -> tuple[Array, Array]:
     force, tangent = np.zeros((len(ends), 12)), np.zeros((len(ends), 12, 12))
-    bow = np.zeros((len(ends), 2)) if bow is None else bow
+    bow = np.zeros((len(ends), 3)) if bow is None else bow
     space_beams(ends, rest, section, bow, u, rotation, np.zeros((9, 9, 9)), force, tangent)
     return force, tangent
 
@@ -65,7 +65,7 @@ def energy(rest: Array, section: Array, bow: Array, u: Array, rotation: Array) -
     (a3, a2), (b3, b2) = bends
     longer = np.linalg.norm(chord) - np.linalg.norm(rest[0])
     for a, b in ((a3, b3), (a2, b2)):
-        longer += bow[0] * (a**2 + b**2) + bow[1] * a * b
+        longer += bow[0] * a**2 + bow[1] * a * b + bow[2] * b**2
     stored = section[0] * longer**2 + section[1] * twist**2
     stored += section[2] * a3**2 + 2.0 * section[3] * a3 * b3 + section[4] * b3**2
     stored += section[5] * a2**2 + 2.0 * section[6] * a2 * b2 + section[7] * b2**2
@@ -79,7 +79,7 @@ def test_forces_and_stiffness_are_derivatives_of_the_energy(size: float) -> None
     rest = oriented(np.array([[0.0, 0.0, 0.0], [1.3, 0.4, -0.2]]), ends, np.array([0.1, 0.2, 1.0]))
     section = stiffness(rest, 50.0, 3.0, (2.0, 5.0))
     section[:, [4, 7]] *= 1.3  # the second end has a longer part that does not deform
-    bow = np.array([[0.3, -0.1]])
+    bow = np.array([[0.3, -0.1, 0.2]])
     u = 0.3 * size * rng.normal(size=(2, 3))
     rotation = Rotation.from_rotvec(size * rng.normal(size=(2, 3))).as_matrix()
     force, tangent = response(ends, rest, section, u, rotation, bow)
@@ -141,7 +141,7 @@ def test_plane_beams_equal_the_matrices_of_crisfield() -> None:
     frame, u = crane_states()
     expected_force, expected = crisfield(frame, u)
     force, tangent = np.zeros_like(expected_force), np.zeros_like(expected)
-    bow = np.zeros((len(frame.rest), 2))
+    bow = np.zeros((len(frame.rest), 3))
     plane_beams(frame.elements, frame.rest, frame.stiffness, bow, u, force, tangent)
     assert np.allclose(force, expected_force, rtol=1e-12, atol=1e-12 * abs(force).max())
     assert np.allclose(tangent, expected, rtol=1e-12, atol=1e-12 * abs(tangent).max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -115,7 +116,7 @@ def test_one_element_and_eight_agree_in_a_lattice_with_joints(of_design: bool) -
         for each, elements in ((small, None), (small, 8), (points, 8))
     )
     assert one == pytest.approx(eight, rel=2e-3)
-    assert without < 0.9 * eight
+    assert without < (0.9 if of_design else 0.95) * eight
 
 
 def joints_of(
@@ -149,13 +150,15 @@ def test_joints_end_where_the_edges_of_neighbours_meet() -> None:
     width = SECTION.width
     # Six beams meet at 60 degrees on both sides, three at 120 degrees, opposite ones nowhere.
     half = 0.5 * width
-    assert joints_of([0, 60, 120, 180, 240, 300]) == pytest.approx(np.full(6, half * np.sqrt(3.0)))
-    assert joints_of([0, 120, 240]) == pytest.approx(np.full(3, half / np.sqrt(3.0)))
+    # Rounding next to opposite beams changes the lengths by less than 1 %.
+    approx = partial(pytest.approx, rel=0.01)
+    assert joints_of([0, 60, 120, 180, 240, 300]) == approx(np.full(6, half * np.sqrt(3.0)))
+    assert joints_of([0, 120, 240]) == approx(np.full(3, half / np.sqrt(3.0)))
     assert joints_of([0, 180]) == pytest.approx(np.zeros(2))
     # The mean of both sides; at a right angle it is half the width of the other beam.
-    assert joints_of([0, 90], [0.2, 0.3]) == pytest.approx([0.075, 0.05])
+    assert joints_of([0, 90], [0.2, 0.3]) == approx([0.075, 0.05])
     # At 60 degrees by the sum (a + b / 2) / sin(60) of half widths.
-    assert joints_of([0, 60], [0.2, 0.3])[0] == pytest.approx(0.5 * 0.2 / np.sin(np.pi / 3))
+    assert joints_of([0, 60], [0.2, 0.3])[0] == approx(0.5 * 0.2 / np.sin(np.pi / 3))
 
 
 def test_a_joint_takes_at_most_two_fifths_of_a_beam() -> None:

@@ -96,7 +96,8 @@ def check_joints(lattice: Lattice, joints: ArrayLike | None) -> NDArray[np.float
     given = real_array("joints", joints)
     if given.shape != (lattice.beam_count, 2):
         raise InvalidProblem(
-            f"joints: expected shape ({lattice.beam_count}, 2), two for each beam, got {given.shape}"
+            f"joints: expected shape ({lattice.beam_count}, 2), both ends of each beam, "
+            f"got {given.shape}"
         )
     wrong = (given < 0.0).any(axis=1) | (given.sum(axis=1) >= lattice.rest_length)
     if wrong.any():

@@ -96,7 +96,7 @@ class Verifier:
     >>> verifier = Verifier(frame_problem(design.problem, PartSpec()), HoppingSettings())
     >>> verification = verifier.verify(design.mask)
     >>> verification.fault, round(verification.response.efficiency, 3)
-    (None, 1.182)
+    (None, 1.176)
     """
 
     def __init__(

@@ -63,7 +63,7 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
     >>> design = replace(design, problem=frame_problem(design.problem, spec))
     >>> (row,) = part_figures(design, spec, elements=None)
     >>> round(row["efficiency"], 2), round(row["efficiency_half"], 2), row["limit_points"]
-    (1.17, 1.42, [])
+    (1.17, 1.38, [])
     """
     units = units_of(design.problem, spec)
     upright = None

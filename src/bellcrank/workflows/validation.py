@@ -284,7 +284,7 @@ def validate(
     >>> crane = human_design("crane")
     >>> validation = validate(crane, PartSpec(), [("frame", FemSettings())])
     >>> round(validation.analyses[0].efficiency, 3)
-    1.182
+    1.176
     """
     check_plan(design, spec, plan)
     part = spec.of(design)

@@ -146,8 +146,8 @@ class CaseEvaluator:
     >>> case.respond(design.mask).status.label
     'converged'
     >>> case.values([Channel("motion", "output")], [0.5, 1.0])["motion", "output"].round(3)
-    array([[ 0.307,  0.   , -0.05 ],
-           [ 0.508,  0.   , -0.092]])
+    array([[ 0.3  ,  0.   , -0.049],
+           [ 0.506,  0.   , -0.091]])
     """
 
     def __init__(

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 LARGEST = 0.4
 """Largest part of a beam that one joint takes."""
+OPPOSITE = 0.05
+"""Deviation from opposite directions, twice in radians, within which beams have almost no joint."""
 COMPLEX_STEP = 1e-30
 
 
@@ -77,7 +79,9 @@ def joint_slopes(problem: Problem, mask: NDArray[np.bool_]) -> csr_matrix:
     corners = _corners(positions, beams, mask)
     shapes = corners.shapes(positions, beams, widths)
     chords, wide = corners.arms(beams), [side[0] for side in corners.sides]
-    rows, columns, values = [], [], []
+    rows: list[Ints] = []
+    columns: list[Ints] = []
+    values: list[Floats] = []
 
     def add(row: Ints, column: Ints, value: Floats) -> None:
         rows.append(row)
@@ -100,8 +104,8 @@ def joint_slopes(problem: Problem, mask: NDArray[np.bool_]) -> csr_matrix:
                     add(2 * own + ends, 2 * far + kind, rate)
                     add(2 * own + ends, 2 * node + kind, -rate)
     shape = (2 * len(beams), coordinates + len(beams))
-    flat = [np.concatenate(each) for each in (values, rows, columns)]
-    slopes = csr_matrix((flat[0], (flat[1], flat[2])), shape=shape)
+    indices = np.concatenate(rows), np.concatenate(columns)
+    slopes: csr_matrix = csr_matrix((np.concatenate(values), indices), shape=shape)
     # Joints of the largest size follow the length of their beam.
     length = lattice.rest_length
     largest = joint_lengths(problem, mask) >= LARGEST * length[:, None]
@@ -170,15 +174,16 @@ def _corners(positions: Floats, beams: Ints, mask: NDArray[np.bool_]) -> _Corner
 def _meeting(one: Any, two: Any, width1: Any, width2: Any) -> tuple[Any, Any]:
     """Return how far from the node the edges of two beams meet, along each of them.
 
-    For widths a and b and the angle t between the beams, ((a + b cos t) / sin t) / 2 along the
-    second one. Beyond a right angle the edge of a wide beam meets the end of a narrow one; the
-    length then is a / (2 tan(t / 2)), which is 0 for opposite beams.
+    For widths a and b and the angle t between the beams, (a + b cos t) / (2 sin t) along the
+    second one. Beyond a right angle, where the edge of a wide beam may meet the end of a narrow
+    one, a / (2 tan(t / 2)); next to opposite beams less, so that the derivative is continuous.
     """
     size = np.sqrt((one * one).sum(axis=1) * (two * two).sum(axis=1))
     cosine = (one * two).sum(axis=1) / size
     sine = (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / size
     convex = sine.real > 0.0
-    sine = np.where(convex, sine, 1.0)
+    cotangent = np.where(convex, sine / (1.0 - cosine), 0.0)  # of half the angle
+    rounded = cotangent * cotangent / np.sqrt(cotangent * cotangent + OPPOSITE**2)
     acute = np.where(cosine.real > 0.0, cosine, 0.0)
-    tangent = np.where(convex, 0.5 * (1.0 + cosine) / ((1.0 + acute) * sine), 0.0)
-    return tangent * (width2 + width1 * acute), tangent * (width1 + width2 * acute)
+    factor = 0.5 * rounded / (1.0 + acute)
+    return factor * (width2 + width1 * acute), factor * (width1 + width2 * acute)

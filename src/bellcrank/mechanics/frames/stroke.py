@@ -85,8 +85,8 @@ class Quantities:
     >>> evaluator = FrameEvaluator(frame_problem(design.problem, PartSpec()))
     >>> along = Quantities(evaluator, ["gain", "rotation"], fractions=[0.5, 1.0])
     >>> along.evaluate(design.mask).round(2)
-    array([[1.42, 2.89],
-           [1.17, 4.8 ]])
+    array([[1.38, 2.81],
+           [1.17, 4.77]])
     """
 
     def __init__(

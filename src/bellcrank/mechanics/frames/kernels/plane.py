@@ -120,8 +120,8 @@ def plane_beam(
         (4,) stiffness: axial, bending of the first end by its own and by the other rotation, and
         of the second end by its own.
     bow
-        (3,) coefficients of the shortening of a bent beam by the square of the rotation of its first
-        end, by the product of both, and by the square of that of its second end; or zeros.
+        (3,) coefficients of the shortening of a bent beam: of the squared rotation of its first
+        end, of the product of both rotations, and of that of its second end squared; or zeros.
     """
     elongation, one, two, inverse, c, s = plane_deformations(rest, rest_length, first, second)
     shortening = bow[0] * one * one + bow[1] * one * two + bow[2] * two * two
