@@ -21,6 +21,7 @@ from __future__ import annotations
 import argparse
 import json
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -35,6 +36,7 @@ from bellcrank.mechanics import (
     Status,
     model_evaluator,
 )
+from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import (
     Design,
     Problem,
@@ -258,11 +260,15 @@ def level_study(pool: ProcessPoolExecutor) -> None:
 
 
 def analyse_joints(name: str) -> dict[str, float]:
-    """Return the energy of a bundled design as a frame by the size of its joints, in widths."""
+    """Return the energy of a bundled design as a frame by its joints, of several sizes or its own."""
     found = {}
     for size in JOINTS:
         part = PartSpec(width=WIDTH, joint=size * WIDTH).of(find_design(name))
         found[f"{size:g}"] = levels["frame"](part, FemSettings()).last.energy
+    design, spec = find_design(name), PartSpec(width=WIDTH)
+    own = with_joints(frame_problem(design.problem, spec), design.mask)
+    part = spec.of(replace(design, problem=own))
+    found["of the design"] = levels["frame"](part, FemSettings()).last.energy
     return found
 
 

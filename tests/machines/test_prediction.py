@@ -68,7 +68,7 @@ def build(
 
 
 def in_model(design: Design, model: str) -> Design:
-    spec = PartSpec(joint=0.5)  # with 0.6 mm one of the machines snaps
+    spec = PartSpec(joint=0.4)  # with 0.5 mm or more one of the machines snaps
     return replace(design, problem=models[model](design.problem, spec))
 
 

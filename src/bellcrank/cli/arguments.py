@@ -47,7 +47,7 @@ Fillet = Annotated[
 Joint = Annotated[
     str | None,
     typer.Option(
-        help="Length of the ends of struts that do not deform in frames. \\[0.3 of the width]"
+        help="Length of the ends of struts that do not bend in frames. \\[0.3 of the width]"
     ),
 ]
 MaterialName = Annotated[

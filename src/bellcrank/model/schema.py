@@ -41,7 +41,7 @@ number. Both forms can be combined.
     shape = "rectangle"             # or: shape = "round", diameter = 0.2
     width = 0.2                     # in the plane of the lattice, lattice units
     thickness = 0.5                 # normal to it, lattice units
-    joint = 0.05                    # ends of beams that do not deform; optional, 0 by default
+    joint = 0.05                    # ends of beams that do not bend; optional, 0 by default
 
     [material]                      # of a frame; optional, these are the defaults
     young = 1.0

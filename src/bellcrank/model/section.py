@@ -41,7 +41,7 @@ class Section:
     shape
         ``"rectangle"`` or ``"round"``.
     joint
-        Length of each end of a beam, from the node, that does not deform: where struts meet, they
+        Length of each end of a beam, from the node, that does not bend: where struts meet, they
         are wider than one strut.
 
     Raises

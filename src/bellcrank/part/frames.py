@@ -63,7 +63,7 @@ def frame_problem(problem: Problem, spec: PartSpec) -> Problem:
     if problem.section is not None:
         ratio = section.width / problem.section.width
         widths = None if widths is None else widths * ratio
-        joints = None if joints is None or spec.joint is not None else joints * ratio
+        joints = joints * ratio if joints is not None and spec.keeps_joints(problem) else None
     return replace(problem, section=section, material=material, widths=widths, joints=joints)
 
 

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
-    from bellcrank.model import Design
+    from bellcrank.model import Design, Problem
 
 LENGTHS = ("width", "thickness", "scale", "fillet", "joint")
 JOINT = 0.3
-"""Length of the ends of struts that do not deform, as a fraction of the width: the joints of frames
+"""Length of the ends of struts that do not bend, as a fraction of the width: the joints of frames
 are then as stiff as those of the sheet with its fillets (docs/validation.md)."""
 
 
@@ -41,7 +41,7 @@ class PartSpec:
         Radius in the corners between struts, mm; None for a quarter of the width, or less where
         there is no room for it.
     joint
-        Length of the ends of struts that do not deform in frames, mm; None for 0.3 of the width.
+        Length of the ends of struts that do not bend in frames, mm; None for 0.3 of the width.
     material
         Name of a registered material, or a material.
 
@@ -85,9 +85,17 @@ class PartSpec:
         modelled = problem.section
         if self.joint is None and modelled is not None:
             section = replace(section, joint=modelled.joint / modelled.width * self.width)
-        elif problem.joints is not None:
+        if problem.joints is not None and not self.keeps_joints(problem):
             design = replace(design, problem=replace(problem, joints=None))
         return Part(design, self.registered_material, section, self.scale, self.fillet)
+
+    def keeps_joints(self, problem: Problem) -> bool:
+        """Whether parts have the joints of a design: no length is given, or that of its section."""
+        modelled = problem.section
+        return self.joint is None or (
+            modelled is not None
+            and math.isclose(self.joint * modelled.width, modelled.joint * self.width)
+        )
 
     def section(self, dimension: int) -> Section:
         """Return the cross-section of struts with joints; mm. Round in space."""

@@ -132,7 +132,7 @@ class PartSection(Table):
     fillet: Length | None = None
     """Radius in the corners between struts."""
     joint: Length | None = None
-    """Length of the ends of struts that do not deform in frames."""
+    """Length of the ends of struts that do not bend in frames."""
     material: Any = "ninjaflex"
     """Name of a registered material, or a table."""
 
