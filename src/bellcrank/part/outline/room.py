@@ -26,6 +26,7 @@ from bellcrank.part.outline.struts import read_struts
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from bellcrank.part.outline.curves import Outline
     from bellcrank.part.outline.struts import Struts
 
 # Half-width, relative to the size of the part, so small that all holes are open. Struts whose
@@ -181,12 +182,25 @@ def find_joins(struts: Struts, half: float, reach: float) -> Limits:
     return Limits(np.empty(0), values[later], points[later])
 
 
+def _hairlines(struts: Struts) -> tuple[float, Outline]:
+    """Return half the width of very narrow struts, and their outline.
+
+    Where rounding hides the order of the edges at one width, it does not at another.
+    """
+    hairs = [factor * _HAIR * struts.extent for factor in (1.0, 1.3, 1.7)]
+    for hair in hairs[:-1]:
+        try:
+            return hair, filled(struts, 2.0 * hair, 0.0)
+        except InvalidSettings:
+            continue
+    return hairs[-1], filled(struts, 2.0 * hairs[-1], 0.0)
+
+
 def _depths(struts: Struts) -> NDArray[np.float64]:
     """Return the radius of the largest circle in each hole between very narrow struts."""
     import shapely
 
-    hair = _HAIR * struts.extent
-    outline = filled(struts, 2.0 * hair, 0.0)
+    hair, outline = _hairlines(struts)
     if struts.extra.any():
         same = filled(replace(struts, extra=np.zeros(len(struts.beams))), 2.0 * hair, 0.0)
         if (same.piece_count, same.hole_count) != (outline.piece_count, outline.hole_count):
