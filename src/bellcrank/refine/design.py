@@ -37,9 +37,9 @@ RESERVE = 0.05
 too."""
 PRINTABLE = 1e-2
 """Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
-SHEETS = 6
+SHEETS = 4
 """Largest number of geometries that are computed in the sheet: it takes a minute."""
-SHEET_STEPS = 8
+SHEET_STEPS = 25
 """Largest number of steps after the sheet misses items; fewer if the corrected bounds are met."""
 MET = 1e-3
 """Sum of violations at which they are."""
