@@ -257,7 +257,7 @@ class FrameEquations:
         count = len(self._rest)
         force, tangent = np.empty((count, 6)), np.empty((count, 6, 6))
         plane_beams(
-            self.frame.elements, self._rest, self.frame.stiffness, np.zeros((count, 2)),
+            self.frame.elements, self._rest, self.frame.stiffness, np.zeros((count, 3)),
             displacement, force, tangent,
         )  # fmt: skip
         return force, tangent
