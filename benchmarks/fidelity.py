@@ -260,7 +260,7 @@ def level_study(pool: ProcessPoolExecutor) -> None:
 
 
 def analyse_joints(name: str) -> dict[str, float]:
-    """Return the energy of a bundled design as a frame by its joints, of several sizes or its own."""
+    """Return the energy of a bundled design as a frame with joints of several sizes, or its own."""
     found = {}
     for size in JOINTS:
         part = PartSpec(width=WIDTH, joint=size * WIDTH).of(find_design(name))

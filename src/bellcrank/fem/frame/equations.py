@@ -46,7 +46,7 @@ class PartFrame:
     struts : (s,) int64
         Lattice beams of the struts.
     rigid : (e, 2) float64
-        Lengths of their ends that do not deform, mm.
+        Lengths of their ends that do not bend, mm.
     stiffness : (e, 4) float64
         Stiffness of the elements, as `bellcrank.mechanics.frames` defines it.
     held : (n, 3) bool

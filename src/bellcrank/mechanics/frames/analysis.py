@@ -121,7 +121,7 @@ def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats
 
     Axial strain and bending strain of the outermost fibre, in space with the shear strain of
     torsion of a round section. Compression in one direction is extension across it. Ends that do
-    not deform have no strain.
+    not bend have the strain of the axial force only, which is smaller.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class Frame(Bundle):
     width: Floats
     """(M,) width in the plane of the lattice, in space the diameter."""
     rigid: Floats
-    """(M, 2) lengths of the ends that do not deform."""
+    """(M, 2) lengths of the ends that do not bend."""
     incident_start: Ints
     """(N + 1,) index in `incident_beam` at which the beams of each node begin."""
     incident_beam: Ints
