@@ -37,10 +37,12 @@ RESERVE = 0.05
 too."""
 PRINTABLE = 1e-2
 """Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
-SHEETS = 4
+SHEETS = 5
 """Largest number of geometries that are computed in the sheet: it takes a minute."""
 SHEET_STEPS = 25
 """Largest number of steps after the sheet misses items; fewer if the corrected bounds are met."""
+HALVINGS = 2
+"""Number of times the path of a refinement that is not stable in the sheet is halved."""
 MET = 1e-3
 """Sum of violations at which they are."""
 ROUNDS = 3
@@ -214,6 +216,7 @@ class _Job:
         self.variables = variables_of(design, settings.largest_move, bounds)
         self.before = self.best = state_of(problem, design.mask)
         self.chosen = np.zeros(self.variables.count)
+        self.path = self.tried = [self.chosen]
         self.steps = self.evaluations = 0
         self.reason = "the response of the design is not stable"
         self.goes_on = True
@@ -229,7 +232,7 @@ class _Job:
                 return
             state, vector, is_last = found
             if _is_better(state, self.best):
-                self.best, self.chosen = state, vector
+                self.best, self.chosen, self.path = state, vector, self.tried
             if not state.items or not self.goes_on or (state.met and is_last):
                 return
             if state.met:
@@ -244,8 +247,13 @@ class _Job:
             return
         stable = STABLE
         vector, state = self.chosen, self._in_sheet(sheet, self.chosen, self.best)
-        self.best = state
-        for _ in range(SHEETS - 1):
+        self.best, left = state, SHEETS - 1
+        if not _is_stable(state.sheet):
+            left -= HALVINGS
+            vector, state = self._earlier(sheet, vector, state)
+            if state.sheet:
+                self.best, self.chosen = state, vector
+        for _ in range(left):
             if not self.goes_on or (state.sheet and all(item.met for item in state.sheet)):
                 return
             correction: Correction = {}
@@ -262,6 +270,28 @@ class _Job:
             state = self._in_sheet(sheet, vector, state)
             if _missed(state.sheet) < _missed(self.best.sheet):
                 self.best, self.chosen = state, vector
+
+    def _earlier(
+        self, sheet: Sheet, vector: NDArray[np.float64], state: State
+    ) -> tuple[NDArray[np.float64], State]:
+        """Return a geometry on the path of the refinement that is stable in the sheet.
+
+        The last one among a few; the given one if there is none.
+        """
+        low, high = 0, len(self.path) - 1
+        for _ in range(HALVINGS):
+            middle = (low + high) // 2
+            if not self.goes_on or middle == low:
+                break
+            found = state_of(self.variables.problem_at(self.path[middle]), self.design.mask)
+            if found.met:
+                found = self._in_sheet(sheet, self.path[middle], found)
+                if not _is_stable(found.sheet):
+                    high = middle
+                    continue
+                vector, state = self.path[middle], found
+            low = middle
+        return vector, state
 
     def _refined(
         self,
@@ -307,6 +337,7 @@ class _Job:
         self.steps, self.evaluations = self.steps + last.step, self.evaluations + last.evaluations
         vectors = [each.vector for each in path]
         state, number = _latest(self.variables, self.design.mask, vectors)
+        self.tried = vectors[: number + 1]
         return state, vectors[number], number == len(vectors) - 1
 
     def _correction(self, vector: NDArray[np.float64], found: tuple[ItemResult, ...]) -> Correction:
