@@ -38,7 +38,8 @@ def test_the_design_of_a_task_is_refined_by_default(runs: dict[str, tuple[Path, 
     assert summaries[1]["refinement"] is None
     found = summaries[0]["refinement"]
     assert found["met_after"]
-    assert found["objective_after"] >= found["objective_before"]
+    # Items in the sheet count before the objective.
+    assert found["met_in_sheet"] or found["objective_after"] >= found["objective_before"]
     assert "refined" in out
     designs = [read_design(each / "design.json") for each in (folder, plain)]
     assert np.array_equal(designs[0].mask, designs[1].mask)
