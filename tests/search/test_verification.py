@@ -330,7 +330,7 @@ def test_faults_of_more_efficient_designs_are_reported(lift: Problem) -> None:
     works, full = finalist(lift, WORKS), finalist(lift, pack_mask(lift.initial))
     brittle = Verifier(lift, HoppingSettings(), strain_limit=0.08)
     assert brittle.verify(works.design.mask).fault is not None
-    chosen, refused, _ = FirstWithoutFault(brittle)([works, full])
+    chosen, refused, *_ = FirstWithoutFault(brittle)([works, full])
     assert chosen.design is full.design
     assert refused == [(works.response.efficiency, "strain above the limit of the material")]
 
@@ -339,11 +339,11 @@ def test_where_every_design_has_a_fault_a_stable_one_is_selected() -> None:
     mask = pack_mask(np.array([True, True]))
     buckles, strained = finalist(column(0.02), mask), finalist(column(0.012), mask)
     verifiers = {0.02: Verifier(column(0.02), HoppingSettings())}
-    chosen, refused, _ = FirstWithoutFault(verifiers[0.02])([buckles])
+    chosen, refused, *_ = FirstWithoutFault(verifiers[0.02])([buckles])
     assert chosen.verification is not None
     assert refused == []
     limited = Verifier(column(0.012), HoppingSettings(), strain_limit=1e-4)
-    chosen, _, _ = FirstWithoutFault(limited)([strained])
+    chosen, *_ = FirstWithoutFault(limited)([strained])
     assert chosen.verification is not None
     assert chosen.verification.fault == "strain above the limit of the material"
     assert math.isfinite(chosen.verification.response.efficiency)

@@ -36,6 +36,7 @@ class SearchProgress(Live):
         self._done: dict[int, int] = {}
         self._made = self._accepted = 0
         self._temperature = 0.0
+        self._refined = 0
         self._start = time.monotonic()
         super().__init__("searching", self._total, TextColumn("left"), TimeRemainingColumn())
 
@@ -59,14 +60,17 @@ class SearchProgress(Live):
         figures = f"verified candidates: {done} of at most {total}"
         self._show(done, total, figures, figures)
 
-    def refining(self, step: RefinementStep) -> None:
+    def refining(self, number: int, step: RefinementStep) -> None:
         """Show the objective of a refinement and what it violates."""
-        from bellcrank.workflows.refinement import EVALUATIONS
+        from bellcrank.workflows.refiners import EVALUATIONS
 
-        self._bar.update(self._task, description="refining ")
-        figures = f"objective {step.rows.objective:.3f}, violation {step.rows.violation:.3f}"
-        line = f"refining: step {step.step}, {figures}"
-        self._show(min(step.evaluations, EVALUATIONS), EVALUATIONS, figures, line)
+        with self._lock:
+            self._bar.update(self._task, description="refining ")
+            rows = step.rows
+            figures = f"objective {rows.objective:.3f}, violation {rows.violation:.3f}"
+            line = f"refining design {number + 1}: step {step.step}, {figures}"
+            self._refined = max(self._refined, min(step.evaluations, EVALUATIONS))
+            self._show(self._refined, EVALUATIONS, figures, line)
 
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)

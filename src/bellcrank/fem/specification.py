@@ -24,7 +24,7 @@ from bellcrank.mechanics.output import best_fit_rotation, motion_weights
 from bellcrank.mechanics.splines import stroke_spline
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from bellcrank.fem.path import EquilibriumPath
     from bellcrank.fem.results import Field
     from bellcrank.mechanics import ItemResult
-    from bellcrank.model import Item, Problem
+    from bellcrank.model import Item, ObjectiveTerm, Problem, Specification
     from bellcrank.part import Part
 
     Values = NDArray[np.float64]
@@ -74,6 +74,22 @@ def sheet_items(
 ) -> list[ItemResult] | None:
     """Return the items of the specification of a part in the sheet.
 
+    Parameters, return value and errors are those of `sheet_records`.
+    """
+    wanted = part.design.problem.specification
+    assert wanted is not None
+    records = sheet_records(part, size, report, fineness)
+    return None if records is None else item_results(wanted.items, records)
+
+
+def sheet_records(
+    part: Part,
+    size: float | None = None,
+    report: Callable[[str, float], None] = lambda _case, _load: None,
+    fineness: Fineness = FINE,
+) -> dict[str, StrokeRecord] | None:
+    """Return the channels of the items and objectives of a part in the sheet, by load case.
+
     Parameters
     ----------
     part
@@ -87,7 +103,7 @@ def sheet_items(
 
     Returns
     -------
-    list of ItemResult or None
+    dict of StrokeRecord, or None
         None if the part is not stable along the whole stroke in every load case.
 
     Raises
@@ -100,12 +116,11 @@ def sheet_items(
     mesh = plane_mesh(part, size, fineness)
     records = {}
     for name, case in part.design.problem.cases.items():
-        items = [item for item in wanted.items if item.case == name]
-        record = _Sheet(part, mesh, case, items, wanted.weight).record(partial(report, name))
+        record = _Sheet(part, mesh, name, case, wanted).record(partial(report, name))
         if record is None:
             return None
         records[name] = record
-    return item_results(wanted.items, records)
+    return records
 
 
 class _Sheet:
@@ -115,13 +130,14 @@ class _Sheet:
         self,
         part: Part,
         mesh: ContinuumMesh,
+        name: str,
         case: Problem,
-        items: Sequence[Item],
-        weight: Values | None,
+        wanted: Specification,
     ) -> None:
         self.part, self.mesh, self.case = part, mesh, case
-        self.items = items
-        self.weight = weight
+        self.items = [item for item in wanted.items if item.case == name]
+        self.objectives = [each for each in wanted.maximise if each.case == name]
+        self.weight = wanted.weight
         self.force_unit = part.stiffness_unit * part.scale
 
     def record(self, report: Callable[[float], None]) -> StrokeRecord | None:
@@ -132,9 +148,8 @@ class _Sheet:
         ends = [end for item in self.items for end in (item.start, item.stop) if end > 0.0]
         kinks = self.case.input.kinks
         fractions = np.unique(np.concatenate([np.arange(1, STATES + 1) / STATES, ends, kinks]))
-        needed = [
-            channel for item in self.items for channel in channels_of(item.quantity, item.output)
-        ]
+        wanted: list[Item | ObjectiveTerm] = [*self.items, *self.objectives]
+        needed = [channel for each in wanted for channel in channels_of(each.quantity, each.output)]
         channels = {
             channel: self._channel(channel, main, fractions) for channel in dict.fromkeys(needed)
         }

@@ -169,6 +169,31 @@ def path_error(
 ) -> Values:
     """Return the root mean square distance of a motion from a wanted path, over its length.
 
+    Parameters are those of `path_deviation`.
+
+    Returns
+    -------
+    (...)
+
+    Examples
+    --------
+    >>> motion = np.array([[1.0, 0.0], [3.0, 0.0]])
+    >>> error = path_error(np.array([0.5, 1.0]), motion, np.array([[0.0, 0.0], [3.0, 0.0]]))
+    >>> round(float(error), 12)
+    0.0
+    """
+    apart = path_deviation(fractions, displacement, path, kinks)
+    return np.asarray(np.sqrt((apart**2).sum(axis=-1).mean(axis=-1)))
+
+
+def path_deviation(
+    fractions: NDArray[np.float64],
+    displacement: Values,
+    path: Values,
+    kinks: tuple[float, ...] = (),
+) -> Values:
+    """Return how far a motion is from a wanted path, over the length of the path.
+
     A cubic spline through the states is compared with the path at equal fractions of the lengths
     of both, so that the pace along the path is free.
 
@@ -185,14 +210,8 @@ def path_error(
 
     Returns
     -------
-    (...)
-
-    Examples
-    --------
-    >>> motion = np.array([[1.0, 0.0], [3.0, 0.0]])
-    >>> error = path_error(np.array([0.5, 1.0]), motion, np.array([[0.0, 0.0], [3.0, 0.0]]))
-    >>> round(float(error), 12)
-    0.0
+    (..., P, 2)
+        At P points; infinite for a motion without length.
     """
     path = np.asarray(path) - path[0]
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
@@ -209,11 +228,11 @@ def path_error(
     total = reached[..., -1:]
     if reached.ndim == 1:
         if not (np.isfinite(total[0]) and total[0] > 0.0):
-            return np.asarray(np.inf)
+            return np.full((PATH_POINTS, 2), np.inf)
         there = np.stack(
             [np.interp(share * total[0], reached, fine[:, axis]) for axis in range(2)], axis=-1
         )
-        return np.asarray(np.sqrt(((there - wanted) ** 2).sum(axis=-1).mean()) / length)
+        return np.asarray((there - wanted) / length)
     with np.errstate(invalid="ignore", divide="ignore"):
         along = reached / total
     # The piece of the spline in which each share of its length lies, and where in it.
@@ -222,14 +241,26 @@ def path_error(
     part = np.divide(share - low, high - low, out=np.zeros_like(low), where=high > low)
     ends = [np.take_along_axis(fine, (piece + k)[..., None], axis=-2) for k in (0, 1)]
     there = ends[0] + part[..., None] * (ends[1] - ends[0])
-    error = np.sqrt(((there - wanted) ** 2).sum(axis=-1).mean(axis=-1)) / length
-    return np.where(np.isfinite(total[..., 0]) & (total[..., 0] > 0.0), error, np.inf)
+    is_known = (np.isfinite(total) & (total > 0.0))[..., None]
+    return np.where(is_known, (there - wanted) / length, np.inf)
 
 
-def scale_of(item: Item) -> float:
-    """Return the size of the bounds of an item, by which its violation is normalised."""
-    bounds = [abs(bound) for bound in (item.at_least, item.at_most) if bound is not None]
-    return max(bounds) or ZERO_SCALE[QUANTITIES[item.quantity].dimension]
+def scales_of(item: Item) -> tuple[float, float]:
+    """Return the sizes of the lower and the upper bound of an item, which normalise violations.
+
+    A bound that is zero, or missing, has the size of the other one.
+
+    Examples
+    --------
+    >>> from bellcrank.model import Item
+    >>> scales_of(Item(quantity="input_force", at_least=0.1, at_most=2.0))
+    (0.1, 2.0)
+    >>> scales_of(Item(quantity="input_force", at_least=0.0, at_most=2.0))
+    (2.0, 2.0)
+    """
+    low, high = abs(item.at_least or 0.0), abs(item.at_most or 0.0)
+    other = max(low, high) or ZERO_SCALE[QUANTITIES[item.quantity].dimension]
+    return low or other, high or other
 
 
 def tightened(item: Item, reserve: float) -> Item:
@@ -250,7 +281,7 @@ def tightened(item: Item, reserve: float) -> Item:
         half = 0.5 * max(0.0, 1.0 - TWO_SIDED * reserve) * (high - low)
         middle = 0.5 * (low + high)
         return replace(item, at_least=middle - half, at_most=middle + half)
-    step = LARGER_RESERVE.get(item.quantity, 1.0) * reserve * scale_of(item)
+    step = LARGER_RESERVE.get(item.quantity, 1.0) * reserve * max(scales_of(item))
     if low is not None:
         return replace(item, at_least=low + step)
     assert high is not None
@@ -275,18 +306,27 @@ def reduced(item: Item, record: StrokeRecord) -> tuple[Values, Values]:
     return low, high
 
 
-def distance_beyond(item: Item, low: Values, high: Values) -> Values:
-    """Return by how much values exceed the bounds of an item; negative within them."""
+def excess(item: Item, low: Values, high: Values) -> Values:
+    """Return by how much values exceed the bounds of an item, over the size of the bound.
+
+    Negative within the bounds; then its opposite is the margin.
+
+    Parameters
+    ----------
+    low, high : (...)
+        Smallest and largest value that the bounds apply to (`reduced`).
+    """
     over = np.full(np.shape(low), -np.inf)
+    low_scale, high_scale = scales_of(item)
     if item.at_most is not None:
-        over = np.maximum(over, high - item.at_most)
+        over = np.maximum(over, (high - item.at_most) / high_scale)
     if item.at_least is not None:
-        over = np.maximum(over, item.at_least - low)
+        over = np.maximum(over, (item.at_least - low) / low_scale)
     return np.where(np.isnan(over), np.inf, over)
 
 
 def violation(item: Item, low: Values, high: Values) -> Values:
-    """Return the violation of an item: ln(1 + e / s), e its excess and s its scale.
+    """Return the violation of an item: ln(1 + e / s), e its excess and s the size of the bound.
 
     It is 0 if the item is met, and ln 2 at an excess of the size of the bound.
 
@@ -295,8 +335,7 @@ def violation(item: Item, low: Values, high: Values) -> Values:
     low, high : (...)
         Smallest and largest value that the bounds apply to (`reduced`).
     """
-    over = np.maximum(0.0, distance_beyond(item, low, high))
-    return np.log1p(np.minimum(over / scale_of(item), LARGEST_EXCESS))
+    return np.log1p(np.clip(excess(item, low, high), 0.0, LARGEST_EXCESS))
 
 
 def worst_value(item: Item, record: StrokeRecord) -> float:
@@ -306,12 +345,14 @@ def worst_value(item: Item, record: StrokeRecord) -> float:
         return low
     if item.at_least is None:
         return high
-    return high if high - item.at_most >= item.at_least - low else low
+    low_scale, high_scale = scales_of(item)
+    above, below = (high - item.at_most) / high_scale, (item.at_least - low) / low_scale
+    return high if above >= below else low
 
 
 def margin(item: Item, value: float) -> float:
-    """Return the distance of a value from the nearest bound, over the scale; negative beyond."""
-    return -float(distance_beyond(item, np.asarray(value), np.asarray(value))) / scale_of(item)
+    """Return the distance of a value from the nearest bound, over its size; negative beyond."""
+    return -float(excess(item, np.asarray(value), np.asarray(value)))
 
 
 TOLERANCE = 1e-9

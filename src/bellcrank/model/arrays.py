@@ -7,6 +7,7 @@ be shared between chains and hashed once.
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,8 @@ import numpy as np
 from bellcrank.errors import InvalidProblem
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from _typeshed import DataclassInstance
     from numpy.typing import ArrayLike, NDArray
 
@@ -158,9 +161,10 @@ def boolean_mask(name: str, values: ArrayLike, length: int) -> NDArray[np.bool_]
     return mask
 
 
-def rebuild(instance: DataclassInstance) -> tuple[type, tuple[Any, ...]]:
+def rebuild(instance: DataclassInstance) -> tuple[Callable[[], Any], tuple[()]]:
     """Pickle and copy `instance` through its constructor (for use as ``__reduce__``).
 
     Pickle does not restore the read-only flag of arrays; the constructor sets it again.
     """
-    return type(instance), tuple(getattr(instance, field.name) for field in fields(instance))
+    values = {field.name: getattr(instance, field.name) for field in fields(instance)}
+    return partial(type(instance), **values), ()

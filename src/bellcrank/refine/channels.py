@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import Channel, StrokeRecord, quantity_values
-from bellcrank.mechanics.items import reduced, scale_of
+from bellcrank.mechanics.items import path_deviation, reduced, scales_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -31,6 +31,12 @@ def bounded(item: Item, record: StrokeRecord) -> Values:
         payload = quantity_values(record, item.quantity, item.output)
         return item.at_least / payload - 1.0
     values = quantity_values(record, item.quantity, item.output, item.path)
+    if item.quantity == "path_error" and item.path is not None and item.at_most:
+        # The root mean square is curved where it is small; components at points are not.
+        motion = record.of("displacement", item.output)
+        apart = path_deviation(record.fractions, motion, item.path, record.kinks)
+        apart = apart[..., 1::2, :].reshape(*apart.shape[:-2], -1)
+        return np.concatenate([values, apart, -apart], axis=-1) / item.at_most - 1.0
     if item.quantity == "off_axis":
         motion = record.of("motion", item.output)
         normal = np.linalg.norm(motion[..., 1:], axis=-1)
@@ -40,12 +46,12 @@ def bounded(item: Item, record: StrokeRecord) -> Values:
     elif values.shape[-1] == len(record.fractions):
         chosen = (record.fractions >= item.start - 1e-9) & (record.fractions <= item.stop + 1e-9)
         values = values[..., chosen]
-    scale = scale_of(item)
+    low_scale, high_scale = scales_of(item)
     sides = []
     if item.at_most is not None:
-        sides.append((values - item.at_most) / scale)
+        sides.append((values - item.at_most) / high_scale)
     if item.at_least is not None:
-        sides.append((item.at_least - values) / scale)
+        sides.append((item.at_least - values) / low_scale)
     return np.concatenate(sides, axis=-1)
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import VERIFICATION_INCREMENT, ItemResult, tightened
+from bellcrank.mechanics import VERIFICATION_INCREMENT, ItemResult, item_results, tightened
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Item, ObjectiveTerm, Specification
 from bellcrank.part.outline import room_for_fillet
+from bellcrank.refine.differences import NO_DIFFERENCE, difference, on_same_path
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
 from bellcrank.refine.shape import shape_rows, volume_of
@@ -21,16 +22,17 @@ from bellcrank.search import HoppingSettings, SpecificationEvaluator
 from bellcrank.search.verification import Verifier
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
     from bellcrank.model import Design, Problem
+    from bellcrank.refine.differences import Difference, Records
     from bellcrank.refine.refinement import Progress
     from bellcrank.refine.variables import Variables
 
-    Sheet = Callable[[Design], Sequence[ItemResult] | None]
-    Correction = dict[int, float]
+    Sheet = Callable[[Design], Records | None]
+    Models = tuple[Difference, ...]
 
 RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
@@ -39,10 +41,10 @@ PRINTABLE = 1e-2
 """Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
 SHEETS = 5
 """Largest number of geometries that are computed in the sheet: it takes a minute."""
-SHEET_STEPS = 25
-"""Largest number of steps after the sheet misses items; fewer if the corrected bounds are met."""
+SHEET_STEPS = 40
+"""Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
 HALVINGS = 2
-"""Number of times the path of a refinement that is not stable in the sheet is halved."""
+"""Number of times the path of a refinement that is not near the sheet is halved."""
 MET = 1e-3
 """Sum of violations at which they are."""
 ROUNDS = 3
@@ -61,14 +63,27 @@ class State:
         Items of the specification; empty if the response is not stable.
     met
         Whether all of them are met, and the geometry prints.
+    records
+        Channels along the stroke by load case.
     sheet
         Items in the sheet; empty if they were not computed, or it is not stable.
+    sheet_records
+        The channels in the sheet.
     """
 
     objective: float
     items: tuple[ItemResult, ...]
     met: bool
+    records: Records = field(default_factory=dict)
     sheet: tuple[ItemResult, ...] = ()
+    sheet_records: Records = field(default_factory=dict)
+
+    @property
+    def is_near_sheet(self) -> bool:
+        """Whether the sheet is stable, under payloads too, and on the same path as the frame."""
+        if not self.sheet or any(math.isnan(item.value) for item in self.sheet):
+            return False
+        return on_same_path(self.records, self.sheet_records)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,8 +152,8 @@ def refine_design(
 ) -> Refinement:
     """Move the nodes of a design, and change the widths of its struts, to meet its specification.
 
-    The result is verified by frames with eight elements in each strut, and in the sheet if its
-    items are given. Where it misses items there that the model of the refinement meets, bounds are
+    The result is verified by frames with eight elements in each strut, and in the sheet if it is
+    given. Where it misses items there that the model of the refinement meets, its channels are
     corrected by the difference and the design is refined again. A result that is no better than
     the given design is discarded.
 
@@ -153,7 +168,8 @@ def refine_design(
     strain_limit
         Largest strain for a problem without a specification.
     sheet
-        Function from a design to its items in the sheet, None where it is not stable.
+        Function from a design to its channels in the sheet by load case, None where it is not
+        stable.
 
     Raises
     ------
@@ -224,10 +240,10 @@ class _Job:
     def by_frames(self) -> None:
         """Refine until all items are met with eight elements."""
         vector, stable = self.chosen, STABLE
-        correction: Correction = {}
+        models: Models = (NO_DIFFERENCE,)
         for _ in range(ROUNDS):
             least = self.settings.evaluations // 4
-            found = self._refined(vector, correction, stable, self.settings.steps, least)
+            found = self._refined(vector, models, stable, self.settings.steps, least)
             if found is None:
                 return
             state, vector, is_last = found
@@ -239,42 +255,44 @@ class _Job:
                 # Eight elements lose their stability, or touch, before one element does.
                 stable *= 1.5
             else:
-                correction = self._correction(vector, state.items)
+                models = self._models(vector, state.records)
 
     def by_sheet(self, sheet: Sheet) -> None:
         """Refine until all items are met in the sheet too; keeps the best in the sheet."""
         if not self.best.met:
             return
-        stable = STABLE
         vector, state = self.chosen, self._in_sheet(sheet, self.chosen, self.best)
-        self.best, left = state, SHEETS - 1
-        if not _is_stable(state.sheet):
+        self.best, left, stable = state, SHEETS - 1, STABLE
+        if not state.is_near_sheet:
             left -= HALVINGS
             vector, state = self._earlier(sheet, vector, state)
             if state.sheet:
                 self.best, self.chosen = state, vector
+        models: Models = (NO_DIFFERENCE,)
         for _ in range(left):
             if not self.goes_on or (state.sheet and all(item.met for item in state.sheet)):
                 return
-            correction: Correction = {}
-            if _is_stable(state.sheet):
-                correction = self._correction(vector, state.sheet)
-            else:
+            if state.is_near_sheet:
+                models = self._models(vector, state.records, state.sheet_records)
+            elif state.met:
                 stable *= 1.5
+            else:
+                models = (*self._models(vector, state.records), *models[1:])
             found = self._refined(
-                vector, correction, stable, SHEET_STEPS, 4 * SHEET_STEPS, until_met=True
+                vector, models, stable, SHEET_STEPS, 4 * SHEET_STEPS, until_met=True
             )
-            if found is None or not found[0].met or not self.goes_on:
+            if found is None or not found[0].items:
                 return
             state, vector, _ = found
-            state = self._in_sheet(sheet, vector, state)
-            if _missed(state.sheet) < _missed(self.best.sheet):
-                self.best, self.chosen = state, vector
+            if state.met and self.goes_on:
+                state = self._in_sheet(sheet, vector, state)
+                if _missed(state.sheet) < _missed(self.best.sheet):
+                    self.best, self.chosen = state, vector
 
     def _earlier(
         self, sheet: Sheet, vector: NDArray[np.float64], state: State
     ) -> tuple[NDArray[np.float64], State]:
-        """Return a geometry on the path of the refinement that is stable in the sheet.
+        """Return a geometry on the path of the refinement that is near the sheet.
 
         The last one among a few; the given one if there is none.
         """
@@ -286,7 +304,7 @@ class _Job:
             found = state_of(self.variables.problem_at(self.path[middle]), self.design.mask)
             if found.met:
                 found = self._in_sheet(sheet, self.path[middle], found)
-                if not _is_stable(found.sheet):
+                if not found.is_near_sheet:
                     high = middle
                     continue
                 vector, state = self.path[middle], found
@@ -296,14 +314,14 @@ class _Job:
     def _refined(
         self,
         vector: NDArray[np.float64],
-        correction: Correction,
+        models: Models,
         stable: float,
         steps: int,
         least: int,
         *,
         until_met: bool = False,
     ) -> tuple[State, NDArray[np.float64], bool] | None:
-        """Refine with corrected bounds.
+        """Refine until all items are met in all given models.
 
         Returns
         -------
@@ -312,13 +330,9 @@ class _Job:
             it is the last one of all. None if the response is not stable.
         """
         items = [
-            moved(
-                tightened(item, 0.0 if item.quantity == "mass" else RESERVE),
-                correction.get(index, 0.0),
-            )
-            for index, item in enumerate(self.items)
+            tightened(item, 0.0 if item.quantity == "mass" else RESERVE) for item in self.items
         ]
-        rows = RowEvaluator(self.variables, self.design.mask, items, stable)
+        rows = RowEvaluator(self.variables, self.design.mask, items, stable, models)
         left = replace(
             self.settings,
             steps=steps,
@@ -340,31 +354,23 @@ class _Job:
         self.tried = vectors[: number + 1]
         return state, vectors[number], number == len(vectors) - 1
 
-    def _correction(self, vector: NDArray[np.float64], found: tuple[ItemResult, ...]) -> Correction:
-        """Return by how much items are higher in a better model than with one element."""
+    def _models(self, vector: NDArray[np.float64], *better: Records) -> Models:
+        """Return the differences of better models from one element in each strut."""
         evaluator = SpecificationEvaluator(self.variables.problem_at(vector))
         if not evaluator.evaluate(self.design.mask, VERIFICATION_INCREMENT).is_admissible:
-            return {}
-        out: Correction = {}
-        for index, (here, there) in enumerate(zip(evaluator.results(), found, strict=True)):
-            difference = there.value - here.value
-            if here.item.quantity == "clearance":
-                # Gaps are known where they are small; the refined geometry is at the bound.
-                difference = min(there.value - (there.item.at_least or 0.0), 0.0)
-            given = here.item.quantity not in {"stable_stroke", "mass"}
-            if given and math.isfinite(difference):
-                out[index] = difference
-        return out
+            return (NO_DIFFERENCE,)
+        gaps = {
+            item.case: item.at_least or 0.0 for item in self.items if item.quantity == "clearance"
+        }
+        return tuple(difference(records, evaluator.records, gaps) for records in better)
 
     def _in_sheet(self, sheet: Sheet, vector: NDArray[np.float64], state: State) -> State:
         problem = self.variables.problem_at(vector)
-        found = sheet(replace(self.design, problem=problem))
-        return state if found is None else replace(state, sheet=tuple(found))
-
-
-def _is_stable(items: tuple[ItemResult, ...]) -> bool:
-    """Whether the response in the sheet is stable, under a payload too."""
-    return bool(items) and all(not math.isnan(item.value) for item in items)
+        records = sheet(replace(self.design, problem=problem))
+        if records is None:
+            return state
+        items = tuple(item_results(self.items, records))
+        return replace(state, sheet=items, sheet_records=records)
 
 
 def _missed(items: tuple[ItemResult, ...]) -> float:
@@ -403,7 +409,8 @@ def state_of(problem: Problem, mask: NDArray[np.bool_]) -> State:
     objective = found.response.efficiency - found.response.penalty
     if found.fault is not None:
         objective = -sum(item.violation for item in found.items)
-    return State(objective, found.items, met=found.fault is None and _prints(problem, mask))
+    met = found.fault is None and _prints(problem, mask)
+    return State(objective, found.items, met, found.records)
 
 
 def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
@@ -416,15 +423,6 @@ def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
     except InvalidSettings:
         return False
     return True
-
-
-def moved(item: Item, change: float) -> Item:
-    """Return an item whose bounds are lower by a change, by which a better model is higher."""
-    return replace(
-        item,
-        at_least=None if item.at_least is None else item.at_least - change,
-        at_most=None if item.at_most is None else item.at_most - change,
-    )
 
 
 def _is_better(new: State, old: State) -> bool:

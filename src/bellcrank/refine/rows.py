@@ -17,6 +17,7 @@ from bellcrank.mechanics.frames.geometry import BeamSlopes, beam_slopes, geometr
 from bellcrank.mechanics.frames.quantities.definition import Measures, Quantity, Slopes, vector
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 from bellcrank.refine.channels import bounded, jacobian, stacked
+from bellcrank.refine.differences import NO_DIFFERENCE
 from bellcrank.refine.gaps import gaps_of
 from bellcrank.refine.shape import shape_rows
 from bellcrank.refine.stability import softest_states
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.model import Item, Problem
+    from bellcrank.refine.differences import Difference
     from bellcrank.refine.gaps import Gaps
     from bellcrank.refine.variables import Variables
 
@@ -114,6 +116,9 @@ class RowEvaluator:
         path must be stable.
     stable
         Smallest lowest stiffness along a path over the smaller one near its ends.
+    models
+        Models in which the items must be met, as differences from one element in each strut. The
+        last one counts for the objectives.
     """
 
     def __init__(
@@ -122,9 +127,11 @@ class RowEvaluator:
         mask: NDArray[np.bool_],
         items: Sequence[Item],
         stable: float = STABLE,
+        models: Sequence[Difference] = (NO_DIFFERENCE,),
     ) -> None:
         self.variables = variables
         self.mask = mask
+        self.models = tuple(models)
         self.items = tuple(items)
         self.stable = stable
         self.soft: dict[tuple[str, int], set[float]] = {}
@@ -196,19 +203,23 @@ class RowEvaluator:
         wanted = [each for each in evaluator.objectives if each.case == name]
 
         def rows_at(channels: Mapping[Channel, Values]) -> tuple[Values, Values]:
-            now = replace(record, channels=channels)
-            found = [
-                quantity_values(now, each.quantity, each.output)[..., -1:] / each.scale
-                for each in wanted
-            ]
-            bounds = stacked([bounded(item, now) for item in items])
+            found: list[Values] = []
+            by_model = []
+            for model in self.models:
+                now = replace(record, channels=model.added_to(name, channels))
+                by_model += [bounded(item, now) for item in items]
+                found = [
+                    quantity_values(now, each.quantity, each.output)[..., -1:] / each.scale
+                    for each in wanted
+                ]
+            bounds = stacked(by_model)
             # Without objectives, the smallest margin is improved.
             return (stacked(found) if evaluator.objectives else -bounds), bounds
 
         objectives, constraints = rows_at(channels)
         if not (np.isfinite(objectives).all() and np.isfinite(constraints).all()):
             return None
-        names = [item.name for item in items for _ in bounded(item, record)]
+        names = [item.name for item in items for _ in bounded(item, record)] * len(self.models)
         keys = tuple((k,) for k in range(len(names)))
         none = np.zeros((0, self.variables.count))
         if not slopes:
@@ -249,7 +260,8 @@ class RowEvaluator:
             for item in self.items
             if item.quantity == "clearance" and item.case == name
         ]
-        bound, width = max(bounds, default=0.0), problem.section.width
+        overlap = max(model.overlaps.get(name, 0.0) for model in self.models)
+        bound, width = max(bounds, default=0.0) + overlap, problem.section.width
         printed = printed_beams(problem, self.mask, case.frame.structure.present != 0)
         values, gradients = [np.zeros(0)], [np.zeros((0, self.variables.count))]
         keys: list[tuple[int, ...]] = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from bellcrank.search.evaluator import verification_evaluator
-from bellcrank.search.selection import most_efficient, select
+from bellcrank.search.selection import Chosen, most_efficient, select
 from bellcrank.search.verdict import Verdict
 from bellcrank.search.verification import Verifier
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import ItemResult
     from bellcrank.model import Problem
-    from bellcrank.search.selection import Candidate, Choice, Finalist, Refusals, Selection
+    from bellcrank.search.selection import Candidate, Choice, Finalist, Selection
     from bellcrank.search.settings import SearchSettings
     from bellcrank.search.verification import Verification
 
@@ -24,6 +24,8 @@ MOST = 48
 """Largest number of candidates that are verified."""
 MOST_UNMET = 12
 """The same for candidates that do not meet their specification in the model of the search."""
+MOST_OTHERS = 4
+"""Largest number of candidates of each other chain that are verified besides."""
 MOST_NEAREST = 5
 """Largest number of designs that are reported where none meets the specification."""
 
@@ -46,7 +48,7 @@ class FirstWithoutFault:
     verifier: Verifier
     report: Callable[[int, int], None] = lambda _done, _total: None
 
-    def __call__(self, finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals, list[Finalist]]:
+    def __call__(self, finalists: Sequence[Finalist]) -> Chosen:
         """Return the chosen finalist with its verification, the faults of others, and the nearest.
 
         The nearest ones are those of which none is better in every item (`nondominated`), if no
@@ -54,11 +56,9 @@ class FirstWithoutFault:
         """
         listed = shortlist(finalists)
         verified: list[Finalist] = []
-        for done, finalist in enumerate(listed):
-            self.report(done, len(listed))
-            verification = self.verifier.verify(finalist.design.mask)
-            verified.append(replace(finalist, verification=verification))
-            if verification.fault is None:
+        for finalist in listed:
+            verified.append(self._verified(finalist, len(verified), len(listed)))
+            if _verification(verified[-1]).fault is None:
                 break
         chosen = min(verified, key=_rank)
         refusals = [
@@ -66,12 +66,35 @@ class FirstWithoutFault:
             for each in verified
             if each is not chosen
         ]
+        others = self._others(chosen, verified, listed) if chosen.items else []
         if _verification(chosen).fault is None:
-            return chosen, refusals, []
+            return Chosen(chosen, refusals, [], others)
         stable = [each for each in verified if _verification(each).items]
         front = nondominated([_violations(_verification(each).items) for each in stable])
         nearest = sorted((stable[index] for index in front), key=_rank)
-        return chosen, refusals, nearest[:MOST_NEAREST]
+        return Chosen(chosen, refusals, nearest[:MOST_NEAREST], others)
+
+    def _verified(self, finalist: Finalist, done: int, total: int) -> Finalist:
+        self.report(done, total)
+        return replace(finalist, verification=self.verifier.verify(finalist.design.mask))
+
+    def _others(
+        self, chosen: Finalist, verified: list[Finalist], listed: Sequence[Finalist]
+    ) -> list[Finalist]:
+        """Return the best finalist of each other chain, the best chain first.
+
+        The first one without a fault among a few, or the one that misses least.
+        """
+        found = []
+        for chain in sorted({each.found.chain for each in listed} - {chosen.found.chain}):
+            own = [each for each in verified if each.found.chain == chain]
+            waiting = [each for each in listed[len(verified) :] if each.found.chain == chain]
+            for finalist in waiting[:MOST_OTHERS]:
+                own.append(self._verified(finalist, len(verified), len(listed)))
+                if _verification(own[-1]).fault is None:
+                    break
+            found.append(min(own, key=_rank))
+        return sorted(found, key=lambda each: (*_rank(each), -each.response.score))
 
 
 def nondominated(violations: Sequence[Sequence[float]]) -> list[int]:

@@ -1,8 +1,8 @@
 """Several chains of one run in parallel, stored as they advance.
 
 Each chain has a thread. The compiled loop of the spring model releases the interpreter lock, so
-threads use all cores; chains of frames are computed in processes (`chain_process`). The results do
-not depend on their number.
+threads use all cores; chains of frames are computed in processes (`bellcrank.processes`). The
+results do not depend on their number.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import numpy as np
 
 from bellcrank.errors import BellcrankError
 from bellcrank.mechanics import evaluators_that_fit
-from bellcrank.search.chain_process import ChainProcess, chain_steps
+from bellcrank.processes import FunctionProcess
+from bellcrank.search.chain_process import chain_steps, received_steps, send_steps
 from bellcrank.search.registry import State, is_done, read_state
 from bellcrank.storage import Proposals, RunFolder
 
@@ -98,7 +99,7 @@ class ChainRunner:
     ) -> None:
         self.done = False
         self._in_process = in_process
-        self._process: ChainProcess | None = None
+        self._process: FunctionProcess | None = None
         self._folder = folder
         self._settings = settings
         self.chain = chain
@@ -140,9 +141,12 @@ class ChainRunner:
         with self._lock:
             if self._closed:
                 return
-            self._process = ChainProcess(self._folder, self._settings, self.chain)
+            path = str(self._folder.path.resolve())
+            self._process = FunctionProcess(
+                send_steps.__module__, send_steps.__name__, path, self.chain
+            )
         try:
-            yield from self._process
+            yield from received_steps(self._process, self._settings)
         except RuntimeError:
             if not self._closed:
                 raise

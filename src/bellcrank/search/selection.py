@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -89,9 +89,22 @@ class Finalist:
 
 Refusals: TypeAlias = "list[tuple[float, str]]"
 """Scores of rejected designs, with the reasons."""
-Choice: TypeAlias = "Callable[[Sequence[Finalist]], tuple[Finalist, Refusals, Sequence[Finalist]]]"
-"""From finalists, the best first, to one of them, the reasons against others, and the nearest ones
-to a specification that none meets."""
+
+
+class Chosen(NamedTuple):
+    """The chosen finalist, and others that were considered."""
+
+    finalist: Finalist
+    refusals: Sequence[tuple[float, str]] = ()
+    """Scores of rejected finalists, with the reasons."""
+    nearest: Sequence[Finalist] = ()
+    """The nearest ones to a specification that none meets."""
+    others: Sequence[Finalist] = ()
+    """For a problem with a specification: the best one of each other chain."""
+
+
+Choice: TypeAlias = "Callable[[Sequence[Finalist]], Chosen]"
+"""From finalists, the best first, to one of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,6 +130,8 @@ class Selection:
     nearest
         Where no design meets the specification: verified designs of which none is better in every
         item.
+    others
+        For a problem with a specification: the best design of each other chain.
     """
 
     design: Design
@@ -128,6 +143,7 @@ class Selection:
     verification: Verification | None = None
     items: tuple[ItemResult, ...] = ()
     nearest: tuple[Finalist, ...] = ()
+    others: tuple[Finalist, ...] = ()
 
 
 def plateaus(
@@ -270,9 +286,9 @@ def _reason_against(evaluator: Evaluator, design: Design, response: Response) ->
     return "in several pieces" if pieces(design.problem, design.mask) > 1 else None
 
 
-def most_efficient(finalists: Sequence[Finalist]) -> tuple[Finalist, Refusals, list[Finalist]]:
+def most_efficient(finalists: Sequence[Finalist]) -> Chosen:
     """Return the first finalist."""
-    return finalists[0], [], []
+    return Chosen(finalists[0])
 
 
 def select(
@@ -320,7 +336,7 @@ def select(
     if not finalists:
         raise NoDesignFound(_no_candidate(problem, len(candidates), refused, evaluator))
     finalists.sort(key=lambda each: each.response.score, reverse=True)
-    chosen, passed_over, nearest = choose(finalists)
+    chosen, passed_over, nearest, others = choose(finalists)
     best = chosen.response.score
     reasons = [reason for value, reason in (*refused, *passed_over) if value > best]
     return Selection(
@@ -333,6 +349,7 @@ def select(
         verification=chosen.verification,
         items=chosen.items,
         nearest=tuple(nearest),
+        others=tuple(others),
     )
 
 

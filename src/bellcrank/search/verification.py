@@ -8,7 +8,7 @@ more elements, and the first without a fault is selected.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,9 +29,11 @@ from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import ItemResult, Response
+    from bellcrank.mechanics import ItemResult, Response, StrokeRecord
     from bellcrank.model import Problem
     from bellcrank.search.settings import SearchSettings
 
@@ -58,6 +60,8 @@ class Verification:
         Reason why the design cannot be built, in a few words, or None.
     items
         Items of the specification of the problem, with the values that the design reaches.
+    records
+        Channels along the stroke by load case, for a problem with a specification.
     """
 
     elements: int
@@ -66,6 +70,7 @@ class Verification:
     contacts: Contacts
     fault: str | None
     items: tuple[ItemResult, ...] = ()
+    records: Mapping[str, StrokeRecord] = field(default_factory=dict)
 
     @property
     def is_stable(self) -> bool:
@@ -144,7 +149,10 @@ class Verifier:
         strain = max(
             (item.value for item in items if item.item.quantity == "strain"), default=math.nan
         )
-        found = Verification(self.elements, response, strain, NO_CONTACT, None, tuple(items))
+        records = evaluator.records if items else {}
+        found = Verification(
+            self.elements, response, strain, NO_CONTACT, None, tuple(items), records
+        )
         fault = None
         if not np.isin(self.problem.lattice.beams[mask], self.problem.supports.nodes).any():
             fault = "held by no support"

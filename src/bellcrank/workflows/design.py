@@ -137,7 +137,7 @@ def complete_design(
     workers: int | None = None,
     progress: Callable[[Progress], None] = lambda _progress: None,
     verifying: Callable[[int, int], None] = lambda _done, _total: None,
-    refining: Callable[[RefinementProgress], None] = lambda _progress: None,
+    refining: Callable[[int, RefinementProgress], None] = lambda _number, _progress: None,
     stop: threading.Event | None = None,
 ) -> DesignReport | None:
     """Run or resume a design job and write its results.
@@ -147,13 +147,15 @@ def complete_design(
     folder
         Folder of the job.
     workers
-        Number of chains that run in parallel, all cores by default; does not change results.
+        Number of chains, and then of refinements, that run in parallel; all cores by default. It
+        does not change results.
     progress
         Called with the progress of a chain, from the thread of that chain.
     verifying
         For a frame: called with the number of candidates verified and the largest number.
     refining
-        For a task with a specification: called with each accepted step of the refinement.
+        For a task with a specification: called with the number of a design and each accepted step
+        of its refinement, from threads of their own.
     stop
         Event that stops the search after the current block of steps; completed steps are stored.
 
@@ -173,7 +175,7 @@ def complete_design(
         try:
             done = run_chains(folder, settings, workers=workers, progress=progress, stop=stop)
             if done:
-                report = conclude(folder, settings, verifying, refining, stop)
+                report = conclude(folder, settings, verifying, refining, stop, workers)
                 if report is not None:
                     folder.finish()
                     return report
@@ -232,8 +234,9 @@ def conclude(
     folder: RunFolder,
     settings: SearchSettings,
     verifying: Callable[[int, int], None] = lambda _done, _total: None,
-    refining: Callable[[RefinementProgress], None] = lambda _progress: None,
+    refining: Callable[[int, RefinementProgress], None] = lambda _number, _progress: None,
     stop: threading.Event | None = None,
+    workers: int | None = None,
 ) -> DesignReport | None:
     """Select, clean, verify, refine and compare a design, and write the result files.
 
@@ -259,12 +262,7 @@ def conclude(
     selection = select_design(problem, candidates, settings, limit, verifying)
     refinement = None
     if folder.provenance.get("refine"):
-
-        def report_step(step: RefinementProgress) -> bool:
-            refining(step)
-            return stop is None or not stop.is_set()
-
-        selection, refinement = refine_selection(selection, spec, report_step)
+        selection, refinement = refine_selection(selection, spec, refining, workers, stop)
         if stop is not None and stop.is_set():
             return None
     elements = None if problem.section is None else ELEMENTS

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from bellcrank.machines.library.entry import Entry
     from bellcrank.machines.library.tasks import EntryTask, MakeSettings
     from bellcrank.model import Problem
-    from bellcrank.refine.refinement import Progress as RefinementProgress
     from bellcrank.search import Candidate, Progress, SearchSettings, Selection
     from bellcrank.storage import RunFolder
 
@@ -190,7 +189,7 @@ def _search(
         progress = partial(report, task)
         if not run_chains(runs[-1], own, workers=workers, progress=progress, stop=stop):
             return None
-    return _select(task.problem(), runs, search, stop)
+    return _select(task.problem(), runs, search, workers, stop)
 
 
 def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
@@ -212,16 +211,13 @@ def _select(
     problem: Problem,
     runs: Sequence[RunFolder],
     settings: SearchSettings,
+    workers: int | None,
     stop: threading.Event | None,
 ) -> tuple[Selection, dict[str, Any]] | None:
     """Select, clean and refine the best design of the searches of a task.
 
     Also return its provenance. None if the refinement was stopped.
     """
-
-    def report(_progress: RefinementProgress) -> bool:
-        return stop is None or not stop.is_set()
-
     candidates: list[Candidate] = []
     chains: list[dict[str, Any]] = []
     for run in runs:
@@ -238,7 +234,7 @@ def _select(
         raise _NoUsableDesign(str(error)) from None
     refinement = None
     if problem.is_specified:
-        chosen, refinement = refine_selection(chosen, None, report)
+        chosen, refinement = refine_selection(chosen, None, workers=workers, stop=stop)
         if stop is not None and stop.is_set():
             return None
     assert chosen.verification is not None

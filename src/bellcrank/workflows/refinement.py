@@ -2,89 +2,101 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import InvalidSettings
-from bellcrank.fem.continuum.mesh import COARSE
 from bellcrank.fem.results import finite
-from bellcrank.fem.specification import sheet_items
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.provenance import provenance
 from bellcrank.refine import Refinement, RefinementSettings, refine_design, specified
 from bellcrank.search import HoppingSettings, SpecificationEvaluator
+from bellcrank.search.parallel import default_workers
 from bellcrank.search.verification import Verifier
+from bellcrank.workflows.refiners import refine_designs, sheet_of
 from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.validation import spec_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
-    from bellcrank.mechanics import ItemResult
     from bellcrank.model import Design
     from bellcrank.part import PartSpec
     from bellcrank.refine.refinement import Progress
     from bellcrank.search import Selection
+    from bellcrank.search.selection import Finalist
 
-EVALUATIONS = 400
-"""Number of geometries that the refinement of the selected designs of a job evaluates."""
 BEFORE_REFINEMENT = {"steps": 8_000}
 """Settings of a search whose design is refined: a longer search gains less than the refinement."""
-MOST_REFINED = 3
-"""Number of designs that are refined where none meets the specification."""
+MOST_REFINED = 2
+"""Number of designs of a search that are refined, of different chains; the better result counts."""
 
 
 def refine_selection(
     selection: Selection,
     spec: PartSpec | None,
-    report: Callable[[Progress], bool] = lambda _progress: True,
+    report: Callable[[int, Progress], None] = lambda _number, _progress: None,
+    workers: int | None = None,
+    stop: threading.Event | None = None,
 ) -> tuple[Selection, Refinement | None]:
-    """Refine the selected design of a search; the nearest ones where none meets all.
+    """Refine the best designs of a search, one of each chain, and select the best result.
+
+    Parameters
+    ----------
+    selection
+        Selected design of the search, and the best ones of other chains.
+    spec
+        Part that is computed in the sheet; None for no sheet.
+    report
+        Called with the number of a design and each accepted step, from threads of their own.
+    workers
+        Number of designs that are refined at a time, each in a process; by default one for each
+        core. The result does not depend on it.
+    stop
+        Event that stops the refinements.
 
     Returns
     -------
     selection
         With the refined design, if it is better.
     refinement
-        How it came about; None if the problem has no specification or is in space.
+        How it came about; None if the problem has no specification or is in space, or the
+        refinements were stopped.
     """
     problem = selection.design.problem
     if not problem.is_specified or problem.lattice.dimension == 3:
         return selection, None
-    found = selection.verification
-    given = replace(selection.design, problem=with_joints(problem, selection.design.mask))
-    selection = replace(selection, design=given)
-    designs = [given]
-    if found is None or found.fault is not None:
-        designs += [
-            each.design
-            for each in selection.nearest
-            if each.design.mask_hex != selection.design.mask_hex
-        ]
-    designs = designs[:MOST_REFINED]
-    settings = RefinementSettings(evaluations=EVALUATIONS // len(designs))
-    sheet = sheet_of(spec)
-    results = [refine_design(design, settings, report, sheet=sheet) for design in designs]
-    best = max(results, key=lambda each: (each.after.met, each.after.objective))
-    if best.design is selection.design:
-        return selection, best
-    return with_design(selection, best.design), best
+    designs = [selection.design, *(each.design for each in selection.others)][:MOST_REFINED]
+    designs = [replace(each, problem=with_joints(each.problem, each.mask)) for each in designs]
+    workers, stop = workers or default_workers(), stop or threading.Event()
+    results = refine_designs(designs, spec, report, workers, stop)
+    if len(results) < len(designs):
+        return selection, None
+    best = max(results, key=_rank)
+    chosen = selection if best is results[0] else _of_other(selection, selection.others[0])
+    chosen = replace(chosen, design=best.design)
+    return (with_design(chosen, best.design) if best.improved else chosen), best
 
 
-def sheet_of(spec: PartSpec | None) -> Callable[[Design], Sequence[ItemResult] | None] | None:
-    """Return a function from a design to its items in the sheet; None without NGSolve."""
-    if spec is None or find_spec("ngsolve") is None:
-        return None
+def _rank(refinement: Refinement) -> tuple[bool, bool, float]:
+    """Return how good a refined design is: items met by frames, and in the sheet; the objective."""
+    after = refinement.after
+    in_sheet = bool(after.sheet) and all(item.met for item in after.sheet)
+    return after.met, in_sheet, after.objective
 
-    def items(design: Design) -> Sequence[ItemResult] | None:
-        try:
-            return sheet_items(spec.of(design), fineness=COARSE)
-        except InvalidSettings:  # no outline: struts almost touch
-            return None
 
-    return items
+def _of_other(selection: Selection, other: Finalist) -> Selection:
+    """Return the selection of the best design of another chain."""
+    return replace(
+        selection,
+        response=other.response,
+        found=other.found,
+        efficiency_before=other.response.efficiency,
+        efficiency_after=other.response.efficiency,
+        verification=other.verification,
+        items=other.items,
+    )
 
 
 def with_design(selection: Selection, design: Design) -> Selection:

@@ -187,7 +187,13 @@ def triangulated(
         geometry.SetMaterial(domain, f"hub{node}")
     # Arcs are divided here and not by Netgen.
     grown = {"grading": fineness.grading, "curvaturesafety": 1.0}
-    return module.Mesh(geometry.GenerateMesh(maxh=size, **grown))
+    try:
+        return module.Mesh(geometry.GenerateMesh(maxh=size, **grown))
+    except Exception as error:  # Netgen's own class, which is not exported
+        raise InvalidSettings(
+            f"the outline cannot be meshed with triangles of {size:.3g} mm ({error}); choose "
+            "another size, or wider gaps between struts"
+        ) from error
 
 
 def check_apart(hubs: dict[int, NDArray[np.float64]], radii: NDArray[np.float64]) -> None:

@@ -1,0 +1,129 @@
+"""Functions that are computed in processes of their own.
+
+Functions in Python hold the interpreter lock most of the time, so that threads do not speed them
+up. A process sends values to its parent while it computes them.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from bellcrank import errors
+from bellcrank.errors import BellcrankError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+PROGRAM = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from bellcrank.processes import main
+main(*sys.argv[2:])
+"""
+"""Program of the process. It does not import the main module of its parent."""
+SINGLE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+class FunctionProcess:
+    """A function that is computed in a process, which sends values.
+
+    Parameters
+    ----------
+    module, function
+        Names of a module and of a function in it. Its first argument is a function that sends a
+        value.
+    arguments
+        Its other arguments, which can be pickled, as the values can.
+
+    Examples
+    --------
+    >>> list(FunctionProcess("bellcrank.processes", "send_all", ["first", 2]))
+    ['first', 2]
+    """
+
+    def __init__(self, module: str, function: str, *arguments: object) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, json.dumps(sys.path), module, function],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, **SINGLE_THREAD},
+        )
+        assert self._process.stdin is not None
+        try:
+            with self._process.stdin as stream:
+                pickle.dump(arguments, stream)
+        except BrokenPipeError:
+            pass  # reported by the end of the process
+
+    def __iter__(self) -> Iterator[Any]:
+        """Yield the values that the process sends.
+
+        Raises
+        ------
+        BellcrankError
+            The error of the process.
+        RuntimeError
+            If the process ended early.
+        """
+        assert self._process.stdout is not None
+        with self._process.stdout as stream:
+            while True:
+                try:
+                    message = pickle.load(stream)
+                except (EOFError, pickle.UnpicklingError, ValueError, OSError):
+                    code = self._process.wait()
+                    raise RuntimeError(f"a process ended with status {code}") from None
+                if message is None:
+                    self._process.wait()
+                    return
+                kind, content = message
+                if kind is not None:
+                    raise _error(kind, content)
+                yield content
+
+    def kill(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.wait()
+
+
+def send_all(send: Any, values: list[Any]) -> None:
+    """Send values one by one."""
+    for value in values:
+        send(value)
+
+
+def _error(name: str, message: str) -> Exception:
+    """Return the error of a process."""
+    kind = getattr(errors, name, None)
+    if isinstance(kind, type) and issubclass(kind, BellcrankError):
+        return kind(message)
+    return RuntimeError(f"{name}: {message}")
+
+
+def main(module: str, function: str) -> None:
+    """Compute a function, and write the values that it sends to standard output."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+    stream = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    try:
+        arguments = pickle.load(sys.stdin.buffer)
+        computed = getattr(importlib.import_module(module), function)
+        computed(lambda value: _write(stream, (None, value)), *arguments)
+        _write(stream, None)
+    except (BrokenPipeError, KeyboardInterrupt):
+        os._exit(1)  # the parent has ended
+    except Exception as error:
+        _write(stream, (type(error).__name__, str(error)))
+
+
+def _write(stream: BinaryIO, message: object) -> None:
+    pickle.dump(message, stream)
+    stream.flush()

@@ -1,0 +1,92 @@
+"""Differences between the model of a refinement and better ones.
+
+A refinement has one element in each strut. The difference of the channels of a better model, at one
+geometry, is added to those of nearby geometries, so that the items follow as in the better model,
+to zeroth order in the change of the geometry.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics import Channel, StrokeRecord
+
+    Values = NDArray[np.float64]
+    Records = Mapping[str, StrokeRecord]
+    """Channels along the stroke by load case."""
+
+LARGEST_DEPARTURE = 0.5
+"""Largest difference of the motions of two models on the same path, over the motion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Difference:
+    """Channels of a better model less those of one element in each strut, at one geometry.
+
+    Parameters
+    ----------
+    channels
+        Differences of channels by load case, in the shapes of the channels. A channel that is not
+        known in both models has none.
+    overlaps
+        By how much struts overlap beyond the bound on their gaps, by load case; lattice units.
+    """
+
+    channels: Mapping[str, Mapping[Channel, Values]] = field(default_factory=dict)
+    overlaps: Mapping[str, float] = field(default_factory=dict)
+
+    def added_to(self, case: str, channels: Mapping[Channel, Values]) -> dict[Channel, Values]:
+        """Return channels (..., F, ...) of a load case as the better model has them."""
+        own = self.channels.get(case, {})
+        return {each: value + own.get(each, 0.0) for each, value in channels.items()}
+
+
+NO_DIFFERENCE = Difference()
+
+
+def difference(better: Records, here: Records, gaps: Mapping[str, float]) -> Difference:
+    """Return the difference of two models.
+
+    Parameters
+    ----------
+    better, here
+        Channels of the better model and of one element in each strut, at the same fractions.
+    gaps
+        Bounds on the gaps between struts by load case.
+    """
+    channels: dict[str, dict[Channel, Values]] = {}
+    overlaps: dict[str, float] = {}
+    for case, record in better.items():
+        own = here[case].channels
+        found = {
+            each: value - own[each]
+            for each, value in record.channels.items()
+            if each in own and value.shape == own[each].shape
+        }
+        channels[case] = {each: v for each, v in found.items() if np.isfinite(v).all()}
+        gap = float(record.given.get("clearance", np.inf))
+        # Gaps are known where they are small; the refined geometry is at the bound.
+        overlaps[case] = max(0.0, gaps.get(case, 0.0) - gap)
+    return Difference(channels, overlaps)
+
+
+def on_same_path(first: Records, second: Records) -> bool:
+    """Whether the motions of two models are so near to each other that they are on one path."""
+    for case, record in first.items():
+        inputs = [v for c, v in record.channels.items() if c.name == "input_motion"]
+        for channel, value in record.channels.items():
+            if channel.name not in {"motion", "displacement"}:
+                continue
+            other = second[case].channels[channel]
+            size = max(float(np.abs(each).max(initial=0.0)) for each in (value, *inputs))
+            if not float(np.abs(other - value).max()) <= LARGEST_DEPARTURE * size:
+                return False
+    return True

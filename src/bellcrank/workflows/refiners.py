@@ -1,0 +1,153 @@
+"""Refinement of several designs at a time, each in a process."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from dataclasses import replace
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.fem.continuum.mesh import COARSE
+from bellcrank.fem.specification import sheet_records
+from bellcrank.processes import FunctionProcess
+from bellcrank.refine import Refinement, RefinementSettings, refine_design
+from bellcrank.search.parallel import POLL_INTERVAL
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from bellcrank.model import Design
+    from bellcrank.part import PartSpec
+    from bellcrank.refine.differences import Records
+    from bellcrank.refine.refinement import Progress
+
+    Report = Callable[[int, Progress], None]
+
+EVALUATIONS = 400
+"""Number of geometries that the refinement of a design of a search evaluates."""
+SETTINGS = RefinementSettings(evaluations=EVALUATIONS)
+
+
+def refine_designs(
+    designs: Sequence[Design],
+    spec: PartSpec | None,
+    report: Report,
+    workers: int,
+    stop: threading.Event,
+) -> list[Refinement]:
+    """Refine designs and return the results in their order.
+
+    Parameters
+    ----------
+    designs
+        Designs of frames in the plane with a specification.
+    spec
+        Part that is computed in the sheet; None for no sheet.
+    report
+        Called with the number of a design and each accepted step, from threads of their own.
+    workers
+        Number of designs at a time. Several are refined in processes.
+    stop
+        Event that stops all; there are fewer results then.
+    """
+    workers = min(workers, len(designs))
+    if workers > 1:
+        return _Refiners(designs, spec, report).run(workers, stop)
+    results: list[Refinement] = []
+    for number, design in enumerate(designs):
+
+        def step(progress: Progress, number: int = number) -> bool:
+            report(number, progress)
+            return not stop.is_set()
+
+        found = refine_design(design, SETTINGS, step, sheet=sheet_of(spec))
+        if stop.is_set():
+            break
+        results.append(found)
+    return results
+
+
+class _Refiners:
+    """Refinements in processes, each followed by a thread."""
+
+    def __init__(self, designs: Sequence[Design], spec: PartSpec | None, report: Report) -> None:
+        self.designs, self.spec, self.report = designs, spec, report
+        self.results: dict[int, Refinement] = {}
+        self.errors: list[BaseException] = []
+        self.waiting = deque(range(len(designs)))
+        self.running: list[FunctionProcess] = []
+        self.lock = threading.Lock()
+        self.stopped = False
+
+    def run(self, workers: int, stop: threading.Event) -> list[Refinement]:
+        """Return the results in the order of the designs; fewer if they were stopped."""
+        threads = [threading.Thread(target=self._work, daemon=True) for _ in range(workers)]
+        for thread in threads:
+            thread.start()
+        try:
+            for thread in threads:
+                while thread.is_alive() and not stop.is_set():
+                    thread.join(POLL_INTERVAL)
+        finally:
+            self._stop()
+        if self.errors:
+            raise self.errors[0]
+        return [self.results[number] for number in sorted(self.results)]
+
+    def _work(self) -> None:
+        while True:
+            with self.lock:
+                if self.stopped or not self.waiting:
+                    return
+                number = self.waiting.popleft()
+                process = FunctionProcess(
+                    __name__, send_refinement.__name__, self.designs[number], self.spec
+                )
+                self.running.append(process)
+            try:
+                for value in process:
+                    if isinstance(value, Refinement):
+                        self.results[number] = value
+                    else:
+                        self.report(number, value)
+            except BaseException as error:  # raised again by `run`
+                if not self.stopped:
+                    self.errors.append(error)
+                self._stop()
+                return
+
+    def _stop(self) -> None:
+        with self.lock:
+            self.stopped = True
+            for process in self.running:
+                process.kill()
+
+
+def send_refinement(send: Callable[[object], None], design: Design, spec: PartSpec | None) -> None:
+    """Refine a design; send each accepted step without derivatives, then the result."""
+
+    def report(progress: Progress) -> bool:
+        none = np.zeros((0, 0))
+        rows = replace(progress.rows, objective_slopes=none, constraint_slopes=none)
+        send(replace(progress, rows=rows))
+        return True
+
+    send(refine_design(design, SETTINGS, report, sheet=sheet_of(spec)))
+
+
+def sheet_of(spec: PartSpec | None) -> Callable[[Design], Records | None] | None:
+    """Return a function from a design to its channels in the sheet; None without NGSolve."""
+    if spec is None or find_spec("ngsolve") is None:
+        return None
+
+    def records(design: Design) -> Records | None:
+        try:
+            return sheet_records(spec.of(design), fineness=COARSE)
+        except InvalidSettings:  # no outline: struts almost touch
+            return None
+
+    return records
