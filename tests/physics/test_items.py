@@ -17,7 +17,7 @@ from bellcrank.mechanics import (
     tightened,
     violation,
 )
-from bellcrank.mechanics.items import path_error
+from bellcrank.mechanics.items import path_deviation, path_error
 from bellcrank.model import Item
 
 FRACTIONS = np.array([0.25, 0.5, 0.75, 1.0])
@@ -55,6 +55,8 @@ def item(quantity: str, **bounds: Any) -> Item:
         (item("off_axis", at_most=0.1), 0.08, 0.0),
         (item("rotation", at_least=-5.0, at_most=5.0, start=0.0), -6.0, 1.0 / 5.0),
         (item("rotation", at_least=-5.0, at_most=5.0), 3.0, 0.0),
+        (item("travel", at_least=1.2, at_most=40.0), 1.0, 0.2 / 1.2),
+        (item("travel", at_least=0.0, at_most=0.8), 1.0, 0.2 / 0.8),
         (item("payload", at_least=0.2), 0.1, 0.1 / 0.2),
         (item("sag", at_most=0.1), 0.25, 0.15 / 0.1),
         (item("input_force", of="largest", at_most=0.6, start=0.0), 0.9, 0.3 / 0.6),
@@ -114,6 +116,15 @@ def test_an_offset_circle_has_the_error_of_its_distance() -> None:
     distance = 0.1 * np.sqrt(np.sin(angles) ** 2 + (1.0 - np.cos(angles)) ** 2)
     expected = math.sqrt((distance**2).mean()) / (1.1 * np.pi / 2.0)
     assert float(path_error(fractions, motion, wanted)) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_motion_that_ends_beside_the_path_deviates_across_it() -> None:
+    corners = np.array([[0.0, 0.0], [4.0, 0.0]])
+    motion = FRACTIONS[:, None] * np.array([4.0, 0.04])
+    apart = path_deviation(FRACTIONS, np.stack([motion, 0.0 * motion]), corners)
+    assert apart[0, -1] == pytest.approx([0.0, 0.01], abs=1e-6)
+    assert np.isinf(apart[1]).all()
+    assert path_deviation(FRACTIONS, motion, corners) == pytest.approx(apart[0])
 
 
 def test_a_right_angle_that_is_cut_has_a_large_error() -> None:

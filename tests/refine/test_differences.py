@@ -63,7 +63,7 @@ def test_items_must_be_met_in_every_model() -> None:
     variables = variables_of(design, 0.3, (width, width))
     vector = np.zeros(variables.count)
     shift = np.zeros((16, 3))
-    shift[:, 1] = 0.3
+    shift[:, 2] = 0.3
     other = Difference({wanted.case: {Channel("motion", wanted.output): shift}})
     one, both = (
         RowEvaluator(variables, design.mask, wanted.items, models=models).evaluate(vector)
@@ -83,7 +83,8 @@ def test_items_must_be_met_in_every_model() -> None:
 
 @pytest.mark.slow
 def test_a_refinement_meets_a_sheet_that_differs_from_frames() -> None:
-    """The sheet is a frame whose output moves farther off its axis, by 3 % of the input."""
+    """The sheet is a frame whose output moves farther off its axis, by 20 % of the
+    input."""
     calls = []
 
     def sheet(design: Design) -> Records:
@@ -92,7 +93,8 @@ def test_a_refinement_meets_a_sheet_that_differs_from_frames() -> None:
         (case, found), *_ = evaluator.records.items()
         channel = next(each for each in found.channels if each.name == "motion")
         moved = found.channels[channel].copy()
-        moved[:, 1] += 0.2 * design.problem.input.amount * found.fractions
+        aside = np.sign(moved[-1, 2]) * 0.2 * design.problem.input.amount
+        moved[:, 2] += aside * found.fractions
         calls.append(case)
         return {case: replace(found, channels={**found.channels, channel: moved})}
 

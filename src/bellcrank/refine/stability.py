@@ -9,7 +9,7 @@ import numpy as np
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.mechanics.frames.quantities import Measures
@@ -65,3 +65,22 @@ def _local_minima(values: dict[float, float]) -> list[float]:
     inner = padded[1:-1]
     is_low = (inner <= padded[:-2]) & (inner <= padded[2:]) & (inner < SOFT * inner.min())
     return [each for each, low in zip(fractions, is_low.tolist(), strict=True) if low]
+
+
+def lower_peaks(values: Mapping[float, float]) -> dict[float, float]:
+    """Return where the largest value before or after each is, whichever is smaller.
+
+    A value counts as before and after itself, so that values on a slope have no other peak.
+
+    Examples
+    --------
+    >>> lower_peaks({0.2: 5.0, 0.4: 1.0, 0.6: 3.0, 0.8: 2.0})
+    {0.2: 0.2, 0.4: 0.6, 0.6: 0.6, 0.8: 0.8}
+    """
+    fractions = sorted(values)
+    peaks = {}
+    for k, here in enumerate(fractions):
+        sides = (fractions[: k + 1], fractions[k:])
+        highest = [max(side, key=values.__getitem__) for side in sides]
+        peaks[here] = min(highest, key=values.__getitem__)
+    return peaks
