@@ -191,6 +191,8 @@ class StepControl:
         First, largest and smallest step, as fractions of the full input.
     iterations
         Newton iterations after which a step is halved.
+    factorisations
+        Number of factorisations after which a failed step ends the path.
 
     Raises
     ------
@@ -202,6 +204,7 @@ class StepControl:
     largest: float = 1.0 / 8.0
     smallest: float = 1e-4
     iterations: int = 15
+    factorisations: int = 2**31
 
     def __post_init__(self) -> None:
         for name in ("first", "largest"):
@@ -264,7 +267,10 @@ class _Continuation:
             slope = None if found is None else self._joined_rate(found[0], found[2], here, rate)
             if found is None or slope is None:
                 step = (load - here.load) / 2.0
-                if step < self.control.smallest:
+                if (
+                    step < self.control.smallest
+                    or self.factorisations > self.control.factorisations
+                ):
                     loss = self._kind_of_loss(tangent, rate, initial_stiffness)
                     lost = unstable or loss is not None
                     status = PathStatus.SNAPPED if lost else PathStatus.UNCONVERGED

@@ -13,7 +13,7 @@ from bellcrank.fem.contact import centre_lines, find_contacts
 from bellcrank.fem.continuum.analysis import interpolator
 from bellcrank.fem.continuum.equations import ContinuumEquations
 from bellcrank.fem.continuum.fields import stress_field
-from bellcrank.fem.continuum.mesh import FINE, plane_mesh
+from bellcrank.fem.continuum.mesh import COARSE, FINE, plane_mesh
 from bellcrank.fem.continuum.response import complete_state, hub_displacements
 from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.path import PathState, PathStatus, StepControl, follow_path
@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     Values = NDArray[np.float64]
 
 STEPS = StepControl(first=0.125, largest=0.125, smallest=1e-3)
+ROUGH_STEPS = StepControl(first=0.125, largest=0.125, smallest=1e-2, factorisations=100)
+"""For coarse meshes: paths that need smaller or more steps count as unstable; most need 40 to 60
+factorisations."""
 STATES = 16
 """Number of states along the stroke at which items are evaluated; between the computed ones,
 channels are interpolated by a cubic spline in each part of the stroke without a kink."""
@@ -99,7 +102,8 @@ def sheet_records(
     report
         Called with the name of the load case and the fraction of the stroke reached.
     fineness
-        How fine the mesh is.
+        How fine the mesh is. With `COARSE`, a path that needs steps below a hundredth of the
+        stroke, or more than a hundred factorisations, counts as unstable.
 
     Returns
     -------
@@ -115,8 +119,9 @@ def sheet_records(
     assert wanted is not None
     mesh = plane_mesh(part, size, fineness)
     records = {}
-    for name, case in part.design.problem.cases.items():
-        record = _Sheet(part, mesh, name, case, wanted).record(partial(report, name))
+    control = ROUGH_STEPS if fineness is COARSE else STEPS
+    for name in part.design.problem.cases:
+        record = _Sheet(part, mesh, name, wanted, control).record(partial(report, name))
         if record is None:
             return None
         records[name] = record
@@ -131,10 +136,11 @@ class _Sheet:
         part: Part,
         mesh: ContinuumMesh,
         name: str,
-        case: Problem,
         wanted: Specification,
+        control: StepControl,
     ) -> None:
-        self.part, self.mesh, self.case = part, mesh, case
+        self.part, self.mesh, self.control = part, mesh, control
+        self.case = part.design.problem.cases[name]
         self.items = [item for item in wanted.items if item.case == name]
         self.objectives = [each for each in wanted.maximise if each.case == name]
         self.weight = wanted.weight
@@ -168,7 +174,7 @@ class _Sheet:
         """Follow a load case to the full stroke; None if stability is lost before."""
         part = replace(self.part, design=replace(self.part.design, problem=problem))
         equations = ContinuumEquations(continuum_system(part, self.mesh, LAW))
-        path = follow_path(equations, STEPS, report)
+        path = follow_path(equations, self.control, report)
         if path.status is not PathStatus.CONVERGED:
             return None
         stresses = [stress_field(equations, state.unknowns) for state in path.states]

@@ -39,7 +39,7 @@ RESERVE = 0.05
 too."""
 PRINTABLE = 1e-2
 """Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
-SHEETS = 5
+SHEETS = 4
 """Largest number of geometries that are computed in the sheet: it takes a minute."""
 SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""

@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 
     from bellcrank.fem.continuum.system import ContinuumSystem
 
-TOLERANCE = 1e-9
-"""Admissible residual as a fraction of the largest force on a node."""
+TOLERANCE = 1e-6
+"""Admissible residual as a fraction of the largest force on a node, before a last correction, which
+reduces it to its square."""
 COMPLIANCE = 1e-8
 """Compliance of exact constraints in the stiffness, as a fraction of 1 / k."""
 SINGULAR = 1e12
