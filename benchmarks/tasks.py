@@ -2,9 +2,10 @@
 
 Every bundled task is designed as by `bellcrank design TASK` with several seeds, on two cores. The
 chosen design is evaluated by frames with eight elements in each strut, and in the sheet. Each run
-is added to ``docs/tasks/runs.json`` as soon as it is done; runs that are in the record are not
-repeated unless ``--again`` is given. ``--only selector,selector:A,selector:B`` designs the load
-cases of a task together, and each alone. A table of medians is printed.
+is added to ``docs/tasks/runs.json`` (or ``--out FILE``) as soon as it is done; runs that are in the
+record are not repeated unless ``--again`` is given. ``--only selector,selector:A,selector:B``
+designs the load cases of a task together, and each alone. ``--first N`` is the first seed. A table
+of medians is printed; times include the sheet of the refinement, not the compilation.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def core_seconds() -> float:
 def run(name: str, seed: int) -> dict[str, Any]:
     """Design a task with one seed, and evaluate the design."""
     task = task_named(name)
-    row: dict[str, Any] = {"task": name, "seed": seed}
+    row: dict[str, Any] = {"task": name, "seed": seed, "commit": provenance()["commit"]}
     started, used = time.perf_counter(), core_seconds()
     with TemporaryDirectory() as temporary:
         folder = start_design(
@@ -125,19 +126,19 @@ def _in_sheet(report: DesignReport, task: Task) -> Sequence[ItemResult] | None:
         return None
 
 
-def write(rows: list[dict[str, Any]]) -> None:
+def write(rows: list[dict[str, Any]], path: Path) -> None:
     """Write the record."""
-    RECORD.parent.mkdir(exist_ok=True)
     ordered = sorted(rows, key=lambda row: (row["task"], row["seed"]))
     data = {"provenance": provenance(), "runs": ordered}
-    RECORD.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    lines = json.dumps(data, indent=1) + "\n"
+    path.write_text(lines, encoding="utf-8")
 
 
 def summary(rows: list[dict[str, Any]]) -> list[str]:
     """Return the rows of the table.
 
     Runs that met all items by frames of 8 elements, and in the sheet; the median gain of the
-    refined designs, the median time on the cores in s, and the binding items of the others.
+    refined designs, the median time on two cores in s, and the binding items of the others.
     """
     lines = []
     for name in sorted({row["task"] for row in rows}):
@@ -148,7 +149,7 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
         lines.append(
             f"| `{name}` | {sum(row.get('met', False) for row in own)} of {len(own)} "
             f"| {sum(row.get('met_in_sheet', False) for row in own)} of {len(own)} "
-            f"| {median(gains):.2f} | {median(row['core_seconds'] for row in own):.0f} s "
+            f"| {median(gains):.2f} | {median(row['seconds'] for row in own):.0f} s "
             f"| {', '.join(map(_item, missed)) or '-'} | {', '.join(map(_item, sheet)) or '-'} |"
         )
     return lines
@@ -164,19 +165,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", default=",".join(bundled_tasks()))
     parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--again", action="store_true")
+    parser.add_argument("--out", type=Path, default=RECORD)
     given = parser.parse_args()
     rows: list[dict[str, Any]] = []
-    if RECORD.exists():
-        rows = json.loads(RECORD.read_text(encoding="utf-8"))["runs"]
-    for seed in range(given.seeds):
+    if given.out.exists():
+        rows = json.loads(given.out.read_text(encoding="utf-8"))["runs"]
+    for seed in range(given.first, given.first + given.seeds):
         for name in given.only.split(","):
             known = [row for row in rows if (row["task"], row["seed"]) == (name, seed)]
             if known and not given.again:
                 continue
             row = run(name, seed)
             rows = [each for each in rows if each not in known] + [row]
-            write(rows)
+            write(rows, given.out)
             print(
                 f"{name} {seed}: met {row.get('met')}, in the sheet {row.get('met_in_sheet')}, "
                 f"{row['seconds']:.0f} s, {row.get('binding')} {row.get('binding_in_sheet')}",
