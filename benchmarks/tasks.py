@@ -130,8 +130,7 @@ def write(rows: list[dict[str, Any]], path: Path) -> None:
     """Write the record."""
     ordered = sorted(rows, key=lambda row: (row["task"], row["seed"]))
     data = {"provenance": provenance(), "runs": ordered}
-    lines = json.dumps(data, indent=1) + "\n"
-    path.write_text(lines, encoding="utf-8")
+    path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
 def summary(rows: list[dict[str, Any]]) -> list[str]:

@@ -22,6 +22,7 @@ from bellcrank.plots.movies import (
     stroke_schedule,
     write_movie,
 )
+from bellcrank.task import find_task
 from bellcrank.workflows import find_design
 from bellcrank.workflows.animate import MotionOptions, animate_motion, in_one_model, motion_movie
 from bellcrank.workflows.loading import loading_path
@@ -163,6 +164,18 @@ def test_a_frame_is_compared_with_a_frame():
     assert all(" · frame · " in sequence.notes[-1] for sequence in shown.sequences)
     both = [pairs[0], ("crane", human)]
     assert in_one_model(both) == both
+
+
+def test_the_load_cases_of_a_design_are_shown_side_by_side():
+    task = find_task("selector")
+    assert task is not None
+    short = MovieSettings(seconds=0.4, fps=10, size=SMALL)
+    movie = motion_movie([("selector", task.problem.full_design())], short)
+    assert [each.title for each in movie.sequences] == ["A", "B"]
+    right, up = (
+        each.displacement[:, each.problem.output.nodes].mean(axis=1)[-1] for each in movie.sequences
+    )
+    assert not np.allclose(right, up)
 
 
 def test_each_frame_shows_the_response_to_a_part_of_the_stroke():

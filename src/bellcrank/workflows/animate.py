@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
     Progress = Callable[[str, int, int], None]
 
+MOST_CASES = 2
+"""Largest number of load cases in a movie."""
 FIGURE_SPACE = "\u2007"
 """A space as wide as a digit, so that text does not move while numbers grow."""
 
@@ -65,8 +67,9 @@ def animate_motion(
 ) -> None:
     """Write a movie of one design, or of two side by side, from rest to the full stroke and back.
 
-    Each frame shows an equilibrium; the colour of a beam shows its strain energy. The return
-    motion repeats the forward motion in reverse, also if the design snaps.
+    The load cases of one design are shown side by side, at most `MOST_CASES` of them. Each frame
+    shows an equilibrium; the colour of a beam shows its strain energy. The return motion repeats
+    the forward motion in reverse, also if the design snaps.
 
     Parameters
     ----------
@@ -115,12 +118,24 @@ def motion_movie(
     def computed(done: int) -> None:
         progress("loading", len(responses) * states + done, len(designs) * states)
 
-    designs = in_one_model(designs)
+    designs = by_case(in_one_model(designs))
     for _, design in designs:
         responses.append(loading_path(design, part, options.objective, computed))
     shown = [(name, design, way) for (name, design), way in zip(designs, responses, strict=True)]
     sequences = tuple(_sequence(*one, options.magnify) for one in shown)
     return Movie(sequences, _graphs(shown), order)
+
+
+def by_case(designs: Sequence[tuple[str, Design]]) -> list[tuple[str, Design]]:
+    """Return one design of several load cases once for each case, at most `MOST_CASES`.
+
+    Several designs, and a design of one load case, are returned as they are.
+    """
+    if len(designs) > 1 or len(designs[0][1].problem.cases) == 1:
+        return list(designs)
+    (_, design), *_ = designs
+    cases = list(design.problem.cases.items())[:MOST_CASES]
+    return [(name, replace(design, problem=problem)) for name, problem in cases]
 
 
 def in_one_model(designs: Sequence[tuple[str, Design]]) -> list[tuple[str, Design]]:

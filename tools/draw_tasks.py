@@ -1,0 +1,69 @@
+"""Pictures and movies of the bundled tasks for the documentation: ``python tools/draw_tasks.py``.
+
+For each task, the run of ``docs/tasks/runs.json`` that meets the most (by frames, then in the
+sheet)
+with the smallest seed is drawn: ``docs/tasks/NAME.png`` with the paths of the outputs, and
+``docs/tasks/NAME.gif``. ``--only NAME,NAME`` draws some.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bellcrank.mechanics.frames.joints import with_joints
+from bellcrank.model import Design
+from bellcrank.part import models
+from bellcrank.plots import draw_cases
+from bellcrank.plots.movies import MovieSettings
+from bellcrank.task import find_task
+from bellcrank.workflows.animate import animate_motion
+from bellcrank.workflows.part_figures import part_figures
+from bellcrank.workflows.pictures import case_motions
+
+if TYPE_CHECKING:
+    from bellcrank.task import Task
+
+FOLDER = Path(__file__).parents[1] / "docs" / "tasks"
+MOVIE = MovieSettings(seconds=2.0, fps=12, size=(480, 270))
+
+
+def design_of(task: Task, run: dict[str, Any]) -> Design:
+    """Return the design of a run of the record."""
+    problem = models["frames"](task.problem, task.part)
+    bits = np.unpackbits(np.frombuffer(bytes.fromhex(run["mask"]), np.uint8))
+    mask = bits[: problem.lattice.beam_count].astype(bool)
+    moved = problem.with_geometry(np.array(run["positions"]), np.array(run["widths"]))
+    return Design(with_joints(moved, mask), mask)
+
+
+def best(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the run that is drawn."""
+    made = [run for run in runs if "mask" in run]
+    return min(made, key=lambda run: (not run["met"], not run["met_in_sheet"], run["seed"]))
+
+
+def main() -> None:
+    """Draw the tasks that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", default="")
+    given = parser.parse_args()
+    runs = json.loads((FOLDER / "runs.json").read_text(encoding="utf-8"))["runs"]
+    names = given.only.split(",") if given.only else sorted({run["task"] for run in runs})
+    for name in names:
+        task = find_task(name)
+        if task is None:  # a load case alone
+            continue
+        design = design_of(task, best([run for run in runs if run["task"] == name]))
+        motions = case_motions(design, task.part, part_figures(design, task.part))
+        draw_cases(motions, FOLDER / f"{name}.png", overwrite=True)
+        animate_motion([(name, design)], FOLDER / f"{name}.gif", MOVIE, overwrite=True)
+        print(name, flush=True)
+
+
+if __name__ == "__main__":
+    main()
