@@ -38,6 +38,7 @@ def refine_designs(
     report: Report,
     workers: int,
     stop: threading.Event,
+    settings: RefinementSettings = SETTINGS,
 ) -> list[Refinement]:
     """Refine designs and return the results in their order.
 
@@ -53,10 +54,12 @@ def refine_designs(
         Number of designs at a time. Several are refined in processes.
     stop
         Event that stops all; there are fewer results then.
+    settings
+        Settings of each refinement.
     """
     workers = min(workers, len(designs))
     if workers > 1:
-        return _Refiners(designs, spec, report).run(workers, stop)
+        return _Refiners(designs, spec, settings, report).run(workers, stop)
     results: list[Refinement] = []
     for number, design in enumerate(designs):
 
@@ -64,7 +67,7 @@ def refine_designs(
             report(number, progress)
             return not stop.is_set()
 
-        found = refine_design(design, SETTINGS, step, sheet=sheet_of(spec))
+        found = refine_design(design, settings, step, sheet=sheet_of(spec))
         if stop.is_set():
             break
         results.append(found)
@@ -74,8 +77,15 @@ def refine_designs(
 class _Refiners:
     """Refinements in processes, each followed by a thread."""
 
-    def __init__(self, designs: Sequence[Design], spec: PartSpec | None, report: Report) -> None:
-        self.designs, self.spec, self.report = designs, spec, report
+    def __init__(
+        self,
+        designs: Sequence[Design],
+        spec: PartSpec | None,
+        settings: RefinementSettings,
+        report: Report,
+    ) -> None:
+        self.designs, self.report = designs, report
+        self.options = (spec, settings)
         self.results: dict[int, Refinement] = {}
         self.errors: list[BaseException] = []
         self.waiting = deque(range(len(designs)))
@@ -105,7 +115,7 @@ class _Refiners:
                     return
                 number = self.waiting.popleft()
                 process = FunctionProcess(
-                    __name__, send_refinement.__name__, self.designs[number], self.spec
+                    __name__, send_refinement.__name__, self.designs[number], *self.options
                 )
                 self.running.append(process)
             try:
@@ -127,7 +137,12 @@ class _Refiners:
                 process.kill()
 
 
-def send_refinement(send: Callable[[object], None], design: Design, spec: PartSpec | None) -> None:
+def send_refinement(
+    send: Callable[[object], None],
+    design: Design,
+    spec: PartSpec | None,
+    settings: RefinementSettings,
+) -> None:
     """Refine a design; send each accepted step without derivatives, then the result."""
 
     def report(progress: Progress) -> bool:
@@ -136,7 +151,7 @@ def send_refinement(send: Callable[[object], None], design: Design, spec: PartSp
         send(replace(progress, rows=rows))
         return True
 
-    send(refine_design(design, SETTINGS, report, sheet=sheet_of(spec)))
+    send(refine_design(design, settings, report, sheet=sheet_of(spec)))
 
 
 def sheet_of(spec: PartSpec | None) -> Callable[[Design], Records | None] | None:

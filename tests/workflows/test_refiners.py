@@ -1,0 +1,75 @@
+"""Refinement of several designs at a time."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.model import Design, gallery_design
+from bellcrank.refine import RefinementSettings
+from bellcrank.task import find_task
+from bellcrank.workflows.refiners import refine_designs
+
+if TYPE_CHECKING:
+    from bellcrank.refine.refinement import Progress
+
+
+def designs() -> list[Design]:
+    """Return the free crane for two tasks of a straight one, without a payload."""
+    task, crane = find_task("straight-crane"), gallery_design("machine", "crane")
+    assert task is not None
+    assert crane is not None
+    wanted = task.problem.specification
+    assert wanted is not None
+    found = []
+    for largest in (0.1, 0.3):
+        items = tuple(
+            replace(item, at_most=largest) if item.quantity == "off_axis" else item
+            for item in wanted.items
+            if item.quantity != "payload"
+        )
+        problem = replace(task.problem, specification=replace(wanted, items=items))
+        found.append(Design(problem, crane.mask))
+    return found
+
+
+def test_results_do_not_depend_on_the_number_of_workers() -> None:
+    settings = RefinementSettings(steps=4)
+    steps: dict[int, list[tuple[int, int]]] = {1: [], 2: []}
+
+    def report(workers: int, number: int, progress: Progress) -> None:
+        steps[workers].append((number, progress.step))
+
+    results = [
+        refine_designs(
+            designs(), None, lambda *words, workers=workers: report(workers, *words), workers,
+            threading.Event(), settings,
+        )
+        for workers in (1, 2)
+    ]  # fmt: skip
+    assert [len(each) for each in results] == [2, 2]
+    for alone, parallel in zip(*results, strict=True):
+        assert alone.after.objective == parallel.after.objective
+        assert np.array_equal(
+            alone.design.problem.lattice.positions, parallel.design.problem.lattice.positions
+        )
+    assert sorted(steps[1]) == sorted(steps[2])
+    assert {number for number, _ in steps[1]} == {0, 1}
+
+
+def test_a_stop_ends_the_processes() -> None:
+    stop = threading.Event()
+    stopped: list[float] = []
+
+    def report(_number: int, _progress: Progress) -> None:
+        if not stop.is_set():
+            stopped.append(time.monotonic())
+            stop.set()
+
+    results = refine_designs(designs(), None, report, 2, stop, RefinementSettings(steps=400))
+    assert len(results) < 2
+    assert time.monotonic() - stopped[0] < 20.0
