@@ -306,7 +306,7 @@ def reduced(item: Item, record: StrokeRecord) -> tuple[Values, Values]:
     return low, high
 
 
-def excess(item: Item, low: Values, high: Values) -> Values:
+def relative_distance(item: Item, low: Values, high: Values) -> Values:
     """Return by how much values exceed the bounds of an item, over the size of the bound.
 
     Negative within the bounds; then its opposite is the margin.
@@ -335,7 +335,7 @@ def violation(item: Item, low: Values, high: Values) -> Values:
     low, high : (...)
         Smallest and largest value that the bounds apply to (`reduced`).
     """
-    return np.log1p(np.clip(excess(item, low, high), 0.0, LARGEST_EXCESS))
+    return np.log1p(np.clip(relative_distance(item, low, high), 0.0, LARGEST_EXCESS))
 
 
 def worst_value(item: Item, record: StrokeRecord) -> float:
@@ -352,7 +352,7 @@ def worst_value(item: Item, record: StrokeRecord) -> float:
 
 def margin(item: Item, value: float) -> float:
     """Return the distance of a value from the nearest bound, over its size; negative beyond."""
-    return -float(excess(item, np.asarray(value), np.asarray(value)))
+    return -float(relative_distance(item, np.asarray(value), np.asarray(value)))
 
 
 TOLERANCE = 1e-9

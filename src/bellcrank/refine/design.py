@@ -45,6 +45,8 @@ SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
 HALVINGS = 2
 """Number of times the path of a refinement that is not near the sheet is halved."""
+LARGEST_MISS = 0.5
+"""Largest sum of violations in the sheet at which a geometry is corrected and not taken back."""
 MET = 1e-3
 """Sum of violations at which they are."""
 ROUNDS = 3
@@ -79,11 +81,16 @@ class State:
     sheet_records: Records = field(default_factory=dict)
 
     @property
-    def is_near_sheet(self) -> bool:
+    def is_on_path_of_sheet(self) -> bool:
         """Whether the sheet is stable, under payloads too, and on the same path as the frame."""
         if not self.sheet or any(math.isnan(item.value) for item in self.sheet):
             return False
         return on_same_path(self.records, self.sheet_records)
+
+    @property
+    def is_near_sheet(self) -> bool:
+        """Whether the sheet is on the same path, and misses little."""
+        return self.is_on_path_of_sheet and _missed(self.sheet) <= LARGEST_MISS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -272,7 +279,7 @@ class _Job:
         for _ in range(left):
             if not self.goes_on or (state.sheet and all(item.met for item in state.sheet)):
                 return
-            if state.is_near_sheet:
+            if state.is_on_path_of_sheet:
                 models = self._models(vector, state.records, state.sheet_records)
             elif state.met:
                 stable *= 1.5

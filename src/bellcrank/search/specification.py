@@ -24,7 +24,7 @@ from bellcrank.mechanics import (
     tightened,
     violation,
 )
-from bellcrank.mechanics.items import TOLERANCE, excess, reduced
+from bellcrank.mechanics.items import TOLERANCE, reduced, relative_distance
 from bellcrank.search.clearance import gap_less_overlaps, smallest_gap
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
 from bellcrank.search.mirror import MirrorGroups
@@ -304,7 +304,7 @@ class SpecificationEvaluator:
     def _smallest_margin(self, extremes: Extremes) -> Values:
         """Return (...) the smallest margin of an item that follows from channels, at least 0."""
         margins = [
-            -excess(item, *extremes[index])
+            -relative_distance(item, *extremes[index])
             for index, item in enumerate(self.items)
             if index in extremes and item.case and channels_of(item.quantity, item.output)
         ]
