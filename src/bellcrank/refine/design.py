@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import VERIFICATION_INCREMENT, ItemResult, item_results, tightened
+from bellcrank.mechanics import VERIFICATION_INCREMENT, item_results, tightened
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Item, ObjectiveTerm, Specification
-from bellcrank.part.outline import room_for_fillet
-from bellcrank.refine.differences import NO_DIFFERENCE, difference, on_same_path
+from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
-from bellcrank.refine.shape import shape_rows, volume_of
+from bellcrank.refine.shape import volume_of
+from bellcrank.refine.state import State, is_better, latest_met, state_of, total_violation
 from bellcrank.refine.variables import variables_of
-from bellcrank.search import HoppingSettings, SpecificationEvaluator
-from bellcrank.search.verification import Verifier
+from bellcrank.search import SpecificationEvaluator
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     from bellcrank.model import Design, Problem
     from bellcrank.refine.differences import Difference, Records
     from bellcrank.refine.refinement import Progress
-    from bellcrank.refine.variables import Variables
 
     Sheet = Callable[[Design], Records | None]
     Models = tuple[Difference, ...]
@@ -37,60 +35,16 @@ if TYPE_CHECKING:
 RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
-PRINTABLE = 1e-2
-"""Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
 SHEETS = 4
 """Largest number of geometries that are computed in the sheet: it takes a minute."""
 SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
 HALVINGS = 2
 """Number of times the path of a refinement that is not near the sheet is halved."""
-LARGEST_MISS = 0.5
-"""Largest sum of violations in the sheet at which a geometry is corrected and not taken back."""
 MET = 1e-3
 """Sum of violations at which they are."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
-
-
-@dataclass(frozen=True, slots=True)
-class State:
-    """A design before or after its refinement, by frames with eight elements in each beam.
-
-    Parameters
-    ----------
-    objective
-        Smallest objective; the smallest margin where there is none.
-    items
-        Items of the specification; empty if the response is not stable.
-    met
-        Whether all of them are met, and the geometry prints.
-    records
-        Channels along the stroke by load case.
-    sheet
-        Items in the sheet; empty if they were not computed, or it is not stable.
-    sheet_records
-        The channels in the sheet.
-    """
-
-    objective: float
-    items: tuple[ItemResult, ...]
-    met: bool
-    records: Records = field(default_factory=dict)
-    sheet: tuple[ItemResult, ...] = ()
-    sheet_records: Records = field(default_factory=dict)
-
-    @property
-    def is_on_path_of_sheet(self) -> bool:
-        """Whether the sheet is stable, under payloads too, and on the same path as the frame."""
-        if not self.sheet or any(math.isnan(item.value) for item in self.sheet):
-            return False
-        return on_same_path(self.records, self.sheet_records)
-
-    @property
-    def is_near_sheet(self) -> bool:
-        """Whether the sheet is on the same path, and misses little."""
-        return self.is_on_path_of_sheet and _missed(self.sheet) <= LARGEST_MISS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -254,7 +208,7 @@ class _Job:
             if found is None:
                 return
             state, vector, is_last = found
-            if _is_better(state, self.best):
+            if is_better(state, self.best):
                 self.best, self.chosen, self.path = state, vector, self.tried
             if not state.items or not self.goes_on or (state.met and is_last):
                 return
@@ -293,7 +247,7 @@ class _Job:
             state, vector, _ = found
             if state.met and self.goes_on:
                 state = self._in_sheet(sheet, vector, state)
-                if _missed(state.sheet) < _missed(self.best.sheet):
+                if total_violation(state.sheet) < total_violation(self.best.sheet):
                     self.best, self.chosen = state, vector
 
     def _earlier(
@@ -357,7 +311,7 @@ class _Job:
         self.reason = last.reason or "stopped"
         self.steps, self.evaluations = self.steps + last.step, self.evaluations + last.evaluations
         vectors = [each.vector for each in path]
-        state, number = _latest(self.variables, self.design.mask, vectors)
+        state, number = latest_met(self.variables, self.design.mask, vectors)
         self.tried = vectors[: number + 1]
         return state, vectors[number], number == len(vectors) - 1
 
@@ -378,60 +332,3 @@ class _Job:
             return state
         items = tuple(item_results(self.items, records))
         return replace(state, sheet=items, sheet_records=records)
-
-
-def _missed(items: tuple[ItemResult, ...]) -> float:
-    """Return the sum of the violations of items; infinite without any."""
-    return sum(item.violation for item in items) if items else math.inf
-
-
-def _latest(
-    variables: Variables, mask: NDArray[np.bool_], path: list[NDArray[np.float64]]
-) -> tuple[State, int]:
-    """Return state and number of the last geometry of a path that meets all with eight elements.
-
-    The later ones may be too close to a loss of stability. The last geometry, if none is found
-    among a few.
-    """
-    low, high = 0, len(path) - 1
-    found = state_of(variables.problem_at(path[high]), mask), high
-    if found[0].met:
-        return found
-    while high - low > 1:
-        middle = (low + high) // 2
-        state = state_of(variables.problem_at(path[middle]), mask)
-        if state.met:
-            low, found = middle, (state, middle)
-        else:
-            high = middle
-    return found
-
-
-def state_of(problem: Problem, mask: NDArray[np.bool_]) -> State:
-    """Return the state of a design of a problem with a specification."""
-    found = Verifier(problem, HoppingSettings()).verify(mask)
-    assert problem.specification is not None
-    if not found.items:
-        return State(-math.inf, (), met=False)
-    objective = found.response.efficiency - found.response.penalty
-    if found.fault is not None:
-        objective = -sum(item.violation for item in found.items)
-    met = found.fault is None and _prints(problem, mask)
-    return State(objective, found.items, met, found.records)
-
-
-def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
-    """Whether all holes between the struts are open, and no strut or angle is too small."""
-    if shape_rows(problem, mask, math.inf).values.max(initial=0.0) > PRINTABLE:
-        return False
-    lattice = problem.lattice
-    try:
-        room_for_fillet(lattice.positions, lattice.beams[mask], problem.beam_widths[mask])
-    except InvalidSettings:
-        return False
-    return True
-
-
-def _is_better(new: State, old: State) -> bool:
-    """Whether a state meets more, or has the larger objective."""
-    return bool(new.items) and (new.met, new.objective) > (old.met, old.objective)

@@ -1,0 +1,125 @@
+"""States of a refined geometry by better models: frames of 8 elements, and the sheet."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.part.outline import room_for_fillet
+from bellcrank.refine.differences import on_same_path
+from bellcrank.refine.shape import shape_rows
+from bellcrank.search import HoppingSettings
+from bellcrank.search.verification import Verifier
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from bellcrank.mechanics import ItemResult
+    from bellcrank.model import Problem
+    from bellcrank.refine.differences import Records
+    from bellcrank.refine.variables import Variables
+
+PRINTABLE = 1e-2
+"""Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
+LARGEST_MISS = 0.5
+"""Largest sum of violations in the sheet at which a geometry is corrected and not taken back."""
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A design before or after its refinement, by frames with eight elements in each beam.
+
+    Parameters
+    ----------
+    objective
+        Smallest objective; the smallest margin where there is none.
+    items
+        Items of the specification; empty if the response is not stable.
+    met
+        Whether all of them are met, and the geometry prints.
+    records
+        Channels along the stroke by load case.
+    sheet
+        Items in the sheet; empty if they were not computed, or it is not stable.
+    sheet_records
+        The channels in the sheet.
+    """
+
+    objective: float
+    items: tuple[ItemResult, ...]
+    met: bool
+    records: Records = field(default_factory=dict)
+    sheet: tuple[ItemResult, ...] = ()
+    sheet_records: Records = field(default_factory=dict)
+
+    @property
+    def is_on_path_of_sheet(self) -> bool:
+        """Whether the sheet is stable, under payloads too, and on the same path as the frame."""
+        if not self.sheet or any(math.isnan(item.value) for item in self.sheet):
+            return False
+        return on_same_path(self.records, self.sheet_records)
+
+    @property
+    def is_near_sheet(self) -> bool:
+        """Whether the sheet is on the same path, and misses little."""
+        return self.is_on_path_of_sheet and total_violation(self.sheet) <= LARGEST_MISS
+
+
+def total_violation(items: tuple[ItemResult, ...]) -> float:
+    """Return the sum of the violations of items; infinite without any."""
+    return sum(item.violation for item in items) if items else math.inf
+
+
+def state_of(problem: Problem, mask: NDArray[np.bool_]) -> State:
+    """Return the state of a design of a problem with a specification."""
+    found = Verifier(problem, HoppingSettings()).verify(mask)
+    assert problem.specification is not None
+    if not found.items:
+        return State(-math.inf, (), met=False)
+    objective = found.response.efficiency - found.response.penalty
+    if found.fault is not None:
+        objective = -sum(item.violation for item in found.items)
+    met = found.fault is None and _prints(problem, mask)
+    return State(objective, found.items, met, found.records)
+
+
+def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
+    """Whether all holes between the struts are open, and no strut or angle is too small."""
+    if shape_rows(problem, mask, math.inf).values.max(initial=0.0) > PRINTABLE:
+        return False
+    lattice = problem.lattice
+    try:
+        room_for_fillet(lattice.positions, lattice.beams[mask], problem.beam_widths[mask])
+    except InvalidSettings:
+        return False
+    return True
+
+
+def latest_met(
+    variables: Variables, mask: NDArray[np.bool_], path: list[NDArray[np.float64]]
+) -> tuple[State, int]:
+    """Return state and number of the last geometry of a path that meets all with eight elements.
+
+    The later ones may be too close to a loss of stability. The last geometry, if none is found
+    among a few.
+    """
+    low, high = 0, len(path) - 1
+    found = state_of(variables.problem_at(path[high]), mask), high
+    if found[0].met:
+        return found
+    while high - low > 1:
+        middle = (low + high) // 2
+        state = state_of(variables.problem_at(path[middle]), mask)
+        if state.met:
+            low, found = middle, (state, middle)
+        else:
+            high = middle
+    return found
+
+
+def is_better(new: State, old: State) -> bool:
+    """Whether a state meets more, or has the larger objective."""
+    return bool(new.items) and (new.met, new.objective) > (old.met, old.objective)
