@@ -35,8 +35,10 @@ if TYPE_CHECKING:
 RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
-SHEETS = 4
-"""Largest number of geometries that are computed in the sheet: it takes a minute."""
+SHEETS = 5
+"""Largest number of geometries that are computed in the sheet: it takes up to a minute."""
+REPAIR_REGION = 0.25
+"""First trust region after the sheet misses items, over that of other refinements."""
 SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
 HALVINGS = 2
@@ -194,7 +196,7 @@ class _Job:
         self.before = self.best = state_of(problem, design.mask)
         self.chosen = np.zeros(self.variables.count)
         self.path = self.tried = [self.chosen]
-        self.steps = self.evaluations = 0
+        self.steps = self.evaluations = self.sheets = 0
         self.reason = "the response of the design is not stable"
         self.goes_on = True
 
@@ -223,16 +225,13 @@ class _Job:
         if not self.best.met:
             return
         vector, state = self.chosen, self._in_sheet(sheet, self.chosen, self.best)
-        self.best, left, stable = state, SHEETS - 1, STABLE
+        self.best = state
         if not state.is_near_sheet:
-            left -= HALVINGS
             vector, state = self._earlier(sheet, vector, state)
-            if state.sheet:
-                self.best, self.chosen = state, vector
+            self.best, self.chosen = state, vector
         models: Models = (NO_DIFFERENCE,)
-        for _ in range(left):
-            if not self.goes_on or (state.sheet and all(item.met for item in state.sheet)):
-                return
+        stable = STABLE
+        while self.goes_on and self.sheets < SHEETS and total_violation(state.sheet) > 0.0:
             if state.is_on_path_of_sheet:
                 models = self._models(vector, state.records, state.sheet_records)
             elif state.met:
@@ -245,7 +244,9 @@ class _Job:
             if found is None or not found[0].items:
                 return
             state, vector, _ = found
-            if state.met and self.goes_on:
+            if not state.met:
+                self.sheets += 1
+            elif self.goes_on:
                 state = self._in_sheet(sheet, vector, state)
                 if total_violation(state.sheet) < total_violation(self.best.sheet):
                     self.best, self.chosen = state, vector
@@ -253,9 +254,9 @@ class _Job:
     def _earlier(
         self, sheet: Sheet, vector: NDArray[np.float64], state: State
     ) -> tuple[NDArray[np.float64], State]:
-        """Return a geometry on the path of the refinement that is near the sheet.
+        """Return a geometry on the path of the refinement that is near the sheet, by halving.
 
-        The last one among a few; the given one if there is none.
+        The given one if there is none among a few.
         """
         low, high = 0, len(self.path) - 1
         for _ in range(HALVINGS):
@@ -263,13 +264,13 @@ class _Job:
             if not self.goes_on or middle == low:
                 break
             found = state_of(self.variables.problem_at(self.path[middle]), self.design.mask)
-            if found.met:
-                found = self._in_sheet(sheet, self.path[middle], found)
-                if not found.is_near_sheet:
-                    high = middle
-                    continue
-                vector, state = self.path[middle], found
-            low = middle
+            if not found.met:
+                low = middle
+                continue
+            found = self._in_sheet(sheet, self.path[middle], found)
+            if found.is_near_sheet:
+                return self.path[middle], found
+            high = middle
         return vector, state
 
     def _refined(
@@ -299,6 +300,9 @@ class _Job:
             steps=steps,
             evaluations=max(least, self.settings.evaluations - self.evaluations),
         )
+        if until_met:
+            # Differences of models hold near the geometry that they were computed for.
+            left = replace(left, first_region=REPAIR_REGION * left.first_region)
         path = []
         for progress in refine_rows(rows, left, vector):
             path.append(progress)
@@ -326,6 +330,7 @@ class _Job:
         return tuple(difference(records, evaluator.records, gaps) for records in better)
 
     def _in_sheet(self, sheet: Sheet, vector: NDArray[np.float64], state: State) -> State:
+        self.sheets += 1
         problem = self.variables.problem_at(vector)
         records = sheet(replace(self.design, problem=problem))
         if records is None:
