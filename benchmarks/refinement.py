@@ -35,7 +35,8 @@ from bellcrank.refine import RefinementSettings, refine_design, specified
 from bellcrank.search import read_settings
 from bellcrank.task import find_task
 from bellcrank.workflows import complete_design, start_design
-from bellcrank.workflows.refinement import BEFORE_REFINEMENT, EVALUATIONS, sheet_of
+from bellcrank.workflows.refinement import BEFORE_REFINEMENT
+from bellcrank.workflows.refiners import EVALUATIONS, sheet_of
 
 from .tasks import CORES, core_seconds
 

@@ -85,6 +85,7 @@ class FunctionProcess:
                     return
                 kind, content = message
                 if kind is not None:
+                    self._process.wait()
                     raise _error(kind, content)
                 yield content
 

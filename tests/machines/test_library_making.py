@@ -20,6 +20,7 @@ from bellcrank.machines.library.catalogue import entry_files
 from bellcrank.machines.library.tasks import EntryTask, MakeSettings
 from bellcrank.mechanics import Status, model_evaluator
 from bellcrank.model import Section
+from bellcrank.refine import RefinementSettings
 from bellcrank.search import Candidate
 from bellcrank.search.choice import select_design
 from bellcrank.storage.locking import LOCK, locked
@@ -71,7 +72,8 @@ def told(folder: Path) -> dict[str, object]:
 def test_entries_of_straight_motions_are_refined(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bellcrank.workflows.refinement.EVALUATIONS", 60)
+    short = RefinementSettings(evaluations=60)
+    monkeypatch.setattr("bellcrank.workflows.refiners.SETTINGS", short)
     settings = MakeSettings(
         directions=("left",), columns=(7,), kinds=("straight",), steps=2000, chains=1
     )

@@ -38,7 +38,7 @@ def refine_designs(
     report: Report,
     workers: int,
     stop: threading.Event,
-    settings: RefinementSettings = SETTINGS,
+    settings: RefinementSettings | None = None,
 ) -> list[Refinement]:
     """Refine designs and return the results in their order.
 
@@ -55,8 +55,9 @@ def refine_designs(
     stop
         Event that stops all; there are fewer results then.
     settings
-        Settings of each refinement.
+        Settings of each refinement; `SETTINGS` by default.
     """
+    settings = settings or SETTINGS
     workers = min(workers, len(designs))
     if workers > 1:
         return _Refiners(designs, spec, settings, report).run(workers, stop)
