@@ -45,6 +45,10 @@ HALVINGS = 2
 """Number of times the path of a refinement that is not near the sheet is halved."""
 MET = 1e-3
 """Sum of violations at which they are."""
+AMPLE = 0.25
+"""Margin at which a specification without objectives is met: a part of the size of each bound.
+Larger margins by frames are lost in the sheet, since geometries with large margins by frames have
+large differences."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
 
@@ -176,6 +180,11 @@ def _with_mass(problem: Problem, mask: NDArray[np.bool_]) -> Problem:
     return replace(problem, specification=replace(wanted, items=(*wanted.items, item)))
 
 
+def _stricter(stable: float) -> float:
+    """Return a larger bound of the lowest stiffness, over its reference; less than 1."""
+    return 0.5 * (1.0 + stable)
+
+
 class _Job:
     """Refinements of one design, each corrected by the result of the one before."""
 
@@ -214,9 +223,9 @@ class _Job:
                 self.best, self.chosen, self.path = state, vector, self.tried
             if not state.items or not self.goes_on or (state.met and is_last):
                 return
-            if state.met:
+            if state.met or not state.is_stable:
                 # Eight elements lose their stability, or touch, before one element does.
-                stable *= 1.5
+                stable = _stricter(stable)
             else:
                 models = self._models(vector, state.records)
 
@@ -234,8 +243,8 @@ class _Job:
         while self.goes_on and self.sheets < SHEETS and total_violation(state.sheet) > 0.0:
             if state.is_on_path_of_sheet:
                 models = self._models(vector, state.records, state.sheet_records)
-            elif state.met:
-                stable *= 1.5
+            elif state.met or not state.is_stable:
+                stable = _stricter(stable)
             else:
                 models = (*self._models(vector, state.records), *models[1:])
             found = self._refined(
@@ -307,17 +316,24 @@ class _Job:
         for progress in refine_rows(rows, left, vector):
             path.append(progress)
             self.goes_on = self.report(progress)
-            if not self.goes_on or (until_met and progress.rows.violation < MET):
+            is_met = progress.rows.violation < MET
+            if not self.goes_on or (is_met and (until_met or self._is_ample(progress))):
                 break
         if not path:
             return None
         last = path[-1]
-        self.reason = last.reason or "stopped"
+        self.reason = last.reason or ("stopped" if not self.goes_on else "all items are met")
         self.steps, self.evaluations = self.steps + last.step, self.evaluations + last.evaluations
         vectors = [each.vector for each in path]
         state, number = latest_met(self.variables, self.design.mask, vectors)
         self.tried = vectors[: number + 1]
         return state, vectors[number], number == len(vectors) - 1
+
+    def _is_ample(self, progress: Progress) -> bool:
+        """Whether there is no objective, and the smallest margin is large."""
+        wanted = self.design.problem.specification
+        assert wanted is not None
+        return not wanted.maximise and progress.rows.objective > AMPLE
 
     def _models(self, vector: NDArray[np.float64], *better: Records) -> Models:
         """Return the differences of better models from one element in each strut."""

@@ -20,7 +20,7 @@ from bellcrank.refine.channels import bounded, jacobian, stacked
 from bellcrank.refine.differences import NO_DIFFERENCE
 from bellcrank.refine.gaps import gaps_of
 from bellcrank.refine.shape import shape_rows
-from bellcrank.refine.stability import lower_peaks, softest_states
+from bellcrank.refine.stability import references, softest_states
 from bellcrank.search.clearance import printed_beams
 from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.stroke_states import fractions_of
@@ -45,9 +45,8 @@ LARGEST_INCREMENT = 1.0 / 16.0
 GAP_STATES = 8
 """States along the stroke at which gaps are computed."""
 STABLE = 0.5
-"""Smallest lowest stiffness along the stroke, as a part of the largest one before or after it,
-whichever is smaller. Near a bifurcation it falls and rises again, and a small change of the
-geometry leads to another path."""
+"""Smallest lowest stiffness along the stroke, as a part of its reference (`references`): near a
+bifurcation it falls and rises again, and a small change of the geometry leads to another path."""
 SOFT = 1.2
 """Lowest stiffness, over its bound, below which a state is a constraint."""
 GAP_REACH = 0.5
@@ -116,8 +115,7 @@ class RowEvaluator:
         What a geometry must meet. Items on the stability of the path are not constraints: every
         path must be stable.
     stable
-        Smallest lowest stiffness along a path, over the smaller one of the largest before and
-        after it.
+        Smallest lowest stiffness along a path, over its reference (`references`).
     models
         Models in which the items must be met, as differences from one element in each strut. The
         last one counts for the objectives.
@@ -308,26 +306,27 @@ class RowEvaluator:
                 return None
             found = here.softest[name, index] = states
             values = {fraction: float(each.value[0]) for fraction, (_, each) in found.items()}
-            reference = lower_peaks(values)
-            ratio = {each: value / values[reference[each]] for each, value in values.items()}
+            known = references(values)
+            least = {each: factor * values[peak] for each, (peak, factor) in known.items()}
+            ratio = {each: value / least[each] for each, value in values.items()}
             # States that were soft in one geometry remain constraints in all others.
             soft |= {each for each in ratio if ratio[each] < SOFT * self.stable}
-            near = [each for each in sorted(soft) if reference[each] != each]
+            near = [each for each in sorted(soft) if known[each][0] != each]
             constraints.append(1.0 - np.array([ratio[each] for each in near]) / self.stable)
             keys += [(index, round(1e6 * each)) for each in near]
             if not slopes or not near:
                 continue
             rates, of_beams = {}, beam_slopes(frame, self.mask)
-            for fraction in {*near, *(reference[each] for each in near)}:
+            for fraction in {*near, *(known[each][0] for each in near)}:
                 equilibrium, measures = found[fraction]
                 slope = geometry_slopes(equilibrium, [(LOWEST_STIFFNESS, measures)], of_beams)
                 if slope is None:
                     return None
                 rates[fraction] = self.variables.gradient(*slope[0])[0]
             for each in near:
-                peak = reference[each]
-                rate = rates[each] - ratio[each] * rates[peak]
-                gradients.append(-rate[None] / (values[peak] * self.stable))
+                peak, factor = known[each]
+                rate = rates[each] - ratio[each] * factor * rates[peak]
+                gradients.append(-rate[None] / (least[each] * self.stable))
         rows = np.concatenate(constraints)
         names = ("stability",) * len(rows)
         return Rows(np.zeros(0), rows, names, tuple(keys), none, np.concatenate(gradients))

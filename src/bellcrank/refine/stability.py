@@ -18,6 +18,8 @@ STABLE_STATES = 16
 """States along the stroke at which the lowest stiffness is computed first."""
 HALVINGS = 3
 """Number of times the distance of states about a soft one is halved."""
+DECLINE = 0.5
+"""Part of the largest stiffness before a state with which it is compared where it only falls."""
 SOFT = 2.0
 """Lowest stiffness over the smallest one up to which a local minimum is searched more closely."""
 
@@ -67,20 +69,34 @@ def _local_minima(values: dict[float, float]) -> list[float]:
     return [each for each, low in zip(fractions, is_low.tolist(), strict=True) if low]
 
 
-def lower_peaks(values: Mapping[float, float]) -> dict[float, float]:
-    """Return where the largest value before or after each is, whichever is smaller.
+def references(values: Mapping[float, float]) -> dict[float, tuple[float, float]]:
+    """Return what the lowest stiffness at each fraction of the stroke is compared with.
 
-    A value counts as before and after itself, so that values on a slope have no other peak.
+    In a valley, the largest one before or after it, whichever is smaller; a value counts as before
+    and after itself, so that values on a slope are not in a valley. Where a part of the largest
+    one before is more, that: a path that gets ever softer is near its end.
+
+    Parameters
+    ----------
+    values
+        Lowest stiffness by fraction of the stroke.
+
+    Returns
+    -------
+    dict
+        The fraction of the reference, and its factor: 1, or `DECLINE` for one before.
 
     Examples
     --------
-    >>> lower_peaks({0.2: 5.0, 0.4: 1.0, 0.6: 3.0, 0.8: 2.0})
-    {0.2: 0.2, 0.4: 0.6, 0.6: 0.6, 0.8: 0.8}
+    >>> references({0.2: 5.0, 0.4: 1.0, 0.6: 3.0, 0.8: 0.5})
+    {0.2: (0.2, 1.0), 0.4: (0.6, 1.0), 0.6: (0.6, 1.0), 0.8: (0.2, 0.5)}
     """
     fractions = sorted(values)
-    peaks = {}
+    found = {}
     for k, here in enumerate(fractions):
-        sides = (fractions[: k + 1], fractions[k:])
-        highest = [max(side, key=values.__getitem__) for side in sides]
-        peaks[here] = min(highest, key=values.__getitem__)
-    return peaks
+        before, after = (
+            max(side, key=values.__getitem__) for side in (fractions[: k + 1], fractions[k:])
+        )
+        known = (min(before, after, key=values.__getitem__), 1.0), (before, DECLINE)
+        found[here] = max(known, key=lambda each: each[1] * values[each[0]])
+    return found

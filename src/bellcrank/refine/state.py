@@ -56,6 +56,16 @@ class State:
     sheet_records: Records = field(default_factory=dict)
 
     @property
+    def is_stable(self) -> bool:
+        """Whether all paths are stable, under payloads too."""
+        return bool(self.items) and not any(math.isnan(item.value) for item in self.items)
+
+    @property
+    def met_in_sheet(self) -> bool | None:
+        """Whether all items are met in the sheet; None if it was not computed or is not stable."""
+        return all(item.met for item in self.sheet) if self.sheet else None
+
+    @property
     def is_on_path_of_sheet(self) -> bool:
         """Whether the sheet is stable, under payloads too, and on the same path as the frame."""
         if not self.sheet or any(math.isnan(item.value) for item in self.sheet):

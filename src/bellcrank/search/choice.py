@@ -177,8 +177,8 @@ def shortlist(finalists: Sequence[Finalist]) -> list[Finalist]:
     """Return the finalists to verify, in their order.
 
     The best ones of each chain, in all at most `MOST`; of those that do not meet the specification
-    of their problem in the model of the search, the ones of which none is better in every item,
-    at most `MOST_UNMET`.
+    of their problem in the model of the search, the ones of which none of their chain is better in
+    every item, at most `MOST_UNMET`.
 
     Parameters
     ----------
@@ -196,6 +196,10 @@ def shortlist(finalists: Sequence[Finalist]) -> list[Finalist]:
         seen[finalist.found.chain] = rank + 1
         ranked.append((rank, index))
     chosen = sorted(index for _, index in sorted(ranked)[:MOST])
-    front = nondominated([_violations(finalists[index].items) for index in unmet])
-    chosen += [unmet[number] for number in front[:MOST_UNMET]]
+    fronts = []
+    for chain in {finalists[index].found.chain for index in unmet}:
+        own = [index for index in unmet if finalists[index].found.chain == chain]
+        front = nondominated([_violations(finalists[index].items) for index in own])
+        fronts += list(enumerate(own[number] for number in front))
+    chosen += sorted(index for _, index in sorted(fronts)[:MOST_UNMET])
     return [finalists[index] for index in chosen]

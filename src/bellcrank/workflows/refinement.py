@@ -82,8 +82,7 @@ def refine_selection(
 def _rank(refinement: Refinement) -> tuple[bool, bool, float]:
     """Return how good a refined design is: items met by frames, and in the sheet; the objective."""
     after = refinement.after
-    in_sheet = bool(after.sheet) and all(item.met for item in after.sheet)
-    return after.met, in_sheet, after.objective
+    return after.met, bool(after.met_in_sheet), after.objective
 
 
 def _of_other(selection: Selection, other: Finalist) -> Selection:
@@ -123,9 +122,7 @@ def refinement_data(refinement: Refinement) -> dict[str, Any]:
         "objective_after": finite(refinement.after.objective),
         "met_before": refinement.before.met,
         "met_after": refinement.after.met,
-        "met_in_sheet": all(item.met for item in refinement.after.sheet)
-        if refinement.after.sheet
-        else None,
+        "met_in_sheet": refinement.after.met_in_sheet,
         "steps": refinement.steps,
         "evaluations": refinement.evaluations,
         "reason": refinement.reason,
