@@ -14,6 +14,7 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     FrameEvaluator,
+    ItemResult,
     Status,
     at_fraction,
     model_evaluator,
@@ -21,6 +22,7 @@ from bellcrank.mechanics import (
 from bellcrank.model import (
     Design,
     Input,
+    Item,
     Lattice,
     Output,
     Problem,
@@ -356,6 +358,22 @@ def test_each_chain_has_its_turn(lift: Problem) -> None:
     assert len(chosen) == 48
     assert chosen[0] is listed[0]
     assert chosen[-1] is listed[-1]
+
+
+def test_unmet_designs_of_each_chain_are_verified(lift: Problem) -> None:
+    """A chain whose designs are worse in every item has its turn too."""
+    works = finalist(lift, WORKS)
+    item = Item(quantity="gain", case="case", output="output", at_least=2.0)
+
+    def unmet(gain: float, chain: int) -> Finalist:
+        response = replace(works.response, status=Verdict.UNMET)
+        items = (ItemResult(item, gain, (2.0 - gain) / 2.0, 1.0),)
+        return replace(
+            works, found=replace(works.found, chain=chain), response=response, items=items
+        )
+
+    listed = [unmet(1.8, 0), unmet(1.5, 0), unmet(1.2, 1), unmet(1.1, 1)]
+    assert shortlist(listed) == [listed[0], listed[2]]
 
 
 def test_designs_in_space_are_verified() -> None:
