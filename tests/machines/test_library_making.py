@@ -88,14 +88,16 @@ def test_entries_of_straight_motions_are_refined(
     assert not moved[task.special_nodes].any()
     figures = entry.figures
     off_axis, rotation = figures["off_axis"], figures["rotation_deg"]
-    sag, travel = figures["sag_mm"], figures["travel_mm"]
+    sag, travel, payload = figures["sag_mm"], figures["travel_mm"], figures["payload_N"]
     assert off_axis is not None
     assert rotation is not None
     assert sag is not None
     assert travel is not None
+    assert payload is not None
     assert off_axis <= 0.1
     assert abs(rotation) <= 5.0
     assert sag <= 0.1 * travel
+    assert payload >= 0.1
     found = Library((tmp_path,)).find("left-7-straight")
     assert found.design.problem.lattice.positions == pytest.approx(
         entry.design.problem.lattice.positions

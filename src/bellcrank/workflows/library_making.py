@@ -234,7 +234,7 @@ def _select(
         raise _NoUsableDesign(str(error)) from None
     refinement = None
     if problem.is_specified:
-        chosen, refinement = refine_selection(chosen, None, workers=workers, stop=stop)
+        chosen, refinement = refine_selection(chosen, PartSpec(), workers=workers, stop=stop)
         if stop is not None and stop.is_set():
             return None
     assert chosen.verification is not None

@@ -26,12 +26,14 @@ if TYPE_CHECKING:
 OFF_AXIS, ROTATION, SAG = 0.1, 5.0, 0.1
 """Largest off-axis motion and sag of a straight motion, as parts of the travel, and its largest
 rotation in degrees."""
+PAYLOAD = 0.1
+"""Smallest force in N that halves the travel of a straight motion: the weight of 10 g."""
 
 
 def straight_motion(problem: Problem) -> Problem:
     """Return the frame of the default part with the specification of a straight motion.
 
-    The gain is maximised. The output is free, and no struts touch.
+    The gain is maximised. The output carries a payload, and no struts touch.
 
     Examples
     --------
@@ -58,7 +60,10 @@ def straight_motion(problem: Problem) -> Problem:
         ),
         Item(quantity="clearance", case=case, at_least=0.0),
     )
-    weight = units_of(problem, spec).weight * np.array([0.0, -1.0])
+    units = units_of(problem, spec)
+    payload = units.in_problem("force", PAYLOAD)
+    items += (Item(quantity="payload", case=case, output=output, at_least=payload),)
+    weight = units.weight * np.array([0.0, -1.0])
     gain = ObjectiveTerm(quantity="gain", case=case, output=output)
     wanted = Specification(items=items, maximise=(gain,), weight=weight)
     return replace(problem, specification=wanted)
