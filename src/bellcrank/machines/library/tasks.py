@@ -43,6 +43,8 @@ def straight_motion(problem: Problem) -> Problem:
     """
     spec = PartSpec()
     case, output = "case", "output"
+    units = units_of(problem, spec)
+    payload = units.in_problem("force", PAYLOAD)
     off_axis = Item(quantity="off_axis", case=case, output=output, at_most=OFF_AXIS)
     rotation = Item(
         quantity="rotation", case=case, output=output, start=0.0, at_least=-ROTATION,
@@ -52,6 +54,7 @@ def straight_motion(problem: Problem) -> Problem:
         off_axis,
         rotation,
         Item(quantity="sag", case=case, output=output, at_most=SAG),
+        Item(quantity="payload", case=case, output=output, at_least=payload),
         Item(
             quantity="strain",
             case=case,
@@ -60,9 +63,6 @@ def straight_motion(problem: Problem) -> Problem:
         ),
         Item(quantity="clearance", case=case, at_least=0.0),
     )
-    units = units_of(problem, spec)
-    payload = units.in_problem("force", PAYLOAD)
-    items += (Item(quantity="payload", case=case, output=output, at_least=payload),)
     weight = units.weight * np.array([0.0, -1.0])
     gain = ObjectiveTerm(quantity="gain", case=case, output=output)
     wanted = Specification(items=items, maximise=(gain,), weight=weight)
