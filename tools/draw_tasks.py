@@ -1,8 +1,7 @@
 """Pictures and movies of the bundled tasks for the documentation: ``python tools/draw_tasks.py``.
 
 For each task, the run of ``docs/tasks/runs.json`` that meets the most (by frames, then in the
-sheet)
-with the smallest seed is drawn: ``docs/tasks/NAME.png`` with the paths of the outputs, and
+sheet) with the smallest seed is drawn: ``docs/tasks/NAME.png`` with the paths of the outputs, and
 ``docs/tasks/NAME.gif``. ``--only NAME,NAME`` draws some.
 """
 
@@ -38,7 +37,7 @@ def design_of(task: Task, run: dict[str, Any]) -> Design:
     bits = np.unpackbits(np.frombuffer(bytes.fromhex(run["mask"]), np.uint8))
     mask = bits[: problem.lattice.beam_count].astype(bool)
     moved = problem.with_geometry(np.array(run["positions"]), np.array(run["widths"]))
-    return Design(with_joints(moved, mask), mask)
+    return Design(with_joints(moved, mask), mask, provenance={"part": task.part.to_dict()})
 
 
 def best(runs: list[dict[str, Any]]) -> dict[str, Any]:

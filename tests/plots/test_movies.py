@@ -26,6 +26,7 @@ from bellcrank.task import find_task
 from bellcrank.workflows import find_design
 from bellcrank.workflows.animate import MotionOptions, animate_motion, in_one_model, motion_movie
 from bellcrank.workflows.loading import loading_path
+from bellcrank.workflows.part_figures import part_figures
 
 SMALL = (320, 180)
 SETTINGS = MovieSettings(seconds=0.8, fps=25, size=SMALL)
@@ -176,6 +177,13 @@ def test_the_load_cases_of_a_design_are_shown_side_by_side():
         each.displacement[:, each.problem.output.nodes].mean(axis=1)[-1] for each in movie.sequences
     )
     assert not np.allclose(right, up)
+    gain, force = movie.graphs
+    assert (gain.x_label, force.y_label) == ("input displacement, mm", "input force, N")
+    figures = part_figures(task.problem.full_design(), task.part)
+    for line, own in zip(force.lines, figures, strict=True):
+        assert line.x[-1] == pytest.approx(3.0)
+        # The figures are those of eight elements.
+        assert line.y.max() == pytest.approx(own["largest_input_force_N"], rel=0.05)
 
 
 def test_each_frame_shows_the_response_to_a_part_of_the_stroke():

@@ -18,7 +18,9 @@ from bellcrank.plots.movies import (
     stroke_schedule,
     write_movie,
 )
+from bellcrank.task import ProblemUnits, units_of
 from bellcrank.workflows.loading import LoadingPath, loading_path
+from bellcrank.workflows.validation import spec_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -196,19 +198,26 @@ def _graphs(shown: list[tuple[str, Design, LoadingPath]]) -> tuple[Graph, ...]:
         lines = [_line(name, 100.0 * way.fraction, way.efficiency, way) for name, _, way in shown]
         return (Graph("part of the stroke, %", "efficiency", tuple(lines)),)
     by_motion = drives == {"displacement"}
-    x_label = "input displacement, lattice units" if by_motion else "force on each input node"
+    of_parts = all(design.problem.section is not None for _, design, _ in shown)
+    length, force = ("mm", "N") if of_parts else ("lattice units", "units of the model")
+    motion_label, force_label = f"displacement, {length}", f"force, {force}"
     efficiency, conjugate = [], []
     for name, design, response in shown:
         given, output = design.problem.input, design.problem.output
+        units = units_of(design.problem, spec_for(design)) if of_parts else ProblemUnits(1.0, 1.0)
         along_output = (response.displacement[:, output.nodes] * output.direction).sum(axis=2)
-        values = response.input_force if by_motion else along_output.mean(axis=1)
-        efficiency.append(
-            _line(name, given.amount * response.fraction, response.efficiency, response)
-        )
-        conjugate.append(_line(name, given.amount * response.fraction, values, response))
+        x, y = given.amount * response.fraction, along_output.mean(axis=1)
+        if by_motion:
+            x, y = units.length * x, units.force * response.input_force
+        else:
+            x, y = units.force * x, units.length * y
+        efficiency.append(_line(name, x, response.efficiency, response))
+        conjugate.append(_line(name, x, y, response))
+    x_label = f"input {motion_label}" if by_motion else f"{force_label}, each input node"
+    y_label = f"input {force_label}" if by_motion else f"output {motion_label}"
     return (
         Graph(x_label, "efficiency", tuple(efficiency)),
-        Graph(x_label, "input force" if by_motion else "output displacement", tuple(conjugate)),
+        Graph(x_label, y_label, tuple(conjugate)),
     )
 
 
