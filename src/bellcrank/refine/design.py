@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
-SHEETS = 5
+SHEETS = 4
 """Largest number of geometries that are computed in the sheet: it takes up to a minute."""
 REPAIR_REGION = 0.25
 """First trust region after the sheet misses items, over that of other refinements."""
@@ -205,6 +205,7 @@ class _Job:
         self.before = self.best = state_of(problem, design.mask)
         self.chosen = np.zeros(self.variables.count)
         self.path = self.tried = [self.chosen]
+        self.stable = STABLE
         self.steps = self.evaluations = self.sheets = 0
         self.reason = "the response of the design is not stable"
         self.goes_on = True
@@ -212,6 +213,7 @@ class _Job:
     def by_frames(self) -> None:
         """Refine until all items are met with eight elements."""
         vector, stable = self.chosen, STABLE
+        path: list[NDArray[np.float64]] = []
         models: Models = (NO_DIFFERENCE,)
         for _ in range(ROUNDS):
             least = self.settings.evaluations // 4
@@ -219,8 +221,11 @@ class _Job:
             if found is None:
                 return
             state, vector, is_last = found
+            path = [*path, *self.tried]
             if is_better(state, self.best):
-                self.best, self.chosen, self.path = state, vector, self.tried
+                self.best, self.chosen = state, vector
+                self.path, self.stable = path, stable
+            is_last = is_last or self.evaluations >= self.settings.evaluations
             if not state.items or not self.goes_on or (state.met and is_last):
                 return
             if state.met or not state.is_stable:
@@ -239,7 +244,7 @@ class _Job:
             vector, state = self._earlier(sheet, vector, state)
             self.best, self.chosen = state, vector
         models: Models = (NO_DIFFERENCE,)
-        stable = STABLE
+        stable = self.stable
         while self.goes_on and self.sheets < SHEETS and total_violation(state.sheet) > 0.0:
             if state.is_on_path_of_sheet:
                 models = self._models(vector, state.records, state.sheet_records)

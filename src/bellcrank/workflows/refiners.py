@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Report = Callable[[int, Progress], None]
 
-EVALUATIONS = 400
+EVALUATIONS = 300
 """Number of geometries that the refinement of a design of a search evaluates."""
 SETTINGS = RefinementSettings(evaluations=EVALUATIONS)
 
