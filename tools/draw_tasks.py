@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Design
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from bellcrank.task import Task
 
 FOLDER = Path(__file__).parents[1] / "docs" / "tasks"
-MOVIE = MovieSettings(seconds=2.0, fps=12, size=(480, 270))
+MOVIE = MovieSettings(seconds=2.0, fps=10, size=(640, 360))
 
 
 def design_of(task: Task, run: dict[str, Any]) -> Design:
@@ -46,6 +47,14 @@ def best(runs: list[dict[str, Any]]) -> dict[str, Any]:
     return min(made, key=lambda run: (not run["met"], not run["met_in_sheet"], run["seed"]))
 
 
+def shrink(path: Path) -> None:
+    """Make a picture smaller: a width of at most 800 pixels, and few colours."""
+    picture = Image.open(path).convert("RGB")
+    picture.thumbnail((800, 800))
+    colours = picture.quantize(64, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    colours.save(path, optimize=True)
+
+
 def main() -> None:
     """Draw the tasks that are asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -60,6 +69,7 @@ def main() -> None:
         design = design_of(task, best([run for run in runs if run["task"] == name]))
         motions = case_motions(design, task.part, part_figures(design, task.part))
         draw_cases(motions, FOLDER / f"{name}.png", overwrite=True)
+        shrink(FOLDER / f"{name}.png")
         animate_motion([(name, design)], FOLDER / f"{name}.gif", MOVIE, overwrite=True)
         print(name, flush=True)
 

@@ -26,6 +26,7 @@ from bellcrank.plots import (
 )
 from bellcrank.plots.saving import check_target
 from bellcrank.search import MetropolisSettings, SearchSettings, Verdict, read_settings, searches
+from bellcrank.search.verification import ELEMENTS
 from bellcrank.storage import RunFolder
 from bellcrank.workflows.figures import model_words
 
@@ -150,6 +151,8 @@ def case_motions(
 ) -> list[Motion]:
     """Return the motion of a design in each load case, with the paths of its outputs.
 
+    By frames with eight elements in each strut.
+
     Parameters
     ----------
     design
@@ -173,13 +176,15 @@ def case_motions(
             for item in wanted.items
             if item.case == name and item.path is not None
         }
-        response = model_evaluator(case).evaluate(design.mask, VERIFICATION_INCREMENT)
+        evaluator = model_evaluator(case, elements=ELEMENTS)
+        response = evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
         motions.append(
             Motion(
                 replace(design, problem=case),
                 response.displacement,
                 response.efficiency,
                 name=design.problem.name if len(cases) == 1 else f"{design.problem.name}: {name}",
+                note=f"frames, {ELEMENTS} elements",
                 paths=tuple(found.get(output, np.empty((0, 2))) for output in case.outputs),
                 wanted_paths=tuple(asked.get(output, np.empty((0, 2))) for output in case.outputs),
             )
