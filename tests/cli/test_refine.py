@@ -42,7 +42,8 @@ def test_the_design_of_a_task_is_refined_by_default(runs: dict[str, tuple[Path, 
     assert found["met_in_sheet"] or found["objective_after"] >= found["objective_before"]
     assert "refined" in out
     designs = [read_design(each / "design.json") for each in (folder, plain)]
-    assert np.array_equal(designs[0].mask, designs[1].mask)
+    # Designs of two chains are refined, so that the beams may be those of the other one.
+    assert designs[0].problem.lattice.beam_count == designs[1].problem.lattice.beam_count
     moved = designs[0].problem.lattice.positions - designs[1].problem.lattice.positions
     assert np.abs(moved).max() > 0.01
     assert designs[0].provenance["refinement"] == found
