@@ -97,6 +97,6 @@ def references(values: Mapping[float, float]) -> dict[float, tuple[float, float]
         before, after = (
             max(side, key=values.__getitem__) for side in (fractions[: k + 1], fractions[k:])
         )
-        known = (min(before, after, key=values.__getitem__), 1.0), (before, DECLINE)
-        found[here] = max(known, key=lambda each: each[1] * values[each[0]])
+        choices = (min(before, after, key=values.__getitem__), 1.0), (before, DECLINE)
+        found[here] = max(choices, key=lambda each: each[1] * values[each[0]])
     return found

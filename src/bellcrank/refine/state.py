@@ -58,7 +58,7 @@ class State:
     @property
     def is_stable(self) -> bool:
         """Whether all paths are stable, under payloads too."""
-        return bool(self.items) and not any(math.isnan(item.value) for item in self.items)
+        return _is_stable(self.items)
 
     @property
     def met_in_sheet(self) -> bool | None:
@@ -68,14 +68,17 @@ class State:
     @property
     def is_on_path_of_sheet(self) -> bool:
         """Whether the sheet is stable, under payloads too, and on the same path as the frame."""
-        if not self.sheet or any(math.isnan(item.value) for item in self.sheet):
-            return False
-        return on_same_path(self.records, self.sheet_records)
+        return _is_stable(self.sheet) and on_same_path(self.records, self.sheet_records)
 
     @property
     def is_near_sheet(self) -> bool:
         """Whether the sheet is on the same path, and misses little."""
         return self.is_on_path_of_sheet and total_violation(self.sheet) <= LARGEST_MISS
+
+
+def _is_stable(items: tuple[ItemResult, ...]) -> bool:
+    """Whether there are items, and all have a value, as on stable paths."""
+    return bool(items) and not any(math.isnan(item.value) for item in items)
 
 
 def total_violation(items: tuple[ItemResult, ...]) -> float:
