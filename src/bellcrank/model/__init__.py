@@ -25,7 +25,6 @@ are stored in JSON.
 
 from bellcrank.model.builtin import builtin
 from bellcrank.model.conditions import Input, Output, Stiffness, Supports
-from bellcrank.model.design import Design
 from bellcrank.model.files import (
     design_from_dict,
     design_to_dict,
@@ -41,7 +40,8 @@ from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
 from bellcrank.model.loads import Loads, NodeForce, NodeSpring
 from bellcrank.model.masks import pack_mask, unpack_mask
-from bellcrank.model.problem import Problem, problem_to_dict, require_plane
+from bellcrank.model.plane import require_plane
+from bellcrank.model.problem import Design, Problem, problem_to_dict
 from bellcrank.model.regions import regions
 from bellcrank.model.schema import problem_from_dict
 from bellcrank.model.section import Elasticity, Section

@@ -11,10 +11,9 @@ from pydantic import Field
 
 from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings, UnknownName
 from bellcrank.model.builtin import builtin
-from bellcrank.model.design import Design
 from bellcrank.model.masks import unpack_mask
 from bellcrank.model.parsing import Table, parse, read_json, read_table
-from bellcrank.model.problem import Problem, problem_to_dict
+from bellcrank.model.problem import Design, Problem, problem_to_dict
 from bellcrank.model.schema import problem_from_dict
 from bellcrank.model.storage import write_text
 

@@ -1,10 +1,11 @@
-"""Problems."""
+"""Problems and designs."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, replace
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from bellcrank.model.arrays import (
     check_ids,
     id_list,
     locked,
+    real_array,
     rebuild,
 )
 from bellcrank.model.checks import (
@@ -29,7 +31,6 @@ from bellcrank.model.checks import (
     check_widths,
 )
 from bellcrank.model.conditions import Aggregate, Input, Output, Stiffness, Supports
-from bellcrank.model.design import Design
 from bellcrank.model.loads import Loads
 from bellcrank.model.masks import pack_mask
 from bellcrank.model.plain_data import (
@@ -42,7 +43,9 @@ from bellcrank.model.section import DEFAULT_MATERIAL, Elasticity, Section
 from bellcrank.model.specification import Case, Specification
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.model.lattice import Lattice
 
@@ -289,31 +292,64 @@ class Problem:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def require_plane(problem: Problem, what: str) -> None:
-    """Check that a problem is in the plane, at the entrance of work that is only defined there.
+@dataclass(frozen=True, slots=True, eq=False)
+class Design:
+    """A problem with the beams that are present.
 
     Parameters
     ----------
     problem
-        The problem.
-    what
-        The work, for the error.
+        The problem, with the objective of `efficiency`.
+    mask : (M,) bool
+        Beams of the lattice that are present.
+    efficiency
+        Efficiency computed when the design was made; None if unknown.
+    provenance
+        Origin of the design, as data for JSON.
 
     Raises
     ------
     InvalidProblem
-        If the positions have three coordinates.
+        If the mask has not one boolean for each beam, or the efficiency is not finite.
 
     Examples
     --------
     >>> from bellcrank.model import find_problem
-    >>> require_plane(find_problem("crane"), "outline")
+    >>> design = find_problem("scaling-8").full_design()
+    >>> design.beam_count
+    219
+    >>> design.with_mask(~design.mask).beam_count
+    0
     """
-    if problem.lattice.dimension != 2:
-        raise InvalidProblem(
-            f"{what}: problem {problem.name!r} is in space; only problems in the plane are "
-            "accepted here"
-        )
+
+    problem: Problem
+    mask: NDArray[np.bool_]
+    efficiency: float | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        mask = boolean_mask("mask", self.mask, self.problem.lattice.beam_count)
+        object.__setattr__(self, "mask", locked(mask))
+        if self.efficiency is not None:
+            efficiency = float(real_array("efficiency", self.efficiency))
+            object.__setattr__(self, "efficiency", efficiency)
+        object.__setattr__(self, "provenance", deepcopy(dict(self.provenance)))
+
+    __reduce__ = rebuild
+
+    @property
+    def beam_count(self) -> int:
+        """Number of beams present."""
+        return int(np.count_nonzero(self.mask))
+
+    @property
+    def mask_hex(self) -> str:
+        """Mask as hexadecimal text."""
+        return pack_mask(self.mask)
+
+    def with_mask(self, mask: ArrayLike) -> Design:
+        """Return a design with other beams and without efficiency."""
+        return replace(self, mask=np.asarray(mask), efficiency=None)
 
 
 def problem_to_dict(problem: Problem) -> dict[str, Any]:
