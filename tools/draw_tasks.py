@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Design
@@ -48,11 +48,26 @@ def best(runs: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def shrink(path: Path) -> None:
-    """Make a picture smaller: a width of at most 800 pixels, and few colours."""
-    picture = Image.open(path).convert("RGB")
-    picture.thumbnail((800, 800))
-    colours = picture.quantize(64, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    colours.save(path, optimize=True)
+    """Make a picture or a movie smaller: at most 800 pixels wide, and one palette of 64 colours."""
+    source = Image.open(path)
+    frames, durations = [], []
+    for frame in ImageSequence.Iterator(source):
+        picture = frame.convert("RGB")
+        picture.thumbnail((800, 800))
+        frames.append(picture)
+        durations.append(frame.info.get("duration", 0))
+    width, height = frames[0].size
+    together = Image.new("RGB", (width, height * len(frames)))
+    for index, picture in enumerate(frames):
+        together.paste(picture, (0, height * index))
+    palette = together.quantize(64, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    first, *others = (
+        picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in frames
+    )
+    if path.suffix == ".gif":
+        first.save(path, save_all=True, append_images=others, duration=durations, loop=0)
+    else:
+        first.save(path, optimize=True)
 
 
 def main() -> None:
@@ -71,6 +86,7 @@ def main() -> None:
         draw_cases(motions, FOLDER / f"{name}.png", overwrite=True)
         shrink(FOLDER / f"{name}.png")
         animate_motion([(name, design)], FOLDER / f"{name}.gif", MOVIE, overwrite=True)
+        shrink(FOLDER / f"{name}.gif")
         print(name, flush=True)
 
 
