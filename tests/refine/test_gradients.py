@@ -17,20 +17,21 @@ from bellcrank.refine.rows import RowEvaluator
 from bellcrank.refine.shape import shape_rows
 from bellcrank.refine.variables import variables_of
 
-from .designs import random_design, stable_corner, straight_crane
+from .designs import random_block, random_design, stable_corner, straight_crane
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 SHARED = {"input_motion", "input_force", "strain"}
 ALL = [Channel(name, "" if name in SHARED else "output") for name in CHANNELS]
-SOFT = {"stiffness", "sag"}
-"""Quantities that follow from linear motions, which are rounded more."""
+STEP = 5e-5
 
 
 def case_of(problem: Problem, mask: np.ndarray) -> CaseEvaluator:
     """Return the response of a design, with tightly converged equilibria."""
-    case = CaseEvaluator(problem, None, [0.0, -1e-3], {"output": 1e-4})
+    weight = np.zeros(problem.lattice.dimension)
+    weight[-1] = -1e-3
+    case = CaseEvaluator(problem, None, weight, {"output": 1e-4})
     frames = [case.frame, *(case.other(load, "output") for load in ("payload", "held output"))]
     for frame in frames:
         frame.frame = replace(frame.frame, tolerance=1e-13)
@@ -39,12 +40,30 @@ def case_of(problem: Problem, mask: np.ndarray) -> CaseEvaluator:
     return case
 
 
-def measures(case: CaseEvaluator) -> dict[tuple[Channel, int], np.ndarray]:
-    return {
-        key: found.value
-        for point in case.merged_points()
-        for key, (_, found) in zip(point.channels, point.measured, strict=True)
-    }
+def measures(case: CaseEvaluator) -> dict[tuple[Channel, int], dict[int, float]]:
+    """Return the measures of each channel at each state; strains by their beams."""
+    found = {}
+    for point in case.merged_points():
+        for key, (_, each) in zip(point.channels, point.measured, strict=True):
+            names = range(len(each.value)) if each.beams is None else each.beams.tolist()
+            found[key] = dict(zip(names, each.value.tolist(), strict=True))
+    return found
+
+
+def smooth(key: tuple[Channel, int], here: dict, nearby: dict[int, dict]) -> list[int]:
+    """Return the names of the measures of a channel that have a derivative.
+
+    A beam may not be among the most strained ones in all geometries, and the more strained one of
+    its ends may change.
+    """
+    names = [name for name in here[key] if all(name in each[key] for each in nearby.values())]
+    if key[0].name != "strain":
+        return names
+    behind, middle, ahead = (
+        np.array([each[key][name] for name in names]) for each in (nearby[-2], here, nearby[2])
+    )
+    kink = np.abs(ahead - 2.0 * middle + behind) > 1e-2 * np.abs(ahead - behind).max()
+    return [name for name, has_kink in zip(names, kink, strict=True) if not has_kink]
 
 
 def central(function: object, step: float) -> np.ndarray:
@@ -72,42 +91,39 @@ def test_joints_have_the_derivatives_of_differences() -> None:
     assert np.abs(slopes).max() > 0.1
 
 
-# Seeds with which no two of the most strained beams change their order within the differences.
-@pytest.mark.parametrize(
-    ("seed", "joints"),
-    [(seed, "of the section") for seed in (0, 1, 2, 3)]
-    + [(seed, "of the design") for seed in (0, 2, 3, 4)],
-)
-def test_channels_have_the_derivatives_of_differences(seed: int, joints: str) -> None:
-    design = random_design(seed)
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("kind", ["plane", "plane, joints of the design", "space"])
+def test_channels_have_the_derivatives_of_differences(seed: int, kind: str) -> None:
+    design = random_block(seed) if kind == "space" else random_design(seed)
     problem, mask = design.problem, design.mask
-    if joints == "of the design":
-        problem = with_joints(problem, mask)
+    own_joints = kind == "plane, joints of the design"
+
+    def at(step: float) -> Problem:
+        moved = problem.with_geometry(positions + step * move, widths + step * widen)
+        return with_joints(moved, mask) if own_joints else moved
+
     positions, widths = problem.lattice.positions, problem.beam_widths
     rng = np.random.default_rng(seed)
     move = rng.normal(size=positions.shape)
     move[problem.special_nodes] = 0.0
     widen = 0.2 * rng.normal(size=widths.shape)
-    case = case_of(problem, mask)
-
-    def at(step: float) -> dict[tuple[Channel, int], np.ndarray]:
-        moved = problem.with_geometry(positions + step * move, widths + step * widen)
-        if joints == "of the design":
-            moved = with_joints(moved, mask)
-        return measures(case_of(moved, mask))
-
-    nearby = {step: at(step * 1e-4) for step in (-2, -1, 1, 2)}
+    case = case_of(at(0.0), mask)
+    nearby = {step: measures(case_of(at(step * STEP), mask)) for step in (-2, -1, 1, 2)}
+    here = measures(case)
     for point in case.merged_points():
         found = geometry_slopes(
             point.equilibrium, point.measured, beam_slopes(point.evaluator, mask)
         )
         assert found is not None
         for key, slope in zip(point.channels, found, strict=True):
+            names = smooth(key, here, nearby)
+            chosen = [list(here[key]).index(name) for name in names]
             given = (slope.positions * move).sum(axis=(1, 2)) + slope.widths @ widen
-            expected = central(lambda step, key=key: nearby[round(step / 1e-4)][key], 1e-4)
+            ahead = {step: [each[key][name] for name in names] for step, each in nearby.items()}
+            expected = central(lambda step, ahead=ahead: np.array(ahead[round(step / STEP)]), STEP)
+            assert len(names) >= len(here[key]) - 2
             size = np.abs(expected).max()
-            within = 1e-5 if key[0].name in SOFT else 1e-6
-            assert given == pytest.approx(expected, abs=within * size + 1e-12), key
+            assert given[chosen] == pytest.approx(expected, abs=1e-6 * size + 1e-12), key
 
 
 def test_the_lowest_stiffness_has_the_derivative_of_differences() -> None:

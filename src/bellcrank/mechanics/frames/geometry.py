@@ -165,17 +165,19 @@ def _products(
     equilibrium: Equilibrium, adjoints: NDArray[np.float64], beams: BeamSlopes
 ) -> _Products:
     """Return the products of adjoints (k, N, b) with the derivatives of the residual."""
-    from bellcrank.mechanics.frames.kernels.geometry import geometry_products
+    from bellcrank.mechanics.frames.kernels.geometry import PARAMETERS, geometry_products
 
     frame = equilibrium.frame
-    dimension = equilibrium.problem.lattice.dimension
+    dimension, section = equilibrium.problem.lattice.dimension, equilibrium.problem.section
+    assert section is not None
     positions = np.zeros((len(adjoints), len(frame.positions), dimension))
     widths = np.zeros((len(adjoints), len(frame.beams)))
     joints = np.zeros((*widths.shape, 2))
     geometry_products(
         frame, equilibrium.structure, equilibrium.fraction, equilibrium.state,
         np.ascontiguousarray(adjoints), beams.section, beams.bow, positions, widths,
-        joints, equilibrium.memory,
+        joints, section.shape == "round", np.zeros((PARAMETERS, 2 * len(frame.unit))),
+        equilibrium.memory,
     )  # fmt: skip
     return _Products(positions, widths, joints)
 

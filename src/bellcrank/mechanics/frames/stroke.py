@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.frames.quantities import Load, Measures, Quantity
     from bellcrank.model import Problem
 
-STOP_STIFFNESS = 1e6
-"""Stiffness of the springs that hold the output, over the largest axial stiffness of a beam."""
+STOP_STIFFNESS = 2e5
+"""Stiffness of the springs that hold the output, over the axial stiffness of a beam as long as wide.
+It does not depend on the geometry, by which blocked forces are differentiated."""
 
 
 def with_held_output(problem: Problem) -> Problem:
@@ -33,8 +34,7 @@ def with_held_output(problem: Problem) -> Problem:
     """
     assert problem.section is not None
     assert problem.material is not None
-    shortest = float(problem.lattice.rest_length.min())
-    axial = problem.material.young * problem.section.area / shortest
+    axial = problem.material.young * problem.section.area / problem.section.width
     return replace(problem, output=replace(problem.output, spring=STOP_STIFFNESS * axial))
 
 
