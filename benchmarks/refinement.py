@@ -1,6 +1,6 @@
 """What refinement gains: ``python -m benchmarks.refinement``.
 
-Three comparisons, by frames with eight elements in each strut and in the sheet:
+Three comparisons, by frames with eight elements in each strut and in the sheet, and a cost:
 
 - ``mass``: the free actuators of the library and the bundled parts, refined at equal mass, equal
   least width and without contact; gain before and after.
@@ -8,6 +8,8 @@ Three comparisons, by frames with eight elements in each strut and in the sheet:
   most 2 degrees, from the bundled design and from searches with several seeds.
 - ``exact``: the slider with a gain of 3.0 within 0.1 %, an off-axis motion below 1 % and a rotation
   below 0.5 degrees, from searches with several seeds.
+- ``cost``: the time of the derivatives of all channels by the geometry, over that of the channels
+  and their responses, in the plane and in space.
 
 Each run is added to ``docs/refinement/runs.json`` as soon as it is done; runs that are in the
 record are not repeated. Times are those of one core. ``--only mass`` makes one comparison.
@@ -17,17 +19,22 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bellcrank.errors import InvalidSettings, NoDesignFound
 from bellcrank.fem.continuum.mesh import COARSE
 from bellcrank.fem.specification import sheet_items
 from bellcrank.machines.library import Library
 from bellcrank.machines.library.catalogue import bundled_folder
+from bellcrank.mechanics.frames.case import CHANNELS, CaseEvaluator, Channel
+from bellcrank.mechanics.frames.geometry import BeamSlopes, beam_slopes, geometry_slopes
 from bellcrank.model import Design, Item, gallery_design
 from bellcrank.part import PartSpec, models
 from bellcrank.provenance import provenance
@@ -38,10 +45,13 @@ from bellcrank.workflows import complete_design, start_design
 from bellcrank.workflows.refinement import BEFORE_REFINEMENT
 from bellcrank.workflows.refiners import EVALUATIONS, sheet_of
 
+from .frames import diluted, octet
 from .tasks import CORES, core_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from bellcrank.mechanics import ItemResult
     from bellcrank.model import Problem
@@ -50,8 +60,46 @@ RECORD = Path(__file__).parents[1] / "docs" / "refinement" / "runs.json"
 PARTS = ("crane", "anti-parallel", "discs", "pliers", "scaling-8")
 SEEDS = 8
 """Number of searches of each straight or exact motion."""
+SHARED = {"input_motion", "input_force", "strain"}
+"""Channels that belong to a case, not to an output."""
+QUARTERS = [0.25, 0.5, 0.75, 1.0]
+REPEATS = 5
 BUNDLED = "bundled"
 """In place of a seed: from the bundled design."""
+
+
+def cost_of_gradients(kind: str) -> dict[str, Any]:
+    """Return the time of all derivatives over that of the channels, medians of random designs."""
+    if kind == "plane":
+        crane = gallery_design("machine", "crane")
+        assert crane is not None
+        problem = models["frames"](crane.problem, PartSpec())
+    else:
+        problem = octet(2)
+    given = problem.input
+    problem = replace(problem, input=replace(given, amount=0.3 * given.amount))
+    weight = np.zeros(problem.lattice.dimension)
+    weight[-1] = -1e-3
+    ratios = []
+    for seed in range(SEEDS):
+        mask = diluted(problem, seed)
+        case = CaseEvaluator(problem, None, weight, {"output": 1e-4})
+        ratios.append(min(_cost(case, mask) for _ in range(REPEATS)))
+    return {"met": max(ratios) <= 2.0, "beams": problem.lattice.beam_count, "cost": median(ratios)}
+
+
+def _cost(case: CaseEvaluator, mask: NDArray[np.bool_]) -> float:
+    started = time.perf_counter()
+    case.respond(mask)
+    channels = [Channel(name, "" if name in SHARED else "output") for name in CHANNELS]
+    case.values(channels, QUARTERS)
+    computed = time.perf_counter()
+    slopes: dict[int, BeamSlopes] = {}
+    for point in case.merged_points():
+        own = id(point.evaluator)
+        slopes[own] = slopes.get(own) or beam_slopes(point.evaluator, mask)
+        geometry_slopes(point.equilibrium, point.measured, slopes[own])
+    return (time.perf_counter() - computed) / (computed - started)
 
 
 def at_equal_mass(name: str) -> dict[str, Any]:
@@ -179,7 +227,9 @@ def _values(items: Sequence[ItemResult], model: str) -> dict[str, float]:
 def runs() -> dict[str, Callable[[], dict[str, Any]]]:
     """Return all runs by name."""
     names = [name for name in Library((bundled_folder(),)).names() if "-free-" in name]
-    out: dict[str, Callable[[], dict[str, Any]]] = {}
+    out: dict[str, Callable[[], dict[str, Any]]] = {
+        f"cost {kind}": lambda kind=kind: cost_of_gradients(kind) for kind in ("plane", "space")
+    }
     for name in (*PARTS, *names):
         out[f"mass {name}"] = lambda name=name: at_equal_mass(name)
     cases = [("straight-crane", straight_problem), ("straight-anti-parallel", straight_problem)]
@@ -203,13 +253,13 @@ def runs() -> dict[str, Callable[[], dict[str, Any]]]:
 def _group(name: str) -> str:
     """Return the comparison that a run belongs to, with its problem where there are seeds."""
     kind, *others = name.split()
-    return kind if kind == "mass" else " ".join((kind, *others[:-1]))
+    return kind if kind in {"mass", "cost"} else " ".join((kind, *others[:-1]))
 
 
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="mass,straight,exact")
+    parser.add_argument("--only", default="cost,mass,straight,exact")
     given = parser.parse_args()
     rows: dict[str, dict[str, Any]] = {}
     if RECORD.exists():
@@ -231,6 +281,9 @@ def summary(rows: dict[str, dict[str, Any]]) -> list[str]:
     lines = []
     for kind in sorted({_group(name) for name in rows}):
         own = [row for name, row in rows.items() if _group(name) == kind]
+        if kind == "cost":
+            lines += [f"{name}: {row['cost']:.2f}" for name, row in rows.items() if row in own]
+            continue
         gains = [row["gain"] for row in own if row.get("gain") is not None]
         text = f"{kind}: {len(own)} runs, {sum(bool(row['met']) for row in own)} met"
         if kind == "mass":

@@ -80,8 +80,11 @@ def test_a_design_in_a_file_is_refined(here: Path, runs: dict[str, tuple[Path, s
 
 
 def test_the_gain_of_a_free_design_grows(here: Path) -> None:
-    outcome = call("refine", "machine:discs", "discs.json", "--evaluations", 80)
+    outcome = call(
+        "refine", "machine:discs", "discs.json", "--evaluations", 80, "--picture", "both.png"
+    )
     assert outcome.code == 0, outcome.err
+    assert (here / "both.png").stat().st_size > 10_000
     assert "off-axis motion" in outcome.out  # a gain alone would flatter
     start = find_design("machine:discs")
     after = read_design(here / "discs.json")
@@ -97,6 +100,7 @@ def test_the_gain_of_a_free_design_grows(here: Path) -> None:
         (("machine:pliers",), "driven by forces"),
         (("machine:crane", "--evaluations", "0"), "--evaluations: expected at least 1, got 0"),
         (("machine:crane", "--largest-move", "0.9"), "--largest-move: expected above 0"),
+        (("machine:crane", "--picture", "both.pic"), "both.pic"),
         (("machine:crane", "--widest", "0.5"), "--widest: expected a number from 1 to 4, got 0.5"),
     ],
 )

@@ -35,9 +35,11 @@ def refine(
         typer.Option(help="Largest width of a strut over that of the section; 1 for no change."),
     ] = 1.8,
     same_mass: Annotated[bool, typer.Option("--same-mass", help="The mass may not grow.")] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an existing file.")
-    ] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the motion before and after (png, svg, pdf)."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
 ) -> None:
     """Move nodes and widen struts, so that a design meets its specification and its gain grows."""
     if evaluations < 1:
@@ -52,10 +54,14 @@ def refine(
     target = out or Path(f"{Path(chosen.problem.name).name}-refined.json")
     if target.exists() and not overwrite:
         raise OutputExists(f"{target} exists; choose another file, or --overwrite")
+    from bellcrank.workflows.pictures import check_targets, draw_before_and_after
+
+    check_targets(picture, None, overwrite=overwrite)
     from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import write_design
     from bellcrank.refine import RefinementSettings
     from bellcrank.workflows.refinement import motion_rows, refine_file, refinement_rows
+    from bellcrank.workflows.validation import spec_for
 
     settings = RefinementSettings(
         evaluations=evaluations, largest_move=largest_move, widest=widest, same_mass=same_mass
@@ -85,5 +91,10 @@ def refine(
     )
     write_design(found.design, target, overwrite=overwrite)
     notes.print(f"wrote {plain(target)}")
+    if picture is not None:
+        draw_before_and_after(
+            chosen, found.design, spec_for(found.design), picture, overwrite=overwrite
+        )
+        notes.print(f"wrote {plain(picture)}")
     if not found.after.met:
         sys.exit(NOT_MET)

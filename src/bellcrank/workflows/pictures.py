@@ -25,10 +25,12 @@ from bellcrank.plots import (
     draw_stress,
 )
 from bellcrank.plots.saving import check_target
+from bellcrank.refine import specified
 from bellcrank.search import MetropolisSettings, SearchSettings, Verdict, read_settings, searches
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.storage import RunFolder
 from bellcrank.workflows.figures import model_words
+from bellcrank.workflows.part_figures import part_figures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -190,6 +192,25 @@ def case_motions(
             )
         )
     return motions
+
+
+def draw_before_and_after(
+    before: Design, after: Design, spec: PartSpec, path: Path, *, overwrite: bool = False
+) -> None:
+    """Draw the motions of a design before and after its refinement, side by side at one scale.
+
+    Raises
+    ------
+    InvalidSettings, OutputExists, StorageError
+        As `bellcrank.plots.draw_motion`.
+    """
+    limit, motions = spec.registered_material.strain_limit, []
+    for title, design in (("before", before), ("after", after)):
+        wanted = replace(design, problem=specified(design.problem, limit))
+        for motion in case_motions(wanted, spec, part_figures(wanted, spec)):
+            name = motion.name.replace(design.problem.name, title, 1)
+            motions.append(replace(motion, name=name))
+    draw_cases(motions, path, overwrite=overwrite)
 
 
 def check_targets(picture: Path | None, vtu: Path | None, *, overwrite: bool) -> None:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 STOP_STIFFNESS = 2e5
-"""Stiffness of the springs that hold the output, over the axial stiffness of a beam as long as wide.
-It does not depend on the geometry, by which blocked forces are differentiated."""
+"""Stiffness of the springs that hold the output, over the axial stiffness of a beam as long as it
+is wide: it does not depend on the geometry, by which blocked forces are differentiated."""
 
 
 def with_held_output(problem: Problem) -> Problem:
