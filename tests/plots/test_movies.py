@@ -182,8 +182,10 @@ def test_the_load_cases_of_a_design_are_shown_side_by_side():
     figures = part_figures(task.problem.full_design(), task.part)
     for line, own in zip(force.lines, figures, strict=True):
         assert line.x[-1] == pytest.approx(3.0)
-        # The figures are those of eight elements.
-        assert line.y.max() == pytest.approx(own["largest_input_force_N"], rel=0.05)
+        assert line.y.max() == pytest.approx(own["largest_input_force_N"], rel=1e-6)
+    for line, own in zip(gain.lines, figures, strict=True):
+        assert line.y[-1] == pytest.approx(own["efficiency"], rel=1e-6)
+    assert all("frame, 8 elements" in each.notes[-1] for each in movie.sequences)
 
 
 def test_each_frame_shows_the_response_to_a_part_of_the_stroke():

@@ -18,6 +18,7 @@ from bellcrank.plots.movies import (
     stroke_schedule,
     write_movie,
 )
+from bellcrank.search.verification import ELEMENTS
 from bellcrank.task import ProblemUnits, units_of
 from bellcrank.workflows.loading import LoadingPath, loading_path
 from bellcrank.workflows.validation import spec_for
@@ -71,7 +72,8 @@ def animate_motion(
 
     The load cases of one design are shown side by side, at most `MOST_CASES` of them. Each frame
     shows an equilibrium; the colour of a beam shows its strain energy. The return motion repeats
-    the forward motion in reverse, also if the design snaps.
+    the forward motion in reverse, also if the design snaps. If a design has a specification, all
+    are computed with eight elements in each strut, like their items.
 
     Parameters
     ----------
@@ -120,11 +122,12 @@ def motion_movie(
     def computed(done: int) -> None:
         progress("loading", len(responses) * states + done, len(designs) * states)
 
+    elements = ELEMENTS if any(design.problem.is_specified for _, design in designs) else None
     designs = by_case(in_one_model(designs))
     for _, design in designs:
-        responses.append(loading_path(design, part, options.objective, computed))
+        responses.append(loading_path(design, part, options.objective, computed, elements))
     shown = [(name, design, way) for (name, design), way in zip(designs, responses, strict=True)]
-    sequences = tuple(_sequence(*one, options.magnify) for one in shown)
+    sequences = tuple(_sequence(*one, options.magnify, elements) for one in shown)
     return Movie(sequences, _graphs(shown), order)
 
 
@@ -158,11 +161,14 @@ def in_one_model(designs: Sequence[tuple[str, Design]]) -> list[tuple[str, Desig
     return [(name, as_frame(design)) for name, design in designs]
 
 
-def _sequence(name: str, design: Design, response: LoadingPath, magnify: float) -> StateSequence:
+def _sequence(
+    name: str, design: Design, response: LoadingPath, magnify: float, elements: int | None
+) -> StateSequence:
     """Return the states of a design along its stroke."""
     word = "stroke" if design.problem.input.drive == "displacement" else "load"
     size = f"{design.beam_count} beams" if magnify == 1.0 else f"motion drawn × {magnify:g}"
     size += " · springs" if design.problem.section is None else " · frame"
+    size += "" if elements is None else f", {elements} elements"
     notes = tuple(
         f"{size} · {word} {_percent(fraction)} · {efficiency_note(efficiency)}"
         for efficiency, fraction in zip(response.efficiency, response.fraction, strict=True)

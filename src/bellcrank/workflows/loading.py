@@ -64,6 +64,7 @@ def loading_path(
     fractions: NDArray[np.float64],
     objective: str | None = None,
     report: Callable[[int], None] = lambda _done: None,
+    elements: int | None = None,
 ) -> LoadingPath:
     """Compute the responses of a design at fractions of its stroke, each from rest.
 
@@ -79,6 +80,8 @@ def loading_path(
         Name of the objective; the problem's own by default.
     report
         Called with the number of responses computed so far.
+    elements
+        For frames, as in `bellcrank.mechanics.FrameEvaluator`.
 
     Raises
     ------
@@ -100,7 +103,7 @@ def loading_path(
     respond = _response_on_path if problem.input.during is not None else _response_from_rest
     shares = np.maximum(fractions, SMALL).tolist()
     for k, (fraction, (response, strain)) in enumerate(
-        zip(fractions.tolist(), respond(design, shares, objective), strict=True)
+        zip(fractions.tolist(), respond(design, shares, objective, elements), strict=True)
     ):
         efficiency[k] = response.efficiency
         snapped[k] = response.status is Status.SNAPPED
@@ -127,21 +130,23 @@ def _checked(response: Response, problem: Problem) -> Response:
 
 
 def _response_from_rest(
-    design: Design, shares: list[float], objective: str | None
+    design: Design, shares: list[float], objective: str | None, elements: int | None
 ) -> Iterator[tuple[Response, Strain]]:
     """Yield responses to fractions of the input, each from rest."""
     for share in shares:
-        evaluator = model_evaluator(at_fraction(design.problem, share), objective)
+        evaluator = model_evaluator(
+            at_fraction(design.problem, share), objective, elements=elements
+        )
         response = _checked(evaluator.evaluate(design.mask, increment_at(share)), design.problem)
         yield response, evaluator.strain()
 
 
 def _response_on_path(
-    design: Design, shares: list[float], objective: str | None
+    design: Design, shares: list[float], objective: str | None, elements: int | None
 ) -> Iterator[tuple[Response, Strain]]:
     """Yield equilibria of the path of the full input, the last stable one beyond its end."""
     problem = design.problem
-    evaluator = FrameEvaluator(problem, objective)
+    evaluator = FrameEvaluator(problem, objective, elements)
     _checked(evaluator.evaluate(design.mask, VERIFICATION_INCREMENT), problem)
     nodes, dimension = problem.lattice.positions.shape
     efficiency = quantities["efficiency"]
