@@ -95,7 +95,7 @@ def test_files_of_impossible_problems_are_refused(write, small, key, value, mess
         ("first_x", "#", "key 'lattice.first_x' is missing"),
         ('kind = "triangular-rows"', "", "key 'lattice.kind' is missing"),
         ('"triangular-rows"', "3", "lattice.kind: expected a name, got 3"),
-        ('"triangular-rows"', '"cubic"', "unknown lattice 'cubic'; known: "),
+        ('"triangular-rows"', '"square"', "unknown lattice 'square'; known: "),
         ("[5, 6, 5, 6, 5, 6]", "[5, 6.5]", "lattice.counts[1]: expected a valid integer"),
         (
             "[5, 6, 5, 6, 5, 6]",

@@ -1,21 +1,31 @@
 from __future__ import annotations
 
+import math
 import tracemalloc
 from unittest import mock
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from bellcrank.errors import InvalidProblem, UnknownName
 from bellcrank.model import lattices
+from bellcrank.model.regions import find_layers
 
 EXAMPLES = {
     "triangular-rows": {"counts": [4, 5, 4], "first_x": [0.5, 0.0, 0.5]},
     "triangular-rectangle": {"columns": 6, "rows": 7},
     "displaced-delaunay": {"columns": 6, "rows": 7},
     "jammed-discs": {"discs": 60},
+    "octet": {"size": [3, 4, 3]},
+    "cubic": {"size": [3, 2, 2]},
+    "body-centred": {"size": [3, 4, 3]},
+    "kelvin": {"size": [6, 6, 6]},
+    "displaced-delaunay-space": {"size": [3, 4, 3]},
 }
-RANDOM = ("displaced-delaunay", "jammed-discs")
+RANDOM = ("displaced-delaunay", "jammed-discs", "displaced-delaunay-space")
+SPACE = ("octet", "cubic", "body-centred", "kelvin", "displaced-delaunay-space")
+PLANE = tuple(kind for kind in EXAMPLES if kind not in SPACE)
 
 
 def make(kind, seed=0, **changes):
@@ -41,7 +51,7 @@ def test_beams_are_sorted_with_the_lower_node_first(kind):
     assert all(a < b for a, b in beams)
 
 
-@pytest.mark.parametrize("kind", EXAMPLES)
+@pytest.mark.parametrize("kind", PLANE)
 def test_no_two_beams_cross(kind):
     lattice = make(kind)
     a, b = lattice.positions[lattice.beams].transpose(1, 0, 2)
@@ -55,6 +65,68 @@ def test_no_two_beams_cross(kind):
                 across = side(a[m], b[m], a[n]) * side(a[m], b[m], b[n])
                 along = side(a[n], b[n], a[m]) * side(a[n], b[n], b[m])
                 assert across >= 0 or along >= 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [(kind, {}) for kind in SPACE]
+    + [("cubic", {"diagonals": "faces"}), ("octet", {"up": [1, 1, 1], "envelope": "cylinder"})],
+)
+def test_no_two_beams_in_space_touch_between_their_ends(kind, changes):
+    lattice = make(kind, **changes)
+    first, second = lattice.positions[lattice.beams].transpose(1, 0, 2)
+    share = np.linspace(0.1, 0.9, 9)[:, None]
+    points = first[:, None] + share * (second - first)[:, None]
+    spheres = cKDTree(points.reshape(-1, 3)).query_pairs(0.05, output_type="ndarray") // 9
+    assert (spheres[:, 0] == spheres[:, 1]).all()
+
+
+def test_octet_lattices_have_twelve_neighbours_and_layers_of_triangles():
+    straight, turned = make("octet", size=[6, 6, 6]), make("octet", size=[6, 6, 6], up=[1, 1, 1])
+    for lattice in (straight, turned):
+        assert lattice.rest_length == pytest.approx(1.0)
+        assert np.bincount(np.bincount(lattice.beams.ravel())).argmax() == 12
+    layers = find_layers(turned)
+    heights = np.array([turned.positions[nodes, 2].mean() for nodes in layers])
+    assert np.diff(heights) == pytest.approx(math.sqrt(2.0 / 3.0))
+    # A node on the axis, about which the lattice is the same after a third of a turn.
+    tall = make("octet", size=[4, 4, 4], up=[1, 1, 1], envelope="cylinder")
+    moved = tall.positions - np.array([2.0, 2.0, 0.0])
+    c, s = -0.5, math.sqrt(0.75)
+    third = moved @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    assert cKDTree(moved).query(third)[0].max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "inner"),
+    [
+        ("cubic", {"diagonals": "none"}, 6),
+        ("cubic", {"diagonals": "bodies"}, 14),
+        ("cubic", {"diagonals": "faces"}, 18),
+        ("body-centred", {}, 8),
+        ("kelvin", {"size": [12, 12, 12]}, 4),
+    ],
+)
+def test_inner_nodes_of_crystals_have_their_neighbours(kind, changes, inner):
+    lattice = make(kind, **({"size": [6, 6, 6]} | changes))
+    assert np.bincount(lattice.beams.ravel()).max() == inner
+
+
+@pytest.mark.parametrize("kind", SPACE)
+def test_a_crystal_is_in_the_middle_of_its_envelope(kind):
+    changes = {"displacement": 0.0} if kind in RANDOM else {}
+    lattice = make(kind, size=[5.3, 4.1, 6.2], **changes)
+    low, high = lattice.positions.min(axis=0), lattice.positions.max(axis=0)
+    assert 0.5 * (low + high) == pytest.approx([2.65, 2.05, 3.1])
+    assert low.min() >= 0.0
+    round_one = make(kind, size=[5.0, 5.0, 5.0], envelope="cylinder", **changes)
+    assert np.hypot(*(round_one.positions[:, :2] - 2.5).T).max() <= 2.5 + 1e-6
+
+
+def test_the_length_of_beams_is_the_spacing():
+    for kind in ("octet", "body-centred", "kelvin"):
+        lattice = make(kind, size=[12, 12, 12], spacing=2.0)
+        assert lattice.rest_length == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("kind", RANDOM)
@@ -121,6 +193,15 @@ def test_contacts_have_only_the_three_lengths_that_two_sizes_allow():
         ("displaced-delaunay", {"displacement": 0.5}, "lattice.displacement: expected 0 or more"),
         ("jammed-discs", {"discs": 19}, "lattice.discs: expected at least 20, got 19"),
         ("jammed-discs", {"packing_fraction": 0.5}, "lattice.packing_fraction: expected 0.85"),
+        ("octet", {"size": [3, 3]}, r"lattice.size: expected three lengths .* got \[3, 3\]"),
+        ("octet", {"size": [3, 3, -1]}, "lattice.size: expected three lengths"),
+        ("octet", {"size": [0.1, 0.1, 0.1]}, "lattice.size: no beam of the lattice fits"),
+        ("octet", {"up": [0, 0, 0]}, "lattice.up: expected three integers"),
+        ("octet", {"envelope": "ball"}, "lattice.envelope: expected 'box' or 'cylinder'"),
+        ("octet", {"spacing": 0.0}, "lattice.spacing: expected a number greater than 0"),
+        ("cubic", {"diagonals": "all"}, "lattice.diagonals: expected 'none', 'faces', 'bodies'"),
+        ("displaced-delaunay-space", {"size": [1, 1, 1]}, "lattice.size: expected room"),
+        ("displaced-delaunay-space", {"displacement": 0.5}, "lattice.displacement: expected 0"),
     ],
 )
 def test_impossible_parameters_are_refused(kind, changes, message):
@@ -141,6 +222,9 @@ def test_unknown_lattices_list_the_known_ones():
         ("triangular-rows", {"counts": [10**9, 10**9], "first_x": [0.0, 0.5]}, "lattice.counts"),
         ("displaced-delaunay", {"columns": 10_000, "rows": 10_000}, "lattice.columns"),
         ("jammed-discs", {"discs": 10**8}, "lattice.discs"),
+        ("octet", {"size": [1000, 1000, 1000]}, "lattice.size"),
+        ("octet", {"size": [3000, 1, 3000], "up": [1, 1, 1]}, "lattice.size"),
+        ("displaced-delaunay-space", {"size": [1e4, 1e4, 1e4]}, "lattice.size"),
     ],
 )
 def test_a_lattice_that_does_not_fit_is_refused_before_it_is_generated(kind, size, key):

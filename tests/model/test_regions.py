@@ -60,3 +60,51 @@ def test_rows_do_not_depend_on_numbering(lattice):
 def test_regions_that_cannot_be_are_refused(lattice, kind, value, options, message):
     with pytest.raises(InvalidProblem, match=message):
         regions[kind](lattice, value, **options)
+
+
+@pytest.fixture
+def cube() -> Lattice:
+    """27 nodes numbered along x, then y, then z."""
+    return lattices["cubic"](size=[2, 2, 2], diagonals="none")
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "options", "expected"),
+    [
+        ("layer", 0, {}, list(range(9))),
+        ("layer", -1, {"axis": "x"}, [2, 5, 8, 11, 14, 17, 20, 23, 26]),
+        ("layer", 1, {"radius": [0.0, 0.5]}, [13]),
+        ("layer", 2, {"radius": [1.0, 1.2]}, [19, 21, 23, 25]),
+        ("layer", 0, {"radius": [0, 0], "around": [2, 0]}, [2]),
+        ("sphere", [1, 1, 1], {"radius": 1.0}, [4, 10, 12, 13, 14, 16, 22]),
+        ("box", [0, 0, 0, 0, 2, 0], {}, [0, 3, 6]),
+        ("nearest", [2, 2, 2], {"count": 2}, [17, 26]),
+    ],
+)
+def test_regions_in_space_pick_the_nodes_they_describe(cube, kind, value, options, expected):
+    assert regions[kind](cube, value, **options).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "options", "message"),
+    [
+        ("row", 0, {}, "in space use layer, box, sphere or nearest"),
+        ("layer", 3, {}, "layer: expected -3 to 2, as the lattice has 3 layers along z, got 3"),
+        ("layer", 0, {"axis": "w"}, "axis: expected 'x', 'y' or 'z', got 'w'"),
+        ("layer", 0, {"radius": [2, 1]}, r"radius: expected \[smallest, largest\], got \[2, 1\]"),
+        ("layer", 0, {"radius": [5, 6]}, "radius: no node of layer 0 lies between 5 and 6"),
+        ("layer", 0, {"around": [0, 0]}, "around: expected with radius"),
+        ("layer", 0, {"around": [0], "radius": [0, 1]}, "around: expected two coordinates"),
+        ("sphere", [0, 0], {"radius": 1}, r"sphere: expected a point \[x, y, z\], got \[0, 0\]"),
+        ("sphere", [0, 0, 0], {"radius": -1.0}, "radius: expected 0 or more, got -1"),
+        ("sphere", [0.5, 0.5, 0.5], {"radius": 0.1}, "sphere: no node lies within 0.1"),
+    ],
+)
+def test_regions_in_space_that_cannot_be_are_refused(cube, kind, value, options, message):
+    with pytest.raises(InvalidProblem, match=message):
+        regions[kind](cube, value, **options)
+
+
+def test_layers_are_refused_in_the_plane(lattice):
+    with pytest.raises(InvalidProblem, match="layer: expected a lattice in space; in the plane"):
+        regions["layer"](lattice, 0)

@@ -150,7 +150,7 @@ def test_lattices_are_made_and_refused_by_their_size(client: TestClient) -> None
     message, key = refusal(client.post("/api/lattices", json={"lattice": {**small, "rows": 10**9}}))
     assert "3000" in message
     assert key == "lattice"
-    refusal(client.post("/api/lattices", json={"lattice": {"kind": "cubic"}}), 404)
+    refusal(client.post("/api/lattices", json={"lattice": {"kind": "square"}}), 404)
 
 
 def test_a_motion_follows_the_true_path(client: TestClient, crane: dict[str, Any]) -> None:

@@ -4,7 +4,7 @@ In a problem file a region is an inline table whose key is the kind of region::
 
     nodes = [{ row = -1, rightmost = 3 }, { box = [0, 8, 2, 10] }, { ids = [4, 5] }]
 
-Rows exist only in the plane.
+Rows exist only in the plane, layers only in space.
 
 To add a kind, register a function ``(lattice, value, ...) -> node ids`` with
 ``@regions.register("key")``. Further parameters are further keys.
@@ -59,15 +59,22 @@ def find_rows(lattice: Lattice) -> list[NDArray[np.int64]]:
     [array([0, 1]), array([2])]
     """
     if lattice.dimension != 2:
-        raise InvalidProblem("row: expected a lattice in the plane; in space use box or nearest")
-    y = lattice.positions[:, 1]
-    order = np.argsort(y, kind="stable")
-    same = 1e-3 * float(np.median(lattice.rest_length))
-    breaks = np.flatnonzero(np.diff(y[order]) > same) + 1
+        raise InvalidProblem(
+            "row: expected a lattice in the plane; in space use layer, box, sphere or nearest"
+        )
     return [
         nodes[np.argsort(lattice.positions[nodes, 0], kind="stable")]
-        for nodes in np.split(order, breaks)
+        for nodes in _levels(lattice, 1)
     ]
+
+
+def _levels(lattice: Lattice, axis: int) -> list[NDArray[np.int64]]:
+    """Return the nodes with equal coordinates along an axis, in its order."""
+    along = lattice.positions[:, axis]
+    order = np.argsort(along, kind="stable")
+    same = 1e-3 * float(np.median(lattice.rest_length))
+    breaks = np.flatnonzero(np.diff(along[order]) > same) + 1
+    return [np.sort(nodes) for nodes in np.split(order, breaks)]
 
 
 @regions.register("row")
@@ -155,6 +162,112 @@ def box(lattice: Lattice, box: Sequence[float]) -> NDArray[np.int64]:
     slack = 1e-6 * float(np.median(lattice.rest_length))
     inside = (lattice.positions >= low - slack) & (lattice.positions <= high + slack)
     return np.flatnonzero(inside.all(axis=1))
+
+
+def find_layers(lattice: Lattice, axis: str = "z") -> list[NDArray[np.int64]]:
+    """Return the nodes of each layer of a lattice in space, in the order of a coordinate.
+
+    Raises
+    ------
+    InvalidProblem
+        If the lattice is in the plane, or there is no such axis.
+
+    Examples
+    --------
+    >>> from bellcrank.model import lattices
+    >>> [len(layer) for layer in find_layers(lattices["octet"]([3, 3, 3]))]
+    [13, 12, 13, 12, 13]
+    """
+    if lattice.dimension != 3:
+        raise InvalidProblem("layer: expected a lattice in space; in the plane use row")
+    if axis not in {"x", "y", "z"}:
+        raise InvalidProblem(f"axis: expected 'x', 'y' or 'z', got {axis!r}")
+    return _levels(lattice, "xyz".index(axis))
+
+
+@regions.register("layer")
+def layer(
+    lattice: Lattice,
+    layer: int,
+    *,
+    axis: str = "z",
+    around: Sequence[float] | None = None,
+    radius: Sequence[float] | None = None,
+) -> NDArray[np.int64]:
+    """Return the nodes of one layer of a lattice in space, or a ring of it.
+
+    Parameters
+    ----------
+    lattice
+        The lattice.
+    layer
+        Number of the layer along the axis, starting at 0; negative numbers count from the end.
+    axis
+        ``"x"``, ``"y"`` or ``"z"``, normal to the layer.
+    around
+        Middle of a ring, two coordinates in the order x, y, z; the middle of the lattice by
+        default.
+    radius
+        Smallest and largest distance from it.
+
+    Raises
+    ------
+    InvalidProblem
+        If there is no such layer, or no node in the ring.
+    """
+    found = find_layers(lattice, axis)
+    if not -len(found) <= layer < len(found):
+        raise InvalidProblem(
+            f"layer: expected {-len(found)} to {len(found) - 1}, as the lattice has "
+            f"{len(found)} layers along {axis}, got {layer}"
+        )
+    nodes = found[layer]
+    if radius is None:
+        if around is not None:
+            raise InvalidProblem("around: expected with radius")
+        return nodes
+    if len(radius) != 2 or not 0.0 <= radius[0] <= radius[1]:
+        raise InvalidProblem(f"radius: expected [smallest, largest], got {list(radius)}")
+    across = np.delete(lattice.positions, "xyz".index(axis), axis=1)
+    middle = 0.5 * (across.min(axis=0) + across.max(axis=0)) if around is None else around
+    if len(middle) != 2:
+        raise InvalidProblem(f"around: expected two coordinates, got {list(middle)}")
+    distance = np.linalg.norm(across[nodes] - np.array(middle), axis=1)
+    slack = 1e-6 * float(np.median(lattice.rest_length))
+    ring: NDArray[np.int64] = nodes[
+        (distance >= radius[0] - slack) & (distance <= radius[1] + slack)
+    ]
+    if not len(ring):
+        raise InvalidProblem(
+            f"radius: no node of layer {layer} lies between {radius[0]:g} and {radius[1]:g}; its "
+            f"nodes have distances of {distance.min():.4g} to {distance.max():.4g}"
+        )
+    return ring
+
+
+@regions.register("sphere")
+def sphere(lattice: Lattice, sphere: Sequence[float], *, radius: float) -> NDArray[np.int64]:
+    """Return the nodes in a sphere around ``[x, y, z]``, in the plane in a circle, edge included.
+
+    Raises
+    ------
+    InvalidProblem
+        If `sphere` is not a point, the radius is negative, or no node lies in the sphere.
+    """
+    axes = "xyz"[: lattice.dimension]
+    if len(sphere) != len(axes):
+        raise InvalidProblem(f"sphere: expected a point [{', '.join(axes)}], got {list(sphere)}")
+    if radius < 0.0:
+        raise InvalidProblem(f"radius: expected 0 or more, got {radius:g}")
+    distance = np.linalg.norm(lattice.positions - np.array(sphere), axis=1)
+    slack = 1e-6 * float(np.median(lattice.rest_length))
+    inside = np.flatnonzero(distance <= radius + slack)
+    if not len(inside):
+        raise InvalidProblem(
+            f"sphere: no node lies within {radius:g} of {list(sphere)}; the nearest one is "
+            f"{distance.min():.4g} away"
+        )
+    return inside
 
 
 @regions.register("nearest")

@@ -7,15 +7,21 @@ parameter ``rng``, which is set from the key ``seed``. Generators check the numb
 (`check_node_count`) before they start.
 """
 
-from bellcrank.model.lattices.delaunay import displaced_delaunay
+from bellcrank.model.lattices.crystals import body_centred, cubic, kelvin, octet
+from bellcrank.model.lattices.delaunay import displaced_delaunay, displaced_delaunay_space
 from bellcrank.model.lattices.jammed import jammed_discs
 from bellcrank.model.lattices.registry import lattices
 from bellcrank.model.lattices.triangular import triangular_rectangle, triangular_rows
 
 __all__ = [
+    "body_centred",
+    "cubic",
     "displaced_delaunay",
+    "displaced_delaunay_space",
     "jammed_discs",
+    "kelvin",
     "lattices",
+    "octet",
     "triangular_rectangle",
     "triangular_rows",
 ]
