@@ -142,7 +142,11 @@ def test_regions_in_space_have_three_coordinates(space):
 @pytest.mark.parametrize(
     ("kind", "value", "message"),
     [
-        ("row", 0, "row: expected a lattice in the plane; in space use layer, box, sphere or nearest"),
+        (
+            "row",
+            0,
+            "row: expected a lattice in the plane; in space use layer, box, sphere or nearest",
+        ),
         ("rows", [0], "row: expected a lattice in the plane"),
         ("box", [0, 0, 1, 1], r"box: expected \[x_min, y_min, z_min, x_max, y_max, z_max\]"),
         ("box", [0, 0, 1, 1, 1, 0], r"box: expected \[x_min, y_min, z_min, x_max, y_max, z_max\]"),

@@ -29,6 +29,7 @@ from bellcrank.part import PartSpec, frame_elasticity, frame_section
 from bellcrank.task.conditions import CaseReader
 from bellcrank.task.domain import fill, in_regions, region_of
 from bellcrank.task.items import ItemReader
+from bellcrank.task.space import beams_in_space, fill_in_space
 from bellcrank.task.units import ProblemUnits, part_units
 
 if TYPE_CHECKING:
@@ -138,7 +139,11 @@ class _Builder:
         items += self._limits(names)
         first, *others = cases
         (output_name, output), *more = first.outputs.items()
-        weight = self.cases.weight(table.limits.upright) if _bounds_sag(items) else None
+        weight = (
+            self.cases.weight(table.limits.upright, "limits.upright")
+            if _bounds_sag(items)
+            else None
+        )
         problem = Problem(
             name=table.name,
             lattice=self.lattice,
@@ -188,6 +193,13 @@ class _Builder:
                 )
             made: Lattice = call_with_keys(lattices[kind], parameters, "domain.lattice")
             return made
+        is_surface = isinstance(domain.outline, str) and domain.outline.lower().endswith(".stl")
+        if is_surface or (domain.size is not None and len(domain.size) == 3):
+            return fill_in_space(domain, self.part, self.folder)
+        if domain.cells is not None:
+            raise InvalidProblem(
+                "domain.cells: expected a domain in space, with a size of 3 lengths"
+            )
         region = region_of(domain, self.folder)
         return fill(region, self.part.scale, self.part.width)
 
@@ -241,7 +253,8 @@ class _Builder:
         """Return the problem whose solid regions keep all beams."""
         if not self.table.domain.solid:
             return problem
-        solid = in_regions(self.table.domain.solid, self.lattice, self.part.scale, "domain.solid")
+        find = in_regions if self.lattice.dimension == 2 else beams_in_space
+        solid = find(self.table.domain.solid, self.lattice, self.part.scale, "domain.solid")
         free = problem.designable[~solid[problem.designable]]
         return replace(problem, designable=free)
 

@@ -11,6 +11,7 @@ import numpy as np
 from bellcrank.errors import InvalidProblem
 from bellcrank.model import Case, Input, Loads, NodeForce, NodeSpring, Output, Supports
 from bellcrank.model.stroke_ranges import WHOLE, check_cover, stroke_range
+from bellcrank.task.schema import unit_vector
 from bellcrank.task.shapes import nodes_at
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class CaseReader:
         Size and material of the part.
     units
         Units of the problem.
-    positions : (N, 2)
+    positions : (N, d)
         Nodes of the lattice, mm.
     spacing
         Distance of neighbouring nodes, mm.
@@ -65,15 +66,30 @@ class CaseReader:
     def _nodes(self, regions: NodeRegions, key: str) -> NDArray[np.int64]:
         return nodes_at(regions, self.positions, self.spacing, key)
 
+    @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        return int(self.positions.shape[1])
+
+    def vector(self, direction: tuple[float, ...] | str, key: str) -> NDArray[np.float64]:
+        """Return (d,) the unit vector of a direction."""
+        return np.array(unit_vector(direction, self.dimension, key))
+
     def _supports(self, sections: Sequence[tuple[str, SupportSection]]) -> Supports:
-        held: dict[str, list[NDArray[np.int64]]] = {"all": [], "x": [], "y": []}
+        held: dict[str, list[NDArray[np.int64]]] = {"all": [], "x": [], "y": [], "z": []}
         for key, section in sections:
+            if section.hold == "z" and self.dimension == 2:
+                raise InvalidProblem(
+                    f"{key}.hold: expected 'all', 'x' or 'y' in the plane, got 'z'"
+                )
             held[section.hold].append(self._nodes(section.at, f"{key}.at"))
         nodes = {
             hold: np.unique(np.concatenate(each)) if each else np.empty(0, np.int64)
             for hold, each in held.items()
         }
-        return Supports(fixed=nodes["all"], fixed_x=nodes["x"], fixed_y=nodes["y"])
+        return Supports(
+            fixed=nodes["all"], fixed_x=nodes["x"], fixed_y=nodes["y"], fixed_z=nodes["z"]
+        )
 
     def case(self, name: str, case: CaseSection, key: str, reader: ItemReader) -> Case:
         """Return a load case, and read its items.
@@ -168,7 +184,10 @@ class CaseReader:
         if both or (neither and base is None):
             raise InvalidProblem(f"{key}: expected displacement or force, and not both")
         nodes = base.nodes if section.at is None else self._nodes(section.at, f"{key}.at")  # type: ignore[union-attr]
-        direction: Any = base.direction if section.direction is None else section.direction  # type: ignore[union-attr]
+        if section.direction is None:
+            direction: Any = base.direction  # type: ignore[union-attr]
+        else:
+            direction = self.vector(section.direction, f"{key}.direction")
         if section.displacement is not None:
             amount = self._displacement(section.displacement, f"{key}.displacement")
             return Input(nodes, direction, "displacement", amount)
@@ -212,10 +231,13 @@ class CaseReader:
             nodes = self._nodes(section.at, f"{where}.at")
             if section.force is not None:
                 total = self.units.in_problem("force", section.force)
-                forces.append(NodeForce(nodes, total / len(nodes) * np.array(section.direction)))
+                direction = self.vector(section.direction, f"{where}.direction")
+                forces.append(NodeForce(nodes, total / len(nodes) * direction))
             else:
                 springs.append(self._spring(nodes, section, where))
-        weight = None if case.gravity is None else self.weight(case.gravity)
+        weight = None
+        if case.gravity is not None:
+            weight = self.weight(case.gravity, f"{key}.gravity")
         return Loads(tuple(forces), tuple(springs), weight)
 
     def _spring(self, nodes: NDArray[np.int64], section: LoadSection, key: str) -> NodeSpring:
@@ -225,7 +247,7 @@ class CaseReader:
                 f"{key}.spring: expected a stiffness above 0, got {section.spring}"
             )
         stiffness = self.units.in_problem("stiffness", section.spring) / len(nodes)
-        direction: Any = section.direction
+        direction: Any = self.vector(section.direction, f"{key}.direction")
         return NodeSpring(nodes, direction, stiffness)
 
     def _outputs(self, case: CaseSection, key: str, reader: ItemReader) -> dict[str, Output]:
@@ -247,8 +269,8 @@ class CaseReader:
                 wanted = getattr(section, quantity)
                 reader.read(quantity, wanted, f"{where}.{quantity}", name)
             if section.path is not None:
-                x, y = outputs[name].direction[0]
-                reader.path(section.path, (float(x), float(y)), f"{where}.path", name)
+                along = tuple(outputs[name].direction[0].tolist())
+                reader.path(section.path, along, f"{where}.path", name)
         return outputs
 
     def _output(self, section: OutputSection, key: str) -> Output:
@@ -256,9 +278,10 @@ class CaseReader:
         if section.at is None and base is None:
             raise InvalidProblem(f"key '{key}.at' is missing")
         nodes = base.nodes if section.at is None else self._nodes(section.at, f"{key}.at")  # type: ignore[union-attr]
-        direction: Any = section.direction
-        if direction is None:
-            direction = (0.0, 1.0) if base is None else base.direction
+        if section.direction is None and base is not None:
+            direction: Any = base.direction
+        else:
+            direction = self.vector(section.direction or "up", f"{key}.direction")
         spring = None
         if section.spring is not None:
             if section.spring <= 0.0:
@@ -268,12 +291,12 @@ class CaseReader:
             spring = self.units.in_problem("stiffness", section.spring) / len(nodes)
         return Output(nodes, direction, spring)
 
-    def weight(self, direction: tuple[float, float]) -> NDArray[np.float64]:
+    def weight(self, direction: tuple[float, ...] | str, key: str) -> NDArray[np.float64]:
         """Return the own weight: force on a unit of volume."""
         if math.isnan(self.units.density):
             raise InvalidProblem(
                 f"part.material: the density of {self.part.registered_material.name} is unknown, "
                 "which sag and gravity need; give a material with density"
             )
-        weight: NDArray[np.float64] = self.units.weight * np.array(direction)
+        weight: NDArray[np.float64] = self.units.weight * self.vector(direction, key)
         return weight

@@ -231,9 +231,7 @@ class ItemReader:
         self.maximise.append(ObjectiveTerm(**named, scale=scale))
         self.scaled.append(scaled)
 
-    def path(
-        self, path: PathSection, direction: tuple[float, float], key: str, output: str
-    ) -> None:
+    def path(self, path: PathSection, direction: tuple[float, ...], key: str, output: str) -> None:
         """Add the item of a wanted path.
 
         Raises
@@ -248,7 +246,17 @@ class ItemReader:
                 f"{key}.error: expected a part of the length of the path up to 50%, got "
                 f"{path.error:g}"
             )
-        corners = arc(*path.arc, direction) if path.arc else np.array(path.points, dtype=float)
+        if path.arc is not None:
+            if len(direction) != 2:
+                raise InvalidProblem(f"{key}.arc: expected points in space, got an arc")
+            corners = arc(*path.arc, direction)
+        else:
+            assert path.points is not None
+            lengths = {len(point) for point in path.points}
+            if lengths != {len(direction)}:
+                axes = ", ".join("xyz"[: len(direction)])
+                raise InvalidProblem(f"{key}.points: expected points [{axes}]")
+            corners = np.array(path.points, dtype=float)
         if len(corners) < 2 or np.abs(np.diff(corners, axis=0)).sum() == 0.0:
             raise InvalidProblem(f"{key}: expected a path of at least two different points")
         if np.abs(corners[0]).max() > 0.0:
@@ -264,7 +272,7 @@ class ItemReader:
         )  # fmt: skip
 
 
-def arc(radius: float, angle: float, direction: tuple[float, float]) -> np.ndarray[Any, Any]:
+def arc(radius: float, angle: float, direction: tuple[float, ...]) -> np.ndarray[Any, Any]:
     """Return (k, 2) points of an arc that begins at the origin along a direction.
 
     Parameters

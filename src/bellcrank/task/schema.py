@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-from bellcrank.errors import InvalidSettings
+from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.model.parsing import Table
 from bellcrank.part.units import UNITS, read_quantity
 
@@ -20,10 +20,15 @@ if TYPE_CHECKING:
     from bellcrank.part.units import Quantity
 
 SCHEMA = "bellcrank/task/1"
-DIRECTIONS = {
-    "right": (1.0, 0.0), "left": (-1.0, 0.0), "up": (0.0, 1.0), "down": (0.0, -1.0),
+DIRECTIONS: dict[int, dict[str, tuple[float, ...]]] = {
+    2: {"right": (1.0, 0.0), "left": (-1.0, 0.0), "up": (0.0, 1.0), "down": (0.0, -1.0)},
+    3: {
+        "right": (1.0, 0.0, 0.0), "left": (-1.0, 0.0, 0.0),
+        "back": (0.0, 1.0, 0.0), "front": (0.0, -1.0, 0.0),
+        "up": (0.0, 0.0, 1.0), "down": (0.0, 0.0, -1.0),
+    },
 }  # fmt: skip
-"""Directions by name."""
+"""Directions by name, in the plane and in space."""
 
 
 def _reader(quantity: Quantity) -> BeforeValidator:
@@ -44,8 +49,22 @@ Mass = Annotated[float, _reader("mass")]
 Angle = Annotated[float, _reader("angle")]
 Ratio = Annotated[float, _reader("ratio")]
 Stiffness = Annotated[float, _reader("stiffness")]
-Point = tuple[Length, Length]
-"""A point [x, y], mm."""
+
+
+def _as_point(value: Any) -> Any:
+    if isinstance(value, list | tuple) and len(value) in {2, 3}:
+        return tuple(value)
+    raise PydanticCustomError("point", "two lengths, or three in space")
+
+
+def _as_box(value: Any) -> Any:
+    if isinstance(value, list | tuple) and len(value) in {4, 6}:
+        return tuple(value)
+    raise PydanticCustomError("box", "four lengths, or six in space")
+
+
+Point = Annotated[tuple[Length, ...], BeforeValidator(_as_point)]
+"""A point [x, y], in space [x, y, z], mm."""
 
 
 def _as_tuple(value: Any) -> Any:
@@ -56,10 +75,6 @@ def _as_range(value: Any) -> Any:
     if value is None or (isinstance(value, list | tuple) and len(value) == 2):
         return _as_tuple(value)
     raise PydanticCustomError("range", "two fractions of the stroke like ['0%', '50%']")
-
-
-def _as_points(value: Any) -> Any:
-    return [_as_tuple(each) for each in value] if isinstance(value, list) else value
 
 
 def _as_list(value: Any) -> Any:
@@ -73,29 +88,59 @@ def _as_bounds(value: Any) -> Any:
     ]
 
 
-def read_direction(value: Any) -> tuple[float, float]:
-    """Return the unit vector of a direction: a name, an angle from the x axis, or a vector.
+def read_direction(value: Any) -> tuple[float, ...] | str:
+    """Return a name as it is, and the unit vector of an angle from the x axis or of a vector.
 
     Examples
     --------
-    >>> read_direction("left"), read_direction([0, 2])
-    ((-1.0, 0.0), (0.0, 1.0))
+    >>> read_direction("left"), read_direction([0, 2]), read_direction([0, 0, 2])
+    ('left', (0.0, 1.0), (0.0, 0.0, 1.0))
     """
-    if isinstance(value, str) and value in DIRECTIONS:
-        return DIRECTIONS[value]
+    if isinstance(value, str) and value in DIRECTIONS[3]:
+        return value
     if isinstance(value, str) and not value.strip().isdigit():
         with suppress(InvalidSettings):
             angle = math.radians(read_quantity("", value, "angle"))
             return math.cos(angle), math.sin(angle)
-    if isinstance(value, list | tuple) and len(value) == 2:
+    if isinstance(value, list | tuple) and len(value) in DIRECTIONS:
         with suppress(TypeError, ValueError, ZeroDivisionError):
-            x, y = (float(each) for each in value)
-            size = math.hypot(x, y)
+            parts = [float(each) for each in value]
+            size = math.hypot(*parts)
             if math.isfinite(size):
-                return x / size, y / size
+                return tuple(each / size for each in parts)
     raise PydanticCustomError(
-        "direction", "left, right, up, down, an angle like '30deg', or a vector [x, y]"
+        "direction",
+        "left, right, up, down, an angle like '30deg', or a vector [x, y]; in space also front, "
+        "back and [x, y, z]",
     )
+
+
+def unit_vector(direction: tuple[float, ...] | str, dimension: int, key: str) -> tuple[float, ...]:
+    """Return the unit vector (d,) of a direction that `read_direction` has read.
+
+    Raises
+    ------
+    InvalidProblem
+        If it is one of the plane in space, or the other way round.
+
+    Examples
+    --------
+    >>> unit_vector("up", 2, "direction"), unit_vector("up", 3, "direction")
+    ((0.0, 1.0), (0.0, 0.0, 1.0))
+    """
+    names = DIRECTIONS[dimension]
+    if isinstance(direction, str):
+        if direction not in names:
+            raise InvalidProblem(
+                f"{key}: expected {', '.join(names)} or a vector in the plane, got {direction!r}"
+            )
+        return names[direction]
+    if len(direction) != dimension:
+        form = f"[{', '.join('xyz'[:dimension])}]"
+        raise InvalidProblem(
+            f"{key}: expected {', '.join(names)} or a vector {form}, got {list(direction)}"
+        )
+    return direction
 
 
 def _switch(quantity: Quantity) -> BeforeValidator:
@@ -113,11 +158,10 @@ def _switch(quantity: Quantity) -> BeforeValidator:
     return BeforeValidator(read)
 
 
-OnePoint = Annotated[Point, BeforeValidator(_as_tuple)]
-PointList = Annotated[list[Point], BeforeValidator(_as_points)]
-Box = Annotated[tuple[Length, Length, Length, Length], BeforeValidator(_as_tuple)]
-Direction = Annotated[tuple[float, float], BeforeValidator(read_direction)]
-"""left, right, up, down, an angle from the x axis, or a vector; a unit vector when read."""
+Pair = Annotated[tuple[Length, Length], BeforeValidator(_as_tuple)]
+Box = Annotated[tuple[Length, ...], BeforeValidator(_as_box)]
+Direction = Annotated[tuple[float, ...] | str, BeforeValidator(read_direction)]
+"""left, right, up, down, in space also front and back, an angle from the x axis, or a vector."""
 
 
 class PartSection(Table):
@@ -138,28 +182,34 @@ class PartSection(Table):
 
 
 class Shape(Table):
-    """A region of the plane: exactly one of circle, box and polygon."""
+    """A region: exactly one of circle, box and polygon, in space of sphere, cylinder and box."""
 
-    circle: OnePoint | None = None
-    """Centre of a circle; with `radius`."""
+    circle: Pair | None = None
+    """Centre of a circle in the plane; with `radius`."""
+    sphere: Point | None = None
+    """Centre of a sphere; with `radius`."""
+    cylinder: Point | None = None
+    """Axis [x, y] of an upright cylinder; with `radius`."""
     radius: Length | None = None
     box: Box | None = None
-    """x_min, y_min, x_max, y_max."""
-    polygon: PointList | None = None
-    """Corners."""
+    """x_min, y_min, x_max, y_max; in space x_min, y_min, z_min, x_max, y_max, z_max."""
+    polygon: list[Point] | None = None
+    """Corners, in the plane."""
 
 
 class NodeRegion(Shape):
     """Nodes: those in a shape, next to a point, on an edge of the domain, or given by number."""
 
-    point: OnePoint | None = None
+    point: Point | None = None
     """The nodes nearest to a point."""
     count: int = 1
     """Number of nodes nearest to the point."""
     edge: Literal["left", "right", "top", "bottom"] | None = None
-    """The nodes on one side of the domain."""
-    between: OnePoint | None = None
+    """The nodes on one side of a domain in the plane."""
+    between: Pair | None = None
     """Range of an edge: from and to, along it."""
+    face: Literal["left", "right", "front", "back", "bottom", "top"] | None = None
+    """The nodes on one side of a domain in space."""
     nodes: list[int] | None = None
     """Numbers of nodes."""
 
@@ -167,10 +217,14 @@ class NodeRegion(Shape):
 class DomainSection(Table):
     """``[domain]``: where material may be."""
 
-    size: OnePoint | None = None
-    """Width and height of a rectangle with its lower left corner at the origin."""
+    size: Point | None = None
+    """Width and height of a rectangle with its lower left corner at the origin; in space width,
+    depth and height of a box."""
     outline: Any = None
-    """DXF or SVG file, next to the task file, a shape, or the corners of a polygon."""
+    """DXF or SVG file, next to the task file, a shape, or the corners of a polygon; in space an STL
+    file."""
+    cells: Any = None
+    """Lattice that fills a domain in space: a name, or a table of its kind and options."""
     lattice: dict[str, Any] | None = None
     """A lattice by name, as in a problem file; in lattice units."""
     problem: str | None = None
@@ -191,8 +245,8 @@ class SupportSection(Table):
     """``[[supports]]``: nodes that are held."""
 
     at: NodeRegions
-    hold: Literal["all", "x", "y"] = "all"
-    """Coordinates that are held; ``"x"`` and ``"y"`` are rollers."""
+    hold: Literal["all", "x", "y", "z"] = "all"
+    """Coordinates that are held; ``"x"``, ``"y"`` and ``"z"`` are rollers."""
 
 
 class InputSection(Table):
@@ -252,7 +306,7 @@ Wanted = Annotated[list[Bounds], BeforeValidator(_as_bounds)]
 class PathSection(Table):
     """A wanted path of the output."""
 
-    points: PointList | None = None
+    points: list[Point] | None = None
     """Corners, from the rest position of the output, which is [0, 0]."""
     arc: Annotated[tuple[Length, Angle], BeforeValidator(_as_tuple)] | None = None
     """Radius and angle of an arc that begins along the direction of the output; a positive angle
@@ -308,7 +362,7 @@ class LimitsSection(Table):
     """Largest mass of the struts."""
     symmetry: Literal["x", "y", "xy"] | None = None
     """Mirror symmetry: left and right, top and bottom, or both."""
-    upright: Direction = (0.0, -1.0)
+    upright: Direction = "down"
     """Direction of the own weight for `sag`."""
 
 

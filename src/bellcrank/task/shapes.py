@@ -9,6 +9,7 @@ import shapely
 from shapely.geometry import Point, Polygon, box
 
 from bellcrank.errors import InvalidProblem
+from bellcrank.task import space
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +20,11 @@ if TYPE_CHECKING:
     from bellcrank.task.schema import NodeRegion, Shape
 
 SHAPES = ("circle", "box", "polygon")
-REGIONS = ("point", "edge", "nodes", *SHAPES)
+REGIONS = {
+    2: ("point", "edge", "nodes", *SHAPES),
+    3: ("point", "face", "nodes", *space.SHAPES),
+}
+"""Regions of nodes in the plane and in space."""
 SNAP = 0.75
 """Largest distance of a node from the point that it is named by, in spacings."""
 ROW = {"top": 0.3, "bottom": 0.3, "left": 0.55, "right": 0.55}
@@ -35,13 +40,15 @@ def kind_of(region: Shape, names: Sequence[str], key: str) -> str:
     InvalidProblem
         If there is none, or several.
     """
-    given = [name for name in names if getattr(region, name, None) is not None]
-    if len(given) != 1:
+    every = {*REGIONS[2], *REGIONS[3]}
+    given = [name for name in sorted(every) if getattr(region, name, None) is not None]
+    if len(given) != 1 or given[0] not in names:
         raise InvalidProblem(
             f"{key}: expected one of {', '.join(names)}, got {' and '.join(given) or 'none'}"
         )
-    if (region.radius is not None) != (given[0] == "circle"):
-        raise InvalidProblem(f"{key}: expected circle and radius together")
+    if (region.radius is not None) != (given[0] in {"circle", "sphere", "cylinder"}):
+        rounded = " or ".join(name for name in ("circle", "sphere", "cylinder") if name in names)
+        raise InvalidProblem(f"{key}: expected {rounded} and radius together")
     return given[0]
 
 
@@ -68,6 +75,10 @@ def shape_of(shape: Shape, key: str) -> BaseGeometry:
         return Point(shape.circle).buffer(shape.radius, quad_segs=32)
     if kind == "box":
         assert shape.box is not None
+        if len(shape.box) != 4:
+            raise InvalidProblem(
+                f"{key}.box: expected [x_min, y_min, x_max, y_max], got {list(shape.box)}"
+            )
         x_min, y_min, x_max, y_max = shape.box
         if x_min >= x_max or y_min >= y_max:
             raise InvalidProblem(
@@ -104,7 +115,7 @@ def nodes_at(
     ----------
     regions
         Tables of a task.
-    positions : (N, 2)
+    positions : (N, d)
         Nodes of the lattice, mm.
     spacing
         Distance of neighbouring nodes, mm.
@@ -126,7 +137,8 @@ def nodes_at(
 def _nodes(
     region: NodeRegion, positions: NDArray[np.float64], spacing: float, key: str
 ) -> NDArray[np.int64]:
-    kind = kind_of(region, REGIONS, key)
+    dimension = positions.shape[1]
+    kind = kind_of(region, REGIONS[dimension], key)
     if region.between is not None and kind != "edge":
         raise InvalidProblem(f"{key}.between: expected with edge, got it with {kind}")
     if region.count != 1 and kind != "point":
@@ -144,6 +156,10 @@ def _nodes(
         return _nearest(region, positions, spacing, key)
     if kind == "edge":
         return _edge(region, positions, spacing, key)
+    if kind == "face":
+        return space.face_nodes(region, positions, spacing)
+    if dimension == 3:
+        return space.nodes_in_shape(region, positions, spacing, key)
     shape = shape_of(region, key).buffer(1e-6 * spacing)
     inside = np.flatnonzero(shapely.contains_xy(shape, positions[:, 0], positions[:, 1]))
     if not len(inside):
@@ -160,6 +176,9 @@ def _nearest(
     region: NodeRegion, positions: NDArray[np.float64], spacing: float, key: str
 ) -> NDArray[np.int64]:
     assert region.point is not None
+    axes = "xyz"[: positions.shape[1]]
+    if len(region.point) != len(axes):
+        raise InvalidProblem(f"{key}.point: expected [{', '.join(axes)}], got {list(region.point)}")
     if not 1 <= region.count <= len(positions):
         raise InvalidProblem(
             f"{key}.count: expected 1 to {len(positions)} nodes, got {region.count}"
@@ -167,13 +186,15 @@ def _nearest(
     gap = np.linalg.norm(positions - np.array(region.point), axis=1)
     order = np.argsort(gap.round(9), kind="stable")
     if gap[order[0]] > SNAP * spacing:
-        near = positions[order[0]]
+        near = ", ".join(f"{each:.4g}" for each in positions[order[0]])
         low, high = positions.min(axis=0), positions.max(axis=0)
+        extent = " and ".join(
+            f"{axis} = {a:.4g} to {b:.4g}" for axis, a, b in zip(axes, low, high, strict=True)
+        )
         raise InvalidProblem(
-            f"{key}.point: the node nearest to {list(region.point)} mm is at [{near[0]:.4g}, "
-            f"{near[1]:.4g}] mm, {gap[order[0]]:.3g} mm away; expected a point within "
-            f"{SNAP * spacing:.3g} mm of a node; the lattice extends from x = {low[0]:.4g} to "
-            f"{high[0]:.4g} and y = {low[1]:.4g} to {high[1]:.4g} mm"
+            f"{key}.point: the node nearest to {list(region.point)} mm is at [{near}] mm, "
+            f"{gap[order[0]]:.3g} mm away; expected a point within {SNAP * spacing:.3g} mm of a "
+            f"node; the lattice extends from {extent} mm"
         )
     return np.sort(order[: region.count])
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     Points = NDArray[np.float64]
     Kinds = NDArray[np.int64]
 
-Envelope = Literal["box", "cylinder"]
-Diagonals = Literal["none", "faces", "bodies"]
-
 SLACK = 1e-6
 """Distance, in cube edges, by which nodes may lie outside the envelope."""
 MOST_AROUND = 16
@@ -41,12 +38,12 @@ FACES = ((0, 2, 2), (2, 0, 2), (2, 2, 0))
 """Centres of the faces of a cube, in quarters of its edge."""
 CENTRE = (2, 2, 2)
 KELVIN = tuple(
-    place
-    for place in itertools.product(range(4), repeat=3)
-    if 0 in place
-    and 2 in place
-    and len({0, 2} & set(place)) == 2
-    and sum(k % 2 for k in place) == 1
+    site
+    for site in itertools.product(range(4), repeat=3)
+    if 0 in site
+    and 2 in site
+    and len({0, 2} & set(site)) == 2
+    and sum(k % 2 for k in site) == 1
 )
 """Corners of truncated octahedra that fill the space: one coordinate of 0, one of a half and one of
 a quarter or three quarters of the edge."""
@@ -59,7 +56,7 @@ class Crystal:
     Parameters
     ----------
     nodes
-        Place of each node in quarters of the edge of the cube, and its kind.
+        Site of each node in quarters of the edge of the cube, and its kind.
     joined
         Pairs of kinds, with the length of the beams between them in edges of the cube.
     """
@@ -77,14 +74,14 @@ CUBIC = {
     "bodies": Crystal((CORNER, (CENTRE, 1)), (EDGES, (0, 1, math.sqrt(0.75)))),
 }
 BODY_CENTRED = Crystal((CORNER, (CENTRE, 1)), ((0, 1, math.sqrt(0.75)),))
-FOAM = Crystal(tuple((place, 0) for place in KELVIN), ((0, 0, math.sqrt(0.125)),))
+FOAM = Crystal(tuple((site, 0) for site in KELVIN), ((0, 0, math.sqrt(0.125)),))
 
 
 @lattices.register("octet")
 def octet(
     size: Sequence[float],
     *,
-    envelope: Envelope = "box",
+    envelope: str = "box",
     up: Sequence[int] = UPRIGHT,
     spacing: float = 1.0,
 ) -> Lattice:
@@ -122,8 +119,8 @@ def octet(
 def cubic(
     size: Sequence[float],
     *,
-    diagonals: Diagonals = "bodies",
-    envelope: Envelope = "box",
+    diagonals: str = "bodies",
+    envelope: str = "box",
     up: Sequence[int] = UPRIGHT,
     spacing: float = 1.0,
 ) -> Lattice:
@@ -159,7 +156,7 @@ def cubic(
 def body_centred(
     size: Sequence[float],
     *,
-    envelope: Envelope = "box",
+    envelope: str = "box",
     up: Sequence[int] = UPRIGHT,
     spacing: float = 1.0,
 ) -> Lattice:
@@ -179,7 +176,7 @@ def body_centred(
 def kelvin(
     size: Sequence[float],
     *,
-    envelope: Envelope = "box",
+    envelope: str = "box",
     up: Sequence[int] = UPRIGHT,
     spacing: float = 1.0,
 ) -> Lattice:
@@ -219,7 +216,7 @@ def crystal(
     """
     found = []
     for positions, kinds in placements(form, size, envelope, up, edge):
-        nodes, beams = _without_dead_ends(len(positions), _joined(form, positions, kinds, edge))
+        nodes, beams = without_dead_ends(len(positions), _joined(form, positions, kinds, edge))
         found.append((positions[nodes], beams))
     positions, beams = max(found, key=lambda each: len(each[1]))
     if not len(beams):
@@ -235,7 +232,7 @@ def placements(
 ) -> list[tuple[Points, Kinds]]:
     """Return the nodes (n, 3) of a crystal inside an envelope and their kinds (n,), both sorted.
 
-    One after the other for each symmetric place of the crystal in the envelope.
+    One after the other for each symmetric site of the crystal in the envelope.
     """
     box = _checked_size(size, edge)
     if envelope not in {"box", "cylinder"}:
@@ -248,8 +245,8 @@ def placements(
     around = math.prod(len(each) for each in ranges) * len(form.nodes)
     check_node_count("lattice.size", around // MOST_AROUND)
     cells = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1)
-    places = np.array([place for place, _ in form.nodes]) / 4.0
-    points = (cells.reshape(-1, 1, 3) + places).reshape(-1, 3)
+    sites = np.array([site for site, _ in form.nodes]) / 4.0
+    points = (cells.reshape(-1, 1, 3) + sites).reshape(-1, 3)
     kinds = np.tile([kind for _, kind in form.nodes], cells.size // 3)
     found = []
     for shift in shifts:
@@ -322,10 +319,25 @@ def _joined(form: Crystal, positions: Points, kinds: Kinds, edge: float) -> NDAr
     return ordered
 
 
-def _without_dead_ends(
+def without_dead_ends(
     nodes: int, beams: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the nodes of the largest piece without dead ends, and its beams in their numbers."""
+    """Return the largest piece of a lattice without its dead ends.
+
+    Parameters
+    ----------
+    nodes
+        Number of nodes.
+    beams : (m, 2)
+        Their beams.
+
+    Returns
+    -------
+    nodes : (n,)
+        Those that are left.
+    beams : (k, 2)
+        Beams between them, in their numbers.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.model.lattices.crystals import Envelope
-
 # Boundary triangles with a larger angle opposite to the boundary edge are slivers: the
 # triangulation fills concave corners of the outline with them.
 WIDEST_ANGLE = math.radians(100.0)
@@ -86,7 +84,7 @@ def displaced_delaunay_space(
     *,
     rng: np.random.Generator,
     displacement: float = 0.2,
-    envelope: Envelope = "box",
+    envelope: str = "box",
     spacing: float = 1.0,
 ) -> Lattice:
     """Return randomly displaced body-centred cubic nodes, joined by a Delaunay triangulation.
@@ -117,8 +115,8 @@ def displaced_delaunay_space(
     """
     _check_displacement(displacement)
     edge = spacing / math.sqrt(0.75)
-    places = placements(BODY_CENTRED, size, envelope, UPRIGHT, edge)
-    regular = max((nodes for nodes, _ in places), key=len)
+    sites = placements(BODY_CENTRED, size, envelope, UPRIGHT, edge)
+    regular = max((nodes for nodes, _ in sites), key=len)
     if len(regular) < 9 or (np.ptp(regular, axis=0) < 0.5 * edge).any():
         raise InvalidProblem(f"lattice.size: expected room for several cubes, got {list(size)}")
     direction = rng.normal(size=regular.shape)
