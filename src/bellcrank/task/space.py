@@ -191,11 +191,11 @@ def _cells(domain: DomainSection) -> tuple[str, dict[str, Any]]:
 def _inside(lattice: Lattice, body: _Body, part: PartSpec) -> Lattice:
     """Return the part of a lattice whose struts lie in a body."""
     positions, beams = lattice.positions * part.scale, lattice.beams
-    kept = np.ones(len(beams), dtype=bool)
+    inside = np.ones(len(beams), dtype=bool)
     for points in _strut_surfaces(positions, beams, 0.5 * part.width):
-        left = np.flatnonzero(kept)
-        kept[left] = body.holds(points[left])
-    nodes, inner = without_dead_ends(lattice.node_count, beams[kept])
+        left = np.flatnonzero(inside)
+        inside[left] = body.holds(points[left])
+    nodes, inner = without_dead_ends(lattice.node_count, beams[inside])
     if not len(inner):
         raise InvalidProblem(
             f"domain: no strut of the lattice fits into it; choose a spacing below "

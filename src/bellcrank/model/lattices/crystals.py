@@ -40,10 +40,7 @@ CENTRE = (2, 2, 2)
 KELVIN = tuple(
     site
     for site in itertools.product(range(4), repeat=3)
-    if 0 in site
-    and 2 in site
-    and len({0, 2} & set(site)) == 2
-    and sum(k % 2 for k in site) == 1
+    if {0, 2} <= set(site) and sum(k % 2 for k in site) == 1
 )
 """Corners of truncated octahedra that fill the space: one coordinate of 0, one of a half and one of
 a quarter or three quarters of the edge."""
@@ -232,7 +229,7 @@ def placements(
 ) -> list[tuple[Points, Kinds]]:
     """Return the nodes (n, 3) of a crystal inside an envelope and their kinds (n,), both sorted.
 
-    One after the other for each symmetric site of the crystal in the envelope.
+    One after the other for each symmetric position of the crystal in the envelope.
     """
     box = _checked_size(size, edge)
     if envelope not in {"box", "cylinder"}:
@@ -343,13 +340,13 @@ def without_dead_ends(
 
     while len(beams):
         degree = np.bincount(beams.ravel(), minlength=nodes)
-        kept = (degree[beams] > 1).all(axis=1)
+        inner = (degree[beams] > 1).all(axis=1)
         graph = coo_matrix((np.ones(len(beams)), beams.T), shape=(nodes, nodes))
         _, piece = connected_components(graph, directed=False)
-        kept &= piece[beams[:, 0]] == np.bincount(piece[beams[:, 0]]).argmax()
-        if kept.all():
+        inner &= piece[beams[:, 0]] == np.bincount(piece[beams[:, 0]]).argmax()
+        if inner.all():
             break
-        beams = beams[kept]
+        beams = beams[inner]
     present = np.unique(beams)
     number = np.full(nodes, -1)
     number[present] = np.arange(len(present))
