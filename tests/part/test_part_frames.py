@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bellcrank.errors import BellcrankError, InvalidProblem, InvalidSettings, UnknownName
+from bellcrank.fem import FemSettings
 from bellcrank.machines.characterisation import characterise
 from bellcrank.machines.placement import place_parts
 from bellcrank.machines.plan import MachineTable, plan_of
@@ -28,6 +29,9 @@ from bellcrank.model import (
 from bellcrank.part import Material, Part, PartSpec, frame_problem, materials, spring_problem
 from bellcrank.plots import Motion
 from bellcrank.web.task_files import problem_of, read_task
+from bellcrank.workflows.card import make_card
+from bellcrank.workflows.fabricate import Grips
+from bellcrank.workflows.validation import validate
 
 
 def in_space() -> Problem:
@@ -132,7 +136,7 @@ def test_parts_that_cannot_be_frames_are_refused(
 
 def test_a_part_in_the_plane_has_no_round_struts() -> None:
     crane = find_problem("crane").full_design()
-    with pytest.raises(InvalidSettings, match=r"^section: expected a rectangle .* got 'round'"):
+    with pytest.raises(InvalidSettings, match=r"^section: expected the shape 'rectangle'"):
         Part(crane, materials["ninjaflex"], Section.round(2.0))
 
 
@@ -150,7 +154,10 @@ def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses(tmp_path) 
     plan = plan_of(MachineTable.model_validate(table), "towers.toml")
     for work in (
         lambda: spring_problem(design.problem),
-        lambda: PartSpec().of(design),
+        lambda: PartSpec().of(design).outline(),
+        lambda: validate(design, PartSpec(), [("frame", FemSettings())]),
+        lambda: make_card(design, PartSpec(), tmp_path / "card.pdf"),
+        lambda: Grips(plate=True).applied(PartSpec().of(design)),
         lambda: Motion(design, np.zeros((5, 3))),
         lambda: characterise(design),
         lambda: place_parts(plan, lambda _: design),

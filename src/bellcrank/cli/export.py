@@ -96,7 +96,8 @@ def export(
     whole = out.suffix.lower() in (*PRINTED, *CUT)
     bundle = bundle_of(chosen, spec, grips, layer=height or None, moved=moved, whole=whole)
     write(bundle, out, overwrite=overwrite)
-    notes.print(f"wrote {plain(out)}, {bundle.thickness:g} mm thick")
+    size = "high" if bundle.part.dimension == 3 else "thick"
+    notes.print(f"wrote {plain(out)}, {bundle.thickness:.4g} mm {size}")
     if out.suffix.lower() in PRINTED:
         for warning in check_print(bundle):
             notes.print(f"[yellow]printing:[/] {plain(warning.sentence)}")

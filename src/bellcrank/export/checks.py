@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,8 +23,10 @@ if TYPE_CHECKING:
     from bellcrank.part import Part
     from bellcrank.part.outline import Outline
 
-    Points = tuple[tuple[float, float], ...]
+    Points = tuple[tuple[float, ...], ...]
 
+STEEP = 40.0
+"""Angle from the horizontal, degrees, above which struts print without supports."""
 WIDTH_TOLERANCE = 0.1
 """Tolerance of the width of struts, as a fraction of the width of a bead."""
 
@@ -38,7 +41,7 @@ class PrintWarning:
         Name of the check.
     sentence
         Description and recommendation.
-    points : tuple of (x, y), mm
+    points : tuple of (x, y) or (x, y, z), mm
         Positions, the worst first; empty if the warning concerns the whole part.
     """
 
@@ -51,6 +54,12 @@ checks: Registry[Callable[[Part, Outline, PrintRules], PrintWarning | None]] = R
     "print check"
 )
 """Functions from a part, its outline and the print rules to a warning or None."""
+
+
+checks_in_space: Registry[Callable[[Part, PrintRules], PrintWarning | None]] = Registry(
+    "print check in space"
+)
+"""Functions from a part in space and the print rules to a warning or None."""
 
 
 def check_print(what: Part | Export, rules: PrintRules | None = None) -> list[PrintWarning]:
@@ -78,8 +87,12 @@ def check_print(what: Part | Export, rules: PrintRules | None = None) -> list[Pr
     """
     rules = rules or PrintRules()
     bundle = what if isinstance(what, Export) else Export(part=what)
-    outline = bundle.outline()
-    warnings = [check(bundle.part, outline, rules) for check in checks.values()]
+    warnings: list[PrintWarning | None]
+    if bundle.part.dimension == 3:
+        warnings = [check(bundle.part, rules) for check in checks_in_space.values()]
+    else:
+        outline = bundle.outline()
+        warnings = [check(bundle.part, outline, rules) for check in checks.values()]
     return [warning for warning in warnings if warning is not None]
 
 
@@ -211,6 +224,12 @@ def check_pieces(part: Part, outline: Outline, rules: PrintRules) -> PrintWarnin
 @checks.register("dead-ends")
 def check_dead_ends(part: Part, outline: Outline, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check for struts that end in a free node."""
+    return check_free_ends(part, rules)
+
+
+@checks_in_space.register("dead-ends")
+def check_free_ends(part: Part, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
+    """Check for struts that end in a free node."""
     problem = part.design.problem
     degree = np.bincount(part.struts.ravel(), minlength=problem.lattice.node_count)
     used = np.concatenate([problem.supports.nodes, problem.input.nodes, problem.output.nodes])
@@ -226,6 +245,64 @@ def check_dead_ends(part: Part, outline: Outline, rules: PrintRules) -> PrintWar
     )
 
 
+@checks_in_space.register("struts")
+def check_diameters(part: Part, rules: PrintRules) -> PrintWarning | None:
+    """Check that struts consist of enough lines."""
+    diameter, least = float(part.widths.min()), rules.width_of(rules.min_lines)
+    if diameter >= least - WIDTH_TOLERANCE * rules.bead_width:
+        return None
+    return PrintWarning(
+        "struts",
+        f"Struts of {diameter:g} mm are thinner than {_counted(rules.min_lines, 'line')} of "
+        f"{rules.bead_width:g} mm; choose a diameter of at least {least:.2f} mm, or a smaller "
+        "nozzle.",
+    )
+
+
+@checks_in_space.register("overhangs")
+def check_overhangs(part: Part, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
+    """Check for struts that are too flat to be printed without supports."""
+    first, second = part.positions[part.struts].transpose(1, 0, 2)
+    across, height = np.hypot(*(second - first)[:, :2].T), np.abs(second - first)[:, 2]
+    # Struts on the bed are supported.
+    above = np.minimum(first, second)[:, 2] > part.positions[part.struts][..., 2].min() + 1e-6
+    flat = np.flatnonzero(above & (height < math.tan(math.radians(STEEP)) * across))
+    if not len(flat):
+        return None
+    longest = flat[np.argsort(-across[flat], kind="stable")]
+    points = 0.5 * (first + second)[longest]
+    return PrintWarning(
+        "overhangs",
+        f"{_counted(len(flat), 'strut')} flatter than {STEEP:g} degrees, the longest "
+        f"{across[longest[0]]:.3g} mm across at {_format(points[0])}, need supports, unless the "
+        "printer bridges this length; a process with powder or resin needs none.",
+        _points(points),
+    )
+
+
+@checks_in_space.register("pieces")
+def check_connected(part: Part, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
+    """Check that the part is one piece."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    nodes = len(part.positions)
+    graph = coo_matrix((np.ones(len(part.struts)), part.struts.T), shape=(nodes, nodes))
+    _, piece = connected_components(graph, directed=False)
+    sizes = np.bincount(piece[part.struts[:, 0]])
+    found = np.flatnonzero(sizes)
+    if len(found) == 1:
+        return None
+    loose = found[np.argsort(sizes[found], kind="stable")][:-1]
+    points = np.array([part.positions[np.flatnonzero(piece == each)[0]] for each in loose])
+    return PrintWarning(
+        "pieces",
+        f"The part is in {len(found)} pieces, the smallest at {_format(points[0])}; remove loose "
+        "pieces.",
+        _points(points),
+    )
+
+
 def _smallest_gap(rules: PrintRules) -> float:
     """Return the smallest gap that stays open, mm."""
     return max(rules.nozzle, rules.bead_width)
@@ -236,8 +313,8 @@ def _counted(count: int, noun: str) -> str:
 
 
 def _format(point: NDArray[np.float64]) -> str:
-    return f"({point[0]:.4g}, {point[1]:.4g}) mm"
+    return f"({', '.join(f'{each:.4g}' for each in point)}) mm"
 
 
 def _points(points: NDArray[np.float64]) -> Points:
-    return tuple((x, y) for x, y in points.tolist())
+    return tuple(map(tuple, points.tolist()))

@@ -36,8 +36,8 @@ class Part:
     material
         Material of the struts.
     section
-        Cross-section of the struts, a rectangle; mm. If the struts of the design have different
-        widths, their ratios to that of the section of the problem are kept.
+        Cross-section of the struts, a rectangle, in space a disc; mm. If the struts of the design
+        have different widths, their ratios to that of the section of the problem are kept.
     scale
         Length of a lattice unit, mm.
     fillet
@@ -47,9 +47,8 @@ class Part:
     Raises
     ------
     InvalidSettings
-        If there are no beams, the struts are round, or they are not longer than wide.
-    InvalidProblem
-        If the problem is in space.
+        If there are no beams, the struts are round in the plane or rectangular in space, or they
+        are not longer than wide.
 
     Examples
     --------
@@ -69,10 +68,11 @@ class Part:
     fillet: float | None = None
 
     def __post_init__(self) -> None:
-        require_plane(self.design.problem, "part")
-        if self.section.shape != "rectangle":
+        wanted, where = ("rectangle", "the plane") if self.dimension == 2 else ("round", "space")
+        if self.section.shape != wanted:
             raise InvalidSettings(
-                f"section: expected a rectangle for a part in the plane, got {self.section.shape!r}"
+                f"section: expected the shape {wanted!r} for a part in {where}, "
+                f"got {self.section.shape!r}"
             )
         if self.fillet is not None and not 0.0 <= self.fillet < float("inf"):
             raise InvalidSettings(f"fillet: expected a radius of 0 mm or more, got {self.fillet!r}")
@@ -89,6 +89,11 @@ class Part:
             )
 
     @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        return self.design.problem.lattice.dimension
+
+    @property
     def fillet_radius(self) -> float:
         """Radius in the corners between struts, mm."""
         if self.fillet is not None:
@@ -98,7 +103,7 @@ class Part:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """Nodes of the lattice at rest, (N, 2), mm."""
+        """Nodes of the lattice at rest, (N, d), mm."""
         return self.design.problem.lattice.positions * self.scale
 
     @property
@@ -133,9 +138,12 @@ class Part:
 
         Raises
         ------
+        InvalidProblem
+            If the part is in space.
         InvalidSettings
             If struts or fillets close holes between struts.
         """
+        require_plane(self.design.problem, "outline")
         return strut_outline(self.positions, self.struts, self.widths, self.fillet_radius)
 
     @property

@@ -81,7 +81,7 @@ class PartSpec:
             length = getattr(self, name)
             if not 0.0 < length < math.inf:
                 raise InvalidSettings(f"{name}: expected a length above 0 mm, got {length:g}")
-        section, problem = self.section(2), design.problem
+        section, problem = self.section(design.problem.lattice.dimension), design.problem
         modelled = problem.section
         if self.joint is None and modelled is not None:
             section = replace(section, joint=modelled.joint / modelled.width * self.width)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import load_bearing_core
+from bellcrank.model import require_plane
 from bellcrank.plots.movies import (
     Graph,
     Line,
@@ -92,8 +93,8 @@ def animate_motion(
 
     Raises
     ------
-    InvalidSettings
-        If a design has no motion to show, or a setting is invalid.
+    InvalidSettings, InvalidProblem
+        If a design has no motion to show or is in space, or a setting is invalid.
     OutputExists, StorageError
         If the file exists or cannot be written.
     """
@@ -115,6 +116,8 @@ def motion_movie(
 ) -> Movie:
     """Compute the movie of `animate_motion`; arguments and errors are the same."""
     options = options or MotionOptions()
+    for _, design in designs:
+        require_plane(design.problem, "movie")
     part, order = stroke_schedule(settings.frames)
     states = len(part)
     responses: list[LoadingPath] = []

@@ -13,6 +13,7 @@ from bellcrank.export.profiles import profiles
 from bellcrank.export.slicer import find_slicer, slice_solid
 from bellcrank.fem.contact import centre_lines, find_contacts
 from bellcrank.mechanics import StrokeEvaluator, model_evaluator
+from bellcrank.model import require_plane
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.part.outline import strut_outline
 from bellcrank.part.outline.grips import filled, with_pointer
@@ -63,15 +64,21 @@ class Grips:
         if not 0.0 <= self.pointer < float("inf"):
             raise InvalidSettings(f"pointer: expected a length, got {self.pointer!r} mm")
 
-    def applied(self, part: Part) -> Outline:
-        """Return the outline of a part with these additions.
+    def applied(self, part: Part) -> Outline | None:
+        """Return the outline of a part with these additions; None for a part in space.
 
         Raises
         ------
+        InvalidProblem
+            If there are some for a part in space.
         InvalidSettings
             If there is no room for them or the output has no beam.
         """
         problem = part.design.problem
+        if part.dimension == 3:
+            if self.plate or self.pad or self.pointer:
+                require_plane(problem, "plate, pad and pointer")
+            return None
         positions, beams = part.positions, part.struts
         width, fillet = part.widths, part.fillet_radius
         shown, drawn = positions, beams

@@ -17,6 +17,7 @@ from bellcrank.mechanics import (
     model_name,
     objective_name,
 )
+from bellcrank.model import require_plane
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.part import PartSpec, read_length
@@ -211,11 +212,12 @@ def check_plan(design: Design, spec: PartSpec, plan: Plan) -> None:
 
     Raises
     ------
-    InvalidSettings
-        If the part cannot be built or analysed.
+    InvalidSettings, InvalidProblem
+        If the part cannot be built or analysed, or is in space.
     UnknownName
         If there is no such level, theory or law.
     """
+    require_plane(design.problem, "validation")
     part = spec.of(design)
     check_supported(design)
     for level, settings in plan:

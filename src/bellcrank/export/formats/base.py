@@ -13,6 +13,7 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.export.flattening import SAGITTA
 from bellcrank.export.solid import Solid, extruded, whole_layers
+from bellcrank.export.struts import struts_solid
 from bellcrank.model.storage import already_exists, write_bytes
 from bellcrank.registry import FormatRegistry
 
@@ -43,7 +44,7 @@ class Export:
         of the part.
     sagitta : float, mm
         Largest distance between arcs and the triangles of STL and 3MF.
-    moved : (N, 2) float64, lattice units
+    moved : (N, d) float64, lattice units
         Displaced nodes; None for nodes at rest.
     title
         Title in the file; None for the name of the problem.
@@ -64,7 +65,7 @@ class Export:
     def __post_init__(self) -> None:
         if self.moved is None:
             return
-        expected = (self.part.design.problem.lattice.node_count, 2)
+        expected = self.part.positions.shape
         moved = np.array(self.moved, dtype=np.float64, order="C")
         if moved.shape != expected:
             raise InvalidSettings(f"moved: expected shape {expected}, got {moved.shape}")
@@ -81,7 +82,13 @@ class Export:
 
     @property
     def thickness(self) -> float:
-        """Thickness of the printed part, mm."""
+        """Thickness of the printed part in the plane, height of one in space, mm."""
+        if self.part.dimension == 3:
+            heights, radii = (
+                self.part.positions[self.part.struts, 2],
+                0.5 * self.part.widths[:, None],
+            )
+            return float((heights + radii).max() - (heights - radii).min())
         wanted = self.part.section.thickness
         return wanted if self.layer is None else whole_layers(wanted, self.layer)
 
@@ -103,6 +110,8 @@ class Export:
         InvalidSettings
             If the part is not valid.
         """
+        if self.part.dimension == 3:
+            return struts_solid(self.part, self.sagitta).on_bed()
         # Validated before the outline, which takes longer.
         thickness = self.thickness
         return extruded(self.outline(), thickness, self.sagitta).on_bed()
