@@ -49,7 +49,8 @@ def support_entries(problems: list[Problem]) -> list[tuple[str, Any]]:
     entries: list[tuple[str, Any]] = []
     if any(len(problem.supports.fixed) for problem in problems):
         entries.append(("support", support_entry()))
-    if any(len(p.supports.fixed_x) + len(p.supports.fixed_y) for p in problems):
+    rollers = ("fixed_x", "fixed_y", "fixed_z")
+    if any(len(getattr(p.supports, name)) for p in problems for name in rollers):
         entries.append(("roller", roller_entry()))
     return entries
 

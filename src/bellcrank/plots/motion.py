@@ -34,10 +34,12 @@ from bellcrank.plots.scene import (
     displacement_arrows,
     extent,
     input_arrows,
+    of_one_height,
     outline_around,
     output_arrows,
     spacing,
 )
+from bellcrank.plots.space import add_drawing_in_space, frame_in_space
 
 if TYPE_CHECKING:
     import os
@@ -159,7 +161,7 @@ def draw_design(
     """
     check_target(path, overwrite=overwrite)
     problem = design.problem
-    at_rest = Motion(design, np.zeros((problem.lattice.node_count, 2)))
+    at_rest = Motion(design, np.zeros(problem.lattice.positions.shape))
     count = np.count_nonzero(design.mask[problem.designable])
     note = f"{design.beam_count} beams · {count} of {len(problem.designable)} designable beams"
     part = Drawing(title or problem.name, note, at_rest, displaced=False)
@@ -192,6 +194,8 @@ def _picture(parts: list[Drawing], width: float) -> Figure:
 def _frame(part: Drawing) -> Frame:
     """Return the lower left and upper right corner of a drawing, lattice units."""
     problem = part.motion.design.problem
+    if problem.lattice.dimension == 3:
+        return frame_in_space(part.motion)
     positions, step = problem.lattice.positions, spacing(problem)
     points = [positions, part.motion.moved]
     held = problem.supports.nodes
@@ -216,12 +220,18 @@ def drawing_frames(
             (np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0)))
             for (low, high), seen in zip(frames, more, strict=True)
         ]
-    return aligned_frames(frames, [part.motion.design.problem for part in parts])
+    problems = [part.motion.design.problem for part in parts]
+    if any(problem.lattice.dimension == 3 for problem in problems):
+        return of_one_height(frames)
+    return aligned_frames(frames, problems)
 
 
 def add_drawing(panel: Panel, part: Drawing) -> None:
     """Draw a design on a panel."""
     problem = panel.problem
+    if problem.lattice.dimension == 3:
+        add_drawing_in_space(panel, part.motion, displaced=part.displaced)
+        return
     add_supports(panel)
     if part.displaced:
         _add_displaced_struts(panel, part.motion)

@@ -9,7 +9,6 @@ import numpy as np
 
 from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.mechanics import load_bearing_core
-from bellcrank.model import require_plane
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,7 +24,7 @@ class Motion:
     ----------
     design
         Problem and beams.
-    displacement : (N, 2) float64, lattice units
+    displacement : (N, d) float64, lattice units
         Displacement of each node. Nodes with values that are not finite are drawn at rest.
     efficiency
         Written below the title; None or nan if unknown.
@@ -35,14 +34,14 @@ class Motion:
         Text after the efficiency, for example a status.
     magnify
         Factor by which the drawn displacement is larger than the given one; part of the caption.
-    paths, wanted_paths : tuple of (k, 2) float64, lattice units
+    paths, wanted_paths : tuple of (k, d) float64, lattice units
         Paths of the outputs along the stroke, and wanted ones, as displacements of their mean
         positions, in the order of the outputs; empty for those that are not drawn.
 
     Raises
     ------
     InvalidProblem
-        If the problem is in space, or the displacement has not one row for each node.
+        If the displacement has not one row for each node.
     InvalidSettings
         If `magnify` is not positive and finite.
 
@@ -64,8 +63,7 @@ class Motion:
     wanted_paths: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
-        require_plane(self.design.problem, "picture")
-        expected = (self.design.problem.lattice.node_count, 2)
+        expected = self.design.problem.lattice.positions.shape
         given = np.array(self.displacement, dtype=np.float64)
         if given.shape != expected:
             raise InvalidProblem(
@@ -79,11 +77,11 @@ class Motion:
 
     @property
     def moved(self) -> NDArray[np.float64]:
-        """(N, 2) drawn positions of the displaced nodes, lattice units."""
+        """(N, d) drawn positions of the displaced nodes, lattice units."""
         return self.design.problem.lattice.positions + self.magnify * self.displacement
 
     def drawn_paths(self, *, wanted: bool = False) -> list[NDArray[np.float64]]:
-        """Return the paths of the mean positions of outputs, (k, 2) each, lattice units."""
+        """Return the paths of the mean positions of outputs, (k, d) each, lattice units."""
         problem = self.design.problem
         found = []
         for output, path in zip(
@@ -146,8 +144,9 @@ def spacing(problem: Problem) -> float:
 
 def arrow_length(problem: Problem) -> float:
     """Return the length of the arrows at input and output, lattice units."""
-    width, height = np.ptp(problem.lattice.positions, axis=0)
-    return max(1.5 * spacing(problem), float(np.sqrt(width * height)) / 9.0)
+    extents = np.ptp(problem.lattice.positions, axis=0)
+    size = float(np.prod(extents) ** (1.0 / len(extents)))
+    return max(1.5 * spacing(problem), size / 9.0)
 
 
 def input_arrows(problem: Problem) -> list[Arrow]:
@@ -209,7 +208,7 @@ def displacement_arrows(motion: Motion) -> list[Arrow]:
     nodes = np.concatenate([output.nodes for output in problem.outputs.values()])
     pairs = zip(problem.lattice.positions[nodes], motion.moved[nodes], strict=True)
     least = 0.15 * spacing(problem)
-    return [Arrow(_pair(a), _pair(b)) for a, b in pairs if np.hypot(*(b - a)) > least]
+    return [Arrow(_pair(a), _pair(b)) for a, b in pairs if np.linalg.norm(b - a) > least]
 
 
 def outline_around(points: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
@@ -300,6 +299,14 @@ def aligned_frames(
         (np.array([low[0], base - below]), np.array([high[0], base + above]))
         for base, (low, high) in zip(bases, frames, strict=True)
     ]
+
+
+def of_one_height(
+    frames: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Extend frames upward to the largest height among them."""
+    height = max(float(high[1] - low[1]) for low, high in frames)
+    return [(low, np.array([high[0], low[1] + height])) for low, high in frames]
 
 
 def _is_uniform(direction: NDArray[np.float64]) -> bool:

@@ -106,8 +106,7 @@ def start_design(
     notes: dict[str, Any] = {}
     if part is not None:
         problem = models["frames"](problem, part)
-        if problem.lattice.dimension == 2:
-            part.of(problem.full_design())
+        part.of(problem.full_design())
         notes["part"] = part.to_dict()
         if not settings.goals and problem.section is not None and not problem.is_specified:
             settings = replace(settings, goals=(f"no-contact {problem.section.width:g}",))
@@ -271,7 +270,6 @@ def conclude(
     human_response = None
     if human is not None:
         human_response = all_beams.evaluate(human.mask, VERIFICATION_INCREMENT)
-    without = problem.section is None or problem.lattice.dimension == 3
     report = DesignReport(
         folder=folder.path,
         settings=settings,
@@ -286,7 +284,9 @@ def conclude(
         part=spec,
         refinement=refinement,
         validation=_validated(selection.design, spec),
-        part_figures=[] if spec is None or without else part_figures(selection.design, spec),
+        part_figures=(
+            [] if spec is None or problem.section is None else part_figures(selection.design, spec)
+        ),
     )
     part = {} if spec is None else {"part": spec.to_dict()}
     design = replace(

@@ -32,8 +32,6 @@ PAYLOAD_TRIALS = 12
 """Largest number of responses in the search for the payload that halves the motion."""
 PAYLOAD_TOLERANCE = 0.01
 """Relative accuracy of this payload."""
-UPRIGHT = (0.0, -1.0)
-"""Direction of the weight of a part that stands upright."""
 
 
 def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> list[dict[str, Any]]:
@@ -42,7 +40,7 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
     Parameters
     ----------
     design
-        Design of a frame in the plane.
+        Design of a frame; it stands upright under its own weight.
     spec
         Size and material of the part.
     elements
@@ -68,7 +66,8 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
     units = units_of(design.problem, spec)
     upright = None
     if not math.isnan(units.density):
-        upright = units.weight * np.array(UPRIGHT)
+        upright = np.zeros(design.problem.lattice.dimension)
+        upright[-1] = -units.weight
     rows = []
     for name, case in design.problem.cases.items():
         evaluator = CaseEvaluator(case, elements, upright)

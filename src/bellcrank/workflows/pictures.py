@@ -109,10 +109,7 @@ def motion_of(
 
 
 def draw_report(report: DesignReport, folder: RunFolder) -> None:
-    """Draw ``efficiency.png``, ``motion.png`` and, with a human design, ``comparison.png``.
-
-    Designs in space have only the first.
-    """
+    """Draw ``efficiency.png``, ``motion.png`` and, with a human design, ``comparison.png``."""
     selection = report.selection
     paths = chain_paths(folder, report.settings)
     found = selection.found
@@ -130,8 +127,6 @@ def draw_report(report: DesignReport, folder: RunFolder) -> None:
         ),
         overwrite=True,
     )
-    if selection.design.problem.lattice.dimension == 3:
-        return
     machine = Motion(
         selection.design,
         selection.response.displacement,

@@ -311,9 +311,9 @@ def part_figure_table(report: DesignReport) -> list[list[str]]:
 
 
 def _force(report: DesignReport, force: list[float] | None) -> str:
-    """Return the size of the input force: of a part in the plane in N, else in lattice units."""
+    """Return the size of the input force: of a part in N, else in lattice units."""
     design, part = report.selection.design, report.part
-    if part is None or design.problem.lattice.dimension == 3:
+    if part is None:
         return figure_text(force, "{:.4g} lattice units")
     made = part.of(design)
     return figure_text(force and [x * made.stiffness_unit * made.scale for x in force], "{:.3g} N")
@@ -357,8 +357,6 @@ def summary_text(report: DesignReport) -> str:
         f"\nNot chosen, though more efficient in the model of the search: {count} ({reason})."
         for reason, count in selection.refused.items()
     )
-    flat = selection.design.problem.lattice.dimension == 2
-    motion = "![the design at rest and displaced](motion.png)\n\n" if flat else ""
     return f"""# {selection.design.problem.name}
 
 {_markdown(item_table(report))}{_markdown(nearest_table(report))}{figures_table}
@@ -373,7 +371,9 @@ that along it. Cleaning removes beams without load: loose pieces, dead ends, and
 connected by a single node or to supports only. Dead ends soften joints in the spring model but not
 in a real part, so the efficiency after cleaning is the one to expect.
 {refused}
-{motion}![efficiency along the chains](efficiency.png)
+![the design at rest and displaced](motion.png)
+
+![efficiency along the chains](efficiency.png)
 """
 
 
