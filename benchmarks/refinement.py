@@ -167,10 +167,9 @@ def from_bundled(task: str, problem: Problem, spec: PartSpec) -> dict[str, Any]:
     design = gallery_design("machine", task.removeprefix("straight-"))
     assert design is not None
     used = core_seconds()
-    found = refine_design(
-        Design(problem, design.mask), RefinementSettings(evaluations=EVALUATIONS),
-        sheet=sheet_of(spec),
-    )  # fmt: skip
+    given = Design(problem, design.mask)
+    settings = RefinementSettings(evaluations=EVALUATIONS)
+    found = refine_design(given, settings, sheet=sheet_of(spec, given))
     return {
         "seconds": round(core_seconds() - used, 1),
         "gain": found.after.objective,

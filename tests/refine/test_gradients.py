@@ -12,7 +12,7 @@ from bellcrank.mechanics.frames.case import CHANNELS, CaseEvaluator, Channel
 from bellcrank.mechanics.frames.geometry import beam_slopes, geometry_slopes
 from bellcrank.mechanics.frames.joints import joint_lengths, joint_slopes, with_joints
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
-from bellcrank.model import Item
+from bellcrank.model import Item, ObjectiveTerm, Specification
 from bellcrank.refine.rows import RowEvaluator
 from bellcrank.refine.shape import shape_rows
 from bellcrank.refine.variables import variables_of
@@ -20,7 +20,9 @@ from bellcrank.refine.variables import variables_of
 from .designs import random_block, random_design, stable_corner, straight_crane
 
 if TYPE_CHECKING:
-    from bellcrank.model import Problem
+    from collections.abc import Callable
+
+    from bellcrank.model import Design, Problem
 
 SHARED = {"input_motion", "input_force", "strain"}
 ALL = [Channel(name, "" if name in SHARED else "output") for name in CHANNELS]
@@ -182,6 +184,53 @@ def test_constraints_have_the_derivatives_of_differences(
     assert {"clearance", "mass", "case.output.off_axis", "case.output.sag"} <= compared
 
 
+def test_constraints_in_space_have_the_derivatives_of_differences(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("bellcrank.refine.rows.GAP_REACH", 3.0)
+    design = random_block(0)
+    case, output = "case", "output"
+    items = (
+        Item(quantity="gain", case=case, output=output, at_least=5.0),
+        Item(quantity="off_axis", case=case, output=output, at_most=0.01),
+        Item(quantity="rotation", case=case, output=output, at_most=0.01),
+        Item(quantity="payload", case=case, output=output, at_least=1e-3),
+        Item(quantity="sag", case=case, output=output, at_most=1e-4),
+        Item(quantity="strain", case=case, at_most=1e-3),
+        Item(quantity="clearance", case=case, at_least=0.1),
+        Item(quantity="mass", case=case, at_most=1.0),
+    )
+    wanted = Specification(
+        case=case, output=output, items=items, weight=np.array([0.0, 0.0, -1e-3]),
+        maximise=(ObjectiveTerm(quantity="gain", case=case, output=output),),
+    )  # fmt: skip
+    design = replace(design, problem=replace(design.problem, specification=wanted))
+    variables = variables_of(design, 0.4, (0.2, 0.4))
+    rows = RowEvaluator(variables, design.mask, items)
+    rng = np.random.default_rng(1)
+    start = 0.01 * rng.normal(size=variables.count)
+    way = rng.normal(size=variables.count)
+    here = rows.evaluate(start, slopes=True)
+    step = 1e-6
+    ahead, behind = (rows.evaluate(start + sign * step * way) for sign in (1.0, -1.0))
+    assert here is not None
+    assert ahead is not None
+    assert behind is not None
+    objective = (ahead.objectives - behind.objectives) / (2.0 * step)
+    assert here.objective_slopes @ way == pytest.approx(objective, rel=1e-5)
+    one, other = (
+        dict(zip(zip(each.names, each.keys, strict=True), each.constraints, strict=True))
+        for each in (ahead, behind)
+    )
+    compared = set()
+    for name, key, slope in zip(here.names, here.keys, here.constraint_slopes @ way, strict=True):
+        if (name, key) in one and (name, key) in other:
+            expected = (one[name, key] - other[name, key]) / (2.0 * step)
+            assert slope == pytest.approx(expected, rel=2e-3, abs=2e-4), (name, key)
+            compared.add(name)
+    assert {"clearance", "mass", "case.output.off_axis", "case.output.payload"} <= compared
+
+
 def test_the_error_of_a_path_with_a_corner_has_the_derivative_of_differences() -> None:
     # Two inputs, one after the other.
     design = stable_corner()
@@ -209,14 +258,15 @@ def test_the_error_of_a_path_with_a_corner_has_the_derivative_of_differences() -
     assert slope == pytest.approx((one - other) / (2.0 * step), rel=1e-4, abs=1e-4)
 
 
+@pytest.mark.parametrize("made", [random_design, random_block])
 def test_constraints_on_the_shape_have_the_derivatives_of_differences(
-    monkeypatch: pytest.MonkeyPatch,
+    made: Callable[[int], Design], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Limits at which most struts, angles, triangles and gaps are constraints.
     limits = {"SMALLEST_HOLE": 3.0, "NEAR_ANGLE": 2.0, "SLENDERNESS": 6.0, "SMALLEST_GAP": 1.8}
     for name, value in limits.items():
         monkeypatch.setattr(f"bellcrank.refine.shape.{name}", value)
-    design = random_design(0)
+    design = made(0)
     problem, mask = design.problem, design.mask
     rng = np.random.default_rng(1)
     # Struts that are parallel have no single pair of nearest points.

@@ -97,7 +97,7 @@ def test_a_problem_without_a_specification_gets_that_of_its_gain() -> None:
 
 def test_what_cannot_be_refined_is_refused() -> None:
     springs = find_problem("crane").full_design()
-    with pytest.raises(InvalidSettings, match="expected a frame in the plane"):
+    with pytest.raises(InvalidSettings, match="expected a frame; designs of springs"):
         refine_design(springs)
     pliers = gallery_design("machine", "pliers")
     assert pliers is not None

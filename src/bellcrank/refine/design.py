@@ -127,7 +127,7 @@ def refine_design(
     Parameters
     ----------
     design
-        A design of a frame in the plane.
+        A design of a frame.
     settings
         Settings of the refinement.
     report
@@ -141,15 +141,13 @@ def refine_design(
     Raises
     ------
     InvalidSettings
-        If the design is in space or has no section, or its problem has no specification and is
-        driven by forces.
+        If the design has no section, or its problem has no specification and is driven by forces.
     """
     settings = settings or RefinementSettings()
     problem = design.problem
-    if problem.section is None or problem.lattice.dimension == 3:
+    if problem.section is None:
         raise InvalidSettings(
-            f"problem {problem.name!r}: expected a frame in the plane; designs of springs and "
-            "designs in space are not refined"
+            f"problem {problem.name!r}: expected a frame; designs of springs are not refined"
         )
     wanted = with_joints(specified(problem, strain_limit), design.mask)
     given = replace(

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 
+PARALLEL = 1e-12
+"""Square of the sine of the angle between struts below which they are parallel."""
+
+
 class Gaps(NamedTuple):
     """Gaps between pairs of struts that are near each other."""
 
@@ -22,7 +26,7 @@ class Gaps(NamedTuple):
     value: NDArray[np.float64]
     """(g,) gaps, lattice units."""
     fields: NDArray[np.float64]
-    """(g, N, 3) derivatives by displacements and rotations of the nodes."""
+    """(g, N, b) derivatives by displacements and rotations of the nodes."""
     widths: NDArray[np.float64]
     """(g, M) derivatives by the widths of the beams."""
 
@@ -30,16 +34,16 @@ class Gaps(NamedTuple):
 def gaps_of(
     problem: Problem, beams: NDArray[np.int64], u: NDArray[np.float64], reach: float
 ) -> Gaps:
-    """Return the gaps between struts without a common node that are below a reach, in the plane.
+    """Return the gaps between struts without a common node that are below a reach.
 
-    Struts are bent as in `bellcrank.mechanics.bent_pieces`: two straight pieces each.
+    Struts are bent as in `bellcrank.mechanics.bent_pieces`: two straight pieces each in the plane.
 
     Parameters
     ----------
     beams : (n,) int64
         The struts.
     u : (N, 3) float64
-        Displacements and rotations of the nodes.
+        Displacements and rotations of the nodes in the plane, displacements in space.
     reach
         Largest gap that is returned, lattice units.
     """
@@ -53,10 +57,11 @@ def gaps_of(
     apart_at_rest = ~(ends[:, 0, :, None] == ends[:, 1, None, :]).any(axis=(1, 2))
     chosen = np.flatnonzero((gap < reach) & apart_at_rest)
     chosen = chosen[np.lexsort((pairs[chosen, 1], pairs[chosen, 0]))]
-    nodes = problem.lattice.node_count
-    fields = np.zeros((len(chosen), nodes, 3))
+    nodes, dimension = problem.lattice.positions.shape
+    fields = np.zeros((len(chosen), nodes, 3 * (dimension - 1)))
     widths = np.zeros((len(chosen), problem.lattice.beam_count))
     for row, index in enumerate(chosen.tolist()):
+        widths[row, beams[strut[index]]] = -0.5
         (a, b), (c, d) = (points[pieces[piece]] for piece in pairs[index])
         s, t = nearest_points(a, b, c, d)
         apart = a + s * (b - a) - c - t * (d - c)
@@ -68,10 +73,9 @@ def gaps_of(
             for point, weight in zip(pieces[piece].tolist(), (1.0 - share, share), strict=True):
                 vector = sign * weight * normal
                 if point < nodes:
-                    fields[row, point, :2] += vector
+                    fields[row, point, :dimension] += vector
                 else:
                     _add_middle(problem, u, int(beams[point - nodes]), vector, fields[row])
-        widths[row, beams[strut[index]]] = -0.5
     return Gaps(pairs[chosen], gap[chosen], fields, widths)
 
 
@@ -119,4 +123,28 @@ def nearest_points(
         distance = float(np.linalg.norm(start + part * along - point))
         if distance < best:
             best, found = distance, (share, part) if swap else (part, share)
-    return found
+    return found if len(a) == 2 else _within(a, b, c, d, best, found)
+
+
+def _within(
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    c: NDArray[np.float64],
+    d: NDArray[np.float64],
+    best: float,
+    found: tuple[float, float],
+) -> tuple[float, float]:
+    """Return the nearest points of two lines in space if both are within the segments.
+
+    Else those that are at an end of one of them, whose distance is `best`.
+    """
+    one, two, apart = b - a, d - c, a - c
+    square, other, both = one @ one, two @ two, one @ two
+    size = square * other - both * both
+    if size <= PARALLEL * square * other:
+        return found
+    s = float((both * (two @ apart) - other * (one @ apart)) / size)
+    t = float((square * (two @ apart) - both * (one @ apart)) / size)
+    inside = 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0
+    nearer = float(np.linalg.norm(apart + s * one - t * two)) < best
+    return (s, t) if inside and nearer else found

@@ -283,7 +283,7 @@ class RowEvaluator:
             moved = geometry_slopes(state, measured, of_beams)
             if moved is None:
                 return None
-            positions = moved[0].positions + found.fields[..., :2]
+            positions = moved[0].positions + found.fields[..., : problem.lattice.dimension]
             by_vector = self.variables.gradient(positions, moved[0].widths + found.widths)
             gradients.append(-by_vector / width)
         constraints = np.concatenate(values)

@@ -127,30 +127,32 @@ def _length_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
 
 
 def _angle_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
-    """Return the constraints on the angles between neighbouring struts of each node."""
+    """Return the constraints on the angles between struts that meet in a node."""
     positions, ends = problem.lattice.positions, problem.lattice.beams[beams]
     node, other = np.concatenate([ends, ends[:, ::-1]]).T
-    along = positions[other] - positions[node]
-    direction = np.arctan2(along[:, 1], along[:, 0])
-    order = np.lexsort((direction, node))
-    node, other, along, direction = (each[order] for each in (node, other, along, direction))
-    # The next strut of the same node, counterclockwise.
-    begin = np.searchsorted(node, node)
-    last = np.searchsorted(node, node, side="right") - 1
-    here = np.arange(len(node))
-    following = np.where(here == last, begin, here + 1)
-    angle = np.mod(direction[following] - direction, 2.0 * np.pi)
+    order = np.lexsort((other, node))
+    node, other = node[order], other[order]
+    most = int(np.bincount(node).max())
+    # Neighbours in the order of the nodes, then those after the next one, and so on.
+    later = [np.flatnonzero(node[k:] == node[:-k]) for k in range(1, most)]
+    first = np.concatenate([np.zeros(0, np.int64), *later])
+    second = first + np.repeat(np.arange(1, most), [len(each) for each in later])
+    node, one, two = node[first], other[first], other[second]
+    sides = [positions[each] - positions[node] for each in (one, two)]
+    lengths = [np.linalg.norm(each, axis=1)[:, None] for each in sides]
+    units = [side / length for side, length in zip(sides, lengths, strict=True)]
+    cosine = np.clip((units[0] * units[1]).sum(axis=1), -1.0, 1.0)
+    angle = np.arccos(cosine)
     near = np.flatnonzero((angle > 1e-6) & (angle < NEAR_ANGLE))
-    after = following[near]
-    square = np.sum(along**2, axis=1)[:, None] * SMALLEST_ANGLE
-    turned = np.column_stack([-along[:, 1], along[:, 0]]) / square
+    node, one, two, angle = node[near], one[near], two[near], angle[near]
+    (u, v), (a, b) = (each[near] for each in units), (each[near] for each in lengths)
+    sine = (np.sin(angle) * SMALLEST_ANGLE)[:, None]
+    by_one = (v - np.cos(angle)[:, None] * u) / (a * sine)
+    by_two = (u - np.cos(angle)[:, None] * v) / (b * sine)
     return _rows_of(
-        problem, "angle between struts", 1.0 - angle[near] / SMALLEST_ANGLE,
-        np.column_stack([node[near], other[near], other[after]]),
-        [
-            (other[near], turned[near]), (other[after], -turned[after]),
-            (node[near], turned[after] - turned[near]),
-        ],
+        problem, "angle between struts", 1.0 - angle / SMALLEST_ANGLE,
+        np.column_stack([node, one, two]),
+        [(one, by_one), (two, by_two), (node, -by_one - by_two)],
     )  # fmt: skip
 
 
@@ -158,23 +160,27 @@ def _hole_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     """Return the constraints on the radius of the circle within triangles, over their width."""
     lattice = problem.lattice
     corners, sides = _triangles(lattice.beams, beams)
-    points = lattice.positions[corners]
+    dimension = lattice.dimension
+    points = np.zeros((len(corners), 3, 3))
+    points[..., :dimension] = lattice.positions[corners]
     edges = np.roll(points, -1, axis=1) - points
     lengths = np.linalg.norm(edges, axis=2)
     half = 0.5 * lengths.sum(axis=1)
-    doubled = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    doubled = np.linalg.norm(normal, axis=1)
     width = problem.beam_widths[sides].mean(axis=1)
-    ratio = 0.5 * np.abs(doubled) / (half * width)
-    small = ratio < 2.0 * SMALLEST_HOLE
-    corners, sides, edges, lengths, half, doubled, width, ratio = (
-        each[small] for each in (corners, sides, edges, lengths, half, doubled, width, ratio)
+    ratio = 0.5 * doubled / (half * width)
+    small = (ratio < 2.0 * SMALLEST_HOLE) & (doubled > 0.0)
+    corners, sides, edges, lengths, half, doubled, width, ratio, normal = (
+        each[small]
+        for each in (corners, sides, edges, lengths, half, doubled, width, ratio, normal)
     )
     opposite = np.roll(edges, -1, axis=1)
-    of_area = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
-    of_area *= 0.5 * np.sign(doubled)[:, None, None]
+    of_area = 0.5 * np.cross((normal / doubled[:, None])[:, None], opposite)
     units = edges / lengths[..., None]
     of_half = 0.5 * (np.roll(units, 1, axis=1) - units)
     rates = of_area / (half * width)[:, None, None] - (ratio / half)[:, None, None] * of_half
+    rates = rates[..., :dimension]
     by_width = ratio / (3.0 * width * SMALLEST_HOLE)
     return _rows_of(
         problem, "holes between struts", 1.0 - ratio / SMALLEST_HOLE, corners,
@@ -211,6 +217,6 @@ def _gap_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     count = len(found.value)
     return ShapeRows(
         1.0 - found.value / least, ("gaps between struts",) * count,
-        tuple(map(tuple, found.pairs.tolist())), -found.fields[..., :2] / least,
-        -found.widths / least,
+        tuple(map(tuple, found.pairs.tolist())),
+        -found.fields[..., : problem.lattice.dimension] / least, -found.widths / least,
     )  # fmt: skip

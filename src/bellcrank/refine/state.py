@@ -104,6 +104,8 @@ def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
     if shape_rows(problem, mask, math.inf).values.max(initial=0.0) > PRINTABLE:
         return False
     lattice = problem.lattice
+    if lattice.dimension == 3:
+        return True
     try:
         room_for_fillet(lattice.positions, lattice.beams[mask], problem.beam_widths[mask])
     except InvalidSettings:

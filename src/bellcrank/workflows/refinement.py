@@ -61,11 +61,11 @@ def refine_selection(
     selection
         With the refined design, if it is better.
     refinement
-        How it came about; None if the problem has no specification or is in space, or the
-        refinements were stopped.
+        How it came about; None if the problem has no specification, or the refinements were
+        stopped.
     """
     problem = selection.design.problem
-    if not problem.is_specified or problem.lattice.dimension == 3:
+    if not problem.is_specified:
         return selection, None
     designs = [selection.design, *(each.design for each in selection.others)][:MOST_REFINED]
     designs = [replace(each, problem=with_joints(each.problem, each.mask)) for each in designs]
@@ -154,7 +154,7 @@ def refine_file(
         As `bellcrank.refine.refine_design`.
     """
     limit = spec_for(design).registered_material.strain_limit
-    sheet = sheet_of(spec_for(design)) if design.problem.is_specified else None
+    sheet = sheet_of(spec_for(design), design) if design.problem.is_specified else None
     result = refine_design(design, settings, report, limit, sheet)
     if not result.improved:
         return result

@@ -45,7 +45,7 @@ def refine_designs(
     Parameters
     ----------
     designs
-        Designs of frames in the plane with a specification.
+        Designs of frames with a specification.
     spec
         Part that is computed in the sheet; None for no sheet.
     report
@@ -68,7 +68,7 @@ def refine_designs(
             report(number, progress)
             return not stop.is_set()
 
-        found = refine_design(design, settings, step, sheet=sheet_of(spec))
+        found = refine_design(design, settings, step, sheet=sheet_of(spec, design))
         if stop.is_set():
             break
         results.append(found)
@@ -152,12 +152,16 @@ def send_refinement(
         send(replace(progress, rows=rows))
         return True
 
-    send(refine_design(design, settings, report, sheet=sheet_of(spec)))
+    send(refine_design(design, settings, report, sheet=sheet_of(spec, design)))
 
 
-def sheet_of(spec: PartSpec | None) -> Callable[[Design], Records | None] | None:
-    """Return a function from a design to its channels in the sheet; None without NGSolve."""
-    if spec is None or find_spec("ngsolve") is None:
+def sheet_of(spec: PartSpec | None, design: Design) -> Callable[[Design], Records | None] | None:
+    """Return a function from a design to its channels in the sheet.
+
+    None in space and without NGSolve.
+    """
+    in_space = design.problem.lattice.dimension == 3
+    if spec is None or in_space or find_spec("ngsolve") is None:
         return None
 
     def records(design: Design) -> Records | None:
