@@ -36,7 +36,10 @@ RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
 SHEETS = 4
-"""Largest number of geometries that are computed in the sheet: it takes up to a minute."""
+"""Largest number of geometries that are computed in the sheet: it takes up to a minute for each load
+case."""
+SHEET_CASES = 6
+"""Largest number of load cases of these geometries, of which there are at least two."""
 REPAIR_REGION = 0.25
 """First trust region after the sheet misses items, over that of other refinements."""
 SHEET_STEPS = 40
@@ -243,7 +246,8 @@ class _Job:
             self.best, self.chosen = state, vector
         models: Models = (NO_DIFFERENCE,)
         stable = self.stable
-        while self.goes_on and self.sheets < SHEETS and total_violation(state.sheet) > 0.0:
+        most = min(SHEETS, max(2, SHEET_CASES // len(self.design.problem.cases)))
+        while self.goes_on and self.sheets < most and total_violation(state.sheet) > 0.0:
             if state.is_on_path_of_sheet:
                 models = self._models(vector, state.records, state.sheet_records)
             elif state.met or not state.is_stable:
