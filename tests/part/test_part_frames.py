@@ -26,9 +26,7 @@ from bellcrank.model import (
     write_design,
 )
 from bellcrank.part import Material, Part, PartSpec, frame_problem, materials, spring_problem
-from bellcrank.plots.movies import MovieSettings
 from bellcrank.web.task_files import problem_of, read_task
-from bellcrank.workflows.animate import motion_movie
 from bellcrank.workflows.card import make_card
 from bellcrank.workflows.fabricate import Grips
 from bellcrank.workflows.validation import validate
@@ -158,7 +156,6 @@ def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses(tmp_path) 
         lambda: validate(design, PartSpec(), [("frame", FemSettings())]),
         lambda: make_card(design, PartSpec(), tmp_path / "card.pdf"),
         lambda: Grips(plate=True).applied(PartSpec().of(design)),
-        lambda: motion_movie([("tower", design)], MovieSettings()),
         lambda: characterise(design),
         lambda: place_parts(plan, lambda _: design),
         lambda: problem_of(data),

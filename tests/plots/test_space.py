@@ -10,10 +10,20 @@ import pytest
 from matplotlib.collections import LineCollection
 from PIL import Image
 
-from bellcrank.errors import InvalidProblem
-from bellcrank.model import Design, Input, Output, Problem, Section, Supports, lattices
+from bellcrank.errors import InvalidProblem, InvalidSettings
+from bellcrank.model import (
+    Design,
+    Input,
+    Output,
+    Problem,
+    Section,
+    Supports,
+    find_problem,
+    lattices,
+)
 from bellcrank.plots import Motion, draw_cases, draw_design, draw_motion, style
 from bellcrank.plots.marks import add_panel
+from bellcrank.plots.movies import MovieSettings
 from bellcrank.plots.space import (
     VIEW,
     add_drawing_in_space,
@@ -21,6 +31,7 @@ from bellcrank.plots.space import (
     frame_in_space,
     view_from,
 )
+from bellcrank.workflows.animate import motion_movie
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,7 +53,7 @@ def design() -> Design:
 
 def test_a_view_is_a_rotation_that_keeps_up_upward() -> None:
     for azimuth, elevation in ((0, 0), (30, 20), (-120, 60)):
-        axes = np.array(view_from(azimuth, elevation))
+        axes = np.array(view_from(azimuth, elevation)[:3])
         assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-12)
         assert np.linalg.det(axes) == pytest.approx(1.0)
         assert axes[1, 2] > 0.0
@@ -95,3 +106,28 @@ def test_pictures_are_written(design: Design, tmp_path: Path) -> None:
 def test_a_displacement_in_the_plane_is_refused(design: Design) -> None:
     with pytest.raises(InvalidProblem, match=r"displacement: expected shape \(63, 3\)"):
         Motion(design, np.zeros((63, 2)))
+
+
+def test_a_movie_shows_a_part_in_space_with_a_turning_camera(design: Design) -> None:
+    from bellcrank.plots.movies.figure import MovieFigure
+    from bellcrank.plots.movies.space_artist import frame_in_space as whole_frame
+    from bellcrank.plots.movies.space_artist import view_at
+
+    movie = motion_movie([("block", design)], MovieSettings(seconds=0.5, fps=10))
+    (sequence,) = movie.sequences
+    states = len(sequence.notes)
+    assert not np.allclose(view_at(sequence, 0).right, view_at(sequence, states - 1).right)
+    low, high = whole_frame(sequence)
+    for state in range(states):
+        seen = view_at(sequence, state).screen(sequence.moved[state])
+        assert (seen > low).all()
+        assert (seen < high).all()
+    figure = MovieFigure(movie, (640, 360))
+    first, last = (figure.draw(state)[..., :3] for state in (0, states - 1))
+    assert (first != last).any(axis=2).mean() > 0.05
+
+
+def test_a_movie_shows_designs_of_one_dimension(design: Design) -> None:
+    crane = find_problem("crane").full_design()
+    with pytest.raises(InvalidSettings, match="in the plane or in space, got both"):
+        motion_movie([("block", design), ("crane", crane)], MovieSettings())

@@ -43,13 +43,18 @@ class View(NamedTuple):
     right: Points
     up: Points
     toward: Points
+    middle: Points
+    """The point in the middle of the picture."""
 
     def screen(self, points: Points) -> Points:
         """Return (..., 2) the positions of points (..., 3) in the picture."""
-        return np.stack([points @ self.right, points @ self.up], axis=-1)
+        relative = points - self.middle
+        return np.stack([relative @ self.right, relative @ self.up], axis=-1)
 
 
-def view_from(azimuth: float = -28.0, elevation: float = 16.0) -> View:
+def view_from(
+    azimuth: float = -28.0, elevation: float = 16.0, middle: Points | None = None
+) -> View:
     """Return a view.
 
     Parameters
@@ -58,6 +63,8 @@ def view_from(azimuth: float = -28.0, elevation: float = 16.0) -> View:
         Angle about z from which the viewer looks, degrees; 0 from the front, 90 from the right.
     elevation
         Angle above the horizontal, degrees.
+    middle : (3,), optional
+        The point in the middle of the picture; the origin by default.
 
     Examples
     --------
@@ -67,7 +74,7 @@ def view_from(azimuth: float = -28.0, elevation: float = 16.0) -> View:
     a, e = math.radians(azimuth), math.radians(elevation)
     right = np.array([math.cos(a), math.sin(a), 0.0])
     toward = np.array([math.sin(a) * math.cos(e), -math.cos(a) * math.cos(e), math.sin(e)])
-    return View(right, np.cross(toward, right), toward)
+    return View(right, np.cross(toward, right), toward, np.zeros(3) if middle is None else middle)
 
 
 VIEW = view_from()
@@ -87,7 +94,7 @@ def frame_in_space(
 
 def arrows_in_space(motion: Motion, view: View = VIEW) -> list[Arrow]:
     """Return the arrows of the input and of the wanted directions of the outputs."""
-    return [*_input_arrows(motion, view), *_output_arrows(motion, view)]
+    return [*input_arrows(motion, view), *output_arrows(motion, view)]
 
 
 def add_drawing_in_space(
@@ -109,8 +116,8 @@ def add_drawing_in_space(
         if displaced:
             add_nodes(panel, view.screen(rest[nodes]), colour, hollow=True)
         add_nodes(panel, view.screen(moved[nodes] if displaced else rest[nodes]), colour)
-    add_arrows(panel, _input_arrows(motion, view), style.INPUT, bold=True)
-    add_arrows(panel, _output_arrows(motion, view), style.WANTED, bold=True)
+    add_arrows(panel, input_arrows(motion, view), style.INPUT, bold=True)
+    add_arrows(panel, output_arrows(motion, view), style.WANTED, bold=True)
     if displaced:
         for path in motion.drawn_paths(wanted=True):
             add_path(panel, view.screen(path), style.WANTED, wanted=True)
@@ -144,14 +151,36 @@ def _add_struts(
     share = (depth[order] - depth.min()) / max(float(np.ptp(depth)), 1e-12)
     white = PALE * (1.0 - share)[:, None]
     colours = (1.0 - white) * np.array(to_rgb(colour)) + white
-    both = np.stack([np.ones_like(colours), colours], axis=1).reshape(-1, 3)
-    wide = np.stack([HALO * widths, widths], axis=1).ravel()
-    inner = lines + SHORTER * (lines[:, ::-1] - lines)
-    pairs = np.stack([inner, lines], axis=1).reshape(-1, 2, 2)
+    segments, colours, widths = margins(lines, colours, widths)
     collection = LineCollection(
-        list(pairs), colors=both, linewidths=wide, capstyle="round", zorder=level
+        list(segments), colors=colours, linewidths=widths, capstyle="round", zorder=level
     )
     panel.axes.add_collection(collection, autolim=False)
+
+
+def margins(
+    lines: Points, colours: NDArray[np.float64], widths: Points
+) -> tuple[Points, NDArray[np.float64], Points]:
+    """Return lines with a white margin below each, which is shorter at both ends.
+
+    Parameters
+    ----------
+    lines : (n, 2, 2)
+        In the order of drawing.
+    colours : (n, 3)
+    widths : (n,)
+
+    Returns
+    -------
+    lines, colours, widths
+        (2 n, ...) of both.
+    """
+    inner = lines + SHORTER * (lines[:, ::-1] - lines)
+    return (
+        np.stack([inner, lines], axis=1).reshape(-1, 2, 2),
+        np.stack([np.ones_like(colours), colours], axis=1).reshape(-1, 3),
+        np.stack([HALO * widths, widths], axis=1).ravel(),
+    )
 
 
 def _add_supports(panel: Panel, view: View) -> None:
@@ -172,7 +201,7 @@ def _add_supports(panel: Panel, view: View) -> None:
         add_nodes(panel, rest[rolling], style.NOTE, hollow=True)
 
 
-def _input_arrows(motion: Motion, view: View) -> list[Arrow]:
+def input_arrows(motion: Motion, view: View) -> list[Arrow]:
     """Return arrows that end at the input."""
     problem = motion.design.problem
     length, gap = arrow_length(problem), 0.4 * spacing(problem)
@@ -183,7 +212,7 @@ def _input_arrows(motion: Motion, view: View) -> list[Arrow]:
     return arrows
 
 
-def _output_arrows(motion: Motion, view: View) -> list[Arrow]:
+def output_arrows(motion: Motion, view: View) -> list[Arrow]:
     """Return arrows that start at the outputs, beyond their displaced nodes."""
     problem = motion.design.problem
     length, gap = arrow_length(problem), 0.4 * spacing(problem)

@@ -36,8 +36,8 @@ RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
 SHEETS = 4
-"""Largest number of geometries that are computed in the sheet: it takes up to a minute for each load
-case."""
+"""Largest number of geometries that are computed in the sheet: each load case takes up to a
+minute."""
 SHEET_CASES = 6
 """Largest number of load cases of these geometries, of which there are at least two."""
 REPAIR_REGION = 0.25

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import load_bearing_core
-from bellcrank.model import require_plane
 from bellcrank.plots.movies import (
     Graph,
     Line,
@@ -73,7 +73,8 @@ def animate_motion(
 
     The load cases of one design are shown side by side, at most `MOST_CASES` of them. Each frame
     shows an equilibrium; the colour of a beam shows its strain energy. The return motion repeats
-    the forward motion in reverse, also if the design snaps. If a design has a specification, all
+    the forward motion in reverse, also if the design snaps. Designs in space are seen by a camera
+    that turns along the stroke. If a design has a specification, all
     are computed with eight elements in each strut, like their items.
 
     Parameters
@@ -93,8 +94,9 @@ def animate_motion(
 
     Raises
     ------
-    InvalidSettings, InvalidProblem
-        If a design has no motion to show or is in space, or a setting is invalid.
+    InvalidSettings
+        If a design has no motion to show, one is in the plane and the other in space, or a setting
+        is invalid.
     OutputExists, StorageError
         If the file exists or cannot be written.
     """
@@ -116,8 +118,8 @@ def motion_movie(
 ) -> Movie:
     """Compute the movie of `animate_motion`; arguments and errors are the same."""
     options = options or MotionOptions()
-    for _, design in designs:
-        require_plane(design.problem, "movie")
+    if len({design.problem.lattice.dimension for _, design in designs}) > 1:
+        raise InvalidSettings("movie: expected designs in the plane or in space, got both")
     part, order = stroke_schedule(settings.frames)
     states = len(part)
     responses: list[LoadingPath] = []

@@ -27,7 +27,8 @@ from bellcrank.plots.movies.lattice_artist import (
     energy_scale,
     frame_of,
 )
-from bellcrank.plots.scene import aligned_frames
+from bellcrank.plots.movies.space_artist import SpaceArtist, frame_in_space
+from bellcrank.plots.scene import aligned_frames, of_one_height
 
 if TYPE_CHECKING:
     from matplotlib.colors import PowerNorm
@@ -107,10 +108,7 @@ class MovieFigure:
         entries = _legend_entries(movie.sequences)
         rows = math.ceil(len(entries) / LEGEND_COLUMNS)
         foot = MARGIN + ROW_HEIGHT * rows + 0.56
-        frames = aligned_frames(
-            [frame_of(sequence) for sequence in movie.sequences],
-            [sequence.problem for sequence in movie.sequences],
-        )
+        frames = _frames(movie.sequences)
         layout = _layout(inches, frames, len(movie.graphs), heading, foot)
         self._curves = [
             Curves(self._figure, graph, box, colours, legend=len(colours) > 1 and number == 0)
@@ -120,7 +118,7 @@ class MovieFigure:
         self._artists = self._add_actors(layout, frames, scale)
         _add_colour_bar(self._figure, scale, MARGIN + ROW_HEIGHT * rows + 0.32)
         add_legend(self._figure, entries, MARGIN, columns=math.ceil(len(entries) / rows))
-        self._parts: list[LatticeArtist | Curves] = [*self._artists, *self._curves]
+        self._parts: list[LatticeArtist | SpaceArtist | Curves] = [*self._artists, *self._curves]
         self._canvas.draw()
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
@@ -130,18 +128,19 @@ class MovieFigure:
 
     def _add_actors(
         self, layout: Layout, frames: list[tuple[Any, Any]], scale: PowerNorm
-    ) -> list[LatticeArtist]:
+    ) -> list[LatticeArtist | SpaceArtist]:
         """Add the lattices side by side, each with a heading."""
         left, bottom, width, height = layout.room
         sizes = [layout.scale * (high - low) for low, high in frames]
         share = (width - sum(float(size[0]) for size in sizes)) / len(sizes)
         lift = bottom + 0.5 * (height - float(sizes[0][1]))
-        artists = []
+        artists: list[LatticeArtist | SpaceArtist] = []
         for sequence, (low, high), size in zip(self._sequences, frames, sizes, strict=True):
             self._add_heading(sequence, left)
             corner = (left + 0.5 * share, lift)
             panel = add_panel(self._figure, sequence.problem, corner, layout.scale, low, high)
-            artists.append(LatticeArtist(panel, sequence, scale))
+            kind = SpaceArtist if sequence.problem.lattice.dimension == 3 else LatticeArtist
+            artists.append(kind(panel, sequence, scale))
             left += float(size[0]) + share
         return artists
 
@@ -174,6 +173,16 @@ class MovieFigure:
                 alarm.set_text(sequence.alarms[state])
                 alarm.draw(renderer)
         return np.array(self._canvas.buffer_rgba(), dtype=np.uint8)
+
+
+def _frames(
+    sequences: tuple[StateSequence, ...],
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Return the corners of the visible area of each lattice, of one height."""
+    problems = [sequence.problem for sequence in sequences]
+    if any(problem.lattice.dimension == 3 for problem in problems):
+        return of_one_height([frame_in_space(sequence) for sequence in sequences])
+    return aligned_frames([frame_of(sequence) for sequence in sequences], problems)
 
 
 def _shortened(title: str) -> str:

@@ -23,7 +23,6 @@ from bellcrank.plots.scene import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from matplotlib.artist import Artist
     from numpy.typing import NDArray
 
     from bellcrank.plots.movies.records import StateSequence
@@ -87,11 +86,11 @@ class LatticeArtist:
         regions = ((problem.input.nodes, style.INPUT), (problem.output.nodes, style.OUTPUT))
         self._dots: list[tuple[NDArray[np.int64], Any]] = []
         for nodes, colour in regions:
-            (dot,) = self._created(partial(add_nodes, panel, rest[nodes], colour))
+            (dot,) = created(panel, partial(add_nodes, panel, rest[nodes], colour))
             self._dots.append((nodes, dot))
         self._input_arrows = input_arrows(problem)
-        self._arrows: list[Any] = self._created(
-            partial(add_arrows, panel, self._input_arrows, style.INPUT, bold=True)
+        self._arrows: list[Any] = created(
+            panel, partial(add_arrows, panel, self._input_arrows, style.INPUT, bold=True)
         )
         self.artists: list[Any] = [
             self._unloaded, self._loaded, self._trail, *(dot for _, dot in self._dots),
@@ -118,12 +117,6 @@ class LatticeArtist:
         drawn = LineCollection([], linewidths=points, capstyle="round", **options)
         self._panel.axes.add_collection(drawn, autolim=False)
         return drawn
-
-    def _created(self, draw: Callable[[], None]) -> list[Artist]:
-        """Call a drawing function; return the artists that it adds to the panel."""
-        before = set(self._panel.axes.get_children())
-        draw()
-        return [one for one in self._panel.axes.get_children() if one not in before]
 
     def update(self, state: int) -> None:
         """Update all artists to a state."""
@@ -153,6 +146,13 @@ class LatticeArtist:
             shift = shift.mean(axis=0, keepdims=True).repeat(len(self._input_arrows), axis=0)
         for arrow, rest, (x, y) in zip(self._arrows, self._input_arrows, shift, strict=True):
             arrow.set_data(x=rest.tail[0] + x, y=rest.tail[1] + y)
+
+
+def created(panel: Panel, draw: Callable[[], None]) -> list[Any]:
+    """Call a drawing function; return the artists that it adds to the panel."""
+    before = set(panel.axes.get_children())
+    draw()
+    return [one for one in panel.axes.get_children() if one not in before]
 
 
 def _output_arrows(sequence: StateSequence) -> list[Arrow]:

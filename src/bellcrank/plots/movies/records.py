@@ -27,7 +27,7 @@ class StateSequence:
         Beams of the design.
     load_bearing : (M,) bool
         Beams that carry load.
-    displacement : (K, N, 2) float64, lattice units
+    displacement : (K, N, d) float64, lattice units
         Displacement of each node in each of K states. Nodes with values that are not finite are
         drawn at rest.
     energy : (K, M) float64
@@ -65,7 +65,7 @@ class StateSequence:
         expected = {
             "present": (beams,),
             "load_bearing": (beams,),
-            "displacement": (states, lattice.node_count, 2),
+            "displacement": (states, *lattice.positions.shape),
             "energy": (states, beams),
             "alarms": (states,),
         }
@@ -78,7 +78,7 @@ class StateSequence:
 
     @property
     def moved(self) -> NDArray[np.float64]:
-        """(K, N, 2) drawn positions of the nodes, lattice units."""
+        """(K, N, d) drawn positions of the nodes, lattice units."""
         known = np.isfinite(self.displacement).all(axis=2, keepdims=True)
         shift = np.where(known, self.displacement, 0.0)
         points: NDArray[np.float64] = self.problem.lattice.positions + self.magnify * shift
