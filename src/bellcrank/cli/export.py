@@ -55,7 +55,7 @@ def export(
     design: DesignName,
     out: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="File: stl, 3mf, step, dxf, svg, vtu, data or dump."),
+        typer.Argument(metavar="FILE", help="File: stl, 3mf, step, dxf, svg or vtu."),
     ],
     part: PartFile = None,
     width: Width = None,
@@ -71,9 +71,7 @@ def export(
     screw_diameter: ScrewDiameter = "3.4mm",
     pad: Pad = False,
     pointer: Pointer = "0",
-    moved: Annotated[
-        bool, typer.Option("--moved", help="Include the motion (vtu, data, dump).")
-    ] = False,
+    moved: Annotated[bool, typer.Option("--moved", help="Include the motion (vtu).")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Write the part of a design to a file for printers, cutters or other programs."""
