@@ -47,13 +47,13 @@ def best(runs: list[dict[str, Any]]) -> dict[str, Any]:
     return min(made, key=lambda run: (not run["met"], not run["met_in_sheet"], run["seed"]))
 
 
-def shrink(path: Path) -> None:
-    """Make a picture or a movie smaller: at most 800 pixels wide, and one palette of 64 colours."""
+def shrink(path: Path, largest: int = 800) -> None:
+    """Make a picture or a movie smaller: at most `largest` pixels, one palette of 64 colours."""
     source = Image.open(path)
     frames, durations = [], []
     for frame in ImageSequence.Iterator(source):
         picture = frame.convert("RGB")
-        picture.thumbnail((800, 800))
+        picture.thumbnail((largest, largest))
         frames.append(picture)
         durations.append(frame.info.get("duration", 0))
     width, height = frames[0].size
