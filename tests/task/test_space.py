@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import copy
+import json
+import re
+import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import meshio
@@ -12,12 +16,12 @@ import trimesh
 
 from bellcrank.errors import InvalidFile, InvalidProblem
 from bellcrank.mechanics import FrameEvaluator, Status
+from bellcrank.search import read_settings
 from bellcrank.task import read_task, task_from_dict
 from bellcrank.task.surfaces import Surface, read_surface
+from bellcrank.workflows import complete_design, start_design
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from bellcrank.task import Task
 
 TASK: dict[str, Any] = {
@@ -115,8 +119,6 @@ def test_a_surface_of_triangles_is_filled(tmp_path: Path) -> None:
     data["supports"] = [{"at": {"sphere": [30, 20, 2], "radius": 15}}]
     data["cases"][0]["inputs"][0]["at"] = {"point": [48, 20, 25]}
     data["cases"][0]["outputs"][0]["at"] = {"point": [12, 20, 25]}
-    import json
-
     (tmp_path / "task.json").write_text(json.dumps(data))
     made = read_task(tmp_path / "task.json")
     distance = np.linalg.norm(struts(made) - [30.0, 20.0, 25.0], axis=2)
@@ -220,3 +222,25 @@ def test_what_is_of_space_is_refused_in_the_plane(changes: dict[str, Any], messa
     }
     with pytest.raises(InvalidProblem, match=message):
         task_from_dict({**data, **changes})
+
+
+@pytest.mark.slow
+def test_the_column_of_the_page_turns_as_it_says(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "tasks.md").read_text(encoding="utf-8")
+    (text,) = [
+        each
+        for each in re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+        if 'name = "twist-column"' in each
+    ]
+    made = task_from_dict(tomllib.loads(text))
+    settings = read_settings({"steps": 300, "chains": 1, "seed": 0})
+    folder = start_design(made.problem, settings, tmp_path / "run", made.part, refine=False)
+    report = complete_design(folder)
+    assert report is not None
+    (figures,) = report.part_figures
+    assert figures["rotation_deg"] == pytest.approx(49.0, abs=0.5)
+    assert figures["off_axis"] == pytest.approx(0.001, abs=5e-4)
+    assert figures["strain"] == pytest.approx(0.07, abs=5e-3)
+    assert figures["travel_mm"] == pytest.approx(3.0, abs=0.15)
+    assert all(item.met for item in dict(report.items)["frames, 8 elements"])
+    assert (folder.path / "motion.png").stat().st_size > 50_000
