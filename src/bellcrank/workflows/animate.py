@@ -172,8 +172,11 @@ def _sequence(
     """Return the states of a design along its stroke."""
     word = "stroke" if design.problem.input.drive == "displacement" else "load"
     size = f"{design.beam_count} beams" if magnify == 1.0 else f"motion drawn × {magnify:g}"
-    size += " · springs" if design.problem.section is None else " · frame"
-    size += "" if elements is None else f", {elements} elements"
+    model = "springs" if design.problem.section is None else "frame"
+    if elements is not None:
+        model += f", {elements} elements"
+    # Two headings side by side have no room for the number of beams too.
+    size = model if elements is not None and magnify == 1.0 else f"{size} · {model}"
     notes = tuple(
         f"{size} · {word} {_percent(fraction)} · {efficiency_note(efficiency)}"
         for efficiency, fraction in zip(response.efficiency, response.fraction, strict=True)
