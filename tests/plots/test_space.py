@@ -110,8 +110,7 @@ def test_a_displacement_in_the_plane_is_refused(design: Design) -> None:
 
 def test_a_movie_shows_a_part_in_space_with_a_turning_camera(design: Design) -> None:
     from bellcrank.plots.movies.figure import MovieFigure
-    from bellcrank.plots.movies.space_artist import frame_in_space as whole_frame
-    from bellcrank.plots.movies.space_artist import view_at
+    from bellcrank.plots.movies.space_artist import view_at, whole_frame
 
     movie = motion_movie([("block", design)], MovieSettings(seconds=0.5, fps=10))
     (sequence,) = movie.sequences

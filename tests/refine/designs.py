@@ -7,18 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from bellcrank.mechanics import FrameEvaluator, Status
-from bellcrank.model import (
-    Design,
-    Elasticity,
-    Input,
-    Lattice,
-    Output,
-    Problem,
-    Section,
-    Supports,
-    gallery_design,
-)
+from bellcrank.model import Design, Elasticity, Section, gallery_design
 from bellcrank.task import find_task
+from tests.physics.test_frame_flips import block
 
 
 def straight_crane() -> Design:
@@ -67,26 +58,15 @@ def random_block(seed: int) -> Design:
 
     With random beams, positions and widths.
     """
-    cube = np.argwhere(np.ones((3, 3, 3))).astype(float)
-    first, second = np.triu_indices(len(cube), 1)
-    near = np.linalg.norm(cube[first] - cube[second], axis=1) < 1.5
-    beams = np.stack([first, second], axis=1)[near]
-    corner = np.flatnonzero((cube[:, 2] == 2.0) & (cube[:, 0] == 2.0) & (cube[:, 1] > 0.5))
-    opposite = np.flatnonzero((cube[:, 2] == 2.0) & (cube[:, 0] == 0.0) & (cube[:, 1] < 1.5))
-    problem = Problem(
-        name="block",
-        lattice=Lattice(cube, beams),
-        supports=Supports(fixed=np.flatnonzero(cube[:, 2] == 0.0)),
-        input=Input(nodes=corner, direction=[0, 0, -1], drive="displacement", amount=0.1),
-        output=Output(nodes=opposite, direction=[-1, 0, 0]),
-        section=Section.round(0.2, joint=0.06),
-        material=Elasticity(12.0, 0.4),
+    problem = replace(
+        block(), section=Section.round(0.2, joint=0.06), material=Elasticity(12.0, 0.4)
     )
+    cube = problem.lattice.positions
     rng = np.random.default_rng(seed)
     while True:
         moved = cube + 0.05 * rng.normal(size=cube.shape)
         moved[problem.special_nodes] = cube[problem.special_nodes]
-        widths = rng.uniform(0.2, 0.3, len(beams))
+        widths = rng.uniform(0.2, 0.3, problem.lattice.beam_count)
         mask = problem.initial.copy()
         mask[rng.choice(problem.designable, len(problem.designable) // 3, replace=False)] = False
         made = Design(problem.with_geometry(moved, widths), mask)

@@ -54,15 +54,14 @@ def refine(
     target = out or Path(f"{Path(chosen.problem.name).name}-refined.json")
     if target.exists() and not overwrite:
         raise OutputExists(f"{target} exists; choose another file, or --overwrite")
-    from bellcrank.workflows.pictures import check_targets, draw_before_and_after
-
-    check_targets(picture, None, overwrite=overwrite)
     from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import write_design
     from bellcrank.refine import RefinementSettings
+    from bellcrank.workflows.pictures import check_targets, draw_before_and_after
     from bellcrank.workflows.refinement import motion_rows, refine_file, refinement_rows
     from bellcrank.workflows.validation import spec_for
 
+    check_targets(picture, None, overwrite=overwrite)
     settings = RefinementSettings(
         evaluations=evaluations, largest_move=largest_move, widest=widest, same_mass=same_mass
     )

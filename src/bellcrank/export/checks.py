@@ -13,6 +13,7 @@ from bellcrank.export.formats.base import Export
 from bellcrank.export.solid import whole_layers
 from bellcrank.part.outline.room import find_joins
 from bellcrank.part.outline.struts import read_struts
+from bellcrank.part.pieces import beam_pieces
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
@@ -212,13 +213,7 @@ def check_pieces(part: Part, outline: Outline, rules: PrintRules) -> PrintWarnin
     if outline.piece_count == 1:
         return None
     loose = sorted(outline.outer, key=lambda loop: loop.area)[:-1]
-    points = np.array([loop.points[0] for loop in loose])
-    return PrintWarning(
-        "pieces",
-        f"The part is in {outline.piece_count} pieces, the smallest at "
-        f"{_format(points[0])}; remove loose pieces.",
-        _points(points),
-    )
+    return _loose_pieces(outline.piece_count, np.array([loop.points[0] for loop in loose]))
 
 
 @checks.register("dead-ends")
@@ -283,21 +278,21 @@ def check_overhangs(part: Part, rules: PrintRules) -> PrintWarning | None:  # no
 @checks_in_space.register("pieces")
 def check_connected(part: Part, rules: PrintRules) -> PrintWarning | None:  # noqa: ARG001
     """Check that the part is one piece."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    nodes = len(part.positions)
-    graph = coo_matrix((np.ones(len(part.struts)), part.struts.T), shape=(nodes, nodes))
-    _, piece = connected_components(graph, directed=False)
-    sizes = np.bincount(piece[part.struts[:, 0]])
-    found = np.flatnonzero(sizes)
-    if len(found) == 1:
+    piece = beam_pieces(part.design)
+    sizes = np.bincount(piece)
+    if len(sizes) == 1:
         return None
-    loose = found[np.argsort(sizes[found], kind="stable")][:-1]
-    points = np.array([part.positions[np.flatnonzero(piece == each)[0]] for each in loose])
+    loose = np.argsort(sizes, kind="stable")[:-1]
+    return _loose_pieces(
+        len(sizes), np.array([part.positions[part.struts[piece == each][0, 0]] for each in loose])
+    )
+
+
+def _loose_pieces(count: int, points: NDArray[np.float64]) -> PrintWarning:
+    """Return the warning of a part in several pieces, with a point of each loose one."""
     return PrintWarning(
         "pieces",
-        f"The part is in {len(found)} pieces, the smallest at {_format(points[0])}; remove loose "
+        f"The part is in {count} pieces, the smallest at {_format(points[0])}; remove loose "
         "pieces.",
         _points(points),
     )

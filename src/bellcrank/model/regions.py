@@ -68,6 +68,19 @@ def find_rows(lattice: Lattice) -> list[NDArray[np.int64]]:
     ]
 
 
+def _numbered(
+    found: list[NDArray[np.int64]], number: int, key: str, many: str
+) -> NDArray[np.int64]:
+    """Return one of several rows or layers; negative numbers count from the end."""
+    count = len(found)
+    if not -count <= number < count:
+        raise InvalidProblem(
+            f"{key}: expected {-count} to {count - 1}, as the lattice has {count} {many}, got "
+            f"{number}"
+        )
+    return found[number]
+
+
 def _levels(lattice: Lattice, axis: int) -> list[NDArray[np.int64]]:
     """Return the nodes with equal coordinates along an axis, in its order."""
     along = lattice.positions[:, axis]
@@ -101,13 +114,7 @@ def row(
     InvalidProblem
         If there is no such row, it has fewer nodes, or both sides are given.
     """
-    found = find_rows(lattice)
-    if not -len(found) <= row < len(found):
-        raise InvalidProblem(
-            f"row: expected {-len(found)} to {len(found) - 1}, as the lattice has "
-            f"{len(found)} rows, got {row}"
-        )
-    nodes = found[row]
+    nodes = _numbered(find_rows(lattice), row, "row", "rows")
     if leftmost is not None and rightmost is not None:
         raise InvalidProblem("row: expected leftmost or rightmost, got both; give two regions")
     for name, count in (("leftmost", leftmost), ("rightmost", rightmost)):
@@ -215,13 +222,7 @@ def layer(
     InvalidProblem
         If there is no such layer, or no node in the ring.
     """
-    found = find_layers(lattice, axis)
-    if not -len(found) <= layer < len(found):
-        raise InvalidProblem(
-            f"layer: expected {-len(found)} to {len(found) - 1}, as the lattice has "
-            f"{len(found)} layers along {axis}, got {layer}"
-        )
-    nodes = found[layer]
+    nodes = _numbered(find_layers(lattice, axis), layer, "layer", f"layers along {axis}")
     if radius is None:
         if around is not None:
             raise InvalidProblem("around: expected with radius")

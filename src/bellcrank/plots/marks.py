@@ -153,21 +153,21 @@ def add_supports(panel: Panel) -> None:
     problem = panel.problem
     positions, step = problem.lattice.positions, spacing(problem)
     for group in support_groups(problem):
-        panel.axes.add_patch(
-            Polygon(
-                outline_around(positions[group], (0.3 if len(group) > 1 else 0.45) * step),
-                facecolor=style.GROUND_FILL,
-                edgecolor=style.GROUND,
-                linewidth=1.0,
-                hatch="////",
-                zorder=0.5,
-            )
-        )
+        reach = (0.3 if len(group) > 1 else 0.45) * step
+        panel.axes.add_patch(support_area(outline_around(positions[group], reach)))
     for nodes, offset in (
         (problem.supports.fixed_y, np.array([0.0, -0.26])),
         (problem.supports.fixed_x, np.array([-0.26, 0.0])),
     ):
         _add_wheels(panel, positions[nodes], offset * step)
+
+
+def support_area(outline: NDArray[np.float64]) -> Polygon:
+    """Return the hatched area (k, 2) of a support."""
+    return Polygon(
+        outline, facecolor=style.GROUND_FILL, edgecolor=style.GROUND, linewidth=1.0, hatch="////",
+        zorder=0.5,
+    )  # fmt: skip
 
 
 def _add_wheels(panel: Panel, points: NDArray[np.float64], offset: NDArray[np.float64]) -> None:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
-from matplotlib.patches import Polygon
 
 from bellcrank.plots import style
-from bellcrank.plots.marks import Panel, add_arrows, add_nodes, add_path
+from bellcrank.plots.marks import Panel, add_arrows, add_nodes, add_path, support_area
 from bellcrank.plots.scene import (
     Arrow,
     Motion,
@@ -188,13 +187,7 @@ def _add_supports(panel: Panel, view: View) -> None:
     problem = panel.problem
     rest, step = view.screen(problem.lattice.positions), spacing(problem)
     for group in support_groups(problem):
-        panel.axes.add_patch(
-            Polygon(
-                outline_around(rest[group], 0.3 * step),
-                facecolor=style.GROUND_FILL, edgecolor=style.GROUND, linewidth=1.0,
-                hatch="////", zorder=0.5,
-            )
-        )  # fmt: skip
+        panel.axes.add_patch(support_area(outline_around(rest[group], 0.3 * step)))
     supports = problem.supports
     rolling = np.unique(np.concatenate([supports.fixed_x, supports.fixed_y, supports.fixed_z]))
     if len(rolling):

@@ -9,27 +9,37 @@ import shapely
 from shapely.geometry import Point, Polygon, box
 
 from bellcrank.errors import InvalidProblem
-from bellcrank.task import space
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
     from bellcrank.task.schema import NodeRegion, Shape
 
-SHAPES = ("circle", "box", "polygon")
-REGIONS = {
-    2: ("point", "edge", "nodes", *SHAPES),
-    3: ("point", "face", "nodes", *space.SHAPES),
-}
+    Points = NDArray[np.float64]
+    Contains = Callable[[Points], NDArray[np.bool_]]
+
+SHAPES = {2: ("circle", "box", "polygon"), 3: ("sphere", "cylinder", "box")}
+"""Shapes in the plane and in space."""
+REGIONS = {2: ("point", "edge", "nodes", *SHAPES[2]), 3: ("point", "face", "nodes", *SHAPES[3])}
 """Regions of nodes in the plane and in space."""
+ROUND = ("circle", "sphere", "cylinder")
+"""Shapes with a radius."""
 SNAP = 0.75
 """Largest distance of a node from the point that it is named by, in spacings."""
-ROW = {"top": 0.3, "bottom": 0.3, "left": 0.55, "right": 0.55}
-"""Distance from the extreme coordinate up to which nodes belong to an edge, in spacings: rows of a
-triangular lattice end alternately half a spacing inside."""
+SIDES = {
+    2: {"left": (0, 0.55), "right": (0, 0.55), "bottom": (1, 0.3), "top": (1, 0.3)},
+    3: {
+        "left": (0, 0.55), "right": (0, 0.55), "front": (1, 0.55), "back": (1, 0.55),
+        "bottom": (2, 0.3), "top": (2, 0.3),
+    },
+}  # fmt: skip
+"""Axis of each edge or face, and the distance from the extreme coordinate up to which nodes belong
+to it, in spacings: rows of a triangular lattice end alternately half a spacing inside."""
+ROUNDING = 1e-6
+"""Distance, in spacings, by which nodes may lie outside a shape."""
 
 
 def kind_of(region: Shape, names: Sequence[str], key: str) -> str:
@@ -46,14 +56,16 @@ def kind_of(region: Shape, names: Sequence[str], key: str) -> str:
         raise InvalidProblem(
             f"{key}: expected one of {', '.join(names)}, got {' and '.join(given) or 'none'}"
         )
-    if (region.radius is not None) != (given[0] in {"circle", "sphere", "cylinder"}):
-        rounded = " or ".join(name for name in ("circle", "sphere", "cylinder") if name in names)
+    if (region.radius is not None) != (given[0] in ROUND):
+        rounded = " or ".join(name for name in ROUND if name in names)
         raise InvalidProblem(f"{key}: expected {rounded} and radius together")
+    if region.radius is not None and region.radius <= 0.0:
+        raise InvalidProblem(f"{key}.radius: expected a length above 0, got {region.radius:g}")
     return given[0]
 
 
 def shape_of(shape: Shape, key: str) -> BaseGeometry:
-    """Return the region that a table describes.
+    """Return the region of the plane that a table describes.
 
     Raises
     ------
@@ -66,12 +78,10 @@ def shape_of(shape: Shape, key: str) -> BaseGeometry:
     >>> round(shape_of(Shape(box=[0, 0, 20, "1cm"]), "hole").area, 1)
     200.0
     """
-    kind = kind_of(shape, SHAPES, key)
+    kind = kind_of(shape, SHAPES[2], key)
     if kind == "circle":
         assert shape.circle is not None
         assert shape.radius is not None
-        if shape.radius <= 0.0:
-            raise InvalidProblem(f"{key}.radius: expected a length above 0, got {shape.radius:g}")
         return Point(shape.circle).buffer(shape.radius, quad_segs=32)
     if kind == "box":
         assert shape.box is not None
@@ -104,6 +114,50 @@ def polygon_of(points: Sequence[Sequence[float]], key: str) -> Polygon:
         reason = shapely.is_valid_reason(polygon)
         raise InvalidProblem(f"{key}: expected a polygon that does not intersect itself ({reason})")
     return polygon
+
+
+def shape_in_space(shape: Shape, key: str, slack: float = 0.0) -> Contains:
+    """Return a function from points (n, 3), mm, to whether they are in a shape (n,).
+
+    Parameters
+    ----------
+    shape
+        Table of a task.
+    key
+        Its name, for errors.
+    slack
+        Distance by which points may lie outside, mm.
+
+    Raises
+    ------
+    InvalidProblem
+        If the table describes no shape in space, several, or an empty one.
+
+    Examples
+    --------
+    >>> from bellcrank.task.schema import Shape
+    >>> ball = shape_in_space(Shape(sphere=[0, 0, 0], radius="1 cm"), "hole")
+    >>> ball(np.array([[0.0, 9.0, 0.0], [8.0, 8.0, 0.0]]))
+    array([ True, False])
+    """
+    kind = kind_of(shape, SHAPES[3], key)
+    if kind == "box":
+        assert shape.box is not None
+        low, high = np.array(shape.box[:3]), np.array(shape.box[3:])
+        if len(shape.box) != 6 or not (low < high).all():
+            raise InvalidProblem(
+                f"{key}.box: expected [x_min, y_min, z_min, x_max, y_max, z_max], got "
+                f"{list(shape.box)}"
+            )
+        low, high = low - slack, high + slack
+        return lambda points: np.all((points >= low) & (points <= high), axis=1)
+    assert shape.radius is not None
+    centre, axes, reach = getattr(shape, kind), 3 if kind == "sphere" else 2, shape.radius + slack
+    if len(centre) != axes:
+        raise InvalidProblem(
+            f"{key}.{kind}: expected [{', '.join('xyz'[:axes])}], got {list(centre)}"
+        )
+    return lambda points: np.linalg.norm(points[:, :axes] - centre, axis=1) <= reach
 
 
 def nodes_at(
@@ -154,13 +208,17 @@ def _nodes(
         return np.array(region.nodes, dtype=np.int64)
     if kind == "point":
         return _nearest(region, positions, spacing, key)
-    if kind == "edge":
-        return _edge(region, positions, spacing, key)
-    if kind == "face":
-        return space.face_nodes(region, positions, spacing)
+    if kind in {"edge", "face"}:
+        return _side(region, positions, spacing, key)
     if dimension == 3:
-        return space.nodes_in_shape(region, positions, spacing, key)
-    shape = shape_of(region, key).buffer(1e-6 * spacing)
+        within = np.flatnonzero(shape_in_space(region, key, ROUNDING * spacing)(positions))
+        if not len(within):
+            raise InvalidProblem(
+                f"{key}: no node lies in this {kind}; the lattice extends from "
+                f"{_extent(positions)} mm"
+            )
+        return within
+    shape = shape_of(region, key).buffer(ROUNDING * spacing)
     inside = np.flatnonzero(shapely.contains_xy(shape, positions[:, 0], positions[:, 1]))
     if not len(inside):
         gap = shapely.distance(shape, shapely.points(positions))
@@ -187,33 +245,38 @@ def _nearest(
     order = np.argsort(gap.round(9), kind="stable")
     if gap[order[0]] > SNAP * spacing:
         near = ", ".join(f"{each:.4g}" for each in positions[order[0]])
-        low, high = positions.min(axis=0), positions.max(axis=0)
-        extent = " and ".join(
-            f"{axis} = {a:.4g} to {b:.4g}" for axis, a, b in zip(axes, low, high, strict=True)
-        )
         raise InvalidProblem(
             f"{key}.point: the node nearest to {list(region.point)} mm is at [{near}] mm, "
             f"{gap[order[0]]:.3g} mm away; expected a point within {SNAP * spacing:.3g} mm of a "
-            f"node; the lattice extends from {extent} mm"
+            f"node; the lattice extends from {_extent(positions)} mm"
         )
     return np.sort(order[: region.count])
 
 
-def _edge(
+def _extent(positions: NDArray[np.float64]) -> str:
+    """Return from where to where nodes extend."""
+    ends = zip("xyz", positions.min(axis=0), positions.max(axis=0), strict=False)
+    return " and ".join(f"{axis} = {low:.4g} to {high:.4g}" for axis, low, high in ends)
+
+
+def _side(
     region: NodeRegion, positions: NDArray[np.float64], spacing: float, key: str
 ) -> NDArray[np.int64]:
-    assert region.edge is not None
-    axis = 0 if region.edge in {"left", "right"} else 1
+    """Return the nodes on an edge of a domain in the plane, or a face of one in space."""
+    side = region.edge or region.face
+    assert side is not None
+    axis, most = SIDES[positions.shape[1]][side]
     across = positions[:, axis]
-    depth = across - across.min() if region.edge in {"left", "bottom"} else across.max() - across
-    chosen = depth <= ROW[region.edge] * spacing
+    at_low = side in {"left", "front", "bottom"}
+    depth = across - across.min() if at_low else across.max() - across
+    chosen = depth <= most * spacing
     if region.between is not None:
         low, high = region.between
         along = positions[:, 1 - axis]
-        chosen &= (along >= low - 1e-6 * spacing) & (along <= high + 1e-6 * spacing)
+        chosen &= (along >= low - ROUNDING * spacing) & (along <= high + ROUNDING * spacing)
         if not chosen.any():
             raise InvalidProblem(
-                f"{key}.between: no node of the {region.edge} edge lies between {low:g} and "
+                f"{key}.between: no node of the {side} edge lies between {low:g} and "
                 f"{high:g} mm; the edge extends from {along.min():.4g} to {along.max():.4g} mm"
             )
     return np.flatnonzero(chosen)

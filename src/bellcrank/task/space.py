@@ -1,4 +1,4 @@
-"""Domains, shapes and regions of nodes in space, in mm."""
+"""Lattices that fill a domain in space."""
 
 from __future__ import annotations
 
@@ -11,84 +11,29 @@ from bellcrank.errors import InvalidFile, InvalidProblem
 from bellcrank.model import Lattice, lattices
 from bellcrank.model.calls import call_with_keys
 from bellcrank.model.lattices.crystals import without_dead_ends
+from bellcrank.task.shapes import ROUNDING, shape_in_space
 from bellcrank.task.surfaces import Surface, read_surface
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from bellcrank.part import PartSpec
-    from bellcrank.task.schema import DomainSection, NodeRegion, Shape
+    from bellcrank.task.schema import DomainSection, Shape
+    from bellcrank.task.shapes import Contains
 
     Points = NDArray[np.float64]
-    Contains = Callable[[Points], NDArray[np.bool_]]
 
-SHAPES = ("sphere", "cylinder", "box")
 CELLS = ("octet", "cubic", "body-centred", "kelvin", "displaced-delaunay-space")
 """Lattices that fill a domain."""
-SNAP = 1e-6
-"""Distance, in spacings, by which points may lie outside a shape."""
+WITHIN = 1.0 - 1e-6
+"""Radius at which the surface of a strut is compared with a domain, over that of the strut."""
 STATIONS = 9
 """Number of sections of a strut at which its surface is compared with a domain."""
 AROUND = 8
 """Number of points of each section."""
-FACES = {
-    "left": (0, 0.55), "right": (0, 0.55), "front": (1, 0.55), "back": (1, 0.55),
-    "bottom": (2, 0.3), "top": (2, 0.3),
-}  # fmt: skip
-"""Axis of each face, and the distance, in spacings, up to which nodes belong to it."""
-
-
-def shape_in_space(shape: Shape, key: str) -> Contains:
-    """Return a function from points (n, 3), mm, to whether they are in a shape (n,).
-
-    Raises
-    ------
-    InvalidProblem
-        If the table describes no shape in space, several, or an empty one.
-
-    Examples
-    --------
-    >>> from bellcrank.task.schema import Shape
-    >>> ball = shape_in_space(Shape(sphere=[0, 0, 0], radius="1 cm"), "hole")
-    >>> ball(np.array([[0.0, 9.0, 0.0], [8.0, 8.0, 0.0]]))
-    array([ True, False])
-    """
-    given = [name for name in SHAPES if getattr(shape, name) is not None]
-    others = [name for name in ("circle", "polygon") if getattr(shape, name) is not None]
-    if len(given) != 1 or others:
-        raise InvalidProblem(
-            f"{key}: expected one of {', '.join(SHAPES)} in space, got "
-            f"{' and '.join([*given, *others]) or 'none'}"
-        )
-    (kind,) = given
-    if (shape.radius is None) != (kind == "box"):
-        raise InvalidProblem(f"{key}: expected a radius with sphere or cylinder")
-    if kind == "box":
-        low, high = _box(shape, key)
-        return lambda points: np.all((points >= low) & (points <= high), axis=1)
-    radius = shape.radius
-    assert radius is not None
-    if radius <= 0.0:
-        raise InvalidProblem(f"{key}.radius: expected a length above 0, got {radius:g}")
-    centre, axes = getattr(shape, kind), 3 if kind == "sphere" else 2
-    if len(centre) != axes:
-        raise InvalidProblem(
-            f"{key}.{kind}: expected [{', '.join('xyz'[:axes])}], got {list(centre)}"
-        )
-    return lambda points: np.linalg.norm(points[:, :axes] - centre, axis=1) <= radius
-
-
-def _box(shape: Shape, key: str) -> tuple[Points, Points]:
-    assert shape.box is not None
-    low, high = np.array(shape.box[:3]), np.array(shape.box[3:])
-    if len(shape.box) != 6 or not (low < high).all():
-        raise InvalidProblem(
-            f"{key}.box: expected [x_min, y_min, z_min, x_max, y_max, z_max], got {list(shape.box)}"
-        )
-    return low, high
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +157,7 @@ def _strut_surfaces(positions: Points, beams: NDArray[np.int64], radius: float) 
     one = np.cross(helper, axis)
     one /= np.linalg.norm(one, axis=1)[:, None]
     two = np.cross(axis, one)
-    reach = (1.0 - SNAP) * radius
+    reach = WITHIN * radius
     found = [first - reach * axis, second + reach * axis]
     angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
     found += [
@@ -235,49 +180,10 @@ def beams_in_space(
     """
     inside = np.zeros(lattice.beam_count, dtype=bool)
     for index, shape in enumerate(shapes):
-        within = _nodes_in(shape, lattice.positions * spacing, spacing, f"{key}[{index}]")
+        contains = shape_in_space(shape, f"{key}[{index}]", ROUNDING * spacing)
+        within = contains(lattice.positions * spacing)
         found = within[lattice.beams].all(axis=1)
         if not found.any():
             raise InvalidProblem(f"{key}[{index}]: no beam lies in this region")
         inside |= found
-    return inside
-
-
-def _nodes_in(shape: Shape, positions: Points, spacing: float, key: str) -> NDArray[np.bool_]:
-    """Return (N,) the nodes in a shape, those that rounding puts just outside included."""
-    contains = shape_in_space(shape, key)
-    shifts = SNAP * spacing * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    inside: NDArray[np.bool_] = np.any([contains(positions + shift) for shift in shifts], axis=0)
-    return inside
-
-
-def face_nodes(region: NodeRegion, positions: Points, spacing: float) -> NDArray[np.int64]:
-    """Return the nodes on one side of a domain in space."""
-    assert region.face is not None
-    axis, most = FACES[region.face]
-    along = positions[:, axis]
-    at_low = region.face in {"left", "front", "bottom"}
-    depth = along - along.min() if at_low else along.max() - along
-    return np.flatnonzero(depth <= most * spacing)
-
-
-def nodes_in_shape(
-    region: NodeRegion, positions: Points, spacing: float, key: str
-) -> NDArray[np.int64]:
-    """Return the nodes in a shape in space.
-
-    Raises
-    ------
-    InvalidProblem
-        If there are none.
-    """
-    inside = np.flatnonzero(_nodes_in(region, positions, spacing, key))
-    if not len(inside):
-        low, high = positions.min(axis=0), positions.max(axis=0)
-        extent = ", ".join(
-            f"{axis} = {a:.4g} to {b:.4g}" for axis, a, b in zip("xyz", low, high, strict=True)
-        )
-        raise InvalidProblem(
-            f"{key}: no node lies in this shape; the lattice extends from {extent} mm"
-        )
     return inside

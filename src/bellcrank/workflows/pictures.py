@@ -199,12 +199,11 @@ def draw_before_and_after(
     InvalidSettings, OutputExists, StorageError
         As `bellcrank.plots.draw_motion`.
     """
-    limit, motions = spec.registered_material.strain_limit, []
+    limit = spec.registered_material.strain_limit
+    motions: list[Motion] = []
     for title, design in (("before", before), ("after", after)):
-        wanted = replace(design, problem=specified(design.problem, limit))
-        for motion in case_motions(wanted, spec, part_figures(wanted, spec)):
-            name = motion.name.replace(design.problem.name, title, 1)
-            motions.append(replace(motion, name=name))
+        wanted = replace(design, problem=replace(specified(design.problem, limit), name=title))
+        motions += case_motions(wanted, spec, part_figures(wanted, spec))
     draw_cases(motions, path, overwrite=overwrite)
 
 

@@ -84,11 +84,8 @@ class Export:
     def thickness(self) -> float:
         """Thickness of the printed part in the plane, height of one in space, mm."""
         if self.part.dimension == 3:
-            heights, radii = (
-                self.part.positions[self.part.struts, 2],
-                0.5 * self.part.widths[:, None],
-            )
-            return float((heights + radii).max() - (heights - radii).min())
+            ends, radii = self.part.positions[self.part.struts, 2].T, 0.5 * self.part.widths
+            return float((ends + radii).max() - (ends - radii).min())
         wanted = self.part.section.thickness
         return wanted if self.layer is None else whole_layers(wanted, self.layer)
 

@@ -27,7 +27,7 @@ from bellcrank.plots.movies.lattice_artist import (
     energy_scale,
     frame_of,
 )
-from bellcrank.plots.movies.space_artist import SpaceArtist, frame_in_space
+from bellcrank.plots.movies.space_artist import SpaceArtist, whole_frame
 from bellcrank.plots.scene import aligned_frames, of_one_height
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def _frames(
     """Return the corners of the visible area of each lattice, of one height."""
     problems = [sequence.problem for sequence in sequences]
     if any(problem.lattice.dimension == 3 for problem in problems):
-        return of_one_height([frame_in_space(sequence) for sequence in sequences])
+        return of_one_height([whole_frame(sequence) for sequence in sequences])
     return aligned_frames([frame_of(sequence) for sequence in sequences], problems)
 
 

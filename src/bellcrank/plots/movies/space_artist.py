@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.patches import Polygon
 
 from bellcrank.plots import style
-from bellcrank.plots.marks import Panel, add_arrows, add_nodes
+from bellcrank.plots.marks import Panel, add_arrows, add_nodes, support_area
 from bellcrank.plots.movies.lattice_artist import ENERGY, created
-from bellcrank.plots.scene import Arrow, Motion, extent, outline_around, spacing, support_groups
-from bellcrank.plots.space import View, input_arrows, margins, output_arrows, view_from
+from bellcrank.plots.scene import Motion, outline_around, spacing, support_groups
+from bellcrank.plots.space import (
+    View,
+    frame_in_space,
+    input_arrows,
+    margins,
+    output_arrows,
+    view_from,
+)
 
 if TYPE_CHECKING:
     from matplotlib.colors import PowerNorm
@@ -26,8 +32,6 @@ if TYPE_CHECKING:
 AZIMUTHS = (-50.0, -10.0)
 """Azimuth of the camera at rest and at full stroke, degrees."""
 ELEVATION = 16.0
-STRUTS, TRAIL, DOTS = 3.0, 4.0, 6.0
-"""Levels of drawing."""
 
 
 def view_at(sequence: StateSequence, state: int) -> View:
@@ -39,26 +43,14 @@ def view_at(sequence: StateSequence, state: int) -> View:
     return view_from(first + share * (last - first), ELEVATION, middle)
 
 
-def frame_in_space(sequence: StateSequence) -> tuple[Points, Points]:
+def whole_frame(sequence: StateSequence) -> tuple[Points, Points]:
     """Return the lower left and upper right corner of all states, lattice units."""
-    problem = sequence.problem
-    positions, step = problem.lattice.positions, spacing(problem)
-    beams = problem.lattice.beams[sequence.present]
-    nodes = np.unique(np.concatenate([beams.ravel(), problem.input.nodes, problem.output.nodes]))
-    points, arrows = [], []
-    for state in range(len(sequence.moved)):
-        view = view_at(sequence, state)
-        points += [view.screen(positions[nodes]), view.screen(sequence.moved[state][nodes])]
-        arrows += _arrows(sequence, state, view)
-        if len(problem.supports.nodes):
-            held = view.screen(positions[problem.supports.nodes])
-            points.append(outline_around(held, 0.35 * step))
-    return extent(points, arrows, 0.2 * step)
-
-
-def _arrows(sequence: StateSequence, state: int, view: View) -> list[Arrow]:
-    motion = _motion(sequence, state)
-    return [*input_arrows(motion, view), *output_arrows(motion, view)]
+    frames = [
+        frame_in_space(_motion(sequence, state), view_at(sequence, state))
+        for state in range(len(sequence.notes))
+    ]
+    low, high = np.array(frames).transpose(1, 0, 2)
+    return low.min(axis=0), high.max(axis=0)
 
 
 def _motion(sequence: StateSequence, state: int) -> Motion:
@@ -80,11 +72,14 @@ class SpaceArtist:
         held = np.isin(self._beams, problem.supports.fixed).all(axis=1)
         self._ground = np.flatnonzero(sequence.present & held)
         self._free = np.flatnonzero(sequence.present & ~held)
-        self._supports = [self._support() for _ in support_groups(problem)]
+        self._groups = support_groups(problem)
+        self._supports = [support_area(np.zeros((3, 2))) for _ in self._groups]
+        for area in self._supports:
+            panel.axes.add_patch(area)
         self._on_ground = self._lines(1.0, colors=style.GROUND)
         self._at_rest = self._lines(1.5, colors=style.IDLE_REST)
-        self._struts = self._lines(STRUTS)
-        self._trail = self._lines(TRAIL, colors=style.OUTPUT, linewidths=0.8)
+        self._struts = self._lines(3.0)
+        self._trail = self._lines(4.0, colors=style.OUTPUT, linewidths=0.8)
         regions = ((problem.input.nodes, style.INPUT), (problem.output.nodes, style.OUTPUT))
         view, rest = view_at(sequence, 0), problem.lattice.positions
         self._dots: list[tuple[NDArray[np.int64], Any]] = []
@@ -107,14 +102,6 @@ class SpaceArtist:
         for artist in self.artists:
             artist.set_animated(True)
 
-    def _support(self) -> Polygon:
-        area = Polygon(
-            np.zeros((3, 2)), facecolor=style.GROUND_FILL, edgecolor=style.GROUND, linewidth=1.0,
-            hatch="////", zorder=0.5,
-        )  # fmt: skip
-        self._panel.axes.add_patch(area)
-        return area
-
     def _lines(self, level: float, **options: Any) -> LineCollection:
         lines = LineCollection([], capstyle="round", zorder=level, **options)
         self._panel.axes.add_collection(lines, autolim=False)
@@ -125,7 +112,7 @@ class SpaceArtist:
         sequence, moved, problem = self._sequence, self._moved[state], self._sequence.problem
         view, rest = view_at(sequence, state), problem.lattice.positions
         seen = view.screen(rest)
-        for area, group in zip(self._supports, support_groups(problem), strict=True):
+        for area, group in zip(self._supports, self._groups, strict=True):
             area.set_xy(outline_around(seen[group], 0.3 * spacing(problem)))
         for lines, beams in ((self._on_ground, self._ground), (self._at_rest, self._free)):
             lines.set_segments(list(seen[self._beams[beams]]))
