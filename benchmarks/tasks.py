@@ -4,7 +4,8 @@ Every bundled task is designed as by `bellcrank design TASK` with several seeds,
 chosen design is evaluated by frames with eight elements in each strut, and in the sheet. Each run
 is added to ``docs/tasks/runs.json`` (or ``--out FILE``) as soon as it is done; runs that are in the
 record are not repeated unless ``--again`` is given. ``--only selector,selector:A,selector:B``
-designs the load cases of a task together, and each alone. ``--first N`` is the first seed. A table
+designs the load cases of a task together, and each alone; ``straight-crane:free`` asks for the
+largest gain within the strain limit and without contact. ``--first N`` is the first seed. A table
 of medians is printed; times include the sheet of the refinement, not the compilation.
 """
 
@@ -42,14 +43,23 @@ SEEDS = 5
 CORES = 2
 
 
+FREE = {"strain", "clearance"}
+"""Quantities of the items of ``TASK:free``."""
+
+
 def task_named(name: str) -> Task:
-    """Return a task, or ``TASK:CASE``, one of its load cases alone on the same lattice."""
+    """Return a task, ``TASK:CASE``, one of its load cases alone, or ``TASK:free``."""
     base, _, case = name.partition(":")
     task = find_task(base)
     assert task is not None
     wanted = task.problem.specification
     if not case or wanted is None:
         return task
+    if case == "free":
+        kept = tuple(item for item in wanted.items if item.quantity in FREE)
+        return replace(
+            task, problem=replace(task.problem, specification=replace(wanted, items=kept))
+        )
     problem = task.problem.cases[case]
     own = problem.specification
     assert own is not None

@@ -67,7 +67,7 @@ def test_an_entry_that_comes_along_is_sound(name: str) -> None:
     problem, mask = entry.design.problem, entry.design.mask
     kind = kinds[entry.kind]
     # Straight motions are searched as parts are designed, with joints of a size.
-    joint = frame_section(PartSpec(), 2).joint if kind.specified else 0.0
+    joint = frame_section(PartSpec(), 2).joint if kind.payload is not None else 0.0
     expected = Section(0.2, 0.5, joint=joint)
     assert problem.section == expected, "struts of 2 mm on 10 mm, 5 mm thick"
     assert entry.characterisation.model == "frames"

@@ -53,21 +53,22 @@ class Kind:
         output.
     goals
         Constraints that the search kept.
-    specified
-        Whether it is searched and refined to the specification of a straight motion
-        (`bellcrank.machines.library.tasks.straight_motion`).
+    payload
+        Smallest force in N that halves the travel, of kinds that are searched and refined to the
+        specification of a straight motion (`bellcrank.machines.library.tasks.straight_motion`);
+        None for other kinds.
 
     Examples
     --------
-    >>> kinds["loaded"].spring, kinds["light"].goals[0]
-    (0.02, 'input-stiffness <= 0.1')
+    >>> kinds["loaded"].spring, kinds["light"].goals[0], kinds["straight"].payload
+    (0.02, 'input-stiffness <= 0.1', 0.1)
     """
 
     title: str
     about: str
     spring: float | None = None
     goals: tuple[str, ...] = ()
-    specified: bool = False
+    payload: float | None = None
 
 
 kinds: Registry[Kind] = Registry("kind of actuator")
@@ -82,7 +83,7 @@ kinds.register("light")(
     )
 )
 kinds.register("straight")(
-    Kind("straight motion", "along its direction, without rotation or sag", specified=True)
+    Kind("straight motion", "along its direction, without rotation or sag", payload=0.1)
 )
 
 

@@ -23,17 +23,22 @@ if TYPE_CHECKING:
     from bellcrank.search import SearchSettings
 
 
-OFF_AXIS, ROTATION, SAG = 0.1, 5.0, 0.1
+OFF_AXIS, ROTATION, SAG = 0.05, 3.0, 0.1
 """Largest off-axis motion and sag of a straight motion, as parts of the travel, and its largest
 rotation in degrees."""
-PAYLOAD = 0.1
-"""Smallest force in N that halves the travel of a straight motion: the weight of 10 g."""
 
 
-def straight_motion(problem: Problem) -> Problem:
+def straight_motion(problem: Problem, payload: float) -> Problem:
     """Return the frame of the default part with the specification of a straight motion.
 
-    The gain is maximised. The output carries a payload, and no struts touch.
+    The gain is maximised, and no struts touch.
+
+    Parameters
+    ----------
+    problem
+        Frame of the default part.
+    payload
+        Smallest force in N that halves the travel.
 
     Examples
     --------
@@ -44,7 +49,6 @@ def straight_motion(problem: Problem) -> Problem:
     spec = PartSpec()
     case, output = "case", "output"
     units = units_of(problem, spec)
-    payload = units.in_problem("force", PAYLOAD)
     off_axis = Item(quantity="off_axis", case=case, output=output, at_most=OFF_AXIS)
     rotation = Item(
         quantity="rotation", case=case, output=output, start=0.0, at_least=-ROTATION,
@@ -54,7 +58,12 @@ def straight_motion(problem: Problem) -> Problem:
         off_axis,
         rotation,
         Item(quantity="sag", case=case, output=output, at_most=SAG),
-        Item(quantity="payload", case=case, output=output, at_least=payload),
+        Item(
+            quantity="payload",
+            case=case,
+            output=output,
+            at_least=units.in_problem("force", payload),
+        ),
         Item(
             quantity="strain",
             case=case,
@@ -100,8 +109,9 @@ class EntryTask:
         """
         made = elementary(self.columns, self.direction, kinds[self.kind].spring)
         given = frame_problem(made, PartSpec())
-        if kinds[self.kind].specified:
-            given = straight_motion(given)
+        payload = kinds[self.kind].payload
+        if payload is not None:
+            given = straight_motion(given, payload)
         lattice = given.lattice
         held = np.isin(lattice.beams, given.supports.nodes).all(axis=1)
         at_ports = lattice.beams_touching(np.concatenate([given.input.nodes, given.output.nodes]))
