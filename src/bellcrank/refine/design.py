@@ -68,6 +68,9 @@ class Refinement:
         States of the given design and of this one.
     steps, evaluations
         Number of accepted steps and of evaluated geometries.
+    sheets
+        Number of geometries made for the sheet; those that miss items by frames are not computed
+        there.
     reason
         Why the refinement ended.
     improved
@@ -79,6 +82,7 @@ class Refinement:
     after: State
     steps: int
     evaluations: int
+    sheets: int
     reason: str
     improved: bool
 
@@ -167,7 +171,14 @@ def refine_design(
         moved_problem = problem.with_geometry(at.lattice.positions, at.widths)
         refined = replace(design, problem=with_joints(moved_problem, design.mask))
     return Refinement(
-        refined, job.before, job.best, job.steps, job.evaluations, job.reason, improved
+        design=refined,
+        before=job.before,
+        after=job.best,
+        steps=job.steps,
+        evaluations=job.evaluations,
+        sheets=job.sheets,
+        reason=job.reason,
+        improved=improved,
     )
 
 

@@ -125,6 +125,7 @@ def refinement_data(refinement: Refinement) -> dict[str, Any]:
         "met_in_sheet": refinement.after.met_in_sheet,
         "steps": refinement.steps,
         "evaluations": refinement.evaluations,
+        "sheets": refinement.sheets,
         "reason": refinement.reason,
     }
 
