@@ -56,9 +56,9 @@ def task_named(name: str) -> Task:
     if not case or wanted is None:
         return task
     if case == "free":
-        kept = tuple(item for item in wanted.items if item.quantity in FREE)
+        items = tuple(item for item in wanted.items if item.quantity in FREE)
         return replace(
-            task, problem=replace(task.problem, specification=replace(wanted, items=kept))
+            task, problem=replace(task.problem, specification=replace(wanted, items=items))
         )
     problem = task.problem.cases[case]
     own = problem.specification
