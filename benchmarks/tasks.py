@@ -41,8 +41,6 @@ RECORD = Path(__file__).parents[1] / "docs" / "tasks" / "runs.json"
 SEEDS = 5
 """Number of searches of each task."""
 CORES = 2
-
-
 FREE = {"strain", "clearance"}
 """Quantities of the items of ``TASK:free``."""
 
@@ -52,25 +50,25 @@ def task_named(name: str) -> Task:
     base, _, case = name.partition(":")
     task = find_task(base)
     assert task is not None
-    wanted = task.problem.specification
+    problem = task.problem
+    wanted = problem.specification
     if not case or wanted is None:
         return task
     if case == "free":
         items = tuple(item for item in wanted.items if item.quantity in FREE)
-        return replace(
-            task, problem=replace(task.problem, specification=replace(wanted, items=items))
+        asked = replace(wanted, items=items)
+    else:
+        problem = problem.cases[case]
+        own = problem.specification
+        assert own is not None
+        asked = replace(
+            own,
+            items=tuple(item for item in wanted.items if item.case in {"", case}),
+            maximise=tuple(each for each in wanted.maximise if each.case in {"", case}),
+            weight=wanted.weight,
+            symmetry=wanted.symmetry,
         )
-    problem = task.problem.cases[case]
-    own = problem.specification
-    assert own is not None
-    alone = replace(
-        own,
-        items=tuple(item for item in wanted.items if item.case in {"", case}),
-        maximise=tuple(each for each in wanted.maximise if each.case in {"", case}),
-        weight=wanted.weight,
-        symmetry=wanted.symmetry,
-    )
-    return replace(task, problem=replace(problem, specification=alone))
+    return replace(task, problem=replace(problem, specification=asked))
 
 
 def core_seconds() -> float:

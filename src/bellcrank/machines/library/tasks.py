@@ -49,6 +49,7 @@ def straight_motion(problem: Problem, payload: float) -> Problem:
     spec = PartSpec()
     case, output = "case", "output"
     units = units_of(problem, spec)
+    carried = units.in_problem("force", payload)
     off_axis = Item(quantity="off_axis", case=case, output=output, at_most=OFF_AXIS)
     rotation = Item(
         quantity="rotation", case=case, output=output, start=0.0, at_least=-ROTATION,
@@ -58,12 +59,7 @@ def straight_motion(problem: Problem, payload: float) -> Problem:
         off_axis,
         rotation,
         Item(quantity="sag", case=case, output=output, at_most=SAG),
-        Item(
-            quantity="payload",
-            case=case,
-            output=output,
-            at_least=units.in_problem("force", payload),
-        ),
+        Item(quantity="payload", case=case, output=output, at_least=carried),
         Item(
             quantity="strain",
             case=case,
