@@ -134,3 +134,22 @@ def test_wrong_widths_are_refused() -> None:
     wide[3] = 20.0
     with pytest.raises(InvalidSettings, match="width: struts of these widths"):
         strut_outline(*layout, wide, 0.1)
+
+
+@pytest.mark.parametrize("kink", [0.0, 1e-12, 1e-9, 1e-7, 2e-6, 6e-6, 2e-5, 1e-4, 1e-2])
+def test_wide_struts_that_are_almost_in_line_have_an_outline(kink: float) -> None:
+    """Arcs that turn by less than a limit are left out, whatever the radius of the joint."""
+    positions = [[0.0, 0.0], [60.0, 30.0 * kink], [120.0, 0.0], [60.0, 90.0]]
+    beams = [[0, 1], [1, 2], [2, 3], [3, 0]]
+    widths = [3.6, 3.6, 2.0, 2.0]
+    room = room_for_fillet(positions, beams, widths)
+    outline = strut_outline(positions, beams, widths, 1.0)
+    assert (outline.piece_count, outline.hole_count) == (1, 1)
+    same = room_for_fillet(
+        [positions[0], positions[2], positions[3]], [[0, 1], [1, 2], [2, 0]], widths[1:]
+    )
+    assert room == pytest.approx(same, rel=1e-2)
+    assert outline.area == pytest.approx(
+        filled_by_polygons((np.array(positions), np.array(beams)), np.array(widths), 1.0, 200).area,
+        rel=1e-4,
+    )

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
     Ids = NDArray[np.int64]
 
-# Lines and arcs shorter than this fraction of the strut width are left out of an outline.
+# Lines shorter than this fraction of the strut width are left out of an outline.
 MIN_EDGE = 1e-5
+# Arcs that turn by less are left out too, rad.
+MIN_TURN = 2.0 * MIN_EDGE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,10 +69,10 @@ def border(struts: Struts, reach: float, width: float) -> Border:
     reach : float, mm
         Half the width of the narrowest struts plus the fillet radius.
     width : float, mm
-        Width of the narrowest struts; the shortest edges are `MIN_EDGE` times as long.
+        Width of the narrowest struts; the shortest lines are `MIN_EDGE` times as long.
     """
     sides = _sides(struts, reach, MIN_EDGE * width)
-    rounds = _rounds(struts, reach, 2.0 * MIN_EDGE)
+    rounds = _rounds(struts, reach, MIN_TURN)
     foot, normal, extra, turn = (np.concatenate(both) for both in zip(sides, rounds, strict=True))
     starts, ends = (foot + (reach + extra)[:, None, None] * normal).transpose(1, 0, 2)
     following, gap = _followers(starts, ends)

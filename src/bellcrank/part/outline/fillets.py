@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.part.outline.boundary import MIN_EDGE, border
+from bellcrank.part.outline.boundary import MIN_EDGE, MIN_TURN, border
 from bellcrank.part.outline.curves import Loop, Outline
 
 if TYPE_CHECKING:
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from bellcrank.part.outline.boundary import Border
     from bellcrank.part.outline.struts import Struts
 
-# Largest gap between consecutive edges, where very short edges were left out, relative to the
-# reach.
+# Largest gap between consecutive edges, relative to the reach; arcs that were left out between wide
+# struts are added to it.
 _MAX_GAP = 1e-3
 
 
@@ -45,7 +45,8 @@ def filled(struts: Struts, width: float, fillet: float) -> Outline:
     """
     reach = 0.5 * width + fillet
     edges = border(struts, reach, width)
-    if not edges.gap < _MAX_GAP * reach:
+    left_out = MIN_TURN * (reach + float(struts.extra.max()))
+    if not edges.gap < _MAX_GAP * reach + left_out:
         raise InvalidSettings(
             f"width: at {width:g} mm with fillets of {fillet:g} mm the outline does not close, "
             "since surfaces of struts almost touch; choose a slightly different width"
