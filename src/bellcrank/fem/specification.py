@@ -148,7 +148,7 @@ class _Sheet:
 
     def record(self, report: Callable[[float], None]) -> StrokeRecord | None:
         """Return the channels that the items need; None without a stable path."""
-        main = self._path(self.case, lambda state: report(state.load))
+        main = self._path(lambda state: report(state.load))
         if main is None:
             return None
         ends = [end for item in self.items for end in (item.start, item.stop) if end > 0.0]
@@ -168,21 +168,36 @@ class _Sheet:
             if item.quantity == "payload" and item.at_least is not None
         }
 
-    def _path(
+    def _follow(
         self, problem: Problem, report: Callable[[PathState], None] = lambda _state: None
-    ) -> SheetPath | None:
+    ) -> tuple[ContinuumEquations, EquilibriumPath] | None:
         """Follow a load case to the full stroke; None if stability is lost before."""
         part = replace(self.part, design=replace(self.part.design, problem=problem))
         equations = ContinuumEquations(continuum_system(part, self.mesh, LAW))
         path = follow_path(equations, self.control, report)
-        if path.status is not PathStatus.CONVERGED:
+        return (equations, path) if path.status is PathStatus.CONVERGED else None
+
+    def _path(self, report: Callable[[PathState], None]) -> SheetPath | None:
+        """Follow the load case, with all figures of its states; None if stability is lost."""
+        found = self._follow(self.case, report)
+        if found is None:
             return None
+        equations, path = found
+        part = replace(self.part, design=replace(self.part.design, problem=self.case))
         stresses = [stress_field(equations, state.unknowns) for state in path.states]
         states = [
             complete_state(part, equations, state, stress)
             for state, stress in zip(path.states, stresses, strict=True)
         ]
         return SheetPath(part, equations, path, states, [each.field for each in stresses])
+
+    def _last_motion(self, problem: Problem) -> Values | None:
+        """Return (N, 2) the displacements at full stroke, lattice units; None without stability."""
+        found = self._follow(problem)
+        if found is None:
+            return None
+        equations, path = found
+        return hub_displacements(equations, path.states[-1])[:, :2] / self.part.scale
 
     def _channel(self, channel: Channel, main: SheetPath, fractions: Values) -> Values:
         """Return a channel at fractions of the stroke, or the one value that it has."""
@@ -200,7 +215,7 @@ class _Sheet:
         """Return (S,) or (S, c) a channel at the states of a path."""
         name = channel.name
         if name == "motion":
-            return self._means(main, problem)
+            return self._means(main.motion, problem)
         if name == "rotation":
             return self._rotation(main, problem)
         if name == "displacement":
@@ -212,8 +227,8 @@ class _Sheet:
         assert name == "strain"
         return np.array([state.strain for state in main.states])
 
-    def _means(self, main: SheetPath, problem: Problem) -> Values:
-        moved = main.motion[:, problem.output.nodes]
+    def _means(self, motion: Values, problem: Problem) -> Values:
+        moved = motion[:, problem.output.nodes]
         return np.asarray(np.einsum("kna,sna->sk", motion_weights(problem), moved))
 
     def _input_motion(self, main: SheetPath) -> Values:
@@ -261,19 +276,19 @@ class _Sheet:
 
     def _loaded(self, _main: SheetPath, problem: Problem, output: str) -> Values:
         """Return (1, 3) the motion of the output under its payload."""
-        found = self._path(with_payload(problem, self._payloads()[output]))
-        if found is None:
+        motion = self._last_motion(with_payload(problem, self._payloads()[output]))
+        if motion is None:
             return np.full((1, 3), np.nan)
-        return self._means(found, problem)[-1:]
+        return self._means(motion[None], problem)
 
     def _blocked(self, _main: SheetPath, problem: Problem, _output: str) -> Values:
         """Return (1,) the force of the output on springs that hold it, lattice units."""
         held = with_held_output(problem)
-        found = self._path(held)
-        if found is None:
+        motion = self._last_motion(held)
+        if motion is None:
             return np.full(1, np.nan)
         assert held.output.spring is not None
-        moved = found.motion[-1, held.output.nodes]
+        moved = motion[held.output.nodes]
         return np.array([held.output.spring * float((moved * held.output.direction).sum())])
 
     def _given(self, main: SheetPath) -> dict[str, float]:
@@ -289,7 +304,7 @@ class _Sheet:
         if "stable_stroke" in wanted:
             bound = wanted["stable_stroke"]
             extended = replace(self.case.input, amount=bound * self.case.input.amount)
-            stable = self._path(replace(self.case, input=extended)) is not None
+            stable = self._follow(replace(self.case, input=extended)) is not None
             given["stable_stroke"] = bound if stable else 1.0
         return given
 

@@ -31,7 +31,7 @@ rotation in degrees."""
 def straight_motion(problem: Problem, payload: float) -> Problem:
     """Return the frame of the default part with the specification of a straight motion.
 
-    The gain is maximised, and no struts touch.
+    The gain is maximised and at least 1, and no struts touch.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def straight_motion(problem: Problem, payload: float) -> Problem:
     --------
     >>> wanted = EntryTask("left", 7, "straight").problem().specification
     >>> [item.name for item in wanted.items][:3]
-    ['case.output.off_axis', 'case.output.rotation', 'case.output.sag']
+    ['case.output.gain', 'case.output.off_axis', 'case.output.rotation']
     """
     spec = PartSpec()
     case, output = "case", "output"
@@ -56,6 +56,7 @@ def straight_motion(problem: Problem, payload: float) -> Problem:
         at_most=ROTATION,
     )  # fmt: skip
     items = (
+        Item(quantity="gain", case=case, output=output, at_least=1.0),
         off_axis,
         rotation,
         Item(quantity="sag", case=case, output=output, at_most=SAG),
