@@ -81,6 +81,11 @@ def test_entries_of_straight_motions_are_refined(
     entry = made.entry
     assert entry is not None
     assert entry.provenance["refinement"]["met_after"]
+    first = entry.provenance["items"][0]
+    assert first["quantity"] == "gain"
+    assert first["reached"]["frames, 8 elements"]["value"] == pytest.approx(
+        entry.figures["efficiency"], rel=1e-6
+    )
     assert not entry.design.problem.is_specified
     task = EntryTask("left", 7, "straight").problem()
     moved = entry.design.problem.lattice.positions - task.lattice.positions

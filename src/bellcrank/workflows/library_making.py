@@ -28,6 +28,7 @@ from bellcrank.workflows import reopen_design, start_design
 from bellcrank.workflows.design import accepted_candidates
 from bellcrank.workflows.library_measurement import measure
 from bellcrank.workflows.refinement import refine_selection, refinement_data
+from bellcrank.workflows.specification import item_data
 
 if TYPE_CHECKING:
     import threading
@@ -248,8 +249,14 @@ def _select(
         "step": chosen.found.step,
         "efficiency_before_cleaning": chosen.efficiency_before,
         "refused": chosen.refused,
-        **({} if refinement is None else {"refinement": refinement_data(refinement)}),
     }
+    if refinement is not None:
+        after = refinement.after
+        models = {"frames, 8 elements": after.items}
+        if after.sheet:
+            models["sheet"] = after.sheet
+        notes["refinement"] = refinement_data(refinement)
+        notes["items"] = item_data(chosen.design.problem, PartSpec(), models)
     # Its items are those of the kind, and its figures are measured.
     alone = replace(chosen.design, problem=replace(chosen.design.problem, specification=None))
     return replace(chosen, design=alone), notes
