@@ -174,10 +174,13 @@ def straight_entries() -> Rows:
         if "-straight-" in name:
             each = library.find(name)
             own = {key: value or 0.0 for key, value in each.figures.items()}
+            gain = next(item for item in each.provenance["items"] if item["quantity"] == "gain")
             yield row(
                 each.direction, each.columns, f"{own['efficiency']:.2f}",
-                f"{own['efficiency_half']:.2f}", f"{100.0 * own['off_axis']:.1f} %",
-                f"{own['rotation_deg']:.1f}", f"{own['sag_mm']:.2f} mm",
+                f"{gain['reached']['sheet']['value']:.2f}", f"{own['efficiency_half']:.2f}",
+                f"{100.0 * own['off_axis']:.1f} %", f"{own['rotation_deg']:.1f}",
+                f"{own['payload_N']:.2f} N", f"{own['sag_mm']:.2f} mm",
+                f"{own['travel_mm']:.1f} mm",
             )  # fmt: skip
 
 

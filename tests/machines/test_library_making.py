@@ -75,7 +75,7 @@ def test_entries_of_straight_motions_are_refined(
     short = RefinementSettings(evaluations=60)
     monkeypatch.setattr("bellcrank.workflows.refiners.SETTINGS", short)
     settings = MakeSettings(
-        directions=("left",), columns=(7,), kinds=("straight",), steps=2000, chains=1
+        directions=("left",), columns=(7,), kinds=("straight-10g",), steps=2000, chains=1
     )
     (made,) = make(settings, tmp_path, workers=1)
     entry = made.entry
@@ -87,7 +87,7 @@ def test_entries_of_straight_motions_are_refined(
         entry.figures["efficiency"], rel=1e-6
     )
     assert not entry.design.problem.is_specified
-    task = EntryTask("left", 7, "straight").problem()
+    task = EntryTask("left", 7, "straight-10g").problem()
     moved = entry.design.problem.lattice.positions - task.lattice.positions
     assert np.abs(moved).max() > 0.01
     assert not moved[task.special_nodes].any()
@@ -104,7 +104,7 @@ def test_entries_of_straight_motions_are_refined(
     assert abs(rotation) <= ROTATION
     assert sag <= SAG * travel
     assert payload >= 0.1
-    found = Library((tmp_path,)).find("left-7-straight")
+    found = Library((tmp_path,)).find("left-7-straight-10g")
     assert found.design.problem.lattice.positions == pytest.approx(
         entry.design.problem.lattice.positions
     )

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from bellcrank.machines.bundled import bundled_machine, bundled_machines
-from bellcrank.machines.library import kinds, library
+from bellcrank.machines.library import library
 from bellcrank.model import unpack_mask
 from bellcrank.web.gallery import BundledDesigns
-from bellcrank.web.machine_gallery import LOADS, Actuators, Machines, Struts
+from bellcrank.web.machine_gallery import Actuators, Machines, Struts
 
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
@@ -34,10 +34,6 @@ def test_every_actuator_of_the_library_is_listed(collections: dict[str, Any]) ->
         assert entry["title"].lower().startswith(summary.direction)
         assert entry["picture"]["lines"]
         assert entry["efficiency"] is not None
-
-
-def test_every_kind_of_actuator_has_a_display_name() -> None:
-    assert set(LOADS) == set(kinds)
 
 
 def test_machines_have_a_description_and_their_contact(collections: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from bellcrank.errors import BellcrankError, UnknownName
 from bellcrank.machines.bundled import bundled_machine, bundled_machines, find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.elementary import strut_named
-from bellcrank.machines.library import library
+from bellcrank.machines.library import kind_title, library
 from bellcrank.web.gallery import Entry, LazyEntries
 
 if TYPE_CHECKING:
@@ -17,11 +17,6 @@ if TYPE_CHECKING:
 
 STRUT = re.compile(r"strut-([3-9]|[1-3][0-9])")
 LISTED = ("strut-3", "strut-4", "strut-6", "strut-9")
-LOADS = {
-    "free": "free stroke", "light": "low input force", "loaded": "loaded output",
-    "straight": "straight motion",
-}  # fmt: skip
-"""Names of the kinds of entries."""
 
 
 class Actuators:
@@ -53,7 +48,7 @@ def _actuators() -> Iterator[Entry]:
         except BellcrankError:
             continue
         width = "" if summary.columns is None else f"{summary.columns} wide"
-        load = LOADS.get(summary.kind, summary.kind)
+        load = kind_title(summary.kind)
         title = ", ".join(filter(None, (summary.direction.capitalize(), width)))
         facets = {"Moves": summary.direction, "Size": width, "Made for": load}
         yield Entry(summary.name, title, load, design, facets)

@@ -60,7 +60,7 @@ class Kind:
 
     Examples
     --------
-    >>> kinds["loaded"].spring, kinds["light"].goals[0], kinds["straight"].payload
+    >>> kinds["loaded"].spring, kinds["light"].goals[0], kinds["straight-10g"].payload
     (0.02, 'input-stiffness <= 0.1', 0.1)
     """
 
@@ -82,9 +82,14 @@ kinds.register("light")(
         goals=("input-stiffness <= 0.1", "input-stiffness >= 0.001"),
     )
 )
-kinds.register("straight")(
-    Kind("straight motion", "along its direction, without rotation or sag", payload=0.1)
-)
+for _grams, _payload in ((10, 0.1), (50, 0.5), (200, 2.0)):
+    kinds.register(f"straight-{_grams}g")(
+        Kind(
+            f"straight motion, {_grams} g",
+            "along its direction, without rotation or sag, with a payload",
+            payload=_payload,
+        )
+    )
 
 
 def kind_title(kind: str) -> str:

@@ -42,7 +42,7 @@ def straight_motion(problem: Problem, payload: float) -> Problem:
 
     Examples
     --------
-    >>> wanted = EntryTask("left", 7, "straight").problem().specification
+    >>> wanted = EntryTask("left", 7, "straight-10g").problem().specification
     >>> [item.name for item in wanted.items][:3]
     ['case.output.gain', 'case.output.off_axis', 'case.output.rotation']
     """
