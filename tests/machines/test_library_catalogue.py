@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ from bellcrank.machines.library import (
     write_entry,
 )
 from bellcrank.machines.library.catalogue import SORTS, entry_files
+from bellcrank.machines.library.tasks import OFF_AXIS, ROTATION, SAG
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Conditions, Status, model_evaluator
 from bellcrank.model import Section
 from bellcrank.part import PartSpec, frame_section
@@ -43,10 +45,26 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own_entry: Entry) -> Pa
 
 def test_there_are_entries_for_all_directions_sizes_and_kinds() -> None:
     there = {(each.direction, each.columns, each.kind) for each in SHIPPED.summaries}
-    assert len(there) == len(NAMES) >= 60
-    assert {direction for direction, _, _ in there} == set(DIRECTIONS)
-    assert {kind for _, _, kind in there} == set(kinds)
-    assert len({columns for _, columns, _ in there}) == 3
+    there_kinds = ["free", "loaded", "light", "straight-10g"]
+    assert there == set(product(DIRECTIONS, (7, 9, 12), there_kinds))
+    assert len(there) == len(NAMES)
+    assert set(kinds) >= set(there_kinds)
+
+
+def test_entries_of_straight_motions_meet_their_items_by_frames_and_in_the_sheet() -> None:
+    straight = [SHIPPED.find(name) for name in NAMES if "-straight-" in name]
+    assert len(straight) == 24
+    for entry in straight:
+        wanted = [item["name"] for item in entry.provenance["items"]]
+        assert len(wanted) == 7
+        for model in ("frames, 8 elements", "sheet"):
+            assert all(item["reached"][model]["met"] for item in entry.provenance["items"])
+        figures = entry.figures
+        assert figures["efficiency"] > 1.0
+        assert figures["off_axis"] <= OFF_AXIS
+        assert abs(figures["rotation_deg"]) <= ROTATION
+        assert figures["sag_mm"] <= SAG * figures["travel_mm"]
+        assert figures["payload_N"] >= kinds[entry.kind].payload
 
 
 def test_what_comes_along_is_small() -> None:
