@@ -36,8 +36,7 @@ PICTURE_TOLERANCE = 0.15
 def polygon_of(part: Part) -> shapely.Polygon:
     """Return the outline of the struts of a part."""
     lines = shapely.linestrings(part.positions[part.struts])
-    half = 0.5 * part.section.width
-    whole = shapely.union_all(shapely.buffer(lines, half, quad_segs=8))
+    whole = shapely.union_all(shapely.buffer(lines, 0.5 * part.widths, quad_segs=8))
     return _rounded(whole, part.fillet_radius)
 
 

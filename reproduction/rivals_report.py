@@ -89,7 +89,7 @@ def _score(row: Mapping[str, Any]) -> str:
 def _by_goals(ours: Mapping[str, Any]) -> str:
     """Return the efficiency for each set of goals as text."""
     return ", ".join(
-        f"{' and '.join(row['goals']) or 'none'}: {number(row['efficiency'])}"
+        f"{' and '.join(row['goals']) or 'none'} by {row['by']}: {number(row['efficiency'])}"
         for row in ours["tried"]
     )
 
