@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from dataclasses import replace
@@ -350,10 +351,9 @@ def _print_report(report: DesignReport) -> None:
     if report.settings.goals:
         table.add_row("goals satisfied", plain(", ".join(report.settings.goals)))
     table.add_row("beams", f"{selection.design.beam_count}")
-    table.add_row(
-        "verified",
-        f"from rest in {' and '.join(report.checks)}, which differ by {report.agreement:.0e}",
-    )
+    unstable = [name for name, value in report.checks.items() if not math.isfinite(value)]
+    compared = f"from rest in {' and '.join(report.checks)}, which differ by {report.agreement:.0e}"
+    table.add_row("verified", f"not stable in {' and '.join(unstable)}" if unstable else compared)
     table.add_row("designs evaluated", f"{report.proposals}")
     table.add_row("results", plain(f"{report.folder}/"))
     results.print(table)

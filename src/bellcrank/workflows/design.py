@@ -10,6 +10,7 @@ import numpy as np
 
 from bellcrank.errors import BellcrankError, InvalidSettings
 from bellcrank.fem import FemSettings
+from bellcrank.fem.results import finite
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     Response,
@@ -338,8 +339,8 @@ def _origin(report: DesignReport) -> dict[str, Any]:
         "settings": report.settings.to_dict(),
         "chain": report.selection.found.chain,
         "step": report.selection.found.step,
-        "efficiency_before_cleaning": report.selection.efficiency_before,
-        "checks": report.checks,
+        "efficiency_before_cleaning": finite(report.selection.efficiency_before),
+        "checks": {name: finite(value) for name, value in report.checks.items()},
         "status": report.selection.response.status.label,
         **({} if report.refinement is None else {"refinement": refinement_data(report.refinement)}),
     }

@@ -17,6 +17,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.fem.results import finite
 from bellcrank.machines.library.catalogue import entry_files, read_summary
 from bellcrank.machines.library.files import write_entry
 from bellcrank.part import PartSpec
@@ -247,7 +248,7 @@ def _select(
         "chains": chains,
         "chain": chosen.found.chain,
         "step": chosen.found.step,
-        "efficiency_before_cleaning": chosen.efficiency_before,
+        "efficiency_before_cleaning": finite(chosen.efficiency_before),
         "refused": chosen.refused,
     }
     if refinement is not None:

@@ -133,8 +133,9 @@ class DesignReport:
 
     @property
     def agreement(self) -> float:
-        """Largest difference between the checks."""
-        return max(self.checks.values()) - min(self.checks.values())
+        """Largest difference between the checks; infinite if the design is not stable in one."""
+        values = self.checks.values()
+        return max(values) - min(values) if all(map(math.isfinite, values)) else math.inf
 
     @property
     def verified(self) -> bool:
@@ -152,14 +153,14 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         "model": model_name(selection.design.problem),
         "efficiency": report.efficiency,
         "search_efficiency": selection.efficiency_after,
-        "efficiency_before_cleaning": selection.efficiency_before,
+        "efficiency_before_cleaning": finite(selection.efficiency_before),
         "status": selection.response.status.label,
         "beams": selection.design.beam_count,
         "mask": selection.design.mask_hex,
-        "checks": report.checks,
+        "checks": {name: finite(value) for name, value in report.checks.items()},
         "verified": report.verified,
         "initial_efficiency": finite(report.initial_efficiency),
-        "human_efficiency": human.efficiency if human else None,
+        "human_efficiency": finite(human.efficiency) if human else None,
         "verification": _verification(report),
         "figures": report.figures,
         **_specification(report),
