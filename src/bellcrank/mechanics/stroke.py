@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.models import ModelEvaluator
     from bellcrank.model import Problem
 
-STATES = 8
+STATES = 16
 """Number of states along the stroke, the full input included, at which contact is checked."""
 
 

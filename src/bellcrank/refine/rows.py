@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 LARGEST_INCREMENT = 1.0 / 16.0
 """Largest increment of the load: larger ones may end on another branch near a bifurcation."""
-GAP_STATES = 8
+GAP_STATES = 16
 """States along the stroke at which gaps are computed."""
 STABLE = 0.5
 """Smallest lowest stiffness along the stroke, as a part of its reference (`references`): near a
