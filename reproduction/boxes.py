@@ -1,10 +1,10 @@
-"""Two standard tasks of compliant-mechanism design on a box with a lattice.
+"""Standard tasks of compliant-mechanism design on a box with a lattice.
 
 The force inverter and the gripper are standard examples of topology optimisation (Bendsoe and
 Sigmund, Topology Optimization, 2003, chapter 2). The input is in the middle of the left side and
 moves to the right; the two left corners are fixed. The output of the inverter is in the middle of
 the right side and moves to the left; the outputs of the gripper are two jaws beside a gap, which
-close.
+close. The lift is not such a standard: its output is that of the inverter and moves up.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from bellcrank.search.constraints import mirror_images
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-TASKS = ("inverter", "gripper")
+TASKS = ("inverter", "gripper", "lift")
 STARTING_SHARE = 0.9
 """Probability with which `stable_start` keeps a beam."""
 GAP = 2.0
@@ -59,20 +59,21 @@ class Box:
 
 
 def box_of(
-    name: str, columns: int, rows: int, stroke: float, spring: float, width: float = 2.0
+    name: str, columns: int, rows: int, stroke: float, spring: float | None, width: float = 2.0
 ) -> Box:
     """Return a task.
 
     Parameters
     ----------
     name
-        ``"inverter"`` or ``"gripper"``.
+        ``"inverter"``, ``"gripper"`` or ``"lift"``.
     columns, rows
         Nodes per row, and number of rows: 4 k + 3, so that the middle row reaches both sides.
     stroke
         Input displacement, lattice units.
     spring
-        Stiffness of the spring at the output, units of the discrete model: a strut has 10.
+        Stiffness of the spring at the output, units of the discrete model: a strut has 10. None
+        for a free output.
     width
         Strut width, mm.
     """
@@ -95,8 +96,9 @@ def box_of(
     rise = math.sqrt(3.0) / 2.0
     initial = np.ones(lattice.beam_count, dtype=bool)
     void = None
-    if name == "inverter":
-        outputs, direction = nearest((right, middle)), np.array([[-1.0, 0.0]])
+    if name != "gripper":
+        outputs = nearest((right, middle))
+        direction = np.array([[-1.0, 0.0] if name == "inverter" else [0.0, 1.0]])
     else:
         outputs = nearest((right - 0.5, middle + rise), (right - 0.5, middle - rise))
         direction = np.array([[0.0, -1.0], [0.0, 1.0]])
@@ -105,7 +107,12 @@ def box_of(
         initial &= ~inside
         half = rise - 0.5 * spec.width / spec.scale
         void = spec.scale * np.array([[right - GAP, middle - half], [right + 1.0, middle + half]])
-    output = Output(nodes=outputs, direction=direction, spring=spring, spring_kind="directional")
+    output = Output(
+        nodes=outputs,
+        direction=direction,
+        spring=spring,
+        spring_kind=None if spring is None else "directional",
+    )
     problem = Problem(
         name=name,
         lattice=lattice,

@@ -139,17 +139,7 @@ def analyse_outline(
         Material law.
     """
     began = time.perf_counter()
-    radius = HUB * part.section.width
-    nodes = [
-        node
-        for node in hub_nodes(part).tolist()
-        if shape.contains(shapely.Point(part.positions[node]).buffer(1.05 * radius))
-    ]
-    hubs = {node: part.positions[node] for node in nodes}
-    raw = triangulated(_outline(shape), hubs, radius, size)
-    mesh = ContinuumMesh(
-        raw, np.array(nodes), box.problem.lattice.node_count, part.section.thickness
-    )
+    mesh = mesh_of(part, shape, size)
     found = solve_mesh(part, mesh, law)
     last = found.states[-1]
     done = found.path.status is PathStatus.CONVERGED
@@ -169,6 +159,20 @@ def analyse_outline(
             found.fields[-1].rest, found.fields[-1].displacement, found.fields[-1].cells
         ),
     }
+
+
+def mesh_of(part: Part, shape: shapely.Polygon, size: float) -> ContinuumMesh:
+    """Mesh an outline with triangles of a largest size, and with the hubs of a part inside it."""
+    radius = HUB * part.section.width
+    nodes = [
+        node
+        for node in hub_nodes(part).tolist()
+        if shape.contains(shapely.Point(part.positions[node]).buffer(1.05 * radius))
+    ]
+    hubs = {node: part.positions[node] for node in nodes}
+    raw = triangulated(_outline(shape), hubs, radius, size)
+    count = part.design.problem.lattice.node_count
+    return ContinuumMesh(raw, np.array(nodes), count, part.section.thickness)
 
 
 def _outline(shape: shapely.Polygon) -> Outline:

@@ -77,7 +77,52 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
                 f"pyMOTO by springs at input and output: {_by_springs(rival)}",
             )
         )
+    lift = figures["lift"]
+    ours, rival = lift["ours"], lift["rival"]
+    found.append(
+        Claim(
+            f"{lift['title']} with a payload of {lift['payload_N']:g} N: bellcrank and pyMOTO",
+            "",
+            f"bellcrank: {_items(ours)}; pyMOTO: {_items(rival)}; "
+            f"area {number(ours['area_mm2'], 0)} and {number(rival['area_mm2'], 0)} mm²; "
+            f"smallest width {number(ours['narrowest_mm'], 1)} and "
+            f"{number(rival['narrowest_mm'], 1)} mm; "
+            f"design time {ours['design_seconds']:.0f} s on all cores and "
+            f"{rival['design_seconds']:.0f} s on one",
+            f"sums of violations and gains of bellcrank by seed: {_attempts(ours, 'seed')}; of "
+            "pyMOTO by limit on the off-axis motion, springs and filter: "
+            f"{_attempts(rival, 'off_axis', 'springs', 'radius')}",
+        )
+    )
     return found
+
+
+UNITS = {"rotation": ("degrees", 1.0), "payload": ("N", 1.0), "gain": ("", 1.0)}
+"""Units of items as they are shown, and the factor; per cent for the others."""
+
+
+def _items(row: Mapping[str, Any]) -> str:
+    """Return the items that a design reaches, with a mark at those that it misses."""
+    if row["items"] is None:
+        return "not stable"
+    texts = []
+    for item in row["items"]:
+        unit, factor = UNITS.get(item["quantity"], ("%", 100.0))
+        value = "not stable" if item["value"] is None else number(factor * item["value"])
+        name = item["quantity"].replace("_", " ")
+        missed = "" if item["met"] else " (missed)"
+        texts.append(f"{name} {value} {unit}".rstrip() + missed)
+    return ", ".join(texts)
+
+
+def _attempts(row: Mapping[str, Any], *of: str) -> str:
+    """Return the sum of violations and the gain of each attempt as text."""
+    texts = []
+    for each in row["tried"]:
+        setting = " ".join(str(each[key]) for key in of)
+        gain = "-" if each["gain"] is None else number(each["gain"])
+        texts.append(f"{setting}: {number(each['violation'])} and {gain}")
+    return ", ".join(texts)
 
 
 def _score(row: Mapping[str, Any]) -> str:

@@ -61,6 +61,7 @@ def optimise(
     springs: tuple[float, float],
     radius: float,
     iterations: int,
+    off_axis: float | None = None,
 ) -> dict[str, Any]:
     """Return densities with a large output displacement.
 
@@ -76,12 +77,16 @@ def optimise(
         Filter radius, elements.
     iterations
         Number of MMA iterations.
+    off_axis
+        Largest motion of the output across its direction, as a part of that along it, at small
+        strokes; None for no limit.
 
     Returns
     -------
     dict
         density (rows from the bottom), elements, seconds (processor time), springs,
-        output_over_input.
+        output_over_input, and across_over_output, the motion of the output across its direction
+        over that along it.
     """
     module = pymoto()
     size = box.high - box.low
@@ -111,14 +116,27 @@ def optimise(
             objective = module.Scaling(scaling=10.0)(reached)
             used = module.EinSum("i->")(smooth)
             limit = module.Scaling(scaling=10.0, maxval=volume * domain.nel)(used)
+            responses = [objective, limit]
+            if off_axis is not None:
+                driven = module.EinSum("i,i->")(moved, module.Signal("a", state=load))
+                aside = module.EinSum("i,i->")(moved, module.Signal("c", state=_across(output)))
+                # The signal `reached` is the negative motion along the direction.
+                responses += [
+                    module.MathExpression(f"({sign}*inp0 + {off_axis}*inp1) / inp2")(
+                        aside, reached, driven
+                    )
+                    for sign in (1.0, -1.0)
+                ]
         with contextlib.redirect_stdout(io.StringIO()):
-            module.minimize_mma(density, [objective, limit], network, maxit=iterations, verbosity=0)
+            module.minimize_mma(density, responses, network, maxit=iterations, verbosity=0)
+    motion = np.asarray(moved.state)
     return {
         "density": np.asarray(smooth.state).reshape(up, across).round(4).tolist(),
         "elements": [across, up],
         "seconds": round(time.thread_time() - began, 2),
         "springs": list(springs),
-        "output_over_input": -float(reached.state) / float(load @ np.asarray(moved.state)),
+        "output_over_input": -float(reached.state) / float(load @ motion),
+        "across_over_output": abs(float(_across(output) @ motion) / float(output @ motion)),
     }
 
 
@@ -164,6 +182,12 @@ def _ports(
         for axis in (0, 1)
     ]
     return load, output, np.array(sorted(set(held)), dtype=np.int64)
+
+
+def _across(output: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean output turned by a right angle."""
+    along = output.reshape(-1, 2)
+    return np.column_stack([-along[:, 1], along[:, 0]]).ravel()
 
 
 def _springs(

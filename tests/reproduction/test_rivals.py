@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.machines.library.tasks import straight_motion
 from reproduction.boxes import TASKS, box_of
 from reproduction.outline_analysis import analyse_outline, contour_of, drawing, polygon_of
+from reproduction.straight_lift import PAYLOAD, scored
 from reproduction.topology import optimise, pymoto
 
 
@@ -76,3 +78,38 @@ def test_the_analysis_of_an_outline_agrees_with_plane_validation() -> None:
     assert result["status"] == "converged"
     assert result["efficiency"] == pytest.approx(known.efficiency, abs=0.02)
     assert result["input_force_N"] == pytest.approx(known.last.push, rel=0.02)
+
+
+@pytest.mark.slow
+def test_topology_optimisation_limits_the_motion_across_the_output() -> None:
+    try:
+        pymoto()
+    except InvalidSettings:
+        pytest.skip("pyMOTO is not installed")
+    box = box_of("lift", 6, 7, 0.2, None)
+    free = optimise(box, 2.0, 0.4, (0.1, 0.01), 1.5, 25)
+    straight = optimise(box, 2.0, 0.4, (0.1, 0.01), 1.5, 25, 0.05)
+    assert free["across_over_output"] > 0.1
+    assert straight["across_over_output"] < 0.07
+
+
+@pytest.mark.slow
+def test_the_items_of_an_outline_are_those_of_its_struts() -> None:
+    pytest.importorskip("ngsolve")
+    from bellcrank.fem.specification import sheet_items
+
+    box = box_of("lift", 4, 3, 0.05, None)
+    problem = straight_motion(box.problem, PAYLOAD, box.spec)
+    part = box.spec.of(problem.full_design())
+    known = {item.item.quantity: item for item in sheet_items(part, 1.0) or ()}
+    found = scored(box, polygon_of(part), 1.0)["items"]
+    assert [item["quantity"] for item in found] == [
+        "gain", "off_axis", "rotation", "sag", "payload", "strain"
+    ]  # fmt: skip
+    values = {item["quantity"]: item["value"] for item in found}
+    # The full lattice hardly moves its output up, so that parts of the travel are compared as
+    # motions.
+    for name in ("gain", "rotation", "off_axis", "sag"):
+        travels = values["gain"], known["gain"].value
+        one, other = travels if name in ("off_axis", "sag") else (1.0, 1.0)
+        assert values[name] * one == pytest.approx(known[name].value * other, rel=0.05, abs=1e-3)

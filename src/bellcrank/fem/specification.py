@@ -90,6 +90,7 @@ def sheet_records(
     size: float | None = None,
     report: Callable[[str, float], None] = lambda _case, _load: None,
     fineness: Fineness = FINE,
+    mesh: ContinuumMesh | None = None,
 ) -> dict[str, StrokeRecord] | None:
     """Return the channels of the items and objectives of a part in the sheet, by load case.
 
@@ -104,6 +105,10 @@ def sheet_records(
     fineness
         How fine the mesh is. With `COARSE`, a path that needs steps below a hundredth of the
         stroke, or more than a hundred factorisations, counts as unstable.
+    mesh
+        Mesh of another outline with the same ports; that of the struts by default. The part then
+        gives the problem and the material only, and a bound on the clearance of its struts has no
+        meaning.
 
     Returns
     -------
@@ -117,7 +122,7 @@ def sheet_records(
     """
     wanted = part.design.problem.specification
     assert wanted is not None
-    mesh = plane_mesh(part, size, fineness)
+    mesh = plane_mesh(part, size, fineness) if mesh is None else mesh
     records = {}
     control = ROUGH_STEPS if fineness is COARSE else STEPS
     for name in part.design.problem.cases:

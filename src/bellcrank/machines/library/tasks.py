@@ -28,17 +28,19 @@ OFF_AXIS, ROTATION, SAG = 0.05, 3.0, 0.1
 rotation in degrees."""
 
 
-def straight_motion(problem: Problem, payload: float) -> Problem:
-    """Return the frame of the default part with the specification of a straight motion.
+def straight_motion(problem: Problem, payload: float, spec: PartSpec | None = None) -> Problem:
+    """Return the frame of a part with the specification of a straight motion.
 
     The gain is maximised and at least 1, and no struts touch.
 
     Parameters
     ----------
     problem
-        Frame of the default part.
+        Frame of the part.
     payload
         Smallest force in N that halves the travel.
+    spec
+        The part; the default one if it is not given.
 
     Examples
     --------
@@ -46,7 +48,7 @@ def straight_motion(problem: Problem, payload: float) -> Problem:
     >>> [item.name for item in wanted.items][:3]
     ['case.output.gain', 'case.output.off_axis', 'case.output.rotation']
     """
-    spec = PartSpec()
+    spec = spec or PartSpec()
     case, output = "case", "output"
     units = units_of(problem, spec)
     carried = units.in_problem("force", payload)
