@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from shapely import Polygon
 
     from reproduction.result_store import ResultStore
-    from reproduction.rivals import Settings
+    from reproduction.rivals_settings import Settings
 
 PAYLOAD = 0.1
 """Smallest force in N that halves the travel."""

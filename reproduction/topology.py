@@ -118,12 +118,12 @@ def optimise(
             limit = module.Scaling(scaling=10.0, maxval=volume * domain.nel)(used)
             responses = [objective, limit]
             if off_axis is not None:
-                driven = module.EinSum("i,i->")(moved, module.Signal("a", state=load))
+                pushed = module.EinSum("i,i->")(moved, module.Signal("a", state=load))
                 aside = module.EinSum("i,i->")(moved, module.Signal("c", state=_across(output)))
                 # The signal `reached` is the negative motion along the direction.
                 responses += [
                     module.MathExpression(f"({sign}*inp0 + {off_axis}*inp1) / inp2")(
-                        aside, reached, driven
+                        aside, reached, pushed
                     )
                     for sign in (1.0, -1.0)
                 ]

@@ -162,7 +162,7 @@ class MakeSettings:
     Examples
     --------
     >>> len(MakeSettings().tasks)
-    96
+    144
     """
 
     directions: tuple[str, ...] = tuple(DIRECTIONS)
