@@ -137,7 +137,7 @@ def _rival(box: Box, volume: float, settings: Settings, store: ResultStore) -> d
 def scored(box: Box, shape: Polygon | None, triangle: float) -> dict[str, Any]:
     """Return the items of an outline in the sheet; None if it is not stable or not connected."""
     if shape is None:
-        return {"items": None, "area_mm2": None}
+        return {"items": None, "area_mm2": None, "narrowest_mm": None}
     problem = straight_motion(box.problem, PAYLOAD, box.spec)
     wanted = problem.specification
     assert wanted is not None
