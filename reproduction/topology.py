@@ -113,7 +113,11 @@ def optimise(
                 matrix, module.Signal("f", state=load)
             )
             reached = module.EinSum("i,i->")(moved, module.Signal("l", state=-output))
-            objective = module.Scaling(scaling=10.0)(reached)
+            size_of_motion = abs(float(load @ np.asarray(moved.state)))
+            if abs(float(reached.state)) > 1e-6 * size_of_motion:
+                objective = module.Scaling(scaling=10.0)(reached)
+            else:  # by symmetry: a scale by the initial value would be infinite
+                objective = module.MathExpression(f"{10.0 / size_of_motion}*inp0")(reached)
             used = module.EinSum("i->")(smooth)
             limit = module.Scaling(scaling=10.0, maxval=volume * domain.nel)(used)
             responses = [objective, limit]
