@@ -153,3 +153,21 @@ def test_wide_struts_that_are_almost_in_line_have_an_outline(kink: float) -> Non
         filled_by_polygons((np.array(positions), np.array(beams)), np.array(widths), 1.0, 200).area,
         rel=1e-4,
     )
+
+
+def test_widths_that_differ_by_rounding_are_equal() -> None:
+    """At a joint of a refined inverter, one of two wide struts is wider in the last digit."""
+    positions = np.array([
+        [45.172370626502854, 31.555278800030955], [55.45029637656474, 32.17949192431123],
+        [54.925171158104796, 40.56053914842613], [63.6843534259442, 39.5487061696909],
+        [44.79004344119589, 45.0], [56.55670204119589, 45.0],
+    ])  # fmt: skip
+    beams = np.array([[0, 2], [1, 2], [2, 3], [2, 4], [2, 5]])
+    widths = np.array([3.233298591669949, 3.2332985916699495, 2.4, 2.4, 2.4])
+    outline = strut_outline(positions, beams, widths, 0.0)
+    assert (outline.piece_count, outline.hole_count) == (1, 0)
+    assert outline.area == pytest.approx(
+        filled_by_polygons((positions, beams), widths, 0.0, 100).area, rel=1e-3
+    )
+    narrow = strut_outline(positions, beams, widths - 2.4 + 3e-3, 0.0)
+    assert (narrow.piece_count, narrow.hole_count) == (1, 0)

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 # Nodes closer than this distance, relative to the size of the part, coincide; nodes closer to a
 # strut lie on it.
 _COINCIDENT = 1e-8
+# Widths are multiples of this length, relative to the size of the part: those that differ by
+# rounding errors are equal.
+_EQUAL = 1e-11
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +98,8 @@ def read_struts(positions: ArrayLike, beams: ArrayLike, width: ArrayLike = 0.0) 
         )
     _, first = np.unique(label, return_index=True)
     nodes = nodes[first] - origin
-    pairs, extra = _cut_at_nodes(nodes, label[pairs], half - half.min(), _COINCIDENT * extent)
+    wider = _EQUAL * extent * np.round((half - half.min()) / (_EQUAL * extent))
+    pairs, extra = _cut_at_nodes(nodes, label[pairs], wider, _COINCIDENT * extent)
     tree = shapely.STRtree(shapely.linestrings(nodes[pairs]))
     return Struts(nodes, pairs, extra, tree, origin, extent)
 
