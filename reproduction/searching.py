@@ -159,6 +159,25 @@ def design_of(problem: Problem, mask: str) -> Design:
     return Design(problem, unpack_mask(mask, problem.lattice.beam_count))
 
 
+def geometry_of(design: Design) -> dict[str, Any]:
+    """Return beams, positions and widths of a design as plain data."""
+    problem = design.problem
+    return {
+        "mask": design.mask_hex,
+        "positions": problem.lattice.positions.round(6).tolist(),
+        "widths": problem.beam_widths.round(6).tolist(),
+    }
+
+
+def design_with(problem: Problem, geometry: Mapping[str, Any]) -> Design:
+    """Return the design of `geometry_of`; one without positions and widths has the problem's."""
+    if "positions" in geometry:
+        problem = problem.with_geometry(
+            np.array(geometry["positions"]), np.array(geometry["widths"])
+        )
+    return design_of(problem, geometry["mask"])
+
+
 def respond(design: Design, part_of_stroke: float = 1.0) -> Response:
     """Return the response of a design from rest with small increments."""
     problem = design.problem

@@ -18,9 +18,9 @@ from bellcrank.search import read_settings
 from bellcrank.workflows import complete_design, start_design
 from bellcrank.workflows.specification import item_data
 from reproduction.boxes import Box, box_of
-from reproduction.outline_analysis import contour_of, mesh_of, narrowest, polygon_of
-from reproduction.searching import design_of
-from reproduction.topology import optimise
+from reproduction.outline_analysis import mesh_of, narrowest, polygon_of
+from reproduction.searching import design_with, geometry_of
+from reproduction.topology_designs import rival_designs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,7 +64,7 @@ def _ours(box: Box, settings: Settings, store: ResultStore) -> tuple[dict[str, A
     tried = []
     for seed in range(settings.lift_seeds):
         made = store.compute(f"lift-ours-{seed}", partial(_designed, box, settings, seed))
-        shape = _shape(box, made)
+        shape = polygon_of(box.spec.of(design_with(box.problem, made))) if made["mask"] else None
         score = store.compute(
             f"lift-ours-scored-{seed}", partial(scored, box, shape, settings.triangle)
         )
@@ -86,50 +86,23 @@ def _designed(box: Box, settings: Settings, seed: int) -> dict[str, Any]:
         except NoDesignFound:
             return {"mask": None, "design_seconds": time.perf_counter() - began}
     assert report is not None
-    design = report.selection.design
-    return {
-        "mask": design.mask_hex,
-        "positions": design.problem.lattice.positions.round(6).tolist(),
-        "widths": design.problem.beam_widths.round(6).tolist(),
-        "design_seconds": time.perf_counter() - began,
-    }
-
-
-def _shape(box: Box, made: Mapping[str, Any]) -> Polygon | None:
-    if made["mask"] is None:
-        return None
-    problem = box.problem.with_geometry(np.array(made["positions"]), np.array(made["widths"]))
-    return polygon_of(box.spec.of(design_of(problem, made["mask"])))
+    seconds = time.perf_counter() - began
+    return {**geometry_of(report.selection.design), "design_seconds": seconds}
 
 
 def _rival(box: Box, volume: float, settings: Settings, store: ResultStore) -> dict[str, Any]:
     """Return the score of the best topology-optimised design of a volume.
 
-    With and without a limit on the off-axis motion; each with all springs and the first filter,
-    then with all filters and the best springs.
+    With and without a limit on the off-axis motion.
     """
-    area = volume * float(np.prod(box.high - box.low))
-    tried: list[dict[str, Any]] = []
-
-    def attempt(
-        off_axis: float | None, springs: tuple[float, float], radius: float
-    ) -> dict[str, Any]:
-        key = f"{off_axis}-{springs[0]:g}-{springs[1]:g}-{radius:g}"
-        work = partial(
-            optimise, box, settings.element, volume, springs, radius, settings.iterations, off_axis
+    score = partial(scored, box, triangle=settings.triangle)
+    tried = [
+        {"off_axis": off_axis, **row}
+        for off_axis in (OFF_AXIS, None)
+        for row, _ in rival_designs(
+            box, f"lift-{off_axis}", volume, settings, store, score, _rank, off_axis
         )
-        made = store.compute(f"lift-rival-{key}", work)
-        shape = contour_of(box, np.array(made["density"]), area)
-        score = store.compute(
-            f"lift-rival-scored-{key}", partial(scored, box, shape, settings.triangle)
-        )
-        setting = {"off_axis": off_axis, "springs": list(springs), "radius": radius}
-        return {**setting, "design_seconds": made["seconds"], **score}
-
-    for off_axis in (OFF_AXIS, None):
-        first = [attempt(off_axis, springs, settings.radii[0]) for springs in settings.springs]
-        good = tuple(min(first, key=_rank)["springs"])
-        tried += [*first, *(attempt(off_axis, good, radius) for radius in settings.radii[1:])]
+    ]
     best = min(tried, key=_rank)
     return {**best, "tried": [_short(row, "off_axis", "springs", "radius") for row in tried]}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -132,6 +133,21 @@ def test_a_problem_with_a_human_design_is_compared_with_it(here: Path) -> None:
     assert_shows_something(here / "crane" / "comparison.png")
     data = json.loads((here / "crane" / "summary.json").read_text())
     assert data["human_efficiency"] == pytest.approx(1.176043, abs=1e-5)
+
+
+def test_a_design_that_is_not_stable_in_a_check_is_written_and_says_so(
+    here: Path, lift: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checks = {"increments of 1/32": 1.0, "adaptive increments": math.nan}
+    monkeypatch.setattr("bellcrank.workflows.design.verify", lambda *_: checks)
+    outcome = call("design", lift, "--steps", "250", "--chains", "1")
+    assert "not stable in adaptive increments" in outcome.out
+    (folder,) = [path.parent for path in here.glob("*/summary.json")]
+    for name in ("summary.json", "design.json"):
+        data = json.loads((folder / name).read_text())
+        found = data if name == "summary.json" else data["provenance"]
+        assert found["checks"] == {"increments of 1/32": 1.0, "adaptive increments": None}
+    assert not json.loads((folder / "summary.json").read_text())["verified"]
 
 
 def test_a_problem_of_ones_own_is_designed_into_a_folder_of_its_name(here: Path, lift: str) -> None:

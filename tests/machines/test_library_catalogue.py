@@ -48,7 +48,7 @@ def test_there_are_entries_for_all_directions_sizes_and_kinds() -> None:
     there_kinds = ["free", "loaded", "light", "straight-10g"]
     assert there == set(product(DIRECTIONS, (7, 9, 12), there_kinds))
     assert len(there) == len(NAMES)
-    assert set(kinds) >= set(there_kinds)
+    assert set(kinds) - set(there_kinds) == {"straight-50g", "straight-200g"}, "not made yet"
 
 
 def test_entries_of_straight_motions_meet_their_items_by_frames_and_in_the_sheet() -> None:

@@ -173,12 +173,15 @@ class _Sheet:
             if item.quantity == "payload" and item.at_least is not None
         }
 
+    def _part(self, problem: Problem) -> Part:
+        return replace(self.part, design=replace(self.part.design, problem=problem))
+
     def _follow(
         self, problem: Problem, report: Callable[[PathState], None] = lambda _state: None
     ) -> tuple[ContinuumEquations, EquilibriumPath] | None:
         """Follow a load case to the full stroke; None if stability is lost before."""
-        part = replace(self.part, design=replace(self.part.design, problem=problem))
-        equations = ContinuumEquations(continuum_system(part, self.mesh, LAW))
+        system = continuum_system(self._part(problem), self.mesh, LAW)
+        equations = ContinuumEquations(system)
         path = follow_path(equations, self.control, report)
         return (equations, path) if path.status is PathStatus.CONVERGED else None
 
@@ -188,7 +191,7 @@ class _Sheet:
         if found is None:
             return None
         equations, path = found
-        part = replace(self.part, design=replace(self.part.design, problem=self.case))
+        part = self._part(self.case)
         stresses = [stress_field(equations, state.unknowns) for state in path.states]
         states = [
             complete_state(part, equations, state, stress)
@@ -202,7 +205,7 @@ class _Sheet:
         if found is None:
             return None
         equations, path = found
-        return hub_displacements(equations, path.states[-1])[:, :2] / self.part.scale
+        return self._hub_motion(equations, path.states[-1].unknowns) / self.part.scale
 
     def _channel(self, channel: Channel, main: SheetPath, fractions: Values) -> Values:
         """Return a channel at fractions of the stroke, or the one value that it has."""
@@ -262,7 +265,7 @@ class _Sheet:
         force = output.direction / len(output.nodes)
         unknowns = main.path.states[-1].unknowns
         motion = main.equations.motion_by_forces(unknowns, output.nodes, force)
-        moved = self._hub_motion(main, motion)[output.nodes]
+        moved = self._hub_motion(main.equations, motion)[output.nodes]
         compliance = float((moved * output.direction).sum(axis=1).mean())
         stiffness = 1.0 / compliance if compliance > 0.0 else 0.0
         return np.array([stiffness / self.part.stiffness_unit])
@@ -271,13 +274,13 @@ class _Sheet:
         """Return (1,) the motion of the output by the own weight at rest, lattice units."""
         assert self.weight is not None
         weight = self.force_unit / self.part.scale**3 * self.weight
-        moved = self._hub_motion(main, main.equations.motion_by_weight(weight))
+        moved = self._hub_motion(main.equations, main.equations.motion_by_weight(weight))
         size = float(np.linalg.norm(moved[problem.output.nodes].mean(axis=0)))
         return np.array([size / self.part.scale])
 
-    def _hub_motion(self, main: SheetPath, unknowns: Values) -> Values:
+    def _hub_motion(self, equations: ContinuumEquations, unknowns: Values) -> Values:
         """Return (N, 2) the mean displacements of hubs, mm."""
-        return hub_displacements(main.equations, PathState(1.0, unknowns))[:, :2]
+        return hub_displacements(equations, PathState(1.0, unknowns))[:, :2]
 
     def _loaded(self, _main: SheetPath, problem: Problem, output: str) -> Values:
         """Return (1, 3) the motion of the output under its payload."""

@@ -16,6 +16,7 @@ from bellcrank.mechanics import Channel, Status, StrokeRecord, channels_of, quan
 from bellcrank.mechanics.frames.geometry import BeamSlopes, beam_slopes, geometry_slopes
 from bellcrank.mechanics.frames.quantities.definition import Measures, Quantity, Slopes, vector
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
+from bellcrank.mechanics.stroke import STATES
 from bellcrank.refine.channels import bounded, jacobian, stacked
 from bellcrank.refine.differences import NO_DIFFERENCE
 from bellcrank.refine.gaps import gaps_of
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
 
 LARGEST_INCREMENT = 1.0 / 16.0
 """Largest increment of the load: larger ones may end on another branch near a bifurcation."""
-GAP_STATES = 16
-"""States along the stroke at which gaps are computed."""
 STABLE = 0.5
 """Smallest lowest stiffness along the stroke, as a part of its reference (`references`): near a
 bifurcation it falls and rises again, and a small change of the geometry leads to another path."""
@@ -266,8 +265,8 @@ class RowEvaluator:
         values, gradients = [np.zeros(0)], [np.zeros((0, self.variables.count))]
         keys: list[tuple[int, ...]] = []
         of_beams = beam_slopes(case.frame, self.mask) if slopes else None
-        for k in range(1, GAP_STATES + 1):
-            state = case.state(k / GAP_STATES)
+        for k in range(1, STATES + 1):
+            state = case.state(k / STATES)
             if state is None:
                 return None
             reach = bound + GAP_REACH * width
