@@ -1,8 +1,8 @@
 """Measure the bundled entries of the library again: ``python -m benchmarks.library``.
 
 Each entry is read, measured as frames of the default part (struts of 2 mm on 10 mm), and written
-under its name, which contains the hash of its problem. Entries of straight kinds get the items of
-their specification by frames of 8 elements and in the sheet. Plans of bundled machines follow
+under its name, which contains the hash of its problem, with the items of its specification by
+frames of 8 elements and in the sheet. Plans of bundled machines follow
 renamed entries, and the page of the library in ``docs/library`` is written anew.
 """
 
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from bellcrank.fem.continuum.mesh import COARSE
 from bellcrank.fem.specification import sheet_items
-from bellcrank.machines.library import Library, bundled_folder, kinds, read_entry, write_entry
+from bellcrank.machines.library import Library, bundled_folder, read_entry, write_entry
 from bellcrank.machines.library.catalogue import entry_files
 from bellcrank.machines.library.pages import write_page
 from bellcrank.machines.library.tasks import EntryTask
@@ -34,9 +34,8 @@ PAGE = ROOT / "docs" / "library"
 
 
 def with_items(entry: Entry) -> Entry:
-    """Return an entry of a straight kind with its items by frames and in the sheet."""
-    if entry.columns is None or entry.kind not in kinds or kinds[entry.kind].payload is None:
-        return entry
+    """Return an entry with the items of its kind by frames and in the sheet."""
+    assert entry.columns is not None, "bundled entries are made by tasks"
     wanted = EntryTask(entry.direction, entry.columns, entry.kind).problem().specification
     design = replace(
         entry.design, problem=replace(entry.design.problem, specification=wanted), efficiency=None

@@ -8,8 +8,8 @@ Actuators can drive each other. The motion of each then depends on the load at i
 # %%
 # Parts
 # -----
-# The bundled library contains actuators by direction, size and kind. The first stage needs a loaded
-# output, the last stage a low input force.
+# The bundled library contains actuators by direction, size and payload. The first stage works
+# against the input of the second one, and needs a larger payload.
 
 from pathlib import Path
 
@@ -20,10 +20,10 @@ from bellcrank.mechanics import model_evaluator
 from bellcrank.plots import draw_motion
 from bellcrank.workflows.pictures import motion_of
 
-loaded = library().find("down-9-loaded").design
-light = library().find("down-9-light").design
+strong = library().find("up-12-straight-200g").design
+wide = library().find("left-12-straight-10g").design
 
-for name, design in (("loaded output", loaded), ("low input force", light)):
+for name, design in (("first stage", strong), ("second stage", wide)):
     element = mean_ports(design)
     port = two_port_at(element, element.rest())
     print(
@@ -34,23 +34,26 @@ for name, design in (("loaded output", loaded), ("low input force", light)):
 # %%
 # Estimate from the two-ports: the output of the first stage works against the input of the second.
 
-first, second = (two_port_at(e, e.rest()) for e in (mean_ports(loaded), mean_ports(light)))
+first, second = (two_port_at(e, e.rest()) for e in (mean_ports(strong), mean_ports(wide)))
 gain = first.efficiency_against(second.input_stiffness) * second.efficiency
-print(f"about {gain:.1f}")
+print(f"about {gain:.1f} for small strokes")
 
 # %%
 # A plan
 # ------
+# The second actuator is turned so that the first one pushes its input along its direction.
 
 Path("two-stage.toml").write_text("""
 name = "two-stage"
 
 [parts.first]
-entry = "down-9-loaded"
+entry = "up-12-straight-200g"
 
 [parts.second]
-entry = "down-9-light"
+entry = "left-12-straight-10g"
 join = "first.output"
+mirror = true
+rotate = 180
 
 [input]
 ports = ["first.input"]

@@ -11,6 +11,7 @@ import pytest
 import trimesh
 
 from bellcrank.fem import FemSettings
+from bellcrank.machines.library import Library, bundled_folder
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.model import problem_from_dict, read_design, unpack_mask
 from bellcrank.part import PartSpec, frame_problem
@@ -228,8 +229,9 @@ def test_a_bundled_machine_is_opened_and_changed(page: Any, server: Server) -> N
     library = page.locator('.collection[data-source="library"]')
     library.get_by_label("Moves").select_option("up")
     library.get_by_label("Size").select_option("9 wide")
-    assert library.locator(".note[role=status]").inner_text() == "3 designs"
-    library.locator("button.tile", has_text="low input force").click()
+    count = len(Library((bundled_folder(),)).search(direction="up", columns=9))
+    assert library.locator(".note[role=status]").inner_text() == f"{count} designs"
+    library.locator("button.tile", has_text="straight, 50 g").click()
     page.locator(".panel h2", has_text="second: Up, 9 wide").wait_for()
     page.goto(f"{server.address}/#/design/machines/gripper")
     page.get_by_role("button", name="Open its plan").click()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bellcrank.machines import read_characterisation
+from bellcrank.machines.library import find_entry
 from bellcrank.model import write_design
 from tests.machines.test_two_port import unstable_actuator
 
@@ -110,8 +111,8 @@ def test_a_record_says_of_which_model_it_is(here: Path) -> None:
         call("characterise", name, "--points", 1, "--load", "free", *model, "--json").data
         for name, model in (
             ("human:crane", ()),
-            ("down-9-free", ("--model", "springs")),
-            ("down-9-free", ()),
+            ("down-9-straight-50g", ("--model", "springs")),
+            ("down-9-straight-50g", ()),
         )
     )
     assert [each["model"] for each in (own, springs, frames)] == ["springs", "springs", "frames"]
@@ -120,5 +121,7 @@ def test_a_record_says_of_which_model_it_is(here: Path) -> None:
     del own["model"]
     write(here / "old.json", own)
     assert read_characterisation(here / "old.json").model == "springs"
-    assert "132 beams; frames" in call("characterise", "down-9-free", "--points", 1).out
-    assert "unknown model 'beams'" in refusal("characterise", "down-9-free", "--model", "beams")
+    name = "down-9-straight-50g"
+    beams = find_entry(name).design.beam_count
+    assert f"{beams} beams; frames" in call("characterise", name, "--points", 1).out
+    assert "unknown model 'beams'" in refusal("characterise", name, "--model", "beams")

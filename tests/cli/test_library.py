@@ -40,35 +40,33 @@ def test_all_entries_are_listed() -> None:
     outcome = call("library", "list", width=80)
     assert outcome.code == 0, outcome.err
     assert f"{COUNT} entries" in outcome.out
-    assert find_entry("down-9-free").name in outcome.out
+    assert find_entry("down-9-straight-50g").name in outcome.out
     assert max(map(len, outcome.out.splitlines())) <= 80
     listed = call("library", "list", "--json").data
     assert len(listed) == COUNT
-    assert {"name", "efficiency", "better", "input_stiffness"} <= set(listed[0])
+    assert {"name", "efficiency", "gain", "input_stiffness"} <= set(listed[0])
 
 
 def test_a_search_gives_the_best_first() -> None:
-    told = call(
-        "library", "search", "--direction", "up", "--kind", "light", "--better", "--json"
-    ).data
-    assert told
-    assert all(
-        (each["direction"], each["kind"], each["better"]) == ("up", "light", True) for each in told
-    )
-    efficiency = [each["free_efficiency"] for each in told]
-    assert efficiency == sorted(efficiency, reverse=True)
+    told = call("library", "search", "--direction", "up", "--kind", "straight-50g", "--json").data
+    assert len(told) == 3
+    assert {(each["direction"], each["kind"]) for each in told} == {("up", "straight-50g")}
+    gains = [each["gain"] for each in told]
+    assert gains == sorted(gains, reverse=True)
     outcome = call("library", "search", "--columns", 9, "--spring", 0.14, "--sort", "work")
     assert "spring" in outcome.out
     assert call("library", "search", "--efficiency", 1e6, "--json").data == []
 
 
 def test_an_entry_is_shown_with_its_two_port_figures_and_origin(tmp_path: Path) -> None:
-    entry = find_entry("down-9-free")
-    outcome = call("library", "show", "down-9-free", "--out", tmp_path / "picture.png")
+    entry = find_entry("down-9-straight-50g")
+    outcome = call("library", "show", "down-9-straight-50g", "--out", tmp_path / "picture.png")
     assert outcome.code == 0, outcome.err
     for words in (
         entry.name,
-        "plain lever",
+        "off-axis motion",
+        "payload that halves the travel",
+        "blocked force",
         "frame analysis",
         "input stiffness",
         "stroke, free",
@@ -77,13 +75,13 @@ def test_an_entry_is_shown_with_its_two_port_figures_and_origin(tmp_path: Path) 
         assert words in outcome.out
     assert (tmp_path / "picture.png").stat().st_size > 1000
     record = call("library", "show", entry.name, "--json").data
-    assert record["schema"] == "bellcrank/entry/1"
+    assert record["schema"] == "bellcrank/entry/2"
     assert record["name"] == entry.name
 
 
 def test_an_entry_goes_wherever_a_design_does(tmp_path: Path) -> None:
-    entry = find_entry("down-9-free")
-    told = call("evaluate", "down-9-free", "--json").data["results"][0]
+    entry = find_entry("down-9-straight-50g")
+    told = call("evaluate", "down-9-straight-50g", "--json").data["results"][0]
     assert told["mask"] == entry.design.mask_hex
     # `evaluate` leaves out the shortening of bent beams.
     assert told["efficiency"] == pytest.approx(entry.efficiency, rel=0.02)
@@ -96,8 +94,8 @@ def test_an_entry_goes_wherever_a_design_does(tmp_path: Path) -> None:
     assert call("export", entry.name, tmp_path / "part.svg").code == 0
     plan = tmp_path / "pair.toml"
     plan.write_text(
-        'name = "pair"\n[parts.first]\nentry = "down-9-free"\n[parts.second]\n'
-        'entry = "down-9-light"\njoin = "first.output"\nrotate = 300\n[input]\n'
+        'name = "pair"\n[parts.first]\nentry = "down-9-straight-50g"\n[parts.second]\n'
+        'entry = "down-9-straight-10g"\njoin = "first.output"\nrotate = 300\n[input]\n'
         'ports = ["first.input"]\n[output]\nports = ["second.output"]\n'
     )
     outcome = call("machine", "build", plan)
@@ -109,7 +107,7 @@ def test_a_file_or_problem_goes_before_an_entry(
     lever: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    name = find_entry("down-9-free").name
+    name = find_entry("down-9-straight-50g").name
     lever.rename(tmp_path / f"{name}.json")
     told = call("evaluate", f"{name}.json", "--json").data["results"][0]
     assert told["mask"] == elementary(7, "left").full_design().mask_hex
@@ -133,15 +131,15 @@ def test_a_design_is_added_to_ones_own_folder(lever: Path, own: Path) -> None:
 
 def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
     words = (
-        "library", "make", "--directions", "down", "--columns", "5", "--kinds", "free",
+        "library", "make", "--directions", "down", "--columns", "5", "--kinds", "straight-10g",
         "--steps", 500, "--chains", 2, "--out", tmp_path / "made",
     )  # fmt: skip
     outcome = call(*words)
     assert outcome.code == 0, outcome.err
-    assert "1 of 1  down-5-free: down-5-free-" in outcome.err
-    assert len(list((tmp_path / "made").glob("down-5-free-*.json"))) == 1
+    assert "1 of 1  down-5-straight-10g: down-5-straight-10g-" in outcome.err
+    assert len(list((tmp_path / "made").glob("down-5-straight-10g-*.json"))) == 1
     assert "exists" in call(*words).err
-    assert "none better than down-5-free-" in call(*words, "--again").err
+    assert "none better than down-5-straight-10g-" in call(*words, "--again").err
     outcome = call("library", "index", "--entries", tmp_path / "made", "--out", tmp_path / "pages")
     assert outcome.code == 0, outcome.err
     (name,) = (path.stem for path in (tmp_path / "made").glob("down-*.json"))
@@ -154,7 +152,7 @@ def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("show", "down-9-frei"), "no library entry 'down-9-frei'; similar: down-9-free-"),
+        (("show", "down-9-strait"), "no library entry 'down-9-strait'; similar: down-9-straight-"),
         (("show", "down"), "is the beginning of"),
         (("search", "--direction", "sideways"), "direction: expected one of right"),
         (("search", "--kind", "strong"), "unknown kind of actuator 'strong'"),
@@ -169,7 +167,7 @@ def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
         ),
         (("add", "nothing.json"), "unknown problem 'nothing.json'"),
         (("add", "crane", "--points", "0"), "--points: expected at least one"),
-        (("show", "down-9-free", "--out", "picture.gif"), "expected a picture name"),
+        (("show", "down-9-straight-50g", "--out", "picture.gif"), "expected a picture name"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(words: tuple[str, ...], told: str, here: Path) -> None:
@@ -177,8 +175,8 @@ def test_what_is_wrong_is_said_in_one_line(words: tuple[str, ...], told: str, he
 
 
 def test_a_name_like_an_entrys_is_told_what_is_near() -> None:
-    assert "no library entry 'down-9-fee'; similar: down-9-free-" in refusal(
-        "evaluate", "down-9-fee"
+    assert "no library entry 'down-9-strait'; similar: down-9-straight-" in refusal(
+        "evaluate", "down-9-strait"
     )
     assert "unknown problem 'crain'" in refusal("evaluate", "crain")
 
@@ -214,6 +212,9 @@ def test_entries_are_found_by_figures_of_their_parts() -> None:
     travels = [each["travel_mm"] for each in found]
     assert travels == sorted(travels, reverse=True)
     assert "payload" in call(*words).out
+    strong = json.loads(call(*words, "--blocked-force", "1N", "--json").out)
+    assert 0 < len(strong) < len(found)
+    assert all(each["blocked_force_N"] >= 1.0 for each in strong)
     fewer = json.loads(call(*words, "--rotation", "2.3deg", "--json").out)
     assert len(fewer) < len(found)
     assert call(*words, "--gain", "1000").out.count("0 entries") == 1

@@ -78,7 +78,7 @@ def test_figures_of_the_part_stand_beside_the_items(met: tuple[Path, str]) -> No
     (row,) = json.loads((folder / "summary.json").read_text())["part_figures"]
     for key in (
         "efficiency", "efficiency_half", "off_axis", "rotation_deg", "input_force_N",
-        "output_stiffness_N_per_mm", "payload_N", "sag_mm", "limit_points",
+        "output_stiffness_N_per_mm", "payload_N", "blocked_force_N", "sag_mm", "limit_points",
     ):  # fmt: skip
         assert row[key] is not None, key
     assert len(row["path_mm"]) == 17

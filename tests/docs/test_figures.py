@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from bellcrank.machines import TwoPort
-from bellcrank.machines.bundled import bundled_machines, find_plan
+from bellcrank.machines.bundled import find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
-from bellcrank.machines.library import Library, bundled_folder
+from bellcrank.machines.library import Library, bundled_folder, kinds
 from benchmarks.tasks import summary
 
 ROOT = Path(__file__).parents[2]
@@ -134,7 +134,7 @@ def bundled() -> Rows:
             f"{each['prediction_seconds']:.2f}", f"{each['simulation_seconds']:.2f}",
             *(
                 f"{each[key]:.3f}"
-                for key in ("rest", "predicted", "simulated", "divided", "springs")
+                for key in ("rest", "predicted", "simulated", "divided")
             ),
         )  # fmt: skip
 
@@ -146,42 +146,32 @@ def test_recorded_predictions_and_simulations_agree_within_2_percent() -> None:
 
 
 def contact() -> Rows:
-    for name in bundled_machines():
+    for each in read("machines/bundled")["rows"]:
+        name, own = each["name"], each["figures"]
         plan = find_plan(name).table
-        yield row(f"`{name}`", len(plan.parts), plan.about, bundled_contact(name).message)
+        yield row(
+            f"`{name}`", len(plan.parts), plan.about, f"{own['efficiency']:.1f}",
+            f"{100.0 * own['off_axis']:.1f} %", f"{own['rotation_deg']:.1f}",
+            f"{own['payload_N']:.2f} N", f"{own['sag_mm']:.1f} mm",
+            bundled_contact(name).message,
+        )  # fmt: skip
 
 
 def entries() -> Rows:
     found = {
-        (each.direction, each.kind, each.columns): each
+        (each.direction, each.kind, each.columns): f"{each.gain:.2f}"
         for each in Library((bundled_folder(),)).summaries
     }
     for direction in ("right", "up-right", "up", "up-left", "left", "down-left", "down",
                       "down-right"):  # fmt: skip
-        cells = [
-            found[direction, kind, columns]
-            for kind in ("free", "loaded", "light")
-            for columns in (7, 9, 12)
-        ]
         yield row(
-            direction, *(f"{each.efficiency:.2f} ({each.lever_efficiency:.2f})" for each in cells)
+            direction,
+            *(
+                found.get((direction, kind, columns), "–")
+                for kind in kinds
+                for columns in (7, 9, 12)
+            ),
         )
-
-
-def straight_entries() -> Rows:
-    library = Library((bundled_folder(),))
-    for name in library.names():
-        if "-straight-" in name:
-            each = library.find(name)
-            own = {key: value or 0.0 for key, value in each.figures.items()}
-            gain = next(item for item in each.provenance["items"] if item["quantity"] == "gain")
-            yield row(
-                each.direction, each.columns, f"{own['efficiency']:.2f}",
-                f"{gain['reached']['sheet']['value']:.2f}", f"{own['efficiency_half']:.2f}",
-                f"{100.0 * own['off_axis']:.1f} %", f"{own['rotation_deg']:.1f}",
-                f"{own['payload_N']:.2f} N", f"{own['sag_mm']:.2f} mm",
-                f"{own['travel_mm']:.1f} mm",
-            )  # fmt: skip
 
 
 def lengths() -> Rows:
@@ -280,7 +270,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),
-    "machines": (bundled, contact, entries, straight_entries, lengths, two_ports),
+    "machines": (bundled, contact, entries, lengths, two_ports),
     "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }
 

@@ -180,6 +180,11 @@ def test_struts_that_come_near_touch() -> None:
     assert "0.5 mm" in contacts.message
 
 
+def test_without_struts_there_is_no_contact() -> None:
+    found = find_contacts(np.array([], dtype=int), LINES[:0], [(1.0, LINES[:0])], 2.0)
+    assert len(found.pairs) == 0
+
+
 def test_contacts_have_the_largest_overlap_and_the_first_load_of_the_stroke() -> None:
     states = []
     for load, height in ((0.2, 3.0), (0.4, 1.8), (0.6, 1.2), (0.8, 3.0)):

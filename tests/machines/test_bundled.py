@@ -4,54 +4,66 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings, UnknownName
 from bellcrank.machines.bundled import bundled_machine, bundled_machines, find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.elementary import strut_named
-from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
+from bellcrank.machines.library import find_entry
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Status, model_evaluator
 from bellcrank.workflows.validation import check_contact
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
+    from bellcrank.machines.assembly import Machine
+
+
+def moved(name: str) -> tuple[Machine, NDArray[np.float64]]:
+    """Return a machine and the mean motion of its output over that of its input, as a frame."""
+    machine = bundled_machine(name)
+    problem = machine.design.problem
+    response = model_evaluator(problem).evaluate(machine.design.mask, VERIFICATION_INCREMENT)
+    assert response.status is Status.CONVERGED
+    motion = response.displacement[problem.output.nodes, :2]
+    return machine, motion.mean(axis=0) / problem.input.amount
+
 
 @pytest.mark.parametrize("name", bundled_machines())
 def test_every_machine_goes_its_whole_stroke(name: str) -> None:
-    machine = bundled_machine(name)
-    response = SpringEvaluator(machine.design.problem).evaluate(
-        machine.design.mask, VERIFICATION_INCREMENT
-    )
-    assert response.status is Status.CONVERGED
-    assert response.efficiency > 1.0
+    machine, _ = moved(name)
+    found = model_evaluator(machine.design.problem).evaluate(machine.design.mask)
+    assert found.efficiency > 3.0
 
 
-def test_the_amplifier_amplifies() -> None:
-    machine = bundled_machine("amplifier")
-    response = SpringEvaluator(machine.design.problem).evaluate(
-        machine.design.mask, VERIFICATION_INCREMENT
-    )
-    assert len(machine.parts) == 2
-    assert response.efficiency > 8.0
+@pytest.mark.parametrize("name", ["amplifier", "reverser", "sorter-left", "sorter-right"])
+def test_machines_with_one_output_move_it_straight(name: str) -> None:
+    machine, motion = moved(name)
+    (along,) = np.unique(machine.design.problem.output.direction, axis=0)
+    assert abs(motion @ [-along[1], along[0]]) < 0.05 * (motion @ along)
 
 
-def test_the_sorter_sorts_by_the_key() -> None:
-    motions = []
-    for key in ("left", "right"):
-        machine = bundled_machine(f"sorter-{key}")
-        problem = machine.design.problem
-        moved = SpringEvaluator(problem).evaluate(machine.design.mask).displacement
-        motions.append(moved[problem.output.nodes].mean(axis=0) / problem.input.amount)
-    left, right = motions
-    assert right[0] > 1.0
+def test_the_amplifier_amplifies_more_than_each_of_its_parts() -> None:
+    machine, motion = moved("amplifier")
+    gains = [find_entry(part.entry).efficiency for part in machine.plan.table.parts.values()]
+    assert len(gains) == 2
+    assert -motion[0] > 1.3 * max(gains)
+
+
+def test_the_inputs_of_the_sorter_move_its_output_to_opposite_sides() -> None:
+    (_, left), (_, right) = moved("sorter-left"), moved("sorter-right")
+    assert left[0] > 3.0
     assert left.tolist() == pytest.approx([-right[0], right[1]], rel=1e-6)
 
 
 def test_one_machine_has_ten_actuators() -> None:
     machine = bundled_machine("wave")
     assert len(machine.parts) == 10
-    assert 3000 <= machine.design.problem.lattice.beam_count <= 4000
+    assert machine.design.problem.lattice.beam_count > 1000
 
 
 QUICK = "sorter-left"
@@ -72,9 +84,8 @@ def test_the_recorded_contact_is_that_of_the_frame_analysis(name: str) -> None:
     assert found.onset == (None if recorded.onset is None else pytest.approx(recorded.onset))
 
 
-def test_contact_is_recorded_for_machines_whose_struts_touch() -> None:
-    touching = {name for name in bundled_machines() if bundled_contact(name).onset is not None}
-    assert {"gripper", "reverser"} <= touching
+def test_no_machine_touches_itself() -> None:
+    assert {bundled_contact(name).onset for name in bundled_machines()} == {None}
     with pytest.raises(UnknownName, match="'claw'"):
         bundled_contact("claw")
 

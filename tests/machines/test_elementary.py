@@ -31,7 +31,6 @@ def test_outputs_are_wanted_in_eight_directions(direction: str) -> None:
 
 
 def test_a_loaded_task_has_springs_on_its_output() -> None:
-    assert elementary(7, "up", 0.02).output.spring == 0.02
     assert elementary(7, "up").output.spring is None
 
 

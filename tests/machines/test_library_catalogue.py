@@ -24,7 +24,7 @@ from bellcrank.machines.library.tasks import OFF_AXIS, ROTATION, SAG
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Conditions, Status, model_evaluator
 from bellcrank.model import Section
 from bellcrank.part import PartSpec, frame_section
-from bellcrank.workflows.library_measurement import MIN_INPUT_STIFFNESS, lever_result
+from bellcrank.workflows.library_measurement import MIN_INPUT_STIFFNESS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,28 +43,30 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own_entry: Entry) -> Pa
     return tmp_path
 
 
-def test_there_are_entries_for_all_directions_sizes_and_kinds() -> None:
+def test_there_are_entries_for_all_directions_sizes_and_payloads() -> None:
     there = {(each.direction, each.columns, each.kind) for each in SHIPPED.summaries}
-    there_kinds = ["free", "loaded", "light", "straight-10g"]
-    assert there == set(product(DIRECTIONS, (7, 9, 12), there_kinds))
     assert len(there) == len(NAMES)
-    assert set(kinds) - set(there_kinds) == {"straight-50g", "straight-200g"}, "not made yet"
+    complete = ("straight-10g", "straight-50g", "straight-100g")
+    assert there >= set(product(DIRECTIONS, (7, 9, 12), complete))
+    assert {kind for _, _, kind in there} == set(kinds)
 
 
 def test_entries_of_straight_motions_meet_their_items_by_frames_and_in_the_sheet() -> None:
-    straight = [SHIPPED.find(name) for name in NAMES if "-straight-" in name]
-    assert len(straight) == 24
-    for entry in straight:
+    for summary in SHIPPED.summaries:
+        entry = SHIPPED.find(summary.name)
         wanted = [item["name"] for item in entry.provenance["items"]]
         assert len(wanted) == 7
         for model in ("frames, 8 elements", "sheet"):
             assert all(item["reached"][model]["met"] for item in entry.provenance["items"])
         figures = entry.figures
-        assert figures["efficiency"] > 1.0
+        assert summary.gain == figures["efficiency"] > 1.0
+        assert summary.blocked_force_N == figures["blocked_force_N"]
         assert figures["off_axis"] <= OFF_AXIS
         assert abs(figures["rotation_deg"]) <= ROTATION
         assert figures["sag_mm"] <= SAG * figures["travel_mm"]
         assert figures["payload_N"] >= kinds[entry.kind].payload
+        assert figures["blocked_force_N"] > 0.0
+        assert not entry.warnings, "no contact along the stroke"
 
 
 def test_what_comes_along_is_small() -> None:
@@ -83,19 +85,14 @@ def test_what_comes_along_is_small() -> None:
 def test_an_entry_that_comes_along_is_sound(name: str) -> None:
     entry = SHIPPED.find(name)
     problem, mask = entry.design.problem, entry.design.mask
-    kind = kinds[entry.kind]
-    # Straight motions are searched as parts are designed, with joints of a size.
-    joint = frame_section(PartSpec(), 2).joint if kind.payload is not None else 0.0
-    expected = Section(0.2, 0.5, joint=joint)
+    expected = Section(0.2, 0.5, joint=frame_section(PartSpec(), 2).joint)
     assert problem.section == expected, "struts of 2 mm on 10 mm, 5 mm thick"
     assert entry.characterisation.model == "frames"
     response = model_evaluator(problem).evaluate(mask, VERIFICATION_INCREMENT)
     assert response.status is Status.CONVERGED, "stable"
     assert entry.efficiency == pytest.approx(response.efficiency, abs=1e-8)
-    assert problem.output.spring == kind.spring
     stiffness = 2.0 * response.energy / problem.input.amount**2
     assert stiffness > MIN_INPUT_STIFFNESS
-    assert not kind.goals or 0.001 <= stiffness <= 0.1, "keeps the goals of its kind"
 
     element = mean_ports(entry.design)
     rest = element.rest()
@@ -113,38 +110,18 @@ def test_an_entry_that_comes_along_is_sound(name: str) -> None:
     assert entry.provenance["settings"]["steps"] > 0
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[] if "-7-" in name else pytest.mark.slow)
-        for name in (*NAMES[3::24], *NAMES[::12])
-    ],
-)
-def test_the_lever_of_an_entry_is_that_of_its_task(name: str) -> None:
-    entry = SHIPPED.find(name)
-    fresh = lever_result(entry.design.problem, kinds[entry.kind].goals)
-    assert entry.lever.efficiency == pytest.approx(fresh.efficiency, abs=1e-8, nan_ok=True)
-    assert entry.better == (not fresh.efficiency >= entry.efficiency)
-    response = model_evaluator(entry.design.problem).evaluate(
-        np.unpackbits(np.frombuffer(bytes.fromhex(entry.lever.mask), np.uint8))[
-            : len(entry.design.mask)
-        ].astype(bool)
-    )
-    assert response.efficiency == pytest.approx(entry.lever.efficiency, abs=1e-8)
-
-
 def test_an_entry_is_known_by_name_beginning_and_hash() -> None:
-    name = next(name for name in NAMES if name.startswith("down-9-free"))
-    for text in (name, name[:-3], "down-9-free", name[-8:], name[-8:-3]):
+    name = next(name for name in NAMES if name.startswith("down-9-straight-50g"))
+    for text in (name, name[:-3], "down-9-straight-50g", name[-8:], name[-8:-3]):
         assert SHIPPED.resolve(text) == name, text
-    assert SHIPPED.find("down-9-free").name == name
+    assert SHIPPED.find("down-9-straight-50g").name == name
 
 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
         ("down", r"is the beginning of \d+ library entries: down-"),
-        ("down-9-frei", "no library entry 'down-9-frei'; similar: down-9-free-"),
+        ("down-9-strait", "no library entry 'down-9-strait'; similar: down-9-straight-"),
         ("zzz", "no library entry 'zzz'; see"),
         ("", "no library entry ''"),
     ],
@@ -155,23 +132,22 @@ def test_what_is_not_known_is_said_with_what_is_near(text: str, told: str) -> No
 
 
 def test_a_search_keeps_what_fits_and_sorts_the_best_first() -> None:
-    found = SHIPPED.search(direction="up", kind="free")
-    assert {(each.direction, each.kind) for each in found} == {("up", "free")}
+    found = SHIPPED.search(direction="up", kind="straight-50g")
+    assert {(each.direction, each.kind) for each in found} == {("up", "straight-50g")}
     values = [each.two_port.efficiency_against(0.0) for each in found]
     assert values == sorted(values, reverse=True)
     assert {each.columns for each in SHIPPED.search(columns=7)} == {7}
-    assert all(each.better for each in SHIPPED.search(better=True))
-    clear = SHIPPED.search(no_warnings=True)
-    assert 0 < len(clear) < len(NAMES)
-    assert not any(SHIPPED.find(each.name).warnings for each in clear[::10])
-    assert all(each.input_stiffness <= 0.2 for each in SHIPPED.search(stiffness=0.2))
+    assert len(SHIPPED.search(no_warnings=True)) == len(NAMES)
+    soft = SHIPPED.search(stiffness=4.0)
+    assert 0 < len(soft) < len(NAMES)
+    assert all(each.input_stiffness <= 4.0 for each in soft)
     assert all(1.0 / each.output_compliance >= 0.1 for each in SHIPPED.search(output_stiffness=0.1))
 
 
 def test_a_search_under_load_prefers_what_pushes() -> None:
     free, loaded = SHIPPED.search(), SHIPPED.search(spring=0.14)
-    assert free[0].kind == "free"
-    assert loaded[0].kind == "loaded"
+    assert free[0].kind == "straight-10g"
+    assert loaded[0].kind != "straight-10g"
     least = SHIPPED.search(spring=0.14, efficiency=1.0)
     assert all(each.two_port.efficiency_against(0.14) >= 1.0 for each in least)
     assert 0 < len(least) < len(loaded)

@@ -24,14 +24,14 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Library:
     """Two entries of another folder."""
     folder = tmp_path_factory.mktemp("entries")
     known = Library((bundled_folder(),))
-    for name in ("left-7-free", "down-7-light"):
+    for name in ("left-7-straight-10g", "down-7-straight-50g"):
         path = known.path(name)
         (folder / path.name).write_bytes(path.read_bytes())
     return Library((folder,))
 
 
 def test_a_drawing_moves_as_the_design_does() -> None:
-    entry = Library((bundled_folder(),)).find("down-9-free")
+    entry = Library((bundled_folder(),)).find("down-9-straight-50g")
     drawn = draw(entry)
     assert drawn.rest.keys() == drawn.moved.keys() == {"m", "i", "o"}
     for name, path in drawn.rest.items():

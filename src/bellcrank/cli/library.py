@@ -18,7 +18,6 @@ from bellcrank.cli.library_view import (
     MakingProgress,
     print_entries,
     print_entry,
-    print_parts,
     warn,
 )
 from bellcrank.errors import InvalidSettings
@@ -35,9 +34,7 @@ app.add_typer(library)
 
 NAME = typer.Argument(help="Entry: its name, a unique beginning of it, or its hash.")
 Name = Annotated[str, NAME]
-KIND_HELP = (
-    "free (free stroke), loaded (loaded output), light (low input force) or own (your designs)."
-)
+KIND_HELP = "straight-10g, straight-50g, straight-100g, straight-200g or own (your designs)."
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
 
@@ -78,12 +75,12 @@ def search(
         str | None,
         typer.Option(help="Minimum load that halves the travel, for example 50g or 0.5N."),
     ] = None,
+    blocked_force: Annotated[
+        str | None, typer.Option(help="Minimum force of the held output, for example 1N.")
+    ] = None,
     sag: Annotated[
         str | None, typer.Option(help="Maximum sag under the own weight, for example 1mm.")
     ] = None,
-    better: Annotated[
-        bool, typer.Option("--better", help="Only entries better than the plain lever.")
-    ] = False,
     no_warnings: Annotated[
         bool,
         typer.Option("--no-warnings", help="Only entries without contact or loss of stability."),
@@ -91,10 +88,10 @@ def search(
     sort: Annotated[
         str,
         typer.Option(
-            help="efficiency, stiffness, output-stiffness, work, gain, size, off-axis, payload or "
-            "travel."
+            help="gain, travel, off-axis, payload, efficiency (at rest, against the spring), "
+            "stiffness, output-stiffness, work or size."
         ),
-    ] = "efficiency",
+    ] = "gain",
     as_json: AsJson = False,
 ) -> None:
     """Search for entries, the best first; lattice units, and those of the part where given."""
@@ -106,6 +103,7 @@ def search(
         ("off_axis", "--off-axis", off_axis, "ratio"),
         ("rotation_deg", "--rotation", rotation, "angle"),
         ("payload_N", "--payload", payload, "load"),
+        ("blocked_force_N", "--blocked-force", blocked_force, "load"),
         ("sag_mm", "--sag", sag, "length"),
     ]
     part = {
@@ -124,15 +122,11 @@ def search(
         efficiency=efficiency,
         stiffness=stiffness,
         output_stiffness=output_stiffness,
-        better=better,
         no_warnings=no_warnings,
         part=part,
         sort=sort,
     )
-    if part and not as_json:
-        print_parts(known, found)
-    else:
-        print_entries(known, found, as_json=as_json, spring=spring)
+    print_entries(known, found, as_json=as_json, spring=spring)
 
 
 @library.command()
@@ -144,7 +138,7 @@ def show(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Show an entry: two-port, frame analysis, plain lever, origin."""
+    """Show an entry: figures of the part, two-port, origin."""
     from bellcrank.machines.library import entry_to_dict, library
 
     if out is not None:
@@ -208,7 +202,7 @@ def make(
         str | None, typer.Option(help="Directions, separated by commas. \\[all eight]")
     ] = None,
     columns: Annotated[str | None, typer.Option(help="Sizes of the lattice. \\[9,7,12]")] = None,
-    kinds: Annotated[str | None, typer.Option(help="Kinds. \\[free,loaded,light]")] = None,
+    kinds: Annotated[str | None, typer.Option(help="Kinds. \\[all four]")] = None,
     steps: Annotated[int, typer.Option(help="Proposals per chain.")] = 20_000,
     chains: Annotated[int, typer.Option(help="Chains per entry.")] = 4,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,

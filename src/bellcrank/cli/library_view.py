@@ -74,79 +74,50 @@ def print_entries(
         return
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("name", no_wrap=True)
+    load = f"gain,\nspring {spring:g}" if spring else "sag\nmm"
     for heading in (
-        "design\nload", f"spring\n{spring:g}" if spring else "free,\nat rest", "plain\nlever",
-        "frame", "input\nstiff.", "output\nstiff.",
+        "gain\n", "travel\nmm", "off-\naxis", "rot.\ndeg", "payload\ng", load,
     ):  # fmt: skip
         table.add_column(heading, justify="right", no_wrap=True)
     for each in found:
-        port = each.two_port
+        against = each.two_port.efficiency_against(spring)
         table.add_row(
             plain(each.name),
-            _figure(each.efficiency, 3),
-            _figure(port.efficiency_against(spring), 3),
-            _figure(each.lever_efficiency, 3) + ("" if each.better else "*"),
-            (_figure(each.frame_efficiency, 3) if each.frame_status == "converged" else "snaps")
-            + ("!" if each.warnings else ""),
-            _figure(each.input_stiffness, 3),
-            _figure(port.output_stiffness, 3),
+            _figure(each.gain, 3) + ("!" if each.warnings else ""),
+            _figure(each.travel_mm, 3),
+            "-" if math.isnan(each.off_axis) else f"{each.off_axis:.0%}",
+            _figure(each.rotation_deg, 2),
+            "-" if math.isnan(each.payload_N) else f"{1e3 * each.payload_N / GRAVITY:.0f}",
+            _figure(against if spring else each.sag_mm, 2),
         )
-    results.print(table)
-    worse = len(found) - sum(each.better for each in found)
-    count = "1 entry" if len(found) == 1 else f"{len(found)} entries"
-    warned = sum(each.warnings for each in found)
-    marks = {"* the plain lever is better": worse, "! struts in contact, or snap-through": warned}
-    results.print(f"\n{count}; efficiencies and stiffnesses in lattice units")
-    for text, number in marks.items():
-        if number:
-            results.print(f"{text} ({number})")
-    warn(known)
-
-
-def print_parts(known: Library, found: list[Summary]) -> None:
-    """Print one line for each entry with the figures of its part."""
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    table.add_column("name", no_wrap=True)
-    for heading in ("gain", "travel", "off-axis", "rotation", "payload", "sag"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for each in found:
-        off_axis = "-" if math.isnan(each.off_axis) else f"{each.off_axis:.0%}"
-        table.add_row(
-            plain(each.name), _figure(each.gain, 3), _figure(each.travel_mm, 3, " mm"), off_axis,
-            _figure(each.rotation_deg, 2, " deg"), _figure(1e3 * each.payload_N / GRAVITY, 2, " g"),
-            _figure(each.sag_mm, 2, " mm"),
-        )  # fmt: skip
     results.print(table)
     count = "1 entry" if len(found) == 1 else f"{len(found)} entries"
     results.print(
         f"\n{count}; parts of struts 2 mm wide on 10 mm, by frames with 8 elements in each strut"
     )
+    if spring:
+        results.print("gain against a spring: at rest, with the spring in lattice units")
+    if warned := sum(each.warnings for each in found):
+        results.print(f"! struts in contact, or loss of stability ({warned})")
     warn(known)
 
 
 def entry_line(entry: Entry) -> str:
     """Return one line about an entry."""
-    lever = _figure(entry.lever.efficiency)
-    return f"{entry.name}  efficiency {entry.efficiency:.3f}, plain lever {lever}"
+    return f"{entry.name}  gain {entry.efficiency:.3f}"
 
 
 def print_entry(entry: Entry, path: Path) -> None:
     """Print an entry."""
     rest, check = entry.characterisation.rest, entry.validation
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    lever = _figure(entry.lever.efficiency)
-    if entry.lever.unbound_efficiency > entry.lever.efficiency:
-        lever += f" ({_figure(entry.lever.unbound_efficiency)} without the constraints)"
-    spring = entry.design.problem.output.spring
     rows = [
         ("name", entry.name),
         ("designed for", _designed_for(entry)),
         ("beams", str(entry.design.beam_count)),
-        ("efficiency" + (f", springs of {spring:g}" if spring else ""), _figure(entry.efficiency)),
-        ("plain lever", lever + ("" if entry.better else ": more efficient")),
-        ("  shape", entry.lever.shape or "none is stable and satisfies the constraints"),
-        ("frame analysis", _frame(entry)),
-        ("  part", f"{check.material}, struts {check.width:g} mm, spacing {check.scale:g} mm"),
+        ("part", f"{check.material}, struts {check.width:g} mm, spacing {check.scale:g} mm"),
+        ("  frame analysis", _frame(entry)),
+        *_part_rows(entry),
         ("at rest, free efficiency", _figure(rest.efficiency)),
         ("  input stiffness", _figure(rest.input_stiffness)),
         ("  output stiffness", _figure(rest.output_stiffness)),
@@ -170,11 +141,23 @@ def print_entry(entry: Entry, path: Path) -> None:
 
 
 def _designed_for(entry: Entry) -> str:
-    from bellcrank.machines.library import kind_title, kinds
+    from bellcrank.machines.library import kind_title
 
     size = "" if entry.columns is None else f", {entry.columns} columns"
-    about = f": {kinds[entry.kind].about}" if entry.kind in kinds else ""
-    return f"output {entry.direction}{size}, {kind_title(entry.kind)}{about}"
+    return f"output {entry.direction}{size}, {kind_title(entry.kind)}"
+
+
+def _part_rows(entry: Entry) -> list[tuple[str, str]]:
+    """Return the figures of the part as rows, those of the reports of `bellcrank design`."""
+    from bellcrank.workflows.report import FIGURES
+
+    rows = []
+    for label, keys, form, unit in FIGURES:
+        values = [entry.figures.get(key) for key in keys]
+        if any(value is not None for value in values):
+            known = [form.format(value) if value is not None else "-" for value in values]
+            rows.append((f"  {label}", f"{', '.join(known)} {unit}".rstrip()))
+    return rows
 
 
 def _frame(entry: Entry) -> str:

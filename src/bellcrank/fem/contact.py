@@ -173,7 +173,7 @@ def _near_segments(
     from scipy.spatial import cKDTree
 
     each = moved.shape[1] - 1
-    middles = 0.5 * (moved[:, :-1] + moved[:, 1:]).reshape(len(moved) * each, -1)
+    middles = 0.5 * (moved[:, :-1] + moved[:, 1:]).reshape(-1, moved.shape[2])
     longest = float(np.linalg.norm(np.diff(moved, axis=1), axis=2).max(initial=0.0))
     near = cKDTree(middles).query_pairs(width + longest, output_type="ndarray")
     near = near[near[:, 0] // each != near[:, 1] // each]

@@ -35,7 +35,7 @@ DIRECTIONS = {
 """Angle of each direction in degrees, counter-clockwise from +x."""
 
 
-def elementary(columns: int, direction: str, spring: float | None = None) -> Problem:
+def elementary(columns: int, direction: str) -> Problem:
     """Return the problem: the right port is pushed down, the left port is to move.
 
     The rows of the lattice have alternately `columns` and `columns` - 1 nodes; there are about as
@@ -49,8 +49,6 @@ def elementary(columns: int, direction: str, spring: float | None = None) -> Pro
         Number of nodes of the lowest row, at least 5.
     direction
         Output direction, a key of `DIRECTIONS`.
-    spring
-        Stiffness k_ext of a spring at each output node; None for a free output.
 
     Raises
     ------
@@ -73,7 +71,7 @@ def elementary(columns: int, direction: str, spring: float | None = None) -> Pro
     angle = math.radians(DIRECTIONS[direction])
     height = HEIGHT * (rows - 2)
     return Problem(
-        name=f"elementary-{columns}-{direction}" + ("" if spring is None else "-loaded"),
+        name=f"elementary-{columns}-{direction}",
         lattice=lattice,
         supports=Supports(fixed=np.arange(columns)),
         input=Input(
@@ -82,7 +80,7 @@ def elementary(columns: int, direction: str, spring: float | None = None) -> Pro
         ),
         output=Output(
             nodes=_hexagon(lattice, (-1.0, height)),
-            direction=np.array([math.cos(angle), math.sin(angle)]).round(15), spring=spring,
+            direction=np.array([math.cos(angle), math.sin(angle)]).round(15),
         ),
     )  # fmt: skip
 

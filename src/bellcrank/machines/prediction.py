@@ -301,6 +301,8 @@ def _condensed(
         stiffness=problem.stiffness,
         section=problem.section,
         material=problem.material,
+        widths=None if problem.widths is None else problem.widths[selected],
+        joints=None if problem.joints is None else problem.joints[selected],
         designable=np.array([0]),
     )
     unknowns = 2 if problem.section is None else 3

@@ -50,7 +50,7 @@ def _actuators() -> Iterator[Entry]:
         width = "" if summary.columns is None else f"{summary.columns} wide"
         load = kind_title(summary.kind)
         title = ", ".join(filter(None, (summary.direction.capitalize(), width)))
-        facets = {"Moves": summary.direction, "Size": width, "Made for": load}
+        facets = {"Moves": summary.direction, "Size": width, "Kind": load}
         yield Entry(summary.name, title, load, design, facets)
 
 

@@ -33,14 +33,14 @@ from bellcrank.workflows.specification import item_data
 
 if TYPE_CHECKING:
     import threading
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from bellcrank.machines.library.catalogue import Summary
     from bellcrank.machines.library.entry import Entry
     from bellcrank.machines.library.tasks import EntryTask, MakeSettings
     from bellcrank.model import Problem
-    from bellcrank.search import Candidate, Progress, SearchSettings, Selection
+    from bellcrank.search import Progress, SearchSettings, Selection
     from bellcrank.storage import RunFolder
 
 SEARCHES = "searches"
@@ -183,15 +183,12 @@ def _search(
     stop: threading.Event | None,
 ) -> tuple[Selection, dict[str, Any]] | None:
     """Search, and select a design with its provenance; None if the search was stopped."""
-    search = settings.search_settings(task.kind)
-    runs = []
-    for name, (problem, chains) in task.starts(settings.chains).items():
-        own = replace(search, chains=chains)
-        runs.append(_run(problem, own, path / name))
-        progress = partial(report, task)
-        if not run_chains(runs[-1], own, workers=workers, progress=progress, stop=stop):
-            return None
-    return _select(task.problem(), runs, search, workers, stop)
+    problem, search = task.problem(), settings.search
+    run = _run(problem, search, path)
+    progress = partial(report, task)
+    if not run_chains(run, search, workers=workers, progress=progress, stop=stop):
+        return None
+    return _select(problem, run, search, workers, stop)
 
 
 def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
@@ -211,41 +208,30 @@ def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
 
 def _select(
     problem: Problem,
-    runs: Sequence[RunFolder],
+    run: RunFolder,
     settings: SearchSettings,
     workers: int | None,
     stop: threading.Event | None,
 ) -> tuple[Selection, dict[str, Any]] | None:
-    """Select, clean and refine the best design of the searches of a task.
+    """Select, clean and refine the best design of a search.
 
     Also return its provenance. None if the refinement was stopped.
     """
-    candidates: list[Candidate] = []
-    chains: list[dict[str, Any]] = []
-    for run in runs:
-        found, _, best = accepted_candidates(run, read_settings(run.settings))
-        candidates += [replace(each, chain=each.chain + len(chains)) for each in found]
-        chains += [
-            {"begun_with": run.path.name, "best": value if math.isfinite(value) else None}
-            for value in best
-        ]
+    candidates, _, _ = accepted_candidates(run, settings)
     limit = PartSpec().registered_material.strain_limit
     try:
         chosen = select_design(problem, candidates, settings, limit)
     except InvalidSettings as error:
         raise _NoUsableDesign(str(error)) from None
-    refinement = None
-    if problem.is_specified:
-        chosen, refinement = refine_selection(chosen, PartSpec(), workers=workers, stop=stop)
-        if stop is not None and stop.is_set():
-            return None
+    chosen, refinement = refine_selection(chosen, PartSpec(), workers=workers, stop=stop)
+    if stop is not None and stop.is_set():
+        return None
     assert chosen.verification is not None
     if chosen.verification.fault is not None:
         raise _NoUsableDesign(f"no design without a fault: {chosen.verification.fault}")
     notes = {
         "kind": "machine",
         "settings": settings.to_dict(),
-        "chains": chains,
         "chain": chosen.found.chain,
         "step": chosen.found.step,
         "efficiency_before_cleaning": finite(chosen.efficiency_before),

@@ -1,8 +1,7 @@
-"""Measurement of an entry: two-port, frame analyses, plain lever."""
+"""Measurement of an entry: two-port, frame analyses, figures of the part."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +13,8 @@ from bellcrank.machines.library.entry import (
     OWN,
     Entry,
     FrameResult,
-    LeverResult,
     direction_of,
-    kinds,
 )
-from bellcrank.machines.library.lever import plain_lever
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Status, model_evaluator
 from bellcrank.part import PartSpec, models
 from bellcrank.provenance import provenance
@@ -26,9 +22,7 @@ from bellcrank.workflows import spec_for, validate
 from bellcrank.workflows.part_figures import part_figures
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from bellcrank.model import Design, Problem
+    from bellcrank.model import Design
 
 MIN_INPUT_STIFFNESS = 1e-6
 """Input stiffness below which a design is a mechanism without resistance."""
@@ -84,7 +78,6 @@ def measure(
         kind=kind,
         characterisation=replace(found, provenance={}),
         validation=frame_result(design, spec_for(design)),
-        lever=lever_result(problem, () if kind == OWN else kinds[kind].goals),
         provenance={**provenance(**(notes or {})), **({"design": origin} if origin else {})},
         figures=entry_figures(design),
     )
@@ -141,27 +134,3 @@ def frame_result(design: Design, spec: PartSpec) -> FrameResult:
         scale=spec.scale,
         warnings=(*found.doubts, *large.warnings),
     )
-
-
-def lever_result(problem: Problem, goals: Sequence[str] = ()) -> LeverResult:
-    """Return the result of the plain lever, with constraints and without."""
-    bound, unbound = _lever(problem, goals), _lever(problem, ()) if goals else None
-    if bound is None:
-        return LeverResult(math.nan, _efficiency(unbound))
-    return LeverResult(
-        efficiency=_efficiency(bound),
-        unbound_efficiency=_efficiency(unbound if goals else bound),
-        shape=str(bound.provenance["origin"]),
-        mask=bound.mask_hex,
-    )
-
-
-def _lever(problem: Problem, goals: Sequence[str]) -> Design | None:
-    try:
-        return plain_lever(problem, goals)
-    except InvalidSettings:
-        return None
-
-
-def _efficiency(lever: Design | None) -> float:
-    return math.nan if lever is None or lever.efficiency is None else lever.efficiency

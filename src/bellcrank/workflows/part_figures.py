@@ -93,7 +93,7 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
 def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[str, Any]:
     """Return the figures that follow from one response."""
     fractions = np.arange(1, STATES + 1) / STATES
-    names = ["motion", "displacement", "rotation", "stiffness"]
+    names = ["motion", "displacement", "rotation", "stiffness", "blocked_force"]
     if units.density == units.density:
         names.append("sag")
     own = [Channel(name, output) for name in names]
@@ -118,6 +118,9 @@ def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[
         "strain": finite(found[Channel("strain")].max()),
         "output_stiffness_N_per_mm": finite(
             units.in_part("stiffness", found[Channel("stiffness", output)][0])
+        ),
+        "blocked_force_N": finite(
+            units.in_part("force", found[Channel("blocked_force", output)][0])
         ),
         "sag_mm": finite(units.in_part("length", sag)),
         "limit_points": limit_points(fractions, force),

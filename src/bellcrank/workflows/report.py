@@ -286,6 +286,7 @@ FIGURES = (
     ("input force, largest along the stroke", ("largest_input_force_N",), "{:.3g}", "N"),
     ("output stiffness", ("output_stiffness_N_per_mm",), "{:.3g}", "N/mm"),
     ("payload that halves the travel", ("payload_N",), "{:.3g}", "N"),
+    ("blocked force at full stroke", ("blocked_force_N",), "{:.3g}", "N"),
     ("sag under own weight, upright", ("sag_mm",), "{:.3g}", "mm"),
 )
 """Figures of a part: name, keys, format and unit."""

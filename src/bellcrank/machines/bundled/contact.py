@@ -51,8 +51,8 @@ def bundled_contact(name: str) -> ContactCheck:
 
     Examples
     --------
-    >>> bundled_contact("reverser").onset is None
-    False
+    >>> bundled_contact("reverser").message
+    'no contact'
     """
     if name not in bundled_machines():
         known = ", ".join(bundled_machines())

@@ -1,15 +1,15 @@
-"""Library of elementary actuators, found by searches and measured.
+"""Library of elementary actuators, found by searches, refined and measured.
 
-An `Entry` is a design with its two-port, the results of frame analyses of the part, and the plain
-lever for the same problem. `library` finds entries. The module `measurement` measures a design as
-an entry, and `making` searches for new entries; both are imported where they are used.
+An `Entry` is a design with its two-port and the figures of the part. `library` finds entries. The
+modules `library_measurement` and `library_making` of `bellcrank.workflows` measure a design as an
+entry and search for new entries.
 
 Examples
 --------
 >>> from bellcrank.machines.library import library
->>> best = library().search(direction="down", columns=9, kind="free", better=True)[0]
+>>> best = library().search(direction="down", part={"payload_N": 0.5}, sort="gain")[0]
 >>> entry = library().find(best.name)
->>> entry.efficiency > entry.lever.efficiency
+>>> entry.figures["off_axis"] <= 0.05
 True
 """
 
@@ -26,7 +26,6 @@ from bellcrank.machines.library.entry import (
     Entry,
     FrameResult,
     Kind,
-    LeverResult,
     kind_title,
     kinds,
 )
@@ -37,7 +36,6 @@ __all__ = [
     "Entry",
     "FrameResult",
     "Kind",
-    "LeverResult",
     "Library",
     "Summary",
     "bundled_folder",

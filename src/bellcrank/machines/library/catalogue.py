@@ -39,18 +39,14 @@ class Summary:
     beams
         Number of beams.
     efficiency
-        Efficiency at the full stroke, under the load that it was designed for.
+        Efficiency at the full stroke.
     free_efficiency, input_stiffness, output_compliance
         Two-port at rest; the compliance is infinite for an output that is not connected.
     frame_efficiency, frame_status
         Result of the nonlinear frame analysis; nan if the full stroke is not reached.
-    lever_efficiency
-        Efficiency of the plain lever; nan if no lever is stable.
-    better
-        Whether the entry is more efficient than the plain lever.
     warnings
         Whether there are warnings: struts in contact, or a loss of stability.
-    gain, off_axis, rotation_deg, travel_mm, payload_N, sag_mm
+    gain, off_axis, rotation_deg, travel_mm, payload_N, blocked_force_N, sag_mm
         Figures of the part with 8 elements in each strut; nan if they are unknown.
     """
 
@@ -65,14 +61,13 @@ class Summary:
     output_compliance: float
     frame_efficiency: float
     frame_status: str
-    lever_efficiency: float
-    better: bool
     warnings: bool
     gain: float = math.nan
     off_axis: float = math.nan
     rotation_deg: float = math.nan
     travel_mm: float = math.nan
     payload_N: float = math.nan  # noqa: N815 - the unit
+    blocked_force_N: float = math.nan  # noqa: N815
     sag_mm: float = math.nan
 
     @property
@@ -88,11 +83,13 @@ class Summary:
         }
 
 
-PART_FIGURES = ("off_axis", "rotation_deg", "travel_mm", "payload_N", "sag_mm")
+PART_FIGURES = (
+    "off_axis", "rotation_deg", "travel_mm", "payload_N", "blocked_force_N", "sag_mm",
+)  # fmt: skip
 """Figures of the part in a summary."""
 PART_BOUNDS = {
     "gain": 1.0, "off_axis": -1.0, "rotation_deg": -1.0, "travel_mm": 1.0, "payload_N": 1.0,
-    "sag_mm": -1.0,
+    "blocked_force_N": 1.0, "sag_mm": -1.0,
 }  # fmt: skip
 """Figures that a search may bound: 1 for a lower bound, -1 for an upper one."""
 
@@ -121,8 +118,6 @@ def read_summary(path: Path) -> Summary:
             output_compliance=_number(rest["output_compliance"], math.inf),
             frame_efficiency=_number(table.validation.efficiency, math.nan),
             frame_status=table.validation.status,
-            lever_efficiency=_number(table.lever.efficiency, math.nan),
-            better=table.lever.better,
             warnings=bool(table.validation.warnings or found["warnings"]),
             gain=_number(table.figures.get("efficiency"), math.nan),
             **{name: _number(table.figures.get(name), math.nan) for name in PART_FIGURES},
@@ -163,7 +158,7 @@ SORTS: dict[str, Callable[[Summary, float], float]] = {
     "stiffness": lambda each, _spring: each.input_stiffness,
     "output-stiffness": lambda each, _spring: -1.0 / each.output_compliance,
     "work": lambda each, _spring: -each.two_port.best_work_share,
-    "gain": lambda each, _spring: -(each.efficiency - each.lever_efficiency),
+    "gain": lambda each, _spring: _known(-each.gain),
     "size": lambda each, _spring: float(each.beams),
     "off-axis": lambda each, _spring: _known(each.off_axis),
     "payload": lambda each, _spring: _known(-each.payload_N),
@@ -284,7 +279,6 @@ class Library:
         efficiency: float | None = None,
         stiffness: float | None = None,
         output_stiffness: float | None = None,
-        better: bool = False,
         no_warnings: bool = False,
         part: Mapping[str, float] | None = None,
         sort: str = "efficiency",
@@ -303,8 +297,6 @@ class Library:
             Maximum input stiffness with a free output.
         output_stiffness
             Minimum output stiffness with the input held.
-        better
-            Only entries that are more efficient than the plain lever.
         no_warnings
             Only entries without warnings: no struts in contact, no loss of stability.
         part
@@ -342,7 +334,6 @@ class Library:
                 and (efficiency is None or each.two_port.efficiency_against(spring) >= efficiency)
                 and (stiffness is None or each.input_stiffness <= stiffness)
                 and (output_stiffness is None or output_stiffness * each.output_compliance <= 1.0)
-                and (each.better or not better)
                 and not (each.warnings and no_warnings)
                 and all(
                     PART_BOUNDS[name] * (getattr(each, name) - bound) >= 0.0
@@ -380,10 +371,10 @@ def find_entry(text: str) -> Entry:
 
     Examples
     --------
-    >>> find_entry("up-9-fre-")  # doctest: +ELLIPSIS
+    >>> find_entry("up-9-strait")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bellcrank.errors.UnknownName: no library entry 'up-9-fre-'...; see bellcrank library list
+    bellcrank.errors.UnknownName: no library entry 'up-9-strait'...; see bellcrank library list
     """
     return library().find(text)
 

@@ -1,8 +1,7 @@
 """Entries of the library, and the kinds of actuators.
 
-The kind of an actuator is the load case that it was designed for: the load at its output during
-the search, and the constraints that the search kept. Actuators of different kinds serve at
-different positions of a chain (`docs/machines.md`).
+All actuators that `bellcrank library make` makes are straight motions with a payload
+(`bellcrank.machines.library.tasks.straight_motion`); their kind is the payload.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ HASH_DIGITS = 8
 MIXED = "mixed"
 """Direction of an output whose nodes move in different directions, like jaws."""
 OWN = "own"
-"""Kind of an entry that was added by the user, with an unknown load case."""
+"""Kind of an entry that was added by the user."""
 
 
 FIGURES = (
     "efficiency", "efficiency_half", "travel_mm", "off_axis", "rotation_deg",
-    "largest_input_force_N", "output_stiffness_N_per_mm", "payload_N", "sag_mm",
+    "largest_input_force_N", "output_stiffness_N_per_mm", "payload_N", "blocked_force_N", "sag_mm",
 )  # fmt: skip
 """Figures of a part (`bellcrank.workflows.part_figures`) that an entry has."""
 
@@ -46,50 +45,22 @@ class Kind:
     ----------
     title
         Name as it is shown; the registered name is the short form in names of entries.
-    about
-        Use of such actuators.
-    spring
-        Stiffness k_ext of the spring at each output node during the search; None for a free
-        output.
-    goals
-        Constraints that the search kept.
     payload
-        Smallest force in N that halves the travel, of kinds that are searched and refined to the
-        specification of a straight motion (`bellcrank.machines.library.tasks.straight_motion`);
-        None for other kinds.
+        Force in N at the output that leaves at least half of the travel.
 
     Examples
     --------
-    >>> kinds["loaded"].spring, kinds["light"].goals[0], kinds["straight-10g"].payload
-    (0.02, 'input-stiffness <= 0.1', 0.1)
+    >>> kinds["straight-10g"]
+    Kind(title='straight, 10 g', payload=0.1)
     """
 
     title: str
-    about: str
-    spring: float | None = None
-    goals: tuple[str, ...] = ()
-    payload: float | None = None
+    payload: float
 
 
 kinds: Registry[Kind] = Registry("kind of actuator")
-kinds.register("free")(Kind("free stroke", "large motion without a load"))
-kinds.register("loaded")(Kind("loaded output", "motion against springs at the output", spring=0.02))
-kinds.register("light")(
-    Kind(
-        "low input force",
-        "driven by other actuators, as the last stage of a chain",
-        # The lower bound excludes mechanisms, whose input stiffness is zero.
-        goals=("input-stiffness <= 0.1", "input-stiffness >= 0.001"),
-    )
-)
-for _grams, _payload in ((10, 0.1), (50, 0.5), (200, 2.0)):
-    kinds.register(f"straight-{_grams}g")(
-        Kind(
-            f"straight motion, {_grams} g",
-            "along its direction, without rotation or sag, with a payload",
-            payload=_payload,
-        )
-    )
+for _grams in (10, 50, 100, 200):
+    kinds.register(f"straight-{_grams}g")(Kind(f"straight, {_grams} g", _grams / 100))
 
 
 def kind_title(kind: str) -> str:
@@ -97,8 +68,8 @@ def kind_title(kind: str) -> str:
 
     Examples
     --------
-    >>> kind_title("light"), kind_title("own")
-    ('low input force', 'own design')
+    >>> kind_title("straight-50g"), kind_title("own")
+    ('straight, 50 g', 'own design')
     """
     return kinds[kind].title if kind in kinds else f"{kind} design"
 
@@ -142,28 +113,6 @@ class FrameResult:
     warnings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class LeverResult:
-    """The plain lever for the same problem, under the same load and constraints.
-
-    Parameters
-    ----------
-    efficiency
-        Efficiency at the full stroke; nan if no lever is stable and satisfies the constraints.
-    unbound_efficiency
-        Efficiency of the best lever without the constraints.
-    shape
-        Description of the lever.
-    mask
-        Its beams, in hexadecimal; empty if there is none.
-    """
-
-    efficiency: float
-    unbound_efficiency: float
-    shape: str = ""
-    mask: str = ""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
     """An actuator of the library.
@@ -171,19 +120,17 @@ class Entry:
     Parameters
     ----------
     design
-        Design, with its efficiency under the load that it was designed for.
+        Design, with its efficiency.
     direction
         Output direction: a name in `DIRECTIONS`, or ``"mixed"``.
     columns
         Size of its elementary problem; None for a design of another lattice.
     kind
-        Load case that it was designed for: a name in `kinds`, or ``"own"``.
+        A name in `kinds`, or ``"own"`` for a design of the user.
     characterisation
         Two-port, without the springs of the problem.
     validation
         Results of the frame analyses.
-    lever
-        Plain lever for comparison.
     provenance
         Origin of the design and of the results.
     figures
@@ -196,7 +143,6 @@ class Entry:
     kind: str
     characterisation: Characterisation
     validation: FrameResult
-    lever: LeverResult
     provenance: dict[str, Any] = field(default_factory=dict)
     figures: dict[str, float | None] = field(default_factory=dict)
 
@@ -207,18 +153,13 @@ class Entry:
 
     @property
     def efficiency(self) -> float:
-        """Efficiency at the full stroke, under the load that it was designed for."""
+        """Efficiency at the full stroke."""
         return math.nan if self.design.efficiency is None else self.design.efficiency
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings of the frame analyses and of the two-port."""
         return (*self.validation.warnings, *self.characterisation.warnings)
-
-    @property
-    def better(self) -> bool:
-        """Whether it is more efficient than the plain lever."""
-        return not self.lever.efficiency >= self.efficiency
 
 
 def identity(design: Design, kind: str) -> str:
@@ -227,8 +168,8 @@ def identity(design: Design, kind: str) -> str:
     Examples
     --------
     >>> from bellcrank.machines import elementary
-    >>> identity(elementary(9, "down").full_design(), "free")
-    '15be2a2a'
+    >>> identity(elementary(9, "down").full_design(), "own")
+    '2bfcbcd9'
     """
     content = {"kind": kind, "mask": design.mask_hex, "problem": design.problem.hash}
     return hashlib.sha256(canonical(content).encode()).hexdigest()[:HASH_DIGITS]
@@ -259,8 +200,8 @@ def stem(direction: str, columns: int | None, kind: str) -> str:
 
     Examples
     --------
-    >>> stem("down", 9, "free"), stem("up-left", None, "own")
-    ('down-9-free', 'up-left-own')
+    >>> stem("down", 9, "straight-10g"), stem("up-left", None, "own")
+    ('down-9-straight-10g', 'up-left-own')
     """
     return "-".join(str(part) for part in (direction, columns, kind) if part is not None)
 

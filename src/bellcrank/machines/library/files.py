@@ -1,11 +1,11 @@
-"""Files of entries: JSON with the schema ``bellcrank/entry/1``, on one line.
+"""Files of entries: JSON with the schema ``bellcrank/entry/2``, on one line.
 
 ::
 
-    {"schema": "bellcrank/entry/1", "name": "down-9-free-3fa2c1b0", "direction": "down",
-     "columns": 9, "kind": "free", "design": {...}, "characterisation": {...},
-     "validation": {"level": "frame", "efficiency": 5.1, ...},
-     "lever": {"efficiency": 3.8, "better": true, ...}, "provenance": {...}, "checksum": "..."}
+    {"schema": "bellcrank/entry/2", "name": "down-9-straight-50g-1df984a7", "direction": "down",
+     "columns": 9, "kind": "straight-50g", "design": {...}, "characterisation": {...},
+     "validation": {"level": "frame", "efficiency": 5.1, ...}, "provenance": {...},
+     "figures": {"off_axis": 0.04, ...}, "checksum": "..."}
 
 ``design`` has the form of a design file, ``characterisation`` that of a file of `bellcrank
 characterise`. The name ends with a hash of problem, beams and kind; ``checksum`` is a hash of all
@@ -32,7 +32,6 @@ from bellcrank.machines.characterisation_files import (
 from bellcrank.machines.library.entry import (
     Entry,
     FrameResult,
-    LeverResult,
     canonical,
     check_direction,
     check_kind,
@@ -45,7 +44,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
-SCHEMA = "bellcrank/entry/1"
+SCHEMA = "bellcrank/entry/2"
 CHANGED = "the file was changed or is damaged; write the entry again (bellcrank library add DESIGN)"
 
 
@@ -68,20 +67,10 @@ class FrameTable(Table):
     warnings: list[str]
 
 
-class LeverTable(Table):
-    """``lever``; null for an efficiency that does not exist."""
-
-    efficiency: float | None
-    unbound_efficiency: float | None
-    shape: str
-    mask: str
-    better: bool
-
-
 class EntryTable(Table):
     """A file."""
 
-    schema_: Literal["bellcrank/entry/1"] = Field(alias="schema")
+    schema_: Literal["bellcrank/entry/2"] = Field(alias="schema")
     name: str
     direction: str
     columns: int | None
@@ -89,7 +78,6 @@ class EntryTable(Table):
     design: dict[str, Any]
     characterisation: dict[str, Any]
     validation: FrameTable
-    lever: LeverTable
     provenance: dict[str, Any]
     figures: dict[str, float | None] = Field(default_factory=dict)
     checksum: str
@@ -106,7 +94,6 @@ def entry_to_dict(entry: Entry) -> dict[str, Any]:
         "design": design_to_dict(entry.design),
         "characterisation": characterisation_to_dict(entry.characterisation),
         "validation": {"level": "frame", **_nan_to_null(asdict(entry.validation))},
-        "lever": {**_nan_to_null(asdict(entry.lever)), "better": entry.better},
         "provenance": dict(entry.provenance),
     }
     data["validation"]["warnings"] = list(entry.validation.warnings)
@@ -135,7 +122,6 @@ def entry_from_dict(data: Mapping[str, Any], source: str) -> Entry:
     table = checked_table(data, source)
     design = design_from_dict(table.design, f"{source}: design")
     check = _null_to_nan(table.validation.model_dump(exclude={"level"}))
-    lever = _null_to_nan(table.lever.model_dump(exclude={"better"}))
     entry = Entry(
         design=design,
         direction=table.direction,
@@ -145,7 +131,6 @@ def entry_from_dict(data: Mapping[str, Any], source: str) -> Entry:
             table.characterisation, f"{source}: characterisation"
         ),
         validation=FrameResult(**{**check, "warnings": tuple(table.validation.warnings)}),
-        lever=LeverResult(**lever),
         provenance=dict(table.provenance),
         figures=dict(table.figures),
     )

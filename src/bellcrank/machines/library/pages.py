@@ -24,14 +24,15 @@ PICTURE = re.compile(r"[a-z0-9-]+-[0-9a-f]{8}\.svg")
 ORDER = ("up-left", "up", "up-right", "right", "down-right", "down", "down-left", "left")
 """Directions in clockwise order."""
 ABOUT = (
-    "{} entries, {} of them more efficient than the plain lever for the same problem. Each is "
-    "pushed down on the right (orange) and moves its left port (blue). `docs/machines.md` defines "
-    "the figures. This page is written by `bellcrank library index`. *Contact*: struts of the part "
-    "touch along the stroke."
+    "{} actuators, frames of struts 2 mm wide on 10 mm. Each is pushed down on the right (orange) "
+    "and moves its left port (blue). `docs/machines.md` defines the figures, those of the part at "
+    "full stroke by frames with 8 elements in each strut; *in the sheet* is the gain by finite "
+    "elements in the plane. This page is written by `bellcrank "
+    "library index`."
 )
 COLUMNS = (
-    "", "name", "efficiency", "plain lever", "frame analysis", "input stiffness",
-    "output stiffness", "share of work",
+    "", "name", "gain", "in the sheet", "travel, mm", "off-axis", "rotation, degrees", "payload, N",
+    "blocked force, N", "sag, mm", "input force, N",
 )  # fmt: skip
 
 
@@ -66,27 +67,29 @@ def write_page(known: Library, folder: Path, *, overwrite: bool = False) -> Path
 
 
 def draw(entry: Entry) -> Thumbnail:
-    """Draw an entry at rest and at its full stroke, under the load that it was designed for."""
+    """Draw an entry at rest and at its full stroke."""
     response = model_evaluator(entry.design.problem).evaluate(entry.design.mask)
     return thumbnail(entry.design, response.displacement)
 
 
 def page(entries: list[Entry]) -> str:
     """Return the Markdown page."""
-    better = sum(entry.better for entry in entries)
-    lines = ["# Library of elementary actuators", "", ABOUT.format(len(entries), better)]
-    for kind in dict.fromkeys(entry.kind for entry in entries):
-        about = f": {kinds[kind].about}." if kind in kinds else "."
+    lines = ["# Library of elementary actuators", "", ABOUT.format(len(entries))]
+    known = [*kinds, *sorted({entry.kind for entry in entries} - set(kinds))]
+    for kind in known:
+        rows = [_row(entry) for entry in entries if entry.kind == kind]
+        if not rows:
+            continue
         lines += [
             "",
             f"## {kind_title(kind).capitalize()}",
             "",
-            f"Kind `{kind}`{about}",
+            f"Kind `{kind}`.",
             "",
             f"| {' | '.join(COLUMNS)} |",
             f"|{'---|' * len(COLUMNS)}",
         ]
-        lines += [_row(entry) for entry in entries if entry.kind == kind]
+        lines += rows
     return "\n".join(lines) + "\n"
 
 
@@ -96,25 +99,32 @@ def _position(entry: Entry) -> tuple[int, int, str]:
     return position, entry.columns or 0, entry.kind
 
 
+def gain_in_sheet(entry: Entry) -> float | None:
+    """Return the gain by finite elements in the plane; None if it is unknown."""
+    for item in entry.provenance.get("items", ()):
+        if item["quantity"] == "gain" and "sheet" in item["reached"]:
+            return float(item["reached"]["sheet"]["value"])
+    return None
+
+
 def _row(entry: Entry) -> str:
-    rest, check = entry.characterisation.rest, entry.validation
-    lever = _figure(entry.lever.efficiency)
-    frame = _figure(check.efficiency) if check.status == "converged" else check.status
-    if entry.warnings:
-        frame += " (warning)" if entry.characterisation.warnings else " (contact)"
+    def figure(name: str, form: str) -> str:
+        value = entry.figures.get(name)
+        return form.format(value) if value is not None and math.isfinite(value) else "–"
+
+    sheet = gain_in_sheet(entry)
+    warning = " (see its warnings)" if entry.warnings else ""
     cells = [
         f'<img src="{entry.name}.svg" width="130" alt="{entry.name}">',
-        f"`{entry.name}`",
-        f"**{_figure(entry.efficiency)}**",
-        lever if entry.better else f"{lever} (more efficient)",
-        frame,
-        _figure(rest.input_stiffness),
-        _figure(rest.output_stiffness),
-        f"{100.0 * rest.best_work_share:.1f} %",
+        f"`{entry.name}`{warning}",
+        f"**{figure('efficiency', '{:.2f}')}**",
+        "–" if sheet is None else f"{sheet:.2f}",
+        figure("travel_mm", "{:.1f}"),
+        figure("off_axis", "{:.1%}"),
+        figure("rotation_deg", "{:.1f}"),
+        figure("payload_N", "{:.2f}"),
+        figure("blocked_force_N", "{:.2f}"),
+        figure("sag_mm", "{:.2f}"),
+        figure("largest_input_force_N", "{:.1f}"),
     ]
     return f"| {' | '.join(cells)} |"
-
-
-def _figure(value: float) -> str:
-    """Return three digits, or a dash for a value that is not finite."""
-    return f"{value:.3g}" if math.isfinite(value) else "–"

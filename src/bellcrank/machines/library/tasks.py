@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.errors import InvalidSettings
 from bellcrank.machines.elementary import DIRECTIONS, elementary
 from bellcrank.machines.library.entry import kinds, stem
-from bellcrank.machines.library.lever import plain_lever
-from bellcrank.mechanics import Status, model_evaluator
 from bellcrank.model import Item, ObjectiveTerm, Specification
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import HoppingSettings
@@ -88,8 +84,8 @@ class EntryTask:
 
     Examples
     --------
-    >>> EntryTask("up", 9, "loaded").problem().name
-    'elementary-9-up-loaded'
+    >>> EntryTask("up", 9, "straight-10g").problem().name
+    'elementary-9-up'
     """
 
     direction: str
@@ -106,42 +102,12 @@ class EntryTask:
 
         Its beams are struts of the default part, 2 mm wide on 10 mm.
         """
-        made = elementary(self.columns, self.direction, kinds[self.kind].spring)
-        given = frame_problem(made, PartSpec())
-        payload = kinds[self.kind].payload
-        if payload is not None:
-            given = straight_motion(given, payload)
+        given = frame_problem(elementary(self.columns, self.direction), PartSpec())
+        given = straight_motion(given, kinds[self.kind].payload)
         lattice = given.lattice
         held = np.isin(lattice.beams, given.supports.nodes).all(axis=1)
         at_ports = lattice.beams_touching(np.concatenate([given.input.nodes, given.output.nodes]))
         return replace(given, designable=np.flatnonzero(~held & ~at_ports))
-
-    def starts(self, chains: int) -> dict[str, tuple[Problem, int]]:
-        """Return the initial designs of the searches, each with a number of chains.
-
-        Half of the chains start from the full lattice, half from the plain lever if there is
-        one. Designs near the lever are hard to reach from the full lattice. Searches to a
-        specification start from the full lattice.
-        """
-        problem = self.problem()
-        if problem.is_specified:
-            return {"full": (problem, chains)}
-        for goals in (kinds[self.kind].goals, ()):
-            with contextlib.suppress(InvalidSettings):
-                lever = plain_lever(problem, goals)
-                break
-        else:
-            return {"full": (problem, chains)}
-        initial = problem.initial.copy()
-        initial[problem.designable] = lever.mask[problem.designable]
-        # With the complete port the lever may snap; a search cannot start there.
-        if model_evaluator(problem).evaluate(initial).status is not Status.CONVERGED:
-            return {"full": (problem, chains)}
-        starts = {
-            "full": (problem, chains - chains // 2),
-            "lever": (replace(problem, initial=initial), chains // 2),
-        }
-        return {name: start for name, start in starts.items() if start[1]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,7 +128,7 @@ class MakeSettings:
     Examples
     --------
     >>> len(MakeSettings().tasks)
-    144
+    96
     """
 
     directions: tuple[str, ...] = tuple(DIRECTIONS)
@@ -175,7 +141,7 @@ class MakeSettings:
     def __post_init__(self) -> None:
         for task in self.tasks:
             task.problem()
-            self.search_settings(task.kind)
+        HoppingSettings(steps=self.steps, chains=self.chains, seed=self.seed)
 
     @property
     def tasks(self) -> list[EntryTask]:
@@ -187,8 +153,7 @@ class MakeSettings:
             for kind in self.kinds
         ]
 
-    def search_settings(self, kind: str) -> SearchSettings:
-        """Return the settings of the search for a kind."""
-        return HoppingSettings(
-            steps=self.steps, chains=self.chains, seed=self.seed, goals=kinds[kind].goals
-        )
+    @property
+    def search(self) -> SearchSettings:
+        """Settings of each search."""
+        return HoppingSettings(steps=self.steps, chains=self.chains, seed=self.seed)
