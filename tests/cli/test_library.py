@@ -11,6 +11,7 @@ import pytest
 from bellcrank.machines import elementary
 from bellcrank.machines.library import Library, bundled_folder, find_entry, read_entry
 from bellcrank.model import read_design, write_design
+from bellcrank.refine import RefinementSettings
 
 from .helpers import call, refusal
 
@@ -129,20 +130,25 @@ def test_a_design_is_added_to_ones_own_folder(lever: Path, own: Path) -> None:
     assert len(read_entry(path).characterisation.curves[0].motion) == 2
 
 
-def test_entries_are_made_where_one_wants_them(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_entries_are_made_where_one_wants_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short = RefinementSettings(evaluations=30)
+    monkeypatch.setattr("bellcrank.workflows.refiners.SETTINGS", short)
     words = (
-        "library", "make", "--directions", "down", "--columns", "5", "--kinds", "straight-10g",
-        "--steps", 500, "--chains", 2, "--out", tmp_path / "made",
+        "library", "make", "--directions", "up", "--columns", "5", "--kinds", "straight-10g",
+        "--steps", 300, "--chains", 2, "--out", tmp_path / "made",
     )  # fmt: skip
     outcome = call(*words)
     assert outcome.code == 0, outcome.err
-    assert "1 of 1  down-5-straight-10g: down-5-straight-10g-" in outcome.err
-    assert len(list((tmp_path / "made").glob("down-5-straight-10g-*.json"))) == 1
+    assert "1 of 1  up-5-straight-10g: up-5-straight-10g-" in outcome.err
+    assert len(list((tmp_path / "made").glob("up-5-straight-10g-*.json"))) == 1
     assert "exists" in call(*words).err
-    assert "none better than down-5-straight-10g-" in call(*words, "--again").err
+    assert "none better than up-5-straight-10g-" in call(*words, "--again").err
     outcome = call("library", "index", "--entries", tmp_path / "made", "--out", tmp_path / "pages")
     assert outcome.code == 0, outcome.err
-    (name,) = (path.stem for path in (tmp_path / "made").glob("down-*.json"))
+    (name,) = (path.stem for path in (tmp_path / "made").glob("up-*.json"))
     readable = (tmp_path / "pages" / "README.md").read_text()
     assert f"{name}.svg" in readable
     assert (tmp_path / "pages" / f"{name}.svg").read_text().startswith("<svg")

@@ -92,9 +92,7 @@ def print_entries(
         )
     results.print(table)
     count = "1 entry" if len(found) == 1 else f"{len(found)} entries"
-    results.print(
-        f"\n{count}; parts of struts 2 mm wide on 10 mm, by frames with 8 elements in each strut"
-    )
+    results.print(f"\n{count}; parts of struts 2 mm wide on 10 mm, frames of 8 elements a strut")
     if spring:
         results.print("gain against a spring: at rest, with the spring in lattice units")
     if warned := sum(each.warnings for each in found):

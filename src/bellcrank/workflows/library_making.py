@@ -229,6 +229,10 @@ def _select(
     assert chosen.verification is not None
     if chosen.verification.fault is not None:
         raise _NoUsableDesign(f"no design without a fault: {chosen.verification.fault}")
+    missed = [] if refinement is None else [each for each in refinement.after.sheet if not each.met]
+    if missed:
+        names = ", ".join(each.item.name for each in missed)
+        raise _NoUsableDesign(f"no design without a fault: misses {names} in the sheet")
     notes = {
         "kind": "machine",
         "settings": settings.to_dict(),
