@@ -1,6 +1,6 @@
 // The page on which parts are placed, rotated and linked, and assembled to one design.
 
-import { bitsOf, get, post, type Point, type Problem, type ServerError, type Collection, type GalleryEntry } from "./api";
+import { bitsOf, get, modelOf, post, type Point, type Problem, type ServerError, type Collection, type GalleryEntry } from "./api";
 import { arrow, Drawing, isEach, where } from "./drawing";
 import { announce, button, choice, clear, field, figure, h, iconButton, number, s, select } from "./dom";
 import { emptyPlan, isPlan, MOST, portLabel, portsOf, readPlan, withoutPart, withPart, writePlan, type Plan, type PlanEnd, type PlanPart, type Port, type WrittenPlan } from "./plan";
@@ -162,7 +162,7 @@ export class MachinePage {
     drawing.overlay.replaceChildren(...(["input", "output"] as const).flatMap((region) => arrows(problem, region)));
     const reversed = built.efficiency !== null && built.efficiency < 0;
     clear(this.readout, h("strong", {}, figure(built.efficiency, 3)),
-      h("span", { class: reversed ? "alarm" : "" }, reversed ? "The output moves against its direction: drive it by an actuator made for a loaded output." : "spring model: output / input displacement"),
+      h("span", { class: reversed ? "alarm" : "" }, reversed ? "The output moves against its direction: drive it by an actuator with a larger payload." : `${modelOf(problem)}: output / input displacement`),
       h("span", {}, `${problem.positions.length} nodes, ${where(bits).length} beams`));
   }
 

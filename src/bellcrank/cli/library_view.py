@@ -74,13 +74,12 @@ def print_entries(
         return
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("name", no_wrap=True)
-    load = f"gain,\nspring {spring:g}" if spring else "sag\nmm"
+    last = f"gain,\nspring {spring:g}" if spring else "sag\nmm"
     for heading in (
-        "gain\n", "travel\nmm", "off-\naxis", "rot.\ndeg", "payload\ng", load,
+        "gain\n", "travel\nmm", "off-\naxis", "rot.\ndeg", "payload\ng", last,
     ):  # fmt: skip
         table.add_column(heading, justify="right", no_wrap=True)
     for each in found:
-        against = each.two_port.efficiency_against(spring)
         table.add_row(
             plain(each.name),
             _figure(each.gain, 3) + ("!" if each.warnings else ""),
@@ -88,7 +87,7 @@ def print_entries(
             "-" if math.isnan(each.off_axis) else f"{each.off_axis:.0%}",
             _figure(each.rotation_deg, 2),
             "-" if math.isnan(each.payload_N) else f"{1e3 * each.payload_N / GRAVITY:.0f}",
-            _figure(against if spring else each.sag_mm, 2),
+            _figure(each.two_port.efficiency_against(spring) if spring else each.sag_mm, 2),
         )
     results.print(table)
     count = "1 entry" if len(found) == 1 else f"{len(found)} entries"
@@ -146,16 +145,12 @@ def _designed_for(entry: Entry) -> str:
 
 
 def _part_rows(entry: Entry) -> list[tuple[str, str]]:
-    """Return the figures of the part as rows, those of the reports of `bellcrank design`."""
-    from bellcrank.workflows.report import FIGURES
+    """Return the figures of the part as rows; of springs, the efficiency alone."""
+    from bellcrank.workflows.report import figure_texts
 
-    rows = []
-    for label, keys, form, unit in FIGURES:
-        values = [entry.figures.get(key) for key in keys]
-        if any(value is not None for value in values):
-            known = [form.format(value) if value is not None else "-" for value in values]
-            rows.append((f"  {label}", f"{', '.join(known)} {unit}".rstrip()))
-    return rows
+    if not entry.figures:
+        return [("  efficiency", _figure(entry.efficiency))]
+    return [(f"  {label}", text) for label, text in figure_texts(entry.figures)]
 
 
 def _frame(entry: Entry) -> str:

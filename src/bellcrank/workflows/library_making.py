@@ -183,7 +183,7 @@ def _search(
     stop: threading.Event | None,
 ) -> tuple[Selection, dict[str, Any]] | None:
     """Search, and select a design with its provenance; None if the search was stopped."""
-    problem, search = task.problem(), settings.search
+    problem, search = task.problem(), settings.search_settings()
     run = _run(problem, search, path)
     progress = partial(report, task)
     if not run_chains(run, search, workers=workers, progress=progress, stop=stop):

@@ -16,7 +16,7 @@ from bellcrank.workflows.refinement import refinement_data
 from bellcrank.workflows.specification import binding, item_data, item_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from bellcrank.mechanics import ItemResult, Response
@@ -292,6 +292,16 @@ FIGURES = (
 """Figures of a part: name, keys, format and unit."""
 
 
+def figure_texts(row: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the figures of a part with their names as texts; a dash for unknown ones."""
+    rows = []
+    for label, keys, form, unit in FIGURES:
+        values = [row.get(key) for key in keys]
+        known = [form.format(value) if value is not None else "-" for value in values]
+        rows.append((label, f"{', '.join(known)} {unit}".rstrip()))
+    return rows
+
+
 def part_figure_table(report: DesignReport) -> list[list[str]]:
     """Return the figures of the part as rows of texts, a column for each output."""
     found = report.part_figures
@@ -300,13 +310,8 @@ def part_figure_table(report: DesignReport) -> list[list[str]]:
     several = len({row["case"] for row in found}) > 1
     names = [f"{row['case']}, {row['output']}" if several else row["output"] for row in found]
     rows = [["as a part, 8 elements", *names]]
-    for label, keys, form, unit in FIGURES:
-        texts = []
-        for row in found:
-            values = [row.get(key) for key in keys]
-            known = [form.format(value) if value is not None else "-" for value in values]
-            texts.append(f"{', '.join(known)} {unit}".rstrip())
-        rows.append([label, *texts])
+    texts_of = [dict(figure_texts(row)) for row in found]
+    rows += [[label, *(texts[label] for texts in texts_of)] for label, *_ in FIGURES]
     points = [row.get("limit_points") or [] for row in found]
     texts = [", ".join(f"{point:.0%}" for point in each) or "none" for each in points]
     return [*rows, ["limit points of the force", *texts]]

@@ -99,7 +99,7 @@ def _position(entry: Entry) -> tuple[int, int, str]:
     return position, entry.columns or 0, entry.kind
 
 
-def gain_in_sheet(entry: Entry) -> float | None:
+def _gain_in_sheet(entry: Entry) -> float | None:
     """Return the gain by finite elements in the plane; None if it is unknown."""
     for item in entry.provenance.get("items", ()):
         if item["quantity"] == "gain" and "sheet" in item["reached"]:
@@ -112,7 +112,7 @@ def _row(entry: Entry) -> str:
         value = entry.figures.get(name)
         return form.format(value) if value is not None and math.isfinite(value) else "–"
 
-    sheet = gain_in_sheet(entry)
+    sheet = _gain_in_sheet(entry)
     warning = " (see its warnings)" if entry.warnings else ""
     cells = [
         f'<img src="{entry.name}.svg" width="130" alt="{entry.name}">',

@@ -141,7 +141,7 @@ class MakeSettings:
     def __post_init__(self) -> None:
         for task in self.tasks:
             task.problem()
-        HoppingSettings(steps=self.steps, chains=self.chains, seed=self.seed)
+        self.search_settings()
 
     @property
     def tasks(self) -> list[EntryTask]:
@@ -153,7 +153,6 @@ class MakeSettings:
             for kind in self.kinds
         ]
 
-    @property
-    def search(self) -> SearchSettings:
-        """Settings of each search."""
+    def search_settings(self) -> SearchSettings:
+        """Return the settings of each search."""
         return HoppingSettings(steps=self.steps, chains=self.chains, seed=self.seed)
