@@ -1,6 +1,6 @@
 """What refinement gains: ``python -m benchmarks.refinement``.
 
-Three comparisons, by frames with eight elements in each strut and in the sheet, and a cost:
+Four comparisons, by frames with eight elements in each strut and in the sheet, and a cost:
 
 - ``mass``: the bundled parts, and designs searched for the largest gain in the 24 directions and
   sizes of the library, refined at equal mass, equal least width and without contact; gain before
@@ -9,6 +9,8 @@ Three comparisons, by frames with eight elements in each strut and in the sheet,
   most 2 degrees, from the bundled design and from searches with several seeds.
 - ``exact``: the slider with a gain of 3.0 within 0.1 %, an off-axis motion below 1 % and a rotation
   below 0.5 degrees, from searches with several seeds.
+- ``path``: the tasks with a path, from searches with several seeds; the error of the path after the
+  search alone and after the refinement.
 - ``cost``: the time of the derivatives of all channels by the geometry, over that of the channels
   and their responses, in the plane and in space.
 
@@ -62,6 +64,8 @@ RECORD = Path(__file__).parents[1] / "docs" / "refinement" / "runs.json"
 PARTS = ("crane", "anti-parallel", "discs", "pliers", "scaling-8")
 SEEDS = 8
 """Number of searches of each straight or exact motion."""
+PATHS = ("line", "arc", "corner")
+PATH_SEEDS = 5
 SHARED = {"input_motion", "input_force", "strain"}
 """Channels that belong to a case, not to an output."""
 QUARTERS = [0.25, 0.5, 0.75, 1.0]
@@ -130,23 +134,26 @@ def at_equal_mass(design: Design) -> dict[str, Any]:
     )
     wanted = problem.specification
     assert wanted is not None
-    gain = Item(quantity="gain", case=wanted.case, output=wanted.output, at_least=0.0)
-    problem = replace(problem, specification=replace(wanted, items=(*wanted.items, gain)))
+    (largest,) = wanted.maximise
+    item = Item(quantity=largest.quantity, case=largest.case, output=largest.output, at_least=0.0)
+    problem = replace(problem, specification=replace(wanted, items=(*wanted.items, item)))
     given = Design(problem, design.mask)
     settings = RefinementSettings(evaluations=EVALUATIONS, same_mass=True)
     used = core_seconds()
-    found = refine_design(given, settings)
+    found = refine_design(given, settings, sheet=sheet_of(spec, given))
     seconds = round(core_seconds() - used, 1)
     row = {
         "seconds": seconds,
-        "gain_before": _value(found.before.items, "gain"),
-        "gain": _value(found.after.items, "gain"),
+        "quantity": item.quantity,
+        "gain_before": found.before.objective,
+        "gain": found.after.objective,
         "met_before": found.before.met,
         "met": found.after.met,
         "reason": found.reason,
     }
     for key, each in (("sheet_before", given), ("sheet", found.design)):
-        row[f"gain_{key}"] = _value(_in_sheet(spec, each) or (), "gain")
+        value = _value(_in_sheet(spec, each) or (), item.quantity)
+        row[f"gain_{key}"] = None if value is None else value / largest.scale
     return row
 
 
@@ -191,7 +198,7 @@ def from_bundled(task: str, problem: Problem, spec: PartSpec) -> dict[str, Any]:
         "seconds": round(core_seconds() - used, 1),
         "gain": found.after.objective,
         "met": found.after.met,
-        "met_in_sheet": bool(found.after.sheet) and all(each.met for each in found.after.sheet),
+        "met_in_sheet": bool(found.after.met_in_sheet),
         **_values(found.after.items, "frame"),
         **_values(found.after.sheet, "sheet"),
         "reason": found.reason,
@@ -216,7 +223,8 @@ def from_search(problem: Problem, spec: PartSpec, seed: int) -> dict[str, Any]:
         "gain_before": report.refinement.before.objective,
         "gain": after.objective,
         "met": after.met,
-        "met_in_sheet": bool(after.sheet) and all(each.met for each in after.sheet),
+        "met_in_sheet": bool(after.met_in_sheet),
+        **_values(report.refinement.before.items, "before"),
         **_values(after.items, "frame"),
         **_values(after.sheet, "sheet"),
         "reason": report.refinement.reason,
@@ -266,6 +274,12 @@ def runs() -> dict[str, Callable[[], dict[str, Any]]]:
                 out[f"{kind} {name} {seed}"] = lambda name=name, problem=problem, spec=spec: (
                     from_bundled(name, problem, spec)
                 )
+    for seed, name in product(range(PATH_SEEDS), PATHS):
+        task = find_task(name)
+        assert task is not None
+        out[f"path {name} {seed}"] = lambda task=task, seed=seed: from_search(
+            task.problem, task.part, seed
+        )
     return out
 
 
@@ -278,7 +292,7 @@ def _group(name: str) -> str:
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="cost,mass,straight,exact")
+    parser.add_argument("--only", default="cost,mass,straight,exact,path")
     given = parser.parse_args()
     rows: dict[str, dict[str, Any]] = {}
     if RECORD.exists():
@@ -316,6 +330,11 @@ def summary(rows: dict[str, dict[str, Any]]) -> list[str]:
         else:
             in_sheet = sum(bool(row.get("met_in_sheet")) for row in own)
             text += f", {in_sheet} in the sheet; gain {median(gains):.2f}"
+        if kind.startswith("path"):
+            before, after = (
+                median(row[f"path_error_{state}"] for row in own) for state in ("before", "frame")
+            )
+            text += f"; error of the path {before:.2%} before, {after:.2%} after"
         lines.append(f"{text}; {median(row.get('seconds', 0.0) for row in own):.0f} s")
     return lines
 

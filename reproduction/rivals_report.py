@@ -64,7 +64,8 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
                 "",
                 f"efficiency {_score(ours)} and {_score(rival)}; largest stress "
                 f"{number(ours['von_mises_MPa'], 1)} and {number(rival.get('von_mises_MPa'), 1)} "
-                f"MPa; input force {number(ours['input_force_N'])} and "
+                f"MPa; {_at_equal_stress(task)}; "
+                f"input force {number(ours['input_force_N'])} and "
                 f"{number(rival.get('input_force_N'))} N; design time on one core "
                 f"{ours['design_seconds']:.0f} and {rival['design_seconds']:.0f} s; "
                 f"area {number(ours['area_mm2'], 0)} and {number(rival.get('area_mm2'), 0)} mm²; "
@@ -95,6 +96,16 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
         )
     )
     return found
+
+
+def _at_equal_stress(task: Mapping[str, Any]) -> str:
+    row = task["ours_at_no_higher_stress"]
+    if row is None:
+        return "bellcrank has no design with a stress as low"
+    return (
+        f"bellcrank with no higher stress {number(row['efficiency'])} "
+        f"({number(row['von_mises_MPa'], 2)} MPa)"
+    )
 
 
 UNITS = {"rotation": ("degrees", 1.0), "payload": ("N", 1.0), "gain": ("", 1.0)}

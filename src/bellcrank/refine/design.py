@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
@@ -88,33 +88,46 @@ class Refinement:
 
 
 def specified(problem: Problem, strain_limit: float = math.nan) -> Problem:
-    """Return a problem with a specification: its own, or to maximise the gain without contact.
+    """Return a problem with a specification: its own, or the largest efficiency without contact.
+
+    The efficiency is the gain, or the force in the output springs over that of the input, if the
+    problem is driven by forces against output springs.
 
     Parameters
     ----------
     strain_limit
         Largest strain for a problem without a specification; nan if it is unknown.
-
-    Raises
-    ------
-    InvalidSettings
-        If a problem without a specification is driven by forces.
     """
     if problem.is_specified:
         return problem
-    if problem.input.drive == "force":
-        raise InvalidSettings(
-            f"problem {problem.name!r} has no specification and is driven by forces; write a task "
-            "that says what is wanted"
-        )
     (output,) = problem.outputs
     (case,) = problem.cases
     items = [Item(quantity="clearance", case=case, at_least=0.0)]
     if math.isfinite(strain_limit):
         items.append(Item(quantity="strain", case=case, at_most=strain_limit))
-    gain = ObjectiveTerm(quantity="gain", case=case, output=output)
-    own = Specification(case=case, output=output, items=tuple(items), maximise=(gain,))
+    own = Specification(
+        case=case,
+        output=output,
+        items=tuple(items),
+        maximise=(ObjectiveTerm(case=case, output=output, **_largest(problem)),),
+    )
     return replace(problem, specification=own)
+
+
+class _Quantity(TypedDict):
+    """Quantity of an objective, and the value of it that counts as 1."""
+
+    quantity: str
+    scale: float
+
+
+def _largest(problem: Problem) -> _Quantity:
+    """Return the quantity whose largest value is that of the efficiency."""
+    given, output = problem.input, problem.output
+    if given.drive == "displacement" or output.spring is None:
+        return {"quantity": "gain", "scale": 1.0}
+    force = given.amount * len(given.nodes)
+    return {"quantity": "travel", "scale": force / (output.spring * len(output.nodes))}
 
 
 def refine_design(
@@ -148,7 +161,7 @@ def refine_design(
     Raises
     ------
     InvalidSettings
-        If the design has no section, or its problem has no specification and is driven by forces.
+        If the design has no section.
     """
     settings = settings or RefinementSettings()
     problem = design.problem
