@@ -16,7 +16,7 @@ from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
 from bellcrank.refine.shape import volume_of
-from bellcrank.refine.state import State, is_better, latest_met, state_of, total_violation
+from bellcrank.refine.state import State, is_better, latest_met, state_of
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
 
@@ -46,6 +46,8 @@ SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
 HALVINGS = 2
 """Number of times the path of a refinement that is not near the sheet is halved."""
+MASS_RESERVE = 2e-3
+"""The same for the mass, which all models have in common: more than `MET`."""
 MET = 1e-3
 """Sum of violations at which they are."""
 AMPLE = 0.25
@@ -260,18 +262,30 @@ class _Job:
                 models = self._models(vector, state.records)
 
     def by_sheet(self, sheet: Sheet) -> None:
-        """Refine until all items are met in the sheet too; keeps the best in the sheet."""
+        """Refine until all items are met in the sheet too; keeps the best in the sheet.
+
+        If no refined geometry is near the sheet, the given design is kept if it is.
+        """
         if not self.best.met:
             return
-        vector, state = self.chosen, self._in_sheet(sheet, self.chosen, self.best)
-        self.best = state
-        if not state.is_near_sheet:
-            vector, state = self._earlier(sheet, vector, state)
-            self.best, self.chosen = state, vector
+        self.best = self._in_sheet(sheet, self.chosen, self.best)
+        if not self.best.is_near_sheet:
+            self.chosen, self.best = self._earlier(sheet, self.chosen, self.best)
+        self._repair(sheet)
+        if self.goes_on and self.before.met and not self.best.is_near_sheet and self.chosen.any():
+            start = np.zeros_like(self.chosen)
+            given = self._in_sheet(sheet, start, self.before)
+            if given.is_near_sheet:
+                self.best, self.chosen = given, start
+                self.reason = "in the sheet, all better geometries are on other paths"
+
+    def _repair(self, sheet: Sheet) -> None:
+        """Refine with the differences from the sheet until all items are met in it."""
+        vector, state = self.chosen, self.best
         models: Models = (NO_DIFFERENCE,)
         stable = self.stable
         most = min(SHEETS, max(2, SHEET_CASES // len(self.design.problem.cases)))
-        while self.goes_on and self.sheets < most and total_violation(state.sheet) > 0.0:
+        while self.goes_on and self.sheets < most and state.missed_in_sheet > 0.0:
             if state.is_on_path_of_sheet:
                 models = self._models(vector, state.records, state.sheet_records)
             elif state.met or not state.is_stable:
@@ -288,7 +302,7 @@ class _Job:
                 self.sheets += 1
             elif self.goes_on:
                 state = self._in_sheet(sheet, vector, state)
-                if total_violation(state.sheet) < total_violation(self.best.sheet):
+                if state.rank_in_sheet < self.best.rank_in_sheet:
                     self.best, self.chosen = state, vector
 
     def _earlier(
@@ -332,7 +346,8 @@ class _Job:
             it is the last one of all. None if the response is not stable.
         """
         items = [
-            tightened(item, 0.0 if item.quantity == "mass" else RESERVE) for item in self.items
+            tightened(item, MASS_RESERVE if item.quantity == "mass" else RESERVE)
+            for item in self.items
         ]
         rows = RowEvaluator(self.variables, self.design.mask, items, stable, models)
         left = replace(

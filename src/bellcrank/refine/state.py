@@ -71,9 +71,19 @@ class State:
         return _is_stable(self.sheet) and on_same_path(self.records, self.sheet_records)
 
     @property
+    def missed_in_sheet(self) -> float:
+        """Sum of the violations in the sheet; infinite where it is not on the same path."""
+        return total_violation(self.sheet) if self.is_on_path_of_sheet else math.inf
+
+    @property
+    def rank_in_sheet(self) -> tuple[float, float]:
+        """How far the sheet is from meeting all items; smaller is better."""
+        return self.missed_in_sheet, total_violation(self.sheet)
+
+    @property
     def is_near_sheet(self) -> bool:
         """Whether the sheet is on the same path, and misses little."""
-        return self.is_on_path_of_sheet and total_violation(self.sheet) <= LARGEST_MISS
+        return self.missed_in_sheet <= LARGEST_MISS
 
 
 def _is_stable(items: tuple[ItemResult, ...]) -> bool:

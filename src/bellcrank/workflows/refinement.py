@@ -154,9 +154,9 @@ def refine_file(
     InvalidSettings
         As `bellcrank.refine.refine_design`.
     """
-    limit = spec_for(design).registered_material.strain_limit
-    sheet = sheet_of(spec_for(design), design) if design.problem.is_specified else None
-    result = refine_design(design, settings, report, limit, sheet)
+    spec = spec_for(design)
+    limit = spec.registered_material.strain_limit
+    result = refine_design(design, settings, report, limit, sheet_of(spec, design))
     if not result.improved:
         return result
     notes = {**design.provenance, "refinement": refinement_data(result)}
