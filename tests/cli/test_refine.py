@@ -97,7 +97,6 @@ def test_the_gain_of_a_free_design_grows(here: Path) -> None:
     ("words", "message"),
     [
         (("crane",), "expected a frame; designs of springs are not refined"),
-        (("machine:pliers",), "driven by forces"),
         (("machine:crane", "--evaluations", "0"), "--evaluations: expected at least 1, got 0"),
         (("machine:crane", "--largest-move", "0.9"), "--largest-move: expected above 0"),
         (("machine:crane", "--picture", "both.pic"), "both.pic"),

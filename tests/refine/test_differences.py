@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Channel, StrokeRecord
+from bellcrank.model import gallery_design
 from bellcrank.refine import RefinementSettings, refine_design
 from bellcrank.refine.differences import NO_DIFFERENCE, Difference, difference, on_same_path
 from bellcrank.refine.rows import RowEvaluator
@@ -103,6 +104,29 @@ def test_a_refinement_meets_a_sheet_that_differs_from_frames() -> None:
     assert found.after.met
     assert all(item.met for item in found.after.items)
     assert all(item.met for item in found.after.sheet)
+
+
+def test_the_given_design_is_kept_if_all_better_ones_are_on_other_paths_in_the_sheet() -> None:
+    """The sheet is the frame for the given geometry, and not stable for others."""
+    crane = gallery_design("machine", "crane")
+    assert crane is not None
+    given = crane.problem.lattice.positions
+    calls = []
+
+    def sheet(design: Design) -> Records | None:
+        calls.append(design)
+        if not np.array_equal(design.problem.lattice.positions, given):
+            return None
+        evaluator = SpecificationEvaluator(design.problem, 8)
+        evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
+        return evaluator.records
+
+    found = refine_design(crane, RefinementSettings(steps=4, evaluations=20), sheet=sheet)
+    assert len(calls) > 2
+    assert found.design is crane
+    assert not found.improved
+    assert found.reason == "in the sheet, all better geometries are on other paths"
+    assert found.after.is_near_sheet
 
 
 def test_a_state_of_a_refinement_can_be_sent_to_another_process() -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
+from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Design, find_problem, gallery_design
 from bellcrank.part import PartSpec, frame_problem
-from bellcrank.refine import RefinementSettings, refine_design, specified
+from bellcrank.refine import RefinementSettings, refine_design, refinement, specified
 from bellcrank.refine.gaps import nearest_points
 from bellcrank.refine.shape import SLENDERNESS, SMALLEST_ANGLE, shape_rows, volume_of
 from bellcrank.refine.steps import linear_step, merit_of
@@ -18,6 +21,9 @@ from bellcrank.refine.variables import variables_of
 from bellcrank.task import find_task
 
 from .designs import straight_crane, unloaded_crane
+
+if TYPE_CHECKING:
+    from bellcrank.refine.steps import Step
 
 
 @pytest.fixture(scope="module")
@@ -99,10 +105,48 @@ def test_what_cannot_be_refined_is_refused() -> None:
     springs = find_problem("crane").full_design()
     with pytest.raises(InvalidSettings, match="expected a frame; designs of springs"):
         refine_design(springs)
+
+
+def test_a_design_driven_by_forces_gets_a_larger_ratio_of_forces() -> None:
+    """The objective is that of the search: the force in the output springs over the input force."""
     pliers = gallery_design("machine", "pliers")
     assert pliers is not None
-    with pytest.raises(InvalidSettings, match="driven by forces"):
-        refine_design(pliers)
+    found = refine_design(pliers, RefinementSettings(steps=3))
+    for design, state in ((pliers, found.before), (found.design, found.after)):
+        evaluator = FrameEvaluator(with_joints(design.problem, design.mask), "force:2", elements=8)
+        response = evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
+        assert state.objective == pytest.approx(response.efficiency, rel=1e-3)
+    assert found.after.objective > 1.1 * found.before.objective
+
+
+def test_an_optimiser_that_fails_leaves_the_last_good_design(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls = []
+
+    def fails(*given: Any) -> Step | None:
+        calls.append(given)
+        return linear_step(*given) if len(calls) <= 4 else None
+
+    monkeypatch.setattr(refinement, "linear_step", fails)
+    found = refine_design(unloaded_crane(), RefinementSettings(steps=20))
+    assert len(calls) > 5
+    assert found.reason == "no step improves the design"
+    worst = sum(item.violation for item in found.before.items)
+    assert sum(item.violation for item in found.after.items) < worst
+    assert found.improved
+
+
+def test_a_design_that_cannot_be_improved_is_returned_as_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(refinement, "linear_step", lambda *_given: None)
+    design = unloaded_crane()
+    found = refine_design(design)
+    assert not found.improved
+    assert found.design is design
+    assert found.after is found.before
+    assert found.reason == "no step improves the design"
 
 
 def test_a_refinement_that_is_stopped_returns_the_best_design() -> None:

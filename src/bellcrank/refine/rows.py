@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
+    from bellcrank.mechanics.frames.evaluator import FrameEvaluator
     from bellcrank.model import Item, Problem
     from bellcrank.refine.differences import Difference
     from bellcrank.refine.gaps import Gaps
@@ -99,6 +100,14 @@ class _Geometry:
     channels: dict[str, dict[Channel, Values]] = field(default_factory=dict)
     softest: dict[tuple[str, int], States] = field(default_factory=dict)
     gaps: dict[tuple[str, int], Gaps] = field(default_factory=dict)
+    beams: dict[int, BeamSlopes] = field(default_factory=dict)
+
+    def beam_slopes(self, frame: FrameEvaluator, mask: NDArray[np.bool_]) -> BeamSlopes:
+        """Return the derivatives of the properties of the beams of a frame of this geometry."""
+        key = id(frame)
+        if key not in self.beams:
+            self.beams[key] = beam_slopes(frame, mask)
+        return self.beams[key]
 
 
 class RowEvaluator:
@@ -223,21 +232,18 @@ class RowEvaluator:
         none = np.zeros((0, self.variables.count))
         if not slopes:
             return Rows(objectives, constraints, tuple(names), keys, none, none)
-        gradients = self._channel_gradients(evaluator, name)
+        gradients = self._channel_gradients(here, name)
         if gradients is None:
             return None
         slopes_by = jacobian(channels, rows_at, gradients)
         return Rows(objectives, constraints, tuple(names), keys, *slopes_by)
 
-    def _channel_gradients(self, evaluator: SpecificationEvaluator, name: str) -> Gradients | None:
+    def _channel_gradients(self, here: _Geometry, name: str) -> Gradients | None:
         """Return (c, n) the derivatives of each channel at each of its states."""
-        known: dict[int, BeamSlopes] = {}
         out: Gradients = {}
-        for point in evaluator.cases[name].evaluator.merged_points():
-            key = id(point.evaluator)
-            if key not in known:
-                known[key] = beam_slopes(point.evaluator, self.mask)
-            found = geometry_slopes(point.equilibrium, point.measured, known[key])
+        for point in here.evaluator.cases[name].evaluator.merged_points():
+            of_beams = here.beam_slopes(point.evaluator, self.mask)
+            found = geometry_slopes(point.equilibrium, point.measured, of_beams)
             if found is None:
                 return None
             for each, (quantity, measures), slope in zip(
@@ -264,7 +270,7 @@ class RowEvaluator:
         printed = printed_beams(problem, self.mask, case.frame.structure.present != 0)
         values, gradients = [np.zeros(0)], [np.zeros((0, self.variables.count))]
         keys: list[tuple[int, ...]] = []
-        of_beams = beam_slopes(case.frame, self.mask) if slopes else None
+        of_beams = here.beam_slopes(case.frame, self.mask) if slopes else None
         for k in range(1, STATES + 1):
             state = case.state(k / STATES)
             if state is None:
@@ -315,7 +321,7 @@ class RowEvaluator:
             keys += [(index, round(1e6 * each)) for each in near]
             if not slopes or not near:
                 continue
-            rates, of_beams = {}, beam_slopes(frame, self.mask)
+            rates, of_beams = {}, here.beam_slopes(frame, self.mask)
             for fraction in {*near, *(known[each][0] for each in near)}:
                 equilibrium, measures = found[fraction]
                 slope = geometry_slopes(equilibrium, [(LOWEST_STIFFNESS, measures)], of_beams)

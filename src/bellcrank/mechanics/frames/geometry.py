@@ -53,7 +53,7 @@ class BeamSlopes(NamedTuple):
     bow: Floats
     """(4, M, 3) of the coefficients of their shortening."""
     joints: csr_matrix
-    """(2 M, N d + M) of the lengths of joints by positions and widths."""
+    """(N d + M, 2 M) of the lengths of joints by positions and widths."""
 
 
 def beam_slopes(evaluator: FrameEvaluator, mask: NDArray[np.bool_]) -> BeamSlopes:
@@ -89,7 +89,7 @@ def beam_slopes(evaluator: FrameEvaluator, mask: NDArray[np.bool_]) -> BeamSlope
             (np.full(2 * beams, given.joint / given.width), (np.arange(2 * beams), columns)),
             shape=(2 * beams, problem.lattice.positions.size + beams),
         )
-    return BeamSlopes(np.stack(section), np.stack(bow), joints)
+    return BeamSlopes(np.stack(section), np.stack(bow), joints.T.tocsr())
 
 
 def geometry_slopes(
@@ -146,7 +146,7 @@ def geometry_slopes(
             positions[row, first_node] -= by_chord
             widths[row, measures.beams] += by_width
             joints[row, measures.beams] += by_joint
-        by_joints = (beams.joints.T @ joints.reshape(len(joints), -1).T).T
+        by_joints = (beams.joints @ joints.reshape(len(joints), -1).T).T
         coordinates = positions[0].size
         positions = positions + by_joints[:, :coordinates].reshape(positions.shape)
         found.append(GeometrySlopes(positions, widths + by_joints[:, coordinates:]))
