@@ -57,7 +57,7 @@ def test_a_refined_geometry_can_be_printed(refined: Design) -> None:
 
 def test_the_mass_may_be_kept() -> None:
     start = straight_crane()
-    settings = RefinementSettings(steps=8, same_mass=True)
+    settings = RefinementSettings(steps=8, evaluations=30, same_mass=True)
     found = refine_design(start, settings)
     before = volume_of(start.problem, start.mask)[0]
     after = volume_of(found.design.problem, found.design.mask)[0]
@@ -163,7 +163,7 @@ def test_a_refinement_that_is_stopped_returns_the_best_design() -> None:
 
 def test_nodes_move_no_farther_than_they_may() -> None:
     design = straight_crane()
-    tiny = RefinementSettings(largest_move=1e-9)
+    tiny = RefinementSettings(largest_move=1e-9, evaluations=8)
     found = refine_design(design, tiny)
     moved = found.design.problem.lattice.positions - design.problem.lattice.positions
     assert np.abs(moved).max() <= 1.1e-9
