@@ -295,12 +295,6 @@ def runs() -> dict[str, Callable[[], dict[str, Any]]]:
     return out
 
 
-def _group(name: str) -> str:
-    """Return the comparison that a run belongs to, with its problem where there are seeds."""
-    kind, *others = name.split()
-    return kind if kind in {"mass", "cost"} else " ".join((kind, *others[:-1]))
-
-
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -322,33 +316,76 @@ def main() -> None:
 
 
 def summary(rows: dict[str, dict[str, Any]]) -> list[str]:
-    """Return the medians of each comparison."""
+    """Return the rows of the tables, and the medians at equal mass."""
+    lines = [f"{name}: {row['cost']:.2f}" for name, row in rows.items() if "cost" in row]
+    mass = {name: row for name, row in rows.items() if name.startswith("mass")}
+    if mass:
+        lines += [*mass_rows(mass), growth(mass)]
+    return [*lines, *specified_rows(rows)]
+
+
+def mass_rows(rows: dict[str, dict[str, Any]]) -> list[str]:
+    """Return a row for each design at equal mass.
+
+    Gain before and after by frames of 8 elements, before and after in the sheet, and the times in s
+    of the refinement and of the sheets.
+    """
+    return [
+        f"| {name.partition(' ')[2]} | {row['gain_before']:.2f} | {row['gain']:.2f} "
+        f"| {_two(row['gain_sheet_before'])} | {_two(row['gain_sheet'])} "
+        f"| {row['seconds']:.0f} s | {row['sheet_seconds']:.0f} s |"
+        for name, row in sorted(rows.items())
+        if name.startswith("mass")
+    ]
+
+
+def _two(value: float | None) -> str:
+    return "not stable" if value is None else f"{value:.2f}"
+
+
+def growth(rows: dict[str, dict[str, Any]]) -> str:
+    """Return the median growth of the gain at equal mass, by frames and in the sheet, as text.
+
+    Designs whose sheet is not stable after the refinement count as not grown.
+    """
+    frames, sheet = [], []
+    for row in rows.values():
+        frames.append(row["gain"] / row["gain_before"] - 1.0)
+        known = row["gain_sheet"] and row["gain_sheet_before"]
+        sheet.append(row["gain_sheet"] / row["gain_sheet_before"] - 1.0 if known else 0.0)
+    return (
+        f"{len(rows)} designs: {median(frames):.0%} by frames, {median(sheet):.0%} in the sheet "
+        f"(medians); {median(row['seconds'] for row in rows.values()):.0f} s"
+    )
+
+
+def specified_rows(rows: dict[str, dict[str, Any]]) -> list[str]:
+    """Return a row for each specification.
+
+    Runs that meet it by frames of 8 elements, and in the sheet; medians of the gain, of the largest
+    off-axis motion and rotation, and of the error of the path before and after the refinement, by
+    frames of 8 elements; the median time in s of one core.
+    """
     lines = []
-    for kind in sorted({_group(name) for name in rows}):
-        own = [row for name, row in rows.items() if _group(name) == kind]
-        if kind == "cost":
-            lines += [f"{name}: {row['cost']:.2f}" for name, row in rows.items() if row in own]
-            continue
-        gains = [row["gain"] for row in own if row.get("gain") is not None]
-        text = f"{kind}: {len(own)} runs, {sum(bool(row['met']) for row in own)} met"
-        if kind == "mass":
-            grown = [row["gain"] / row["gain_before"] - 1.0 for row in own if row["gain_before"]]
-            sheet = [
-                row["gain_sheet"] / row["gain_sheet_before"] - 1.0
-                for row in own
-                if row["gain_sheet"] and row["gain_sheet_before"]
-            ]
-            text += f"; grown by {median(grown):.0%}, in the sheet by {median(sheet):.0%}"
-        else:
-            in_sheet = sum(bool(row.get("met_in_sheet")) for row in own)
-            text += f", {in_sheet} in the sheet; gain {median(gains):.2f}"
-        if kind.startswith("path"):
-            before, after = (
-                median(row[f"path_error_{state}"] for row in own) for state in ("before", "frame")
-            )
-            text += f"; error of the path {before:.2%} before, {after:.2%} after"
-        lines.append(f"{text}; {median(row.get('seconds', 0.0) for row in own):.0f} s")
+    kinds = {"straight", "exact", "path"}
+    names = {name.rpartition(" ")[0] for name in rows if name.split()[0] in kinds}
+    for kind in sorted(names):
+        own = [row for name, row in rows.items() if name.rpartition(" ")[0] == kind]
+        lines.append(
+            f"| {kind} | {sum(row['met'] for row in own)} of {len(own)} "
+            f"| {sum(bool(row.get('met_in_sheet')) for row in own)} of {len(own)} "
+            f"| {_median(own, 'gain', '.3g')} | {_median(own, 'off_axis_frame', '.1%')} "
+            f"| {_median(own, 'rotation_frame', '.2g')} "
+            f"| {_median(own, 'path_error_before', '.2%')} "
+            f"| {_median(own, 'path_error_frame', '.2%')} | {_median(own, 'seconds', '.0f')} s |"
+        )
     return lines
+
+
+def _median(rows: list[dict[str, Any]], key: str, style: str) -> str:
+    """Return the median of a figure as text; a dash where it is not known."""
+    values = [row[key] for row in rows if row.get(key) is not None]
+    return format(median(values), style).replace("%", " %") if values else "-"
 
 
 if __name__ == "__main__":
