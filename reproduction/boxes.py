@@ -18,7 +18,7 @@ import numpy as np
 from bellcrank.mechanics import FrameEvaluator, Status
 from bellcrank.model import Input, Output, Problem, Supports, lattices
 from bellcrank.part import PartSpec, frame_problem
-from bellcrank.search.constraints import mirror_images
+from bellcrank.search.symmetry import beam_images
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -135,7 +135,7 @@ def stable_start(problem: Problem) -> Problem:
     left out at random, with its mirror image, until the design is stable.
     """
     evaluator = FrameEvaluator(problem)
-    images, rng = mirror_images(problem, "y"), np.random.default_rng(0)
+    images, rng = beam_images(problem, "y"), np.random.default_rng(0)
     initial = problem.initial.copy()
     while evaluator.evaluate(initial).status is not Status.CONVERGED:
         present = rng.random(len(problem.designable)) < STARTING_SHARE

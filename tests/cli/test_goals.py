@@ -9,7 +9,8 @@ import pytest
 
 from bellcrank.mechanics import Core, SpringEvaluator, near_pairs
 from bellcrank.model import read_design
-from bellcrank.search.constraints import mass_of, mirror_images
+from bellcrank.search.constraints import mass_of
+from bellcrank.search.symmetry import beam_images
 
 from .helpers import PROBLEM, call, colours, refusal
 
@@ -62,7 +63,7 @@ def test_a_mirror_symmetric_design_stays_so_when_it_is_cleaned(tmp_path: Path) -
     assert outcome.code == 0, outcome.err
     design = read_design(folder / "design.json")
     present = design.mask[design.problem.designable]
-    assert (present == present[mirror_images(design.problem, "x")]).all()
+    assert (present == present[beam_images(design.problem, "x")]).all()
     assert 0 < present.sum() < len(present)
 
 

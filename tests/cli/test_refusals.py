@@ -410,10 +410,10 @@ def test_contradictory_models_of_a_design_are_refused(words: tuple[str, ...], me
     assert refusal("design", PROBLEM, *words).startswith(f"error: {message}")
 
 
-def test_designs_in_space_have_no_spring_model_and_no_mirror_images(here: Path) -> None:
+def test_designs_in_space_have_no_spring_model_and_need_a_symmetric_lattice(here: Path) -> None:
     problem, _ = read_reference("octet-crane")
     write(here / "space.json", problem_to_dict(problem))
     line = refusal("design", "space.json", "--model", "springs")
     assert line.startswith("error: spring model: problem 'octet-crane' is in space")
     line = refusal("design", "space.json", "--goal", "mirror x")
-    assert line.startswith("error: goal 'mirror x': problem 'octet-crane' is in space")
+    assert line.startswith("error: goal 'mirror x': problem 'octet-crane' is not symmetric in x")

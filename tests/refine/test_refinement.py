@@ -11,14 +11,16 @@ import pytest
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.mechanics.frames.joints import with_joints
-from bellcrank.model import Design, find_problem, gallery_design
+from bellcrank.model import Design, Specification, find_problem, gallery_design
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.refine import RefinementSettings, refine_design, refinement, specified
 from bellcrank.refine.gaps import nearest_points
 from bellcrank.refine.shape import SLENDERNESS, SMALLEST_ANGLE, shape_rows, volume_of
 from bellcrank.refine.steps import linear_step, merit_of
 from bellcrank.refine.variables import variables_of
+from bellcrank.search.symmetry import beam_images, node_images, operation
 from bellcrank.task import find_task
+from tests.search.test_symmetry import OCTETS, column
 
 from .designs import straight_crane, unloaded_crane
 
@@ -89,6 +91,30 @@ def test_symmetry_remains() -> None:
     partner = np.abs(first[:, None] - mirrored(first)[None]).sum(axis=2).argmin(axis=1)
     assert positions == pytest.approx(mirrored(positions)[partner], abs=1e-12)
     assert len(np.unique(widths.round(12))) > 10
+
+
+@pytest.mark.parametrize("symmetry", [("3-fold",), ("3-fold", "x"), ("x",)])
+def test_symmetry_in_space_remains(symmetry: tuple[str, ...]) -> None:
+    """Moved nodes of a column of octets, and widths of its struts, have the symmetry."""
+    problem = column("octet", **OCTETS)
+    problem = replace(problem, specification=Specification(symmetry=symmetry))
+    section = problem.section
+    assert section is not None
+    design = Design(problem, problem.initial)
+    variables = variables_of(design, 0.3, (section.width, 2.0 * section.width))
+    rng = np.random.default_rng(0)
+    positions, widths = variables.geometry(0.05 * rng.normal(size=variables.count))
+    assert np.abs(positions - problem.lattice.positions).max() > 0.05
+    for name in symmetry:
+        matrix, centre = operation(problem, name)
+        nodes, beams = node_images(problem, name), beam_images(problem, name)
+        free = ~np.isin(np.arange(len(nodes)), problem.special_nodes)
+        free &= free[nodes]
+        moved = (positions - centre) @ matrix.T + centre
+        assert positions[nodes][free] == pytest.approx(moved[free], abs=1e-9)
+        assert widths[beams] == pytest.approx(widths)
+    gradient = variables.gradient(np.ones((1, *positions.shape)), np.zeros((1, len(widths))))
+    assert gradient.shape == (1, variables.count)
 
 
 def test_a_problem_without_a_specification_gets_that_of_its_gain() -> None:

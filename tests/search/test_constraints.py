@@ -25,9 +25,9 @@ from bellcrank.search.constraints import (
     LoadCase,
     constraints,
     mass_of,
-    mirror_images,
     parse_goal,
 )
+from bellcrank.search.symmetry import beam_images
 
 EVERY_GOAL = {
     "mass": "mass <= 0.5",
@@ -109,7 +109,7 @@ def test_every_goal_is_tested_here() -> None:
     "text",
     [
         "mass", "mass < 0.5", "mass <= x", "mass <= 0", "mass <= -1", "mass <= nan", "mass <= inf",
-        "degree >= 2.5", "degree <= 2", "connected 3", "mirror", "mirror z", "no-contact -1",
+        "degree >= 2.5", "degree <= 2", "connected 3", "mirror", "mirror w", "no-contact -1",
         "stiffness <= 1", "strain >= 1", "no-snapping now",
     ],
 )  # fmt: skip
@@ -131,7 +131,7 @@ def test_an_unknown_goal_lists_the_known_ones() -> None:
     [
         ("mass <= 1", "expected a fraction below 1"),
         ("degree >= 7", "no node of problem 'crane' has more than 6 beams"),
-        ("mirror x", "not symmetric in x: 9 of 203 designable beams have no designable mirror"),
+        ("mirror x", "not symmetric in x: 9 of 203 designable beams have no designable image"),
     ],
 )
 def test_goals_that_make_no_sense_for_a_problem_say_why(text: str, message: str) -> None:
@@ -211,7 +211,7 @@ def test_two_pieces_are_one_too_many() -> None:
 
 def test_mirror_counts_the_beams_whose_image_differs() -> None:
     problem = find_problem("scaling-8")
-    images = mirror_images(problem, "x")
+    images = beam_images(problem, "x")
     assert (images[images] == np.arange(len(images))).all()
     lattice = problem.lattice
     middle = lattice.positions[lattice.beams].mean(axis=1)[problem.designable]
@@ -228,7 +228,7 @@ def test_mirror_counts_the_beams_whose_image_differs() -> None:
 
 def test_images_tell_crossing_diagonals_apart() -> None:
     problem = ladder()
-    images = mirror_images(problem, "x")
+    images = beam_images(problem, "x")
     middle = np.flatnonzero((problem.lattice.beams == (1, 6)).all(axis=1))[0]
     other = np.flatnonzero((problem.lattice.beams == (2, 5)).all(axis=1))[0]
     assert images[middle] == other

@@ -195,10 +195,12 @@ def test_every_registered_goal_is_tried() -> None:
     assert set(EVERY_GOAL) == set(constraints)
 
 
-def test_mirror_images_are_refused_in_space() -> None:
+def test_mirror_images_in_space_need_a_symmetric_lattice(small: Problem) -> None:
     problem, _ = read_reference("octet-crane")
-    with pytest.raises(InvalidSettings, match=r"goal .mirror x.: .* is in space"):
+    with pytest.raises(InvalidSettings, match=r"goal .mirror x.: .* is not symmetric in x"):
         ConstrainedEvaluator([LoadCase(problem)], ["mirror x"])
+    with pytest.raises(InvalidSettings, match=r"goal .mirror z.: .* is in the plane"):
+        ConstrainedEvaluator([LoadCase(small)], ["mirror z"])
 
 
 def test_a_search_of_frames_satisfies_its_goals(small: Problem) -> None:

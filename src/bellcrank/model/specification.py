@@ -22,6 +22,11 @@ Dimension = Literal["ratio", "length", "angle", "force", "stiffness", "volume"]
 Scope = Literal["output", "case", "design"]
 Reduction = Literal["every", "largest", "smallest", "spread"]
 
+FOLDS = {"2-fold": 2, "3-fold": 3, "4-fold": 4, "6-fold": 6}
+"""Rotational symmetry about the vertical axis: number of equal parts of a turn."""
+SYMMETRIES = ("x", "y", "z", *FOLDS)
+"""Names of symmetries; a letter is the axis along which mirror images are exchanged."""
+
 
 class QuantityType(NamedTuple):
     """What is known of a quantity before it is computed."""
@@ -272,7 +277,9 @@ class Specification:
     weight : (d,) float64
         Own weight, a force on a unit of volume, for `sag`; None if it is not bounded.
     symmetry
-        ``"x"`` for designs that equal their mirror image left and right, ``"y"`` top and bottom.
+        ``"x"``, ``"y"`` or in space ``"z"`` for designs that equal their mirror image along this
+        axis; in space also ``"2-fold"``, ``"3-fold"``, ``"4-fold"`` or ``"6-fold"`` for those that
+        a part of a turn about the vertical axis does not change.
 
     Raises
     ------
@@ -308,9 +315,11 @@ class Specification:
             raise InvalidProblem(f"cases: names must differ, got {', '.join(self.case_names)}")
         if self.output in self.outputs:
             raise InvalidProblem(f"outputs: the name {self.output!r} is given twice")
-        for axis in self.symmetry:
-            if axis not in {"x", "y"}:
-                raise InvalidProblem(f"symmetry: expected 'x' or 'y', got {axis!r}")
+        for name in self.symmetry:
+            if name not in SYMMETRIES:
+                raise InvalidProblem(
+                    f"symmetry: expected one of {', '.join(SYMMETRIES)}, got {name!r}"
+                )
         for item in self.items:
             self._check(item)
         for objective in self.maximise:

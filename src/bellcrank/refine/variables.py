@@ -6,28 +6,28 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bellcrank.mechanics.frames.joints import with_joints
-from bellcrank.search.mirror import AXES
+from bellcrank.search.symmetry import node_images, operation
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
     from scipy.sparse import csr_matrix
 
     from bellcrank.model import Design, Problem
 
-SAME_POSITION = 1e-4
-"""Tolerance on the position of a mirror image, in mean beam lengths."""
+Image = tuple[NDArray[np.int64], NDArray[np.float64]]
+"""Image of each node by a symmetry, -1 where it has none, and the matrix of the symmetry."""
+INDEPENDENT = 1e-9
+"""Singular value of the conditions on a motion below which they do not restrict it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variables:
     """Positions of the free nodes and widths of the present beams, as one vector.
 
-    The vector is zero for the initial geometry. Mirror images of a node or a beam share their
-    variables.
+    The vector is zero for the initial geometry. Images of a node or a beam by a symmetry share
+    their variables.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Variables:
     map : (P, n) sparse
         From the vector to the changes of all positions (N d), then of all widths (M).
     moves : (n,) bool
-        Whether a variable is the position of a node; else it is a width.
+        Whether a variable is a coordinate of a node; else it is a width.
     low, high : (n,) float64
         Bounds, lattice units.
     """
@@ -112,91 +112,96 @@ def variables_of(design: Design, largest_move: float, widths: tuple[float, float
     free[lattice.beams[mask].ravel()] = True
     free[problem.special_nodes_of_all_cases] = False
     wanted = problem.specification
-    axes = () if wanted is None else wanted.symmetry
-    images = _images(problem, axes)
-    rows, columns, signs = [], [], []
+    images: list[Image] = [
+        (node_images(problem, name), operation(problem, name)[0])
+        for name in (() if wanted is None else wanted.symmetry)
+    ]
+    rows: list[int] = []
+    columns: list[int] = []
+    factors: list[float] = []
     count = 0
     moves: list[bool] = []
-    anchors: list[int] = []
-    done = np.zeros(nodes * dimension, dtype=bool)
-    for start in (np.flatnonzero(free)[:, None] * dimension + np.arange(dimension)).ravel():
+    now: list[float] = []
+    done = np.zeros(nodes, dtype=bool)
+    for start in np.flatnonzero(free).tolist():
         if done[start]:
             continue
-        orbit = _orbit(int(start), dimension, images)
-        if orbit is None:  # on a mirror axis, which it may not leave
-            done[start] = True
+        orbit, motions = _orbit(start, dimension, images)
+        done[list(orbit)] = True
+        if not free[list(orbit)].all():
             continue
-        for entry, sign in orbit.items():
-            done[entry] = True
-            rows.append(entry)
-            columns.append(count)
-            signs.append(sign)
-        anchors.append(int(start))
-        moves.append(True)
-        count += 1
+        for node, matrix in orbit.items():
+            for axis, by_motion in enumerate((matrix @ motions).tolist()):
+                for variable, factor in enumerate(by_motion):
+                    if factor:
+                        rows.append(node * dimension + axis)
+                        columns.append(count + variable)
+                        factors.append(factor)
+        moves += [True] * motions.shape[1]
+        count += motions.shape[1]
     if widths[1] > widths[0]:
         for group in _beam_groups(problem, mask, images):
             rows += [nodes * dimension + each for each in group]
             columns += [count] * len(group)
-            signs += [1.0] * len(group)
-            anchors.append(nodes * dimension + group[0])
+            factors += [1.0] * len(group)
+            now.append(float(problem.beam_widths[group[0]]))
             moves.append(False)
             count += 1
     shape = (nodes * dimension + lattice.beam_count, count)
-    matrix = csr_matrix((signs, (rows, columns)), shape=shape)
-    moving, start = np.array(moves, dtype=bool), np.array(anchors, dtype=np.int64)
+    whole = csr_matrix((factors, (rows, columns)), shape=shape)
+    moving = np.array(moves, dtype=bool)
     low, high = np.zeros(count), np.zeros(count)
     reach = largest_move * float(np.mean(lattice.rest_length[mask]))
     low[moving], high[moving] = -reach, reach
-    now = problem.beam_widths[start[~moving] - nodes * dimension]
-    low[~moving], high[~moving] = widths[0] - now, widths[1] - now
-    return Variables(problem, mask, matrix, moving, np.minimum(low, 0.0), np.maximum(high, 0.0))
-
-
-def _images(problem: Problem, axes: Sequence[str]) -> list[tuple[NDArray[np.int64], int]]:
-    """Return the mirror image of each node, and the coordinate that is mirrored, for each axis."""
-    from scipy.spatial import cKDTree
-
-    positions, found = problem.lattice.positions, []
-    for axis in axes:
-        column = AXES[axis]
-        ends = positions[problem.lattice.beams[problem.designable]].reshape(-1, 2)
-        image = positions.copy()
-        image[:, column] = ends[:, column].min() + ends[:, column].max() - image[:, column]
-        distance, partner = cKDTree(positions).query(image)
-        tolerance = SAME_POSITION * float(np.mean(problem.lattice.rest_length))
-        found.append((np.where(distance < tolerance, partner, -1), column))
-    return found
+    low[~moving], high[~moving] = widths[0] - np.array(now), widths[1] - np.array(now)
+    return Variables(problem, mask, whole, moving, np.minimum(low, 0.0), np.maximum(high, 0.0))
 
 
 def _orbit(
-    entry: int, dimension: int, images: list[tuple[NDArray[np.int64], int]]
-) -> dict[int, float] | None:
-    """Return the mirror images of a coordinate and their signs; None if one is its opposite."""
-    orbit = {entry: 1.0}
-    waiting = [entry]
+    start: int, dimension: int, images: list[Image]
+) -> tuple[dict[int, NDArray[np.float64]], NDArray[np.float64]]:
+    """Return the images of a node, and the motions that it may have.
+
+    Returns
+    -------
+    orbit : dict of (d, d)
+        Matrix from the motion of the node to that of each image, itself included.
+    motions : (d, f)
+        Orthonormal motions that keep the symmetry: a node on a mirror plane stays there, and one on
+        an axis of rotation too.
+    """
+    orbit, waiting = {start: np.eye(dimension)}, [start]
+    conditions = [np.zeros((1, dimension))]
     while waiting:
-        node, axis = divmod(waiting.pop(), dimension)
-        sign = orbit[node * dimension + axis]
-        for partner, column in images:
-            other = int(partner[node])
+        node = waiting.pop()
+        for partner, matrix in images:
+            other, by_start = int(partner[node]), matrix @ orbit[node]
             if other < 0:
                 continue
-            key, mirrored = other * dimension + axis, -sign if axis == column else sign
-            if key not in orbit:
-                orbit[key] = mirrored
-                waiting.append(key)
-            elif orbit[key] != mirrored:
-                return None
-    return orbit
+            if other in orbit:
+                conditions.append(by_start - orbit[other])
+            else:
+                orbit[other] = by_start
+                waiting.append(other)
+    restricted = np.concatenate(conditions)
+    if not np.abs(restricted).max() > INDEPENDENT:
+        return orbit, np.eye(dimension)
+    _, sizes, directions = np.linalg.svd(restricted)
+    rank = int((sizes > INDEPENDENT).sum())
+    return orbit, _clean(directions[rank:].T)
+
+
+def _clean(motions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return motions without components that are rounding errors."""
+    return np.where(np.abs(motions) > INDEPENDENT, motions, 0.0)
 
 
 def _beam_groups(
     problem: Problem,
     mask: NDArray[np.bool_],
-    images: list[tuple[NDArray[np.int64], int]],
+    images: list[Image],
 ) -> list[list[int]]:
-    """Return the beams of a design in groups of mirror images."""
+    """Return the beams of a design in groups of images."""
     beams = problem.lattice.beams
     numbers = {tuple(sorted(pair)): k for k, pair in enumerate(beams.tolist())}
     known = np.zeros(len(beams), dtype=bool)

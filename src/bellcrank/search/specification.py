@@ -27,8 +27,8 @@ from bellcrank.mechanics import (
 from bellcrank.mechanics.items import TOLERANCE, reduced, relative_distance
 from bellcrank.search.clearance import gap_less_overlaps, smallest_gap
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
-from bellcrank.search.mirror import MirrorGroups
 from bellcrank.search.stroke_states import fractions_of
+from bellcrank.search.symmetry import SymmetryGroups
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class SpecificationEvaluator:
         if wanted is None:
             raise InvalidSettings(f"problem {problem.name!r} has no specification")
         try:
-            self.groups = MirrorGroups(problem, wanted.symmetry)
+            self.groups = SymmetryGroups(problem, wanted.symmetry)
         except ValueError as error:
             raise InvalidSettings(f"limits.symmetry: {error}") from None
         self.problem = self.groups.problem

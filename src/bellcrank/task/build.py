@@ -25,6 +25,7 @@ from bellcrank.model import (
     lattices,
 )
 from bellcrank.model.calls import call_with_keys
+from bellcrank.model.specification import FOLDS
 from bellcrank.part import PartSpec, frame_elasticity, frame_section
 from bellcrank.task.conditions import CaseReader
 from bellcrank.task.domain import fill, in_regions, region_of
@@ -161,7 +162,7 @@ class _Builder:
                 items=tuple(items),
                 maximise=tuple(maximise),
                 weight=weight,
-                symmetry=tuple(table.limits.symmetry or ""),
+                symmetry=_symmetry_names(table.limits.symmetry),
             ),
         )
         return Task(self._with_solid(problem), self.part, self.units, table.description)
@@ -300,6 +301,11 @@ def _base(domain: DomainSection) -> Problem | None:
             f"domain.problem: unknown problem {domain.problem!r}; known: {', '.join(builtin)}"
         )
     return builtin[domain.problem]()
+
+
+def _symmetry_names(key: str | None) -> tuple[str, ...]:
+    """Return the names of the symmetries that the key of the limits stands for."""
+    return (key,) if key in FOLDS else tuple(key or "")
 
 
 def _bounds_sag(items: Sequence[Item]) -> bool:

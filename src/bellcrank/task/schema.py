@@ -212,6 +212,8 @@ class NodeRegion(Shape):
     """The nodes on one side of a domain in space."""
     nodes: list[int] | None = None
     """Numbers of nodes."""
+    without: Shape | None = None
+    """A shape whose nodes are left out."""
 
 
 class DomainSection(Table):
@@ -360,8 +362,11 @@ class LimitsSection(Table):
     """Part of the stroke up to which the part is stable, such as 1.2."""
     mass: Mass | None = None
     """Largest mass of the struts."""
-    symmetry: Literal["x", "y", "xy"] | None = None
-    """Mirror symmetry: left and right, top and bottom, or both."""
+    symmetry: (
+        Literal["x", "y", "z", "xy", "xz", "yz", "xyz", "2-fold", "3-fold", "4-fold", "6-fold"]
+        | None
+    ) = None
+    """Mirror symmetry along axes, or in space rotational symmetry about the vertical axis."""
     upright: Direction = "down"
     """Direction of the own weight for `sag`."""
 

@@ -184,8 +184,24 @@ def nodes_at(
     found = []
     for index, region in enumerate(regions):
         name = f"{key}[{index}]" if len(regions) > 1 else key
-        found.append(_nodes(region, positions, spacing, name))
+        nodes = _nodes(region, positions, spacing, name)
+        if region.without is not None:
+            within = _contains(region.without, positions[nodes], spacing, f"{name}.without")
+            if within.all():
+                raise InvalidProblem(f"{name}.without: all nodes of the region lie in this shape")
+            nodes = nodes[~within]
+        found.append(nodes)
     return np.unique(np.concatenate(found))
+
+
+def _contains(
+    shape: Shape, positions: NDArray[np.float64], spacing: float, key: str
+) -> NDArray[np.bool_]:
+    """Return (n,) which positions lie in a shape."""
+    if positions.shape[1] == 3:
+        return shape_in_space(shape, key, ROUNDING * spacing)(positions)
+    area = shape_of(shape, key).buffer(ROUNDING * spacing)
+    return np.asarray(shapely.contains_xy(area, positions[:, 0], positions[:, 1]))
 
 
 def _nodes(
@@ -210,17 +226,13 @@ def _nodes(
         return _nearest(region, positions, spacing, key)
     if kind in {"edge", "face"}:
         return _side(region, positions, spacing, key)
-    if dimension == 3:
-        within = np.flatnonzero(shape_in_space(region, key, ROUNDING * spacing)(positions))
-        if not len(within):
-            raise InvalidProblem(
-                f"{key}: no node lies in this {kind}; the lattice extends from "
-                f"{_extent(positions)} mm"
-            )
-        return within
-    shape = shape_of(region, key).buffer(ROUNDING * spacing)
-    inside = np.flatnonzero(shapely.contains_xy(shape, positions[:, 0], positions[:, 1]))
+    inside = np.flatnonzero(_contains(region, positions, spacing, key))
+    if not len(inside) and dimension == 3:
+        raise InvalidProblem(
+            f"{key}: no node lies in this {kind}; the lattice extends from {_extent(positions)} mm"
+        )
     if not len(inside):
+        shape = shape_of(region, key).buffer(ROUNDING * spacing)
         gap = shapely.distance(shape, shapely.points(positions))
         near = positions[int(np.argmin(gap))]
         raise InvalidProblem(

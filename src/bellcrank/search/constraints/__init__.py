@@ -23,7 +23,6 @@ from bellcrank.search.constraints.constraint import (
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator, penalty_of
 from bellcrank.search.constraints.response import no_contact  # registers
 from bellcrank.search.constraints.structure import mass_of
-from bellcrank.search.mirror import mirror_images
 
 __all__ = [
     "ConstrainedEvaluator",
@@ -35,7 +34,6 @@ __all__ = [
     "at_strokes",
     "constraints",
     "mass_of",
-    "mirror_images",
     "no_contact",
     "parse_goal",
     "penalty_of",

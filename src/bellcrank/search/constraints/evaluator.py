@@ -18,7 +18,7 @@ from bellcrank.mechanics import (
 )
 from bellcrank.search.constraints.cases import LoadCase, check_compatible
 from bellcrank.search.constraints.constraint import TOLERANCE, DeformedDesign, parse_goal
-from bellcrank.search.mirror import MirrorGroups
+from bellcrank.search.symmetry import SymmetryGroups
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class ConstrainedEvaluator:
             each.structure_violation is not None for _, made in self._constraints for each in made
         )
         axes = [goal.value for goal in parsed if goal.name == "mirror"]
-        self.groups = MirrorGroups(original, axes)
+        self.groups = SymmetryGroups(original, axes)
         self.problem = self.groups.problem
         self._violation = self._reference_violation = math.inf
         self._efficiencies = [math.nan] * len(cases)

@@ -17,7 +17,7 @@ from bellcrank.search.constraints.constraint import (
     counted,
     no_value,
 )
-from bellcrank.search.mirror import AXES, mirror_images
+from bellcrank.search.symmetry import AXES, beam_images
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -116,7 +116,7 @@ def connected(problem: Problem, _value: None) -> Constraint:
 
 
 def axis_name(rest: str) -> str:
-    """Parse ``x`` or ``y``."""
+    """Parse ``x``, ``y`` or ``z``."""
     if rest not in AXES:
         raise ValueError(rest)
     return rest
@@ -124,7 +124,7 @@ def axis_name(rest: str) -> str:
 
 def mirror(problem: Problem, axis: str) -> Constraint:
     """Require that designable beams and their mirror images are present or absent together."""
-    images = mirror_images(problem, axis)
+    images = beam_images(problem, axis)
 
     def violation(mask: NDArray[np.bool_], _core: NDArray[np.bool_]) -> float:
         present = mask[problem.designable]
@@ -137,6 +137,6 @@ for _name, _usage, _parse, _make in (
     ("mass", "'mass <= NUMBER', the number above 0", at_most, mass),
     ("degree", "'degree >= NUMBER', an integer above 0", whole, degree),
     ("connected", "'connected' alone", no_value, connected),
-    ("mirror", "'mirror x' or 'mirror y'", axis_name, mirror),
+    ("mirror", "'mirror x', 'mirror y' or in space 'mirror z'", axis_name, mirror),
 ):
     constraints.register(_name)(ConstraintType(_usage, _parse, _make))
