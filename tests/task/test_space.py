@@ -244,9 +244,9 @@ def test_the_column_of_the_page_turns_as_it_says(tmp_path: Path) -> None:
     report = complete_design(folder)
     assert report is not None
     (figures,) = report.part_figures
-    assert figures["rotation_deg"] == pytest.approx(49.0, abs=0.5)
-    assert figures["off_axis"] == pytest.approx(0.001, abs=5e-4)
-    assert figures["strain"] == pytest.approx(0.07, abs=5e-3)
+    assert figures["rotation_deg"] == pytest.approx(41.0, abs=0.5)
+    assert figures["off_axis"] < 1e-9
+    assert figures["strain"] == pytest.approx(0.04, abs=5e-3)
     assert figures["travel_mm"] == pytest.approx(3.0, abs=0.15)
     assert all(item.met for item in dict(report.items)["frames, 8 elements"])
     assert (folder.path / "motion.png").stat().st_size > 50_000
