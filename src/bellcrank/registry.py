@@ -98,16 +98,18 @@ class FormatRegistry(Registry[F]):
     """A registry of file formats, which are selected by the suffix of a path."""
 
     def for_path(self, path: str | os.PathLike[str]) -> F:
-        """Return the format of the suffix of `path`; upper and lower case are equal.
+        """Return the format of the longest known suffix of `path`; upper and lower case are equal.
 
         Raises
         ------
         UnknownName
             If no format has that suffix; lists the known ones.
         """
-        suffix = Path(path).suffix.lower()
-        for entry in self.values():
-            if suffix in entry.suffixes:
-                return entry
+        suffixes = [each.lower() for each in Path(path).suffixes]
+        for first in range(len(suffixes)):
+            for entry in self.values():
+                if "".join(suffixes[first:]) in entry.suffixes:
+                    return entry
+        suffix = suffixes[-1] if suffixes else ""
         known = ", ".join(suffix for entry in self.values() for suffix in entry.suffixes)
         raise UnknownName(f"{path}: unknown {self.kind} {suffix!r}; known suffixes: {known}")

@@ -25,7 +25,7 @@ SLICER = pytest.mark.skipif(
 )
 
 
-@pytest.mark.parametrize("name", [name for name in exporters if name != "step"])
+@pytest.mark.parametrize("name", [name for name in exporters if name not in {"step", "3mf-beams"}])
 def test_every_format_is_written_by_its_suffix(here: Path, name: str) -> None:
     file = f"part{exporters[name].suffixes[0]}"
     outcome = call("export", "human:crane", file, "--plate", "--screws", 2, "--pad", "--moved")

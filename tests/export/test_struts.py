@@ -11,7 +11,17 @@ import trimesh
 from bellcrank.errors import BellcrankError, InvalidSettings
 from bellcrank.export import Export, PrintRules, check_print, export
 from bellcrank.export.struts import sides_of, struts_solid
-from bellcrank.model import Design, Input, Lattice, Output, Problem, Section, Supports, lattices
+from bellcrank.model import (
+    Design,
+    Input,
+    Lattice,
+    Output,
+    Problem,
+    Section,
+    Supports,
+    find_problem,
+    lattices,
+)
 from bellcrank.part import PartSpec
 
 KINDS = {
@@ -111,6 +121,27 @@ def test_files_of_a_part_in_space(tmp_path) -> None:
     found = objects.GetCurrentMeshObject()
     assert found.IsManifoldAndOriented()
     assert found.GetTriangleCount() == len(solid.triangles)
+    export(bundle, tmp_path / "part.beams.3mf")
+    model = lib3mf.get_wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromFile(str(tmp_path / "part.beams.3mf"))
+    assert reader.GetWarningCount() == 0
+    objects = model.GetMeshObjects()
+    assert objects.MoveNext()
+    found = objects.GetCurrentMeshObject()
+    beams = found.BeamLattice()
+    assert beams.GetBeamCount() == len(part.struts)
+    first = beams.GetBeam(0)
+    assert list(first.Radii) == pytest.approx([1.0, 1.0])
+    ends = [list(found.GetVertex(k).Coordinates) for k in first.Indices]
+    length = np.linalg.norm(np.subtract(*ends))
+    assert length == pytest.approx(np.linalg.norm(np.diff(part.positions[part.struts[0]], axis=0)))
+    lowest = np.min([list(v.Coordinates) for v in found.GetVertices()], axis=0)
+    assert lowest == pytest.approx(1.0)
+    plane = PartSpec().of(find_problem("crane").full_design())
+    with pytest.raises(InvalidSettings, match="3MF beams are round"):
+        export(plane, tmp_path / "plane.beams.3mf")
     export(bundle, tmp_path / "part.vtu")
     lines = meshio.read(tmp_path / "part.vtu")
     assert len(lines.cells[0].data) == len(part.struts)

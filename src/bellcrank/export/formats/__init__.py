@@ -4,7 +4,7 @@ To add one, register an `Exporter` with ``exporters.register("name")`` in a modu
 and import it below. The contract tests include every registered format.
 
 >>> exporters.names()
-['stl', '3mf', 'step', 'dxf', 'svg', 'vtu']
+['stl', '3mf', '3mf-beams', 'step', 'dxf', 'svg', 'vtu']
 """
 
 from bellcrank.export.formats import stl  # isort: skip
