@@ -309,7 +309,7 @@ def _column(analysis: Analysis) -> list[str]:
     status = analysis.status.value
     return [
         f"{analysis.efficiency:.4f}" if known else "-",
-        f"{point.output[0]:.3f}, {point.output[1]:.3f}",
+        ", ".join(f"{value:.3f}" for value in point.output),
         f"{point.push:.3f}",
         f"{point.stress:.3f}",
         f"{point.strain:.1%}",

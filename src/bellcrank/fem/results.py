@@ -29,9 +29,9 @@ class StrokePoint:
         Fraction of the full input, 0 to 1.
     efficiency
         Efficiency by the problem's objective.
-    output : (2,)
-        Mean displacement of the output nodes in x and y, mm.
-    force : (2,)
+    output : (d,)
+        Mean displacement of the output nodes, mm.
+    force : (d,)
         Total force on the input nodes, N.
     push
         Sum over the input nodes of the force along the node's input direction, N. It differs from
@@ -46,8 +46,8 @@ class StrokePoint:
 
     load: float
     efficiency: float
-    output: tuple[float, float]
-    force: tuple[float, float]
+    output: tuple[float, ...]
+    force: tuple[float, ...]
     push: float
     energy: float
     stress: float
@@ -82,9 +82,9 @@ def stroke_point(
         Part that is analysed.
     load
         Fraction of the full input, 0 to 1.
-    motion : (N, 2) float64
+    motion : (N, d) float64
         Displacements of the lattice nodes, mm; 0 for nodes without struts.
-    forces : (i, 2) float64
+    forces : (i, d) float64
         Forces on the input nodes, N.
     **figures
         Energy, stress and strain.
@@ -94,8 +94,8 @@ def stroke_point(
     return StrokePoint(
         load=load,
         efficiency=efficiency_of(problem, motion / part.scale, load=load),
-        output=(float(output[0]), float(output[1])),
-        force=(float(force[0]), float(force[1])),
+        output=tuple(output.tolist()),
+        force=tuple(force.tolist()),
         push=float((forces * problem.input.direction).sum()),
         **figures,
     )

@@ -1,4 +1,4 @@
-"""Items of a specification in the sheet: the printed outline in plane stress."""
+"""Items of a specification in the sheet: the outline in plane stress; in space in the solid."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from bellcrank.fem.continuum.equations import ContinuumEquations
 from bellcrank.fem.continuum.fields import stress_field
 from bellcrank.fem.continuum.mesh import COARSE, FINE, plane_mesh
 from bellcrank.fem.continuum.response import complete_state, hub_displacements
+from bellcrank.fem.continuum.space_mesh import space_mesh
 from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.path import PathState, PathStatus, StepControl, follow_path
 from bellcrank.mechanics import Channel, StrokeRecord, channels_of, item_results
@@ -24,7 +25,7 @@ from bellcrank.mechanics.output import best_fit_rotation, motion_weights
 from bellcrank.mechanics.splines import stroke_spline
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -50,7 +51,7 @@ LAW = "neo-hookean"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SheetPath:
-    """Path of a part in plane stress in one load case."""
+    """Path of a part in one load case."""
 
     part: Part
     equations: ContinuumEquations
@@ -65,7 +66,7 @@ class SheetPath:
 
     @property
     def motion(self) -> Values:
-        """(S, N, 2) mean displacements of the hubs of lattice nodes, lattice units."""
+        """(S, N, d) mean displacements of the hubs of lattice nodes, lattice units."""
         return np.stack([state.motion for state in self.states]) / self.part.scale
 
 
@@ -122,7 +123,9 @@ def sheet_records(
     """
     wanted = part.design.problem.specification
     assert wanted is not None
-    mesh = plane_mesh(part, size, fineness) if mesh is None else mesh
+    if mesh is None:
+        in_plane = part.dimension == 2
+        mesh = plane_mesh(part, size, fineness) if in_plane else space_mesh(part, size)
     records = {}
     control = ROUGH_STEPS if fineness is COARSE else STEPS
     for name in part.design.problem.cases:
@@ -200,7 +203,7 @@ class _Sheet:
         return SheetPath(part, equations, path, states, [each.field for each in stresses])
 
     def _last_motion(self, problem: Problem) -> Values | None:
-        """Return (N, 2) the displacements at full stroke, lattice units; None without stability."""
+        """Return (N, d) the displacements at full stroke, lattice units; None without stability."""
         found = self._follow(problem)
         if found is None:
             return None
@@ -244,19 +247,21 @@ class _Sheet:
         return np.asarray((main.motion[:, given.nodes] * given.direction).sum(axis=2).mean(axis=1))
 
     def _rotation(self, main: SheetPath, problem: Problem) -> Values:
-        """Return (S,) the rotation of the output: of its nodes, or of a single hub."""
+        """Return (S,) the rotation of the output, of its nodes or of a single hub; degrees.
+
+        In space its size.
+        """
         nodes, rest = problem.output.nodes, problem.lattice.positions
         if len(nodes) > 1:
             turns = [best_fit_rotation(rest[nodes], moved[nodes]) for moved in main.motion]
-            return np.array(turns, dtype=np.float64)
+            return _angles(turns)
         inside = self.mesh.elements[self.mesh.hub_of_element == nodes[0]]
         corners = np.unique(inside)
-        return np.array(
+        return _angles(
             [
                 best_fit_rotation(field.rest[corners], field.displacement[corners])
                 for field in main.fields
-            ],
-            dtype=np.float64,
+            ]
         )
 
     def _stiffness(self, main: SheetPath, problem: Problem, _output: str) -> Values:
@@ -279,14 +284,14 @@ class _Sheet:
         return np.array([size / self.part.scale])
 
     def _hub_motion(self, equations: ContinuumEquations, unknowns: Values) -> Values:
-        """Return (N, 2) the mean displacements of hubs, mm."""
-        return hub_displacements(equations, PathState(1.0, unknowns))[:, :2]
+        """Return (N, d) the mean displacements of hubs, mm."""
+        return hub_displacements(equations, PathState(1.0, unknowns))
 
     def _loaded(self, _main: SheetPath, problem: Problem, output: str) -> Values:
-        """Return (1, 3) the motion of the output under its payload."""
+        """Return (1, 1 + d) the motion of the output under its payload."""
         motion = self._last_motion(with_payload(problem, self._payloads()[output]))
         if motion is None:
-            return np.full((1, 3), np.nan)
+            return np.full((1, 1 + problem.lattice.dimension), np.nan)
         return self._means(motion[None], problem)
 
     def _blocked(self, _main: SheetPath, problem: Problem, _output: str) -> Values:
@@ -320,7 +325,7 @@ class _Sheet:
         """Return the smallest gap between struts; infinite above the bound. Lattice units."""
         part = self.part
         lines = centre_lines(part.positions[part.struts])
-        interpolate = interpolator(main.fields[0], lines.reshape(-1, 2))
+        interpolate = interpolator(part, main.fields[0], lines)
         stroke = (
             (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
             for state, field in zip(main.states, main.fields, strict=True)
@@ -329,3 +334,9 @@ class _Sheet:
         beams = np.flatnonzero(part.design.mask)
         overlap = find_contacts(beams, lines, stroke, least).overlap
         return bound - float(overlap.max()) / part.scale if len(overlap) else math.inf
+
+
+def _angles(rotations: Sequence[Values]) -> Values:
+    """Return (S,) rotations in the plane, and the sizes of rotation vectors in space, degrees."""
+    found = np.array(rotations, dtype=np.float64)
+    return found if found.ndim == 1 else np.asarray(np.linalg.norm(found, axis=1))

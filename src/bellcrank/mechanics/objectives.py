@@ -159,7 +159,7 @@ def efficiency_of(
 
     Parameters
     ----------
-    displacement : (N, 2)
+    displacement : (N, d)
         Displacement of the nodes, in lattice units.
     name
         Objective; by default that of the problem.
@@ -187,7 +187,7 @@ def efficiency_of(
     objective = objective_of(problem, name)
     motion = np.asarray(displacement, dtype=np.float64)
     there = motion[problem.output.nodes]
-    size = np.hypot(there[:, 0], there[:, 1])
+    size = np.linalg.norm(there, axis=1)
     along = (there * problem.output.direction).sum(axis=1)
     cosine = np.divide(along, size, out=np.zeros_like(size), where=size > 0.0)
     half = np.sqrt(np.clip(0.5 * (1.0 + cosine), 0.0, 1.0))

@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.model.geometry import distances_to_segments, inner_distances
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Design
+
+TOUCHING = 1e-9
+"""Distance of centre lines that intersect, over the length of the longest beam."""
 
 
 def beam_pieces(design: Design) -> NDArray[np.int64]:
@@ -85,20 +89,31 @@ def connection_warnings(design: Design) -> list[str]:
         first, second = crossing[0]
         found.append(
             f"beams cross without a common node, for example {first} and {second}: they are "
-            "independent in frames and in the spring model but joined in the printed outline"
+            "independent in frames and in the spring model but joined in the printed part"
         )
     return found
 
 
 def crossings(design: Design) -> NDArray[np.int64]:
     """Return the pairs of beams, (p, 2), that intersect without a common node."""
-    import shapely
+    from scipy.spatial import cKDTree
 
     present = np.flatnonzero(design.mask)
     beams = design.problem.lattice.beams[present]
-    lines = shapely.linestrings(design.problem.lattice.positions[beams])
-    one, other = shapely.STRtree(lines).query(lines, predicate="intersects")
-    one, other = one[one < other], other[one < other]
+    ends = design.problem.lattice.positions[beams]
+    longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
+    near = cKDTree(ends.mean(axis=1)).query_pairs(longest, output_type="ndarray")
+    one, other = near[np.lexsort(near.T[::-1])].T
     shared = (beams[one][:, :, None] == beams[other][:, None, :]).any(axis=(1, 2))
-    pairs: NDArray[np.int64] = np.stack([present[one[~shared]], present[other[~shared]]], axis=1)
+    one, other = one[~shared], other[~shared]
+    gaps = [
+        inner_distances(ends[one], ends[other])[0],
+        *(
+            distances_to_segments(ends[first, end], ends[second, 0], ends[second, 1])
+            for first, second in ((one, other), (other, one))
+            for end in (0, 1)
+        ),
+    ]
+    meet = np.min(gaps, axis=0) <= TOUCHING * longest
+    pairs: NDArray[np.int64] = np.stack([present[one[meet]], present[other[meet]]], axis=1)
     return pairs

@@ -267,7 +267,7 @@ def stressed_part(analysis: Analysis) -> StressedPart:
     part, points = analysis.part, analysis.points
     load = np.array([0.0, *(point.load for point in points)])
     force = np.array([0.0, *(point.push for point in points)])
-    output = np.array([0.0, *(np.hypot(*point.output) for point in points)])
+    output = np.array([0.0, *(np.linalg.norm(point.output) for point in points)])
     by_motion = part.design.problem.input.drive == "displacement"
     known = f"efficiency {analysis.last.efficiency:.3f}"
     if np.isnan(analysis.efficiency):

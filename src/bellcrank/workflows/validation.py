@@ -17,7 +17,6 @@ from bellcrank.mechanics import (
     model_name,
     objective_name,
 )
-from bellcrank.model import require_plane
 from bellcrank.model.parsing import read_json
 from bellcrank.model.storage import write_text
 from bellcrank.part import PartSpec, read_length
@@ -68,8 +67,8 @@ class Validation:
         Results, in the order of the plan, as far as they are computed.
     items
         Items of the specification of the problem by model, if it has one: the model of the search,
-        eight elements in each beam and, with the level ``plane``, the sheet. A model in which the
-        part is not stable is left out.
+        eight elements in each beam and, with the level ``plane``, the sheet; in space the solid
+        with the level ``solid``. A model in which the part is not stable is left out.
     """
 
     design: Design
@@ -143,7 +142,8 @@ def validated_items(design: Design, spec: PartSpec, plan: Plan) -> dict[str, lis
     Parameters
     ----------
     design, spec, plan
-        As in `validate`; the sheet is computed if the plan has the level ``plane``.
+        As in `validate`; the sheet is computed if the plan has the level ``plane``, the solid of a
+        part in space if it has the level ``solid``.
     """
     problem = design.problem
     if not problem.is_specified or spec != spec_for(design):
@@ -152,11 +152,12 @@ def validated_items(design: Design, spec: PartSpec, plan: Plan) -> dict[str, lis
         model_words(problem, elements): results_for(problem, design.mask, elements)
         for elements in (None, ELEMENTS)
     }
-    sizes = [settings.size for level, settings in plan if level == "plane"]
+    wanted, name = {2: ("plane", "sheet"), 3: ("solid", "solid")}[problem.lattice.dimension]
+    sizes = [settings.size for level, settings in plan if level == wanted]
     if sizes:
         from bellcrank.fem.specification import sheet_items
 
-        found["sheet"] = sheet_items(spec.of(design), sizes[0])
+        found[name] = sheet_items(spec.of(design), sizes[0])
     return {model: items for model, items in found.items() if items is not None}
 
 
@@ -213,11 +214,10 @@ def check_plan(design: Design, spec: PartSpec, plan: Plan) -> None:
     Raises
     ------
     InvalidSettings, InvalidProblem
-        If the part cannot be built or analysed, or is in space.
+        If the part cannot be built or analysed; parts in space are analysed as solids alone.
     UnknownName
         If there is no such level, theory or law.
     """
-    require_plane(design.problem, "validation")
     part = spec.of(design)
     check_supported(design)
     for level, settings in plan:

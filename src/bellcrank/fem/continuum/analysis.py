@@ -27,15 +27,31 @@ if TYPE_CHECKING:
     from bellcrank.part import Part
 
 
-def check_outline(part: Part, settings: FemSettings) -> None:
-    """Raise an error if the law is unknown, NGSolve is missing or there is no valid outline."""
+SECTION = 1.01
+"""Radius of the ball of vertices around a point on a centre line, over that of the strut."""
+
+
+def check_law(settings: FemSettings) -> None:
+    """Raise an error if the law is unknown, or NGSolve is missing."""
     law = laws[settings.law]
     if law.small:
         raise InvalidSettings(
             f"law: {settings.law!r} is for small displacements; use --linear instead"
         )
     ngsolve()
+
+
+def check_plane(part: Part, settings: FemSettings) -> None:
+    """Raise an error if a part has no valid outline, or cannot be computed with these settings."""
+    check_law(settings)
     part.outline()
+
+
+def check_solid(part: Part, settings: FemSettings) -> None:
+    """Raise an error if a part cannot be computed; one in the plane needs a valid outline."""
+    check_law(settings)
+    if part.dimension == 2:
+        part.outline()
 
 
 def analyse_plane(part: Part, settings: FemSettings, report: Callable[[float], None]) -> Analysis:
@@ -67,11 +83,9 @@ def analyse_solid(part: Part, settings: FemSettings, report: Callable[[float], N
 
 
 levels.register("plane")(
-    Level(analyse_plane, check_outline, missing_ngsolve, "2D solid", "up to a minute")
+    Level(analyse_plane, check_plane, missing_ngsolve, "2D solid", "up to a minute")
 )
-levels.register("solid")(
-    Level(analyse_solid, check_outline, missing_ngsolve, "3D solid", "minutes")
-)
+levels.register("solid")(Level(analyse_solid, check_solid, missing_ngsolve, "3D solid", "minutes"))
 
 
 def _analyse(
@@ -110,11 +124,13 @@ def _analyse(
 
 def _point_of(part: Part, state: ContinuumState) -> StrokePoint:
     """Return the figures of an equilibrium."""
+    problem = part.design.problem
+    axes = slice(problem.lattice.dimension)
     return stroke_point(
         part,
         state.load,
-        state.motion[:, :2],
-        state.force[part.design.problem.input.nodes, :2],
+        state.motion[:, axes],
+        state.force[problem.input.nodes, axes],
         energy=state.energy,
         stress=state.stress,
         strain=state.strain,
@@ -124,7 +140,7 @@ def _point_of(part: Part, state: ContinuumState) -> StrokePoint:
 def _contacts_of(part: Part, response: ContinuumResponse) -> Contacts:
     """Find the struts whose centre lines come too close in any equilibrium of the path."""
     lines = centre_lines(part.positions[part.struts])
-    interpolate = interpolator(response.fields[0], lines.reshape(-1, 2))
+    interpolate = interpolator(part, response.fields[0], lines)
     stroke = (
         (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
         for state, field in zip(response.states, response.fields, strict=True)
@@ -134,23 +150,51 @@ def _contacts_of(part: Part, response: ContinuumResponse) -> Contacts:
 
 
 def interpolator(
-    field: Field, points: NDArray[np.float64]
+    part: Part, field: Field, lines: NDArray[np.float64]
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Return a function that interpolates vertex displacements to points of a part.
+    """Return a function from displacements of vertices to those of points on centre lines.
 
     Parameters
     ----------
+    part
+        The part.
     field
-        Any state of the part; in space the points are on its lower face.
-    points : (p, 2) float64
-        Points within the part at rest, mm.
+        Any of its states.
+    lines : (s, k, d) float64
+        Points on the centre lines of its struts at rest, mm.
 
     Returns
     -------
     callable
-        Function from (n, 2) or (n, 3) displacements of the vertices to (p, 2) displacements of
+        Function from (n, 2) or (n, 3) displacements of the vertices to (s k, d) displacements of
         the points, mm.
     """
+    points = lines.reshape(-1, lines.shape[2])
+    if part.dimension == 2:
+        return _within_triangles(field, points)
+    return _mean_of_sections(field, points, np.repeat(0.5 * part.widths, lines.shape[1]))
+
+
+def _mean_of_sections(
+    field: Field, points: NDArray[np.float64], radii: NDArray[np.float64]
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Return a function to the means of the vertices around points on centre lines in space."""
+    from scipy.sparse import csr_matrix
+    from scipy.spatial import cKDTree
+
+    around = cKDTree(field.rest).query_ball_point(points, SECTION * radii)
+    counts = np.array([len(each) for each in around])
+    columns = np.concatenate([np.array(each, dtype=np.int64) for each in around])
+    rows = np.repeat(np.arange(len(points)), counts)
+    shape = (len(points), len(field.rest))
+    weights = csr_matrix((np.repeat(1.0 / counts, counts), (rows, columns)), shape=shape)
+    return lambda displacement: np.asarray(weights @ displacement)
+
+
+def _within_triangles(
+    field: Field, points: NDArray[np.float64]
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Return a function that interpolates to points in the plane, or on the floor of a solid."""
     import shapely
 
     rest, cells = field.rest[:, :2], field.cells

@@ -67,12 +67,16 @@ class ContinuumMesh:
     thickness
         Factor of integrals over the mesh: the thickness of the part in the plane, mm, and 1 in
         space.
+    curves
+        Deformation of NGSolve that curves the edges on the surface of a part in space; None for
+        other meshes.
     """
 
     mesh: Any
     hubs: NDArray[np.int64]
     node_count: int
     thickness: float
+    curves: Any = None
 
     @property
     def dimension(self) -> int:

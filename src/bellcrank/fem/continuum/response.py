@@ -12,6 +12,7 @@ from bellcrank.fem.continuum.equations import ContinuumEquations
 from bellcrank.fem.continuum.fields import StressField, stress_field
 from bellcrank.fem.continuum.mesh import plane_mesh
 from bellcrank.fem.continuum.solid import solid_mesh
+from bellcrank.fem.continuum.space_mesh import space_mesh
 from bellcrank.fem.continuum.system import MEAN_ORDER, continuum_system, integration
 from bellcrank.fem.path import EquilibriumPath, PathState, PathStatus, StepControl, follow_path
 
@@ -118,11 +119,13 @@ def solve_solid(
     control: StepControl = STEPS,
     report: Callable[[PathState], None] = lambda _state: None,
 ) -> ContinuumResponse:
-    """Return the response of a part as a solid, with one layer of elements across its thickness.
+    """Return the response of a part as a solid.
 
-    Parameters and errors are those of `solve_plane`, but the default size is the strut width.
+    A part in the plane has one layer of elements across its thickness. Parameters and errors are
+    those of `solve_plane`; the default size is the strut width, in space that of `space_mesh`.
     """
-    return solve_mesh(part, solid_mesh(part, size), law, control, report)
+    mesh = solid_mesh(part, size) if part.dimension == 2 else space_mesh(part, size)
+    return solve_mesh(part, mesh, law, control, report)
 
 
 def solve_mesh(
@@ -174,7 +177,7 @@ def complete_state(
         load=state.load,
         motion=motion,
         force=force,
-        input_force=float((force[given.nodes, :2] * given.direction).sum()),
+        input_force=float((force[given.nodes, : given.direction.shape[1]] * given.direction).sum()),
         energy=float(energy),
         stress=stress.largest_stress,
         strain=stress.largest_strain,
@@ -204,7 +207,7 @@ def _hub_forces(equations: ContinuumEquations, state: PathState) -> NDArray[np.f
     multipliers = state.unknowns[equations.moving :]
     for constraint, multiplier in zip(boundary.means, multipliers.tolist(), strict=True):
         force[constraint.node] -= system.unit * multiplier * np.array(constraint.direction)
-    force[boundary.loaded, :2] += state.load * boundary.force
+    force[boundary.loaded, : boundary.force.shape[1]] += state.load * boundary.force
     internal = equations.forces(state.unknowns)[: equations.displacements.ndof]
     internal = internal.reshape(mesh.dimension, -1)
     hub_of_element, elements = mesh.hub_of_element, mesh.elements

@@ -70,9 +70,9 @@ class Boundary:
         Constraints on mean displacements of hubs.
     loaded : (p,) int64
         Lattice nodes whose hubs are loaded by forces.
-    force : (p, 2) float64
+    force : (p, d) float64
         Forces on them at the full load, N.
-    weight : (2,) float64, optional
+    weight : (d,) float64, optional
         Own weight at the full load, N / mm^3.
     """
 
@@ -86,8 +86,8 @@ class Boundary:
 def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary:
     """Return the supports and loads of the hubs of a part.
 
-    In space the mean displacement of driven hubs and of those on rollers has no component out of
-    the plane.
+    In the mesh of a solid, the mean displacement of driven hubs of a part in the plane, and of
+    those on rollers, has no component out of the plane.
 
     Parameters
     ----------
@@ -96,17 +96,19 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
     hubs : (h,) int64
         Lattice nodes that have a hub.
     dimension
-        2 in the plane, 3 in space.
+        2 for a mesh in the plane, 3 for one in space.
     """
     problem = part.design.problem
     supports, given = problem.supports, problem.input
     axes = [tuple(row) for row in np.eye(dimension).tolist()]
+    across = axes[problem.lattice.dimension :]
     means: list[MeanConstraint] = []
-    for nodes, held in ((supports.fixed_x, 0), (supports.fixed_y, 1)):
+    rollers = (supports.fixed_x, supports.fixed_y, supports.fixed_z)
+    for nodes, held in zip(rollers, axes, strict=False):
         for node in np.intersect1d(nodes, hubs).tolist():
-            means += [MeanConstraint(node, axis) for axis in (axes[held], *axes[2:])]
+            means += [MeanConstraint(node, axis) for axis in (held, *across)]
     present = np.isin(given.nodes, hubs)
-    total = np.zeros((len(problem.lattice.positions), 2))
+    total = np.zeros(problem.lattice.positions.shape)
     if given.drive == "displacement":
         full = given.amount * part.scale * given.direction[present]
         ranges = given.ranges[present].tolist()
@@ -117,7 +119,7 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
                 MeanConstraint(node, axis, move, during=tuple(during))
                 for axis, move in zip(axes, motion, strict=False)
             ]
-            means += [MeanConstraint(node, axis) for axis in axes[2:]]
+            means += [MeanConstraint(node, axis) for axis in across]
     else:
         total[given.nodes] += given.amount * given.direction
     for each in problem.loads.forces:
@@ -139,13 +141,14 @@ def _springs(
 ) -> Iterator[MeanConstraint]:
     """Yield the springs at outputs and at other hubs."""
     problem = part.design.problem
-    rest = axes[0][2:]
+    dimension = problem.lattice.dimension
+    rest = axes[0][dimension:]
     for output in problem.outputs.values():
         if output.spring is None:
             continue
         for node, along in zip(output.nodes.tolist(), output.direction.tolist(), strict=True):
             isotropic = output.spring_kind == "isotropic"
-            for direction in axes[:2] if isotropic else [(*along, *rest)]:
+            for direction in axes[:dimension] if isotropic else [(*along, *rest)]:
                 if node in hubs:
                     spring = output.spring * part.stiffness_unit
                     yield MeanConstraint(node, direction, spring=spring)

@@ -15,6 +15,7 @@ from bellcrank.fem.path import PathStatus, follow_path
 from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
 from bellcrank.mechanics.frames.analysis import without_ends
 from bellcrank.mechanics.frames.beams import theories
+from bellcrank.model import require_plane
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -27,9 +28,10 @@ if TYPE_CHECKING:
     from bellcrank.part.part import Part
 
 
-def check_frame(_part: Part, settings: FemSettings) -> None:
-    """Raise UnknownName for an unknown beam theory."""
+def check_frame(part: Part, settings: FemSettings) -> None:
+    """Raise an error for an unknown beam theory, and for a part in space."""
     theories[settings.theory]
+    require_plane(part.design.problem, "level 'frame'")
 
 
 def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], None]) -> Analysis:
