@@ -15,6 +15,7 @@ from bellcrank.machines import TwoPort
 from bellcrank.machines.bundled import find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder, kinds
+from benchmarks.refinement import mass_rows, specified_rows
 from benchmarks.tasks import summary
 
 ROOT = Path(__file__).parents[2]
@@ -265,11 +266,20 @@ def tasks() -> Rows:
     yield from summary(read("tasks/runs")["runs"])
 
 
+def equal_mass() -> Rows:
+    yield from mass_rows(read("refinement/runs")["runs"])
+
+
+def refined_specifications() -> Rows:
+    yield from specified_rows(read("refinement/runs")["runs"])
+
+
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (search_comparison, move_comparison),
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),
+    "refinement": (equal_mass, refined_specifications),
     "machines": (bundled, contact, entries, lengths, two_ports),
     "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }

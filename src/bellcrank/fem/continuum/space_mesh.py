@@ -65,7 +65,7 @@ class RoundStruts:
     def distance(self, points: Values) -> Values:
         """Return (n,) the distance of points (n, 3) from the surface, negative inside.
 
-        Infinite farther than two radii away.
+        Infinite farther than two radii from all struts.
         """
         found = np.full(len(points), np.inf)
         for (first, second), radius in zip(self.ends, self.radii.tolist(), strict=True):
@@ -148,8 +148,6 @@ def stuffed(struts: RoundStruts, size: float) -> tuple[Values, Numbers]:
     distance = struts.distance(vertices)
     used, numbers = np.unique(elements[distance[elements].min(axis=1) < 0.0], return_inverse=True)
     vertices, distance = vertices[used], distance[used]
-    # Cuts are found between points inside and outside; farther away the distance is not needed.
-    distance = np.minimum(distance, 2.0 * size)
     elements = numbers.reshape(-1, 4)
     sides = np.array(list(combinations(range(4), 2)))
     edges = np.unique(np.sort(elements[:, sides].reshape(-1, 2), axis=1), axis=0)
