@@ -38,7 +38,7 @@ surface; the long edges are those between centres of cubes. Values of Labelle an
 BISECTIONS = 12
 LARGEST_CURVE = 0.3
 """Largest distance of the middle of an edge on the surface from its chord, in edges of cubes."""
-DIRECTIONS = 5
+SURFACE_STEPS = 5
 """Newton steps that move the middle of an edge onto the surface."""
 
 
@@ -82,7 +82,7 @@ class RoundStruts:
     def on_surface(self, points: Values) -> Values:
         """Return (n, 3) points that are moved onto the surface nearby."""
         step = 1e-4 * float(self.radii.min())
-        for _ in range(DIRECTIONS):
+        for _ in range(SURFACE_STEPS):
             slopes = np.column_stack(
                 [
                     (self.distance(points + step * axis) - self.distance(points - step * axis))
