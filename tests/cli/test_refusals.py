@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bellcrank.model import problem_to_dict
+from bellcrank.model import design_to_dict, problem_to_dict
 from bellcrank.storage.locking import LOCK, locked
 from tests.reference3d import read_reference
 
@@ -408,6 +408,13 @@ def test_the_spring_model_is_refused_in_space(here: Path) -> None:
 )
 def test_contradictory_models_of_a_design_are_refused(words: tuple[str, ...], message: str) -> None:
     assert refusal("design", PROBLEM, *words).startswith(f"error: {message}")
+
+
+def test_pictures_of_stress_are_for_the_plane(here: Path) -> None:
+    problem, _ = read_reference("octet-crane")
+    write(here / "space.json", design_to_dict(problem.full_design()))
+    words = ("validate", "space.json", "--level", "solid", "--picture", "stress.png")
+    assert refusal(*words).startswith("error: --picture: problem 'octet-crane' is in space; only")
 
 
 def test_designs_in_space_have_no_spring_model_and_need_a_symmetric_lattice(here: Path) -> None:

@@ -130,14 +130,7 @@ def validate(
     plan, missing = without_missing_levels(
         _plan(level, theory, law, linear=linear, elements=elements, size=size)
     )
-    others = [design_named(compare)] if compare is not None else []
-    if others and picture is None:
-        raise InvalidSettings("--compare is for the picture; give --picture FILE too")
-    drives = {one.problem.input.drive for one in (chosen, *others)}
-    if len(drives) > 1:
-        raise InvalidSettings(
-            f"--compare: {compare} and {design} are not driven alike, by a displacement or a force"
-        )
+    others = _compared(chosen, design, compare, picture)
     strokes = [
         one if stroke is None else with_stroke(one, stroke, spec.scale) for one in (chosen, *others)
     ]
@@ -173,6 +166,26 @@ def validate(
         analysis.status.value in ("mechanism", "unconverged") for analysis in validation.analyses
     ):
         raise typer.Exit(FAILED)
+
+
+def _compared(
+    chosen: Design, design: str, compare: str | None, picture: Path | None
+) -> list[Design]:
+    """Return the second design of the picture, if there is one; refuse what it cannot show."""
+    from bellcrank.model import require_plane
+
+    if picture is not None:
+        require_plane(chosen.problem, "--picture")
+    if compare is None:
+        return []
+    if picture is None:
+        raise InvalidSettings("--compare is for the picture; give --picture FILE too")
+    other = design_named(compare)
+    if other.problem.input.drive != chosen.problem.input.drive:
+        raise InvalidSettings(
+            f"--compare: {compare} and {design} are not driven alike, by a displacement or a force"
+        )
+    return [other]
 
 
 def _plan(

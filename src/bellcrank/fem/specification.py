@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bellcrank.fem.contact import centre_lines, find_contacts
-from bellcrank.fem.continuum.analysis import interpolator
+from bellcrank.fem.continuum.analysis import contacts_along
 from bellcrank.fem.continuum.equations import ContinuumEquations
 from bellcrank.fem.continuum.fields import stress_field
 from bellcrank.fem.continuum.mesh import COARSE, FINE, plane_mesh
@@ -104,8 +103,8 @@ def sheet_records(
     report
         Called with the name of the load case and the fraction of the stroke reached.
     fineness
-        How fine the mesh is. With `COARSE`, a path that needs steps below a hundredth of the
-        stroke, or more than a hundred factorisations, counts as unstable.
+        How fine the mesh in the plane is. With `COARSE`, a path that needs steps below a
+        hundredth of the stroke, or more than a hundred factorisations, counts as unstable.
     mesh
         Mesh of another outline with the same ports; that of the struts by default. The part then
         gives the problem and the material only, and a bound on the clearance of its struts has no
@@ -324,15 +323,8 @@ class _Sheet:
     def _gap(self, main: SheetPath, bound: float) -> float:
         """Return the smallest gap between struts; infinite above the bound. Lattice units."""
         part = self.part
-        lines = centre_lines(part.positions[part.struts])
-        interpolate = interpolator(part, main.fields[0], lines)
-        stroke = (
-            (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
-            for state, field in zip(main.states, main.fields, strict=True)
-        )
         least = part.widths + bound * part.scale
-        beams = np.flatnonzero(part.design.mask)
-        overlap = find_contacts(beams, lines, stroke, least).overlap
+        overlap = contacts_along(part, main.states, main.fields, least).overlap
         return bound - float(overlap.max()) / part.scale if len(overlap) else math.inf
 
 

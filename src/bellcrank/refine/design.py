@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, item_results, tightened
 from bellcrank.mechanics.frames.joints import with_joints
-from bellcrank.model import Item, ObjectiveTerm, Specification
+from bellcrank.model import Item
+from bellcrank.refine.default_specification import specified
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
+MASS_RESERVE = 2e-3
+"""The same for the mass, which is that of all models: more than `MET`."""
 SHEETS = 4
 """Largest number of geometries that are computed in the sheet: each load case takes up to a
 minute."""
@@ -46,8 +49,6 @@ SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
 HALVINGS = 2
 """Number of times the path of a refinement that is not near the sheet is halved."""
-MASS_RESERVE = 2e-3
-"""The same for the mass, which all models have in common: more than `MET`."""
 MET = 1e-3
 """Sum of violations at which they are."""
 AMPLE = 0.25
@@ -87,49 +88,6 @@ class Refinement:
     sheets: int
     reason: str
     improved: bool
-
-
-def specified(problem: Problem, strain_limit: float = math.nan) -> Problem:
-    """Return a problem with a specification: its own, or the largest efficiency without contact.
-
-    The efficiency is the gain, or the force in the output springs over that of the input, if the
-    problem is driven by forces against output springs.
-
-    Parameters
-    ----------
-    strain_limit
-        Largest strain for a problem without a specification; nan if it is unknown.
-    """
-    if problem.is_specified:
-        return problem
-    (output,) = problem.outputs
-    (case,) = problem.cases
-    items = [Item(quantity="clearance", case=case, at_least=0.0)]
-    if math.isfinite(strain_limit):
-        items.append(Item(quantity="strain", case=case, at_most=strain_limit))
-    own = Specification(
-        case=case,
-        output=output,
-        items=tuple(items),
-        maximise=(ObjectiveTerm(case=case, output=output, **_largest(problem)),),
-    )
-    return replace(problem, specification=own)
-
-
-class _Quantity(TypedDict):
-    """Quantity of an objective, and the value of it that counts as 1."""
-
-    quantity: str
-    scale: float
-
-
-def _largest(problem: Problem) -> _Quantity:
-    """Return the quantity whose largest value is that of the efficiency."""
-    given, output = problem.input, problem.output
-    if given.drive == "displacement" or output.spring is None:
-        return {"quantity": "gain", "scale": 1.0}
-    force = given.amount * len(given.nodes)
-    return {"quantity": "travel", "scale": force / (output.spring * len(output.nodes))}
 
 
 def refine_design(

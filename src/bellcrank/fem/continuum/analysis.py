@@ -17,7 +17,7 @@ from bellcrank.fem.path import PathStatus
 from bellcrank.fem.results import Analysis, StrokePoint, stroke_point
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -139,40 +139,38 @@ def _point_of(part: Part, state: ContinuumState) -> StrokePoint:
 
 def _contacts_of(part: Part, response: ContinuumResponse) -> Contacts:
     """Find the struts whose centre lines come too close in any equilibrium of the path."""
-    lines = centre_lines(part.positions[part.struts])
-    interpolate = interpolator(part, response.fields[0], lines)
-    stroke = (
-        (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
-        for state, field in zip(response.states, response.fields, strict=True)
-    )
-    beams = np.flatnonzero(part.design.mask)
-    return find_contacts(beams, lines, stroke, part.widths)
+    return contacts_along(part, response.states, response.fields, part.widths)
 
 
-def interpolator(
-    part: Part, field: Field, lines: NDArray[np.float64]
-) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Return a function from displacements of vertices to those of points on centre lines.
+def contacts_along(
+    part: Part,
+    states: Sequence[ContinuumState],
+    fields: Sequence[Field],
+    widths: NDArray[np.float64],
+) -> Contacts:
+    """Find the struts whose centre lines come nearer than a width in any state.
 
     Parameters
     ----------
     part
         The part.
-    field
-        Any of its states.
-    lines : (s, k, d) float64
-        Points on the centre lines of its struts at rest, mm.
-
-    Returns
-    -------
-    callable
-        Function from (n, 2) or (n, 3) displacements of the vertices to (s k, d) displacements of
-        the points, mm.
+    states, fields
+        Its states along the stroke.
+    widths : (s,) float64
+        Widths of the struts, mm, with the gaps between them that are wanted.
     """
+    lines = centre_lines(part.positions[part.struts])
     points = lines.reshape(-1, lines.shape[2])
     if part.dimension == 2:
-        return _within_triangles(field, points)
-    return _mean_of_sections(field, points, np.repeat(0.5 * part.widths, lines.shape[1]))
+        interpolate = _within_triangles(fields[0], points)
+    else:
+        radii = np.repeat(0.5 * part.widths, lines.shape[1])
+        interpolate = _mean_of_sections(fields[0], points, radii)
+    stroke = (
+        (state.load, lines + interpolate(field.displacement).reshape(lines.shape))
+        for state, field in zip(states, fields, strict=True)
+    )
+    return find_contacts(np.flatnonzero(part.design.mask), lines, stroke, widths)
 
 
 def _mean_of_sections(
@@ -182,7 +180,9 @@ def _mean_of_sections(
     from scipy.sparse import csr_matrix
     from scipy.spatial import cKDTree
 
-    around = cKDTree(field.rest).query_ball_point(points, SECTION * radii)
+    tree = cKDTree(field.rest)
+    nearest, _ = tree.query(points)
+    around = tree.query_ball_point(points, SECTION * np.maximum(radii, nearest))
     counts = np.array([len(each) for each in around])
     columns = np.concatenate([np.array(each, dtype=np.int64) for each in around])
     rows = np.repeat(np.arange(len(points)), counts)

@@ -139,7 +139,7 @@ class ContinuumEquations:
         return load
 
     def _hub_load(self, nodes: NDArray[np.int64], force: NDArray[np.float64]) -> Any:
-        """Return the form of the work of forces (n, 2) on hubs, N."""
+        """Return the form of the work of forces (n, d) on hubs, N."""
         module, system = ngsolve(), self.system
         rules = integration(system.mesh.dimension, MEAN_ORDER)
         test = self.space.TestFunction()[0]
@@ -157,7 +157,7 @@ class ContinuumEquations:
         return system.mesh.thickness * pulled * module.dx
 
     def motion_by_weight(self, weight: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (f,) the linear motion at rest by the own weight (2,), N / mm^3."""
+        """Return (f,) the linear motion at rest by the own weight (d,), N / mm^3."""
         module = ngsolve()
         form = module.LinearForm(self.space)
         form += self._body_force(self.space.TestFunction()[0], weight)
@@ -169,7 +169,7 @@ class ContinuumEquations:
     def motion_by_forces(
         self, unknowns: NDArray[np.float64], nodes: NDArray[np.int64], force: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return (f,) the linear motion from a state by forces (n, 2) on hubs, N."""
+        """Return (f,) the linear motion from a state by forces (n, d) on hubs, N."""
         form = self._hub_load(nodes, force)
         form.Assemble()
         right: NDArray[np.float64] = form.vec.FV().NumPy()[self.free]

@@ -8,6 +8,7 @@ elements. The edges on the surface are curved.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +41,8 @@ LARGEST_CURVE = 0.3
 """Largest distance of the middle of an edge on the surface from its chord, in edges of cubes."""
 SURFACE_STEPS = 5
 """Newton steps that move the middle of an edge onto the surface."""
+FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+"""Corners of the faces of a tetrahedron."""
 
 
 class RoundStruts:
@@ -129,9 +132,7 @@ def space_mesh(part: Part, size: float | None = None) -> ContinuumMesh:
             "choose a smaller size"
         )
     mesh = solid_of(vertices, elements, hubs, part.design.problem.lattice.node_count)
-    return ContinuumMesh(
-        mesh.mesh, mesh.hubs, mesh.node_count, 1.0, _curved(mesh, struts, elements, size)
-    )
+    return replace(mesh, curves=_curved(mesh, struts, elements, size))
 
 
 def stuffed(struts: RoundStruts, size: float) -> tuple[Values, Numbers]:
@@ -233,9 +234,6 @@ def _cuts(struts: RoundStruts, vertices: Values, crossed: Numbers) -> Values:
     return np.asarray(0.5 * (inner + outer))
 
 
-FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
-
-
 def _inner_pieces(
     element: list[int], side: list[float], cuts: dict[tuple[int, int], int]
 ) -> list[tuple[int, int, int, int]]:
@@ -263,7 +261,8 @@ def _inner_pieces(
             faces.append(polygon)
         if len(on_surface) == 2 and any(side[k] > 0.0 for k in face):
             section.append((on_surface[0], on_surface[1]))
-    faces += _loops(section)
+    if len(section) >= 3:
+        faces.append(_polygon(section))
     lowest = min(vertex for face in faces for vertex in face)
     found = []
     for polygon in faces:
@@ -277,10 +276,8 @@ def _inner_pieces(
     return found
 
 
-def _loops(sides: list[tuple[int, int]]) -> list[list[int]]:
-    """Return the polygon that sides enclose; none for fewer than three."""
-    if len(sides) < 3:
-        return []
+def _polygon(sides: list[tuple[int, int]]) -> list[int]:
+    """Return the corners of the polygon that sides enclose, in order."""
     left = list(sides)
     first, last = left.pop()
     polygon = [first]
@@ -289,7 +286,7 @@ def _loops(sides: list[tuple[int, int]]) -> list[list[int]]:
         index = next(k for k, pair in enumerate(left) if last in pair)
         one, other = left.pop(index)
         last = other if last == one else one
-    return [polygon]
+    return polygon
 
 
 def _volumes(vertices: Values, elements: Numbers) -> Values:
