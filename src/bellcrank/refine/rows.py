@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
-    from bellcrank.mechanics.frames.evaluator import FrameEvaluator
     from bellcrank.model import Item, Problem
     from bellcrank.refine.differences import Difference
     from bellcrank.refine.gaps import Gaps
@@ -100,14 +99,14 @@ class _Geometry:
     channels: dict[str, dict[Channel, Values]] = field(default_factory=dict)
     softest: dict[tuple[str, int], States] = field(default_factory=dict)
     gaps: dict[tuple[str, int], Gaps] = field(default_factory=dict)
-    beams: dict[int, BeamSlopes] = field(default_factory=dict)
+    beams: BeamSlopes | None = None
 
-    def beam_slopes(self, frame: FrameEvaluator, mask: NDArray[np.bool_]) -> BeamSlopes:
-        """Return the derivatives of the properties of the beams of a frame of this geometry."""
-        key = id(frame)
-        if key not in self.beams:
-            self.beams[key] = beam_slopes(frame, mask)
-        return self.beams[key]
+    def beam_slopes(self, mask: NDArray[np.bool_]) -> BeamSlopes:
+        """Return the derivatives of the properties of beams, which are those of all load cases."""
+        if self.beams is None:
+            case = next(iter(self.evaluator.cases.values()))
+            self.beams = beam_slopes(case.evaluator.frame, mask)
+        return self.beams
 
 
 class RowEvaluator:
@@ -241,8 +240,8 @@ class RowEvaluator:
     def _channel_gradients(self, here: _Geometry, name: str) -> Gradients | None:
         """Return (c, n) the derivatives of each channel at each of its states."""
         out: Gradients = {}
+        of_beams = here.beam_slopes(self.mask)
         for point in here.evaluator.cases[name].evaluator.merged_points():
-            of_beams = here.beam_slopes(point.evaluator, self.mask)
             found = geometry_slopes(point.equilibrium, point.measured, of_beams)
             if found is None:
                 return None
@@ -270,7 +269,7 @@ class RowEvaluator:
         printed = printed_beams(problem, self.mask, case.frame.structure.present != 0)
         values, gradients = [np.zeros(0)], [np.zeros((0, self.variables.count))]
         keys: list[tuple[int, ...]] = []
-        of_beams = here.beam_slopes(case.frame, self.mask) if slopes else None
+        of_beams = here.beam_slopes(self.mask) if slopes else None
         for k in range(1, STATES + 1):
             state = case.state(k / STATES)
             if state is None:
@@ -321,7 +320,7 @@ class RowEvaluator:
             keys += [(index, round(1e6 * each)) for each in near]
             if not slopes or not near:
                 continue
-            rates, of_beams = {}, here.beam_slopes(frame, self.mask)
+            rates, of_beams = {}, here.beam_slopes(self.mask)
             for fraction in {*near, *(known[each][0] for each in near)}:
                 equilibrium, measures = found[fraction]
                 slope = geometry_slopes(equilibrium, [(LOWEST_STIFFNESS, measures)], of_beams)

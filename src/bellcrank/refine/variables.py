@@ -188,12 +188,8 @@ def _orbit(
         return orbit, np.eye(dimension)
     _, sizes, directions = np.linalg.svd(restricted)
     rank = int((sizes > INDEPENDENT).sum())
-    return orbit, _clean(directions[rank:].T)
-
-
-def _clean(motions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return motions without components that are rounding errors."""
-    return np.where(np.abs(motions) > INDEPENDENT, motions, 0.0)
+    motions = directions[rank:].T
+    return orbit, np.where(np.abs(motions) > INDEPENDENT, motions, 0.0)
 
 
 def _beam_groups(
