@@ -99,6 +99,18 @@ def test_no_strut_is_in_a_hole() -> None:
     assert made.problem.lattice.beam_count < task().problem.lattice.beam_count
 
 
+def test_a_region_may_leave_out_the_nodes_of_a_shape() -> None:
+    data = copy.deepcopy(TASK)
+    data["supports"] = [{"at": {"face": "bottom"}}]
+    whole = task_from_dict(data).problem
+    data["supports"][0]["at"]["without"] = {"cylinder": [23, 23], "radius": "15 mm"}
+    ring = task_from_dict(data).problem
+    away = np.linalg.norm(10.0 * whole.lattice.positions[:, :2] - 23.0, axis=1)
+    held = whole.supports.fixed
+    assert np.array_equal(ring.supports.fixed, held[away[held] > 15.0])
+    assert 0 < len(ring.supports.fixed) < len(held)
+
+
 def test_beams_of_solid_regions_stay() -> None:
     made = task(solid=[{"box": [0, 0, 30, 46, 46, 46]}])
     problem = made.problem
@@ -180,6 +192,14 @@ def test_what_is_no_closed_surface_is_refused(
         (
             {"supports.0.at": {"sphere": [0, 0, 90], "radius": 2}},
             "no node lies in this sphere; the lattice extends from x = ",
+        ),
+        (
+            {"supports.0.at": {"face": "bottom", "without": {"box": [0, 0, 0, 46, 46, 46]}}},
+            "supports.*without: all nodes of the region lie in this shape",
+        ),
+        (
+            {"supports.0.at": {"face": "bottom", "without": {"circle": [5, 5], "radius": 3}}},
+            "supports.*without: expected one of sphere, cylinder",
         ),
         ({"cases.0.inputs.0.direction": [0, 1]}, r"direction: expected .* a vector \[x, y, z\]"),
         ({"cases.0.inputs.0.direction": "30 deg"}, r"direction: expected right, left, back"),
