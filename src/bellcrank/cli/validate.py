@@ -127,10 +127,10 @@ def validate(
         "width": width, "thickness": thickness, "scale": scale, "fillet": fillet, "joint": joint,
     }  # fmt: skip
     spec = part_of(spec_for(chosen), part, lengths, material, young, poisson)
+    others = _compared(chosen, design, compare, picture)
     plan, missing = without_missing_levels(
         _plan(level, theory, law, linear=linear, elements=elements, size=size)
     )
-    others = _compared(chosen, design, compare, picture)
     strokes = [
         one if stroke is None else with_stroke(one, stroke, spec.scale) for one in (chosen, *others)
     ]
