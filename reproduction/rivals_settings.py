@@ -23,13 +23,13 @@ class Settings:
         Length and number of chains of bellcrank's default search.
     goals
         Sets of goals of bellcrank's search; the best result is reported.
-    element
-        Element size of the topology optimisation, mm.
+    elements
+        Elements of the topology optimisation along the longer side of the box.
     radii
         Filter radii, in elements. The first is that of the examples of pyMOTO.
     springs
-        Springs at input and output, in units of Young's modulus times thickness; the best result
-        is reported.
+        Springs at input and output, in units of Young's modulus times thickness. The best result
+        of all springs and radii is reported.
     iterations
         Iterations of the optimiser.
     triangle, finer
@@ -51,7 +51,7 @@ class Settings:
     steps: int = 8000
     chains: int = 3
     goals: tuple[tuple[str, ...], ...] = ((), ("mirror y",))
-    element: float = 1.0
+    elements: int = 100
     radii: tuple[float, ...] = (2.0, 1.5)
     springs: tuple[tuple[float, float], ...] = tuple(itertools.product((0.1, 1.0), (0.007, 0.005)))
     iterations: int = 100

@@ -100,7 +100,7 @@ def _rival(box: Box, volume: float, settings: Settings, store: ResultStore) -> d
         {"off_axis": off_axis, **row}
         for off_axis in (OFF_AXIS, None)
         for row, _ in rival_designs(
-            box, f"lift-{off_axis}", volume, settings, store, score, _rank, off_axis
+            box, f"lift-{off_axis}", volume, settings, store, score, off_axis
         )
     ]
     best = min(tried, key=_rank)

@@ -56,7 +56,7 @@ def pymoto() -> Any:
 
 def optimise(
     box: Box,
-    element: float,
+    elements: int,
     volume: float,
     springs: tuple[float, float],
     radius: float,
@@ -67,8 +67,8 @@ def optimise(
 
     Parameters
     ----------
-    element
-        Element size, mm.
+    elements
+        Number of elements along the longer side of the box.
     volume
         Largest volume fraction.
     springs
@@ -90,7 +90,7 @@ def optimise(
     """
     module = pymoto()
     size = box.high - box.low
-    across, up = (max(round(float(side) / element), 2) for side in size)
+    across, up = (max(round(elements * float(side) / size.max()), 2) for side in size)
     domain = module.VoxelDomain(across, up)
     step = size / np.array([across, up])
     solid, empty = _passive(box, domain, step, (across, up))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from reproduction.outline_analysis import contour_of
 from reproduction.topology import optimise
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from shapely import Polygon
 
@@ -29,12 +30,9 @@ def rival_designs(
     settings: Settings,
     store: ResultStore,
     score: Callable[[Polygon | None], Row],
-    rank: Callable[[Mapping[str, Any]], Any],
     off_axis: float | None = None,
 ) -> list[tuple[Row, Polygon | None]]:
     """Return topology-optimised designs of a volume: their settings and scores, and outlines.
-
-    All springs are tried with the first filter, then the other filters with the best springs.
 
     Parameters
     ----------
@@ -42,18 +40,16 @@ def rival_designs(
         Prefix of the stored results.
     score
         Function of an outline; None if input, output and support are not connected.
-    rank
-        Function of a score, smaller for better designs.
     off_axis
         As in `optimise`.
     """
     area = volume * float(np.prod(box.high - box.low))
+    attempts = tuple(product(settings.radii, settings.springs))
     tried: list[tuple[Row, Polygon | None]] = []
-
-    def attempt(springs: tuple[float, float], radius: float) -> None:
+    for radius, springs in attempts:
         key = f"{springs[0]:g}-{springs[1]:g}-{radius:g}"
         work = partial(
-            optimise, box, settings.element, volume, springs, radius, settings.iterations, off_axis
+            optimise, box, settings.elements, volume, springs, radius, settings.iterations, off_axis
         )
         made = store.compute(f"{name}-rival-{key}", work)
         shape = contour_of(box, np.array(made["density"]), area)
@@ -65,11 +61,5 @@ def rival_designs(
             **store.compute(f"{name}-rival-judged-{key}", partial(score, shape)),
         }
         tried.append((row, shape))
-        store.progress(f"{name}-rival", len(tried), len(settings.springs) + len(settings.radii) - 1)
-
-    for springs in settings.springs:
-        attempt(springs, settings.radii[0])
-    good = min(tried, key=lambda each: rank(each[0]))[0]["springs"]
-    for radius in settings.radii[1:]:
-        attempt((good[0], good[1]), radius)
+        store.progress(f"{name}-rival", len(tried), len(attempts))
     return tried
