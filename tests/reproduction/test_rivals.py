@@ -61,7 +61,7 @@ def test_topology_optimisation_finds_an_inverter() -> None:
     except InvalidSettings:
         pytest.skip("pyMOTO is not installed")
     box = box_of("inverter", 4, 7, 0.2, 0.01)
-    result = optimise(box, 2.0, 0.4, (0.1, 0.01), 1.5, 25)
+    result = optimise(box, 26, 0.4, (0.1, 0.01), 1.5, 25)
     assert result["output_over_input"] > 0.3
 
 
@@ -87,8 +87,8 @@ def test_topology_optimisation_limits_the_motion_across_the_output() -> None:
     except InvalidSettings:
         pytest.skip("pyMOTO is not installed")
     box = box_of("lift", 6, 7, 0.2, None)
-    free = optimise(box, 2.0, 0.4, (0.1, 0.01), 1.5, 25)
-    straight = optimise(box, 2.0, 0.4, (0.1, 0.01), 1.5, 25, 0.05)
+    free = optimise(box, 26, 0.4, (0.1, 0.01), 1.5, 25)
+    straight = optimise(box, 26, 0.4, (0.1, 0.01), 1.5, 25, 0.05)
     assert free["across_over_output"] > 0.1
     assert straight["across_over_output"] < 0.07
 
