@@ -67,7 +67,7 @@ from bellcrank.search.selection import (
     select,
 )
 from bellcrank.search.settings import SearchSettings
-from bellcrank.search.specification import SpecificationEvaluator
+from bellcrank.search.specification import SpecificationEvaluator, relaxed
 from bellcrank.search.verdict import Verdict
 
 __all__ = [
@@ -110,6 +110,7 @@ __all__ = [
     "plateaus",
     "read_settings",
     "read_state",
+    "relaxed",
     "run_chains",
     "schedules",
     "searches",

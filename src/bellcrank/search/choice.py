@@ -69,10 +69,7 @@ class FirstWithoutFault:
         others = self._others(chosen, verified, listed) if chosen.items else []
         if _verification(chosen).fault is None:
             return Chosen(chosen, refusals, [], others)
-        stable = [each for each in verified if _verification(each).items]
-        front = nondominated([_violations(_verification(each).items) for each in stable])
-        nearest = sorted((stable[index] for index in front), key=_rank)
-        return Chosen(chosen, refusals, nearest[:MOST_NEAREST], others)
+        return Chosen(chosen, refusals, nearest(verified), others)
 
     def _verified(self, finalist: Finalist, done: int, total: int) -> Finalist:
         self.report(done, total)
@@ -95,6 +92,16 @@ class FirstWithoutFault:
                     break
             found.append(min(own, key=_rank))
         return sorted(found, key=lambda each: (*_rank(each), -each.response.score))
+
+
+def nearest(verified: Sequence[Finalist]) -> list[Finalist]:
+    """Return the verified finalists nearest to a specification: at most `MOST_NEAREST`.
+
+    They are stable, and none of the others is better in every item (`nondominated`).
+    """
+    stable = [each for each in verified if _verification(each).items]
+    front = nondominated([_violations(_verification(each).items) for each in stable])
+    return sorted((stable[index] for index in front), key=_rank)[:MOST_NEAREST]
 
 
 def nondominated(violations: Sequence[Sequence[float]]) -> list[int]:

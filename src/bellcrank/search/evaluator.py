@@ -11,7 +11,7 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import FlipPrediction, Response, check_memory, model_evaluator
 from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
-from bellcrank.search.specification import RESERVE, SpecificationEvaluator
+from bellcrank.search.specification import RESERVE, SpecificationEvaluator, relaxed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,7 +87,8 @@ def make_evaluator(
                 f"goals and strokes: problem {problem.name!r} has a specification; change the "
                 "items of its task instead"
             )
-        return SpecificationEvaluator(problem, elements, reserve)
+        wanted = relaxed(problem) if settings.before_refinement else problem
+        return SpecificationEvaluator(wanted, elements, reserve)
     if not settings.goals and settings.strokes == (1.0,):
         return model_evaluator(problem, *options)
     cases = at_strokes(problem, settings.strokes)

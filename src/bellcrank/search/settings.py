@@ -40,6 +40,9 @@ class SearchSettings:
         (`bellcrank.search.constraints`).
     strokes
         Fractions of the full input over which the efficiency is averaged.
+    before_refinement
+        Whether the design is refined afterwards: the search relaxes the bounds of a specification
+        that a refinement meets more easily than a search (`bellcrank.search.relaxed`).
 
     Raises
     ------
@@ -58,6 +61,7 @@ class SearchSettings:
     unloaded_beams: UnloadedBeams = "prune_all"
     goals: tuple[str, ...] = ()
     strokes: tuple[float, ...] = (1.0,)
+    before_refinement: bool = False
 
     def __post_init__(self) -> None:
         check_whole("steps", self.steps, 1)
@@ -65,6 +69,10 @@ class SearchSettings:
         check_whole("chains", self.chains, 1, MAX_CHAINS)
         check_goals(self.goals)
         check_strokes(self.strokes)
+        if not isinstance(self.before_refinement, bool):
+            raise InvalidSettings(
+                f"before_refinement: expected true or false, got {self.before_refinement!r}"
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings as plain data, the form stored in `run.json`."""

@@ -25,7 +25,7 @@ from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
 from bellcrank.search.evaluator import verification_evaluator
-from bellcrank.search.specification import SpecificationEvaluator
+from bellcrank.search.specification import SpecificationEvaluator, relaxed
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ class Verifier:
         strain_limit: float = math.nan,
         elements: int = ELEMENTS,
     ) -> None:
-        self.problem = problem
+        self.problem = relaxed(problem) if settings.before_refinement else problem
         self.strain_limit = strain_limit
         self.elements = elements
         self._evaluator = verification_evaluator(problem, settings, elements)

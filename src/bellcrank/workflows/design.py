@@ -114,6 +114,7 @@ def start_design(
     if problem.is_specified:
         problem = with_stable_initial(problem, settings)
         notes["refine"] = refine
+        settings = replace(settings, before_refinement=refine)
     prepare(problem, settings)
     return RunFolder.create(out, problem, settings.to_dict(), notes=notes)
 

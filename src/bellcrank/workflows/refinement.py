@@ -12,20 +12,21 @@ from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.provenance import provenance
 from bellcrank.refine import Refinement, RefinementSettings, refine_design, specified
 from bellcrank.search import HoppingSettings, SpecificationEvaluator
+from bellcrank.search.choice import nearest
 from bellcrank.search.parallel import default_workers
+from bellcrank.search.selection import Finalist
 from bellcrank.search.verification import Verifier
 from bellcrank.workflows.refiners import refine_designs, sheet_of
 from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.validation import spec_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from bellcrank.model import Design
     from bellcrank.part import PartSpec
     from bellcrank.refine.refinement import Progress
     from bellcrank.search import Selection
-    from bellcrank.search.selection import Finalist
 
 BEFORE_REFINEMENT = {"steps": 8_000}
 """Settings of a search whose design is refined: a longer search gains less than the refinement."""
@@ -64,19 +65,22 @@ def refine_selection(
         How it came about; None if the problem has no specification, or the refinements were
         stopped.
     """
-    problem = selection.design.problem
-    if not problem.is_specified:
+    if not selection.design.problem.is_specified:
         return selection, None
-    designs = [selection.design, *(each.design for each in selection.others)][:MOST_REFINED]
+    finalists = [_finalist(selection), *selection.others][:MOST_REFINED]
+    designs = [each.design for each in finalists]
     designs = [replace(each, problem=with_joints(each.problem, each.mask)) for each in designs]
     workers, stop = workers or default_workers(), stop or threading.Event()
     results = refine_designs(designs, spec, report, workers, stop)
     if len(results) < len(designs):
         return selection, None
-    best = max(results, key=_rank)
-    chosen = selection if best is results[0] else _of_other(selection, selection.others[0])
-    chosen = replace(chosen, design=best.design)
-    return (with_design(chosen, best.design) if best.improved else chosen), best
+    best = max(range(len(results)), key=lambda number: _rank(results[number]))
+    refined = [
+        _verified(finalist, result.design)
+        for finalist, result in zip(finalists, results, strict=True)
+    ]
+    others = [_verified(each, each.design) for each in selection.nearest]
+    return _with_finalist(selection, refined[best], [*refined, *others]), results[best]
 
 
 def _rank(refinement: Refinement) -> tuple[bool, bool, float]:
@@ -85,33 +89,37 @@ def _rank(refinement: Refinement) -> tuple[bool, bool, float]:
     return after.met, bool(after.met_in_sheet), after.objective
 
 
-def _of_other(selection: Selection, other: Finalist) -> Selection:
-    """Return the selection of the best design of another chain."""
-    return replace(
-        selection,
-        response=other.response,
-        found=other.found,
-        efficiency_before=other.response.efficiency,
-        efficiency_after=other.response.efficiency,
-        verification=other.verification,
-        items=other.items,
-    )
+def _finalist(selection: Selection) -> Finalist:
+    """Return the selected design as a finalist."""
+    return Finalist(selection.found, selection.design, selection.response, selection.items)
 
 
-def with_design(selection: Selection, design: Design) -> Selection:
-    """Return a selection of another design of the same specification."""
-    verification = Verifier(design.problem, HoppingSettings()).verify(design.mask)
+def _verified(finalist: Finalist, design: Design) -> Finalist:
+    """Return a finalist with a design in place of its own, by the specification of its problem."""
     evaluator = SpecificationEvaluator(design.problem)
     response = evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
     items = tuple(evaluator.results()) if response.is_admissible else ()
+    verification = Verifier(design.problem, HoppingSettings()).verify(design.mask)
+    return Finalist(finalist.found, design, response, items, verification)
+
+
+def _with_finalist(
+    selection: Selection, chosen: Finalist, verified: Sequence[Finalist]
+) -> Selection:
+    """Return the selection of a finalist, with the nearest designs where it misses items."""
+    verification = chosen.verification
+    assert verification is not None
+    is_own = chosen.found is selection.found
     return replace(
         selection,
-        design=design,
-        response=response,
-        efficiency_after=response.efficiency,
+        design=chosen.design,
+        response=chosen.response,
+        found=chosen.found,
+        efficiency_before=selection.efficiency_before if is_own else chosen.response.efficiency,
+        efficiency_after=chosen.response.efficiency,
         verification=verification,
-        items=items,
-        nearest=() if verification.fault is None else selection.nearest,
+        items=chosen.items,
+        nearest=() if verification.fault is None else tuple(nearest(verified)),
     )
 
 
