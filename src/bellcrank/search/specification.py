@@ -25,6 +25,7 @@ from bellcrank.mechanics import (
     violation,
 )
 from bellcrank.mechanics.items import TOLERANCE, reduced, relative_distance
+from bellcrank.model import ObjectiveTerm
 from bellcrank.search.clearance import gap_less_overlaps, smallest_gap
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
 from bellcrank.search.stroke_states import fractions_of
@@ -65,7 +66,8 @@ def relaxed(problem: Problem) -> Problem:
 
     Upper bounds on unwanted motions are at least those of `RELAXED`, and lower ones at most their
     opposites. A wanted motion with two bounds has a tolerance of at least `WANTED_TOLERANCE`. All
-    other items keep their bounds.
+    other items keep their bounds. Without an objective, gains with a lower bound are maximised: a
+    search for the largest margin alone ends at stiff designs that hardly move.
 
     Examples
     --------
@@ -78,7 +80,12 @@ def relaxed(problem: Problem) -> Problem:
     if wanted is None:
         return problem
     items = tuple(map(_relaxed, wanted.items))
-    return replace(problem, specification=replace(wanted, items=items))
+    maximise = wanted.maximise or tuple(
+        ObjectiveTerm(quantity=item.quantity, case=item.case, output=item.output)
+        for item in wanted.items
+        if item.quantity == "gain" and item.at_least is not None and item.at_least > 0.0
+    )
+    return replace(problem, specification=replace(wanted, items=items, maximise=maximise))
 
 
 def _relaxed(item: Item) -> Item:
