@@ -129,11 +129,36 @@ def test_items_of_a_part_in_space_are_computed_in_the_solid() -> None:
             assert other.value == pytest.approx(one.value, rel=rough), one.item.quantity
 
 
+def test_a_frame_in_space_has_the_figures_of_the_solid() -> None:
+    design = arm()
+    part = PartSpec.of_section(design.problem.section).of(design)
+    frame, solid = (levels[level](part, FemSettings()) for level in ("frame", "solid"))
+    assert frame.status == solid.status == "converged"
+    for figure in ("efficiency", "push", "energy"):
+        expected = getattr(solid.last, figure)
+        assert getattr(frame.last, figure) == pytest.approx(expected, rel=0.05), figure
+    # The solid has the stress of the joints too.
+    assert frame.last.stress == pytest.approx(solid.last.stress, rel=0.15)
+    assert frame.last.strain == pytest.approx(solid.last.strain, rel=0.2)
+    assert [point.load for point in frame.points] == [k / 16 for k in range(1, 17)]
+
+
+def test_a_part_in_space_that_is_not_held_has_no_path() -> None:
+    push = Input([1], [0, 0, -1], "force", 0.2)
+    design = arm(supports=Supports(fixed=[4]), input=push)
+    part = PartSpec.of_section(design.problem.section).of(design.with_mask(np.arange(5) != 3))
+    found = levels["frame"](part, FemSettings())
+    assert found.status == "mechanism"
+    assert [point.load for point in found.points] == [0.0]
+    assert np.isnan(found.efficiency)
+
+
 def test_levels_that_are_for_the_plane_refuse_a_part_in_space() -> None:
     part = PartSpec.of_section(arm().problem.section).of(arm())
-    for level in ("frame", "plane"):
-        with pytest.raises(InvalidProblem, match="is in space; only problems in the plane"):
-            levels[level].check(part, FemSettings())
+    with pytest.raises(InvalidProblem, match="is in space; only problems in the plane"):
+        levels["plane"].check(part, FemSettings())
+    with pytest.raises(InvalidSettings, match="level 'frame': parts in space are analysed with"):
+        levels["frame"].check(part, FemSettings(linear=True))
     with pytest.raises(InvalidSettings, match="no element within the joint of node"):
         space_mesh(part, 4.0)
     with pytest.raises(InvalidSettings, match="size: expected a length above 0 mm"):

@@ -318,8 +318,8 @@ def _figures(selection: Selection) -> list[dict[str, Any]]:
 
 
 def _validated(design: Design, spec: PartSpec | None) -> Validation | None:
-    """Return the frame analysis of a part; None without one, in space, or if it is not held."""
-    if spec is None or design.problem.lattice.dimension == 3:
+    """Return the frame analysis of a part; None without one, or if it is not held."""
+    if spec is None:
         return None
     try:
         return validate(design, spec, [("frame", FemSettings())])

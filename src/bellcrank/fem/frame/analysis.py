@@ -10,12 +10,12 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.contact import find_contacts
 from bellcrank.fem.frame.equations import FrameEquations, part_frame
+from bellcrank.fem.frame.space import analyse_in_space, check_in_space
 from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import PathStatus, follow_path
 from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
 from bellcrank.mechanics.frames.analysis import without_ends
 from bellcrank.mechanics.frames.beams import theories
-from bellcrank.model import require_plane
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -29,9 +29,10 @@ if TYPE_CHECKING:
 
 
 def check_frame(part: Part, settings: FemSettings) -> None:
-    """Raise an error for an unknown beam theory, and for a part in space."""
+    """Raise an error for an unknown beam theory, and for a linear analysis in space."""
     theories[settings.theory]
-    require_plane(part.design.problem, "level 'frame'")
+    if part.dimension == 3:
+        check_in_space(settings)
 
 
 def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], None]) -> Analysis:
@@ -51,6 +52,8 @@ def analyse_frame(part: Part, settings: FemSettings, report: Callable[[float], N
     InvalidSettings
         If a piece of the part is not held, in a linear analysis.
     """
+    if part.dimension == 3:
+        return analyse_in_space(part, settings, report)
     began = time.perf_counter()
     frame = part_frame(part, settings.elements, settings.theory)
     equations = FrameEquations(frame)

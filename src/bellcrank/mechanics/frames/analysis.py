@@ -130,10 +130,38 @@ def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats
     resultants : (m, 3) or (m, 6)
         Their forces and moments; see `stress_resultants`.
     """
-    assert problem.section is not None
     assert problem.material is not None
+    nu = problem.material.poisson
+    axial, bending, shear = _fibre_strains(frame, problem, beams, resultants)
+    strains = [
+        0.5 * (1.0 - nu) * normal + np.hypot(0.5 * (1.0 + nu) * normal, 0.5 * shear)
+        for normal in (axial + bending, axial - bending)
+    ]
+    largest: Floats = np.maximum(*strains)
+    return largest
+
+
+def fibre_stress(frame: Frame, problem: Problem, beams: Ints, resultants: Floats) -> Floats:
+    """Return (m,) the largest von Mises stress in beams, of the outermost fibre.
+
+    Parameters are those of `fibre_strain`.
+    """
+    assert problem.material is not None
+    axial, bending, shear = _fibre_strains(frame, problem, beams, resultants)
+    nu = problem.material.poisson
+    stress: Floats = problem.material.young * np.hypot(
+        np.abs(axial) + bending, math.sqrt(3.0) * 0.5 / (1.0 + nu) * shear
+    )
+    return stress
+
+
+def _fibre_strains(
+    frame: Frame, problem: Problem, beams: Ints, resultants: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return (m,) the axial strain, the largest bending strain and the largest shear strain."""
     section = problem.section
-    radius, nu = 0.5 * frame.width[beams], problem.material.poisson
+    assert section is not None
+    radius = 0.5 * frame.width[beams]
     length, rigid = frame.rest_length[beams], frame.rigid[beams]
     # From the stiffness of each beam, which may be a part of that of its section.
     extensional = frame.section[beams, 0] * length
@@ -151,12 +179,7 @@ def fibre_strain(frame: Frame, problem: Problem, beams: Ints, resultants: Floats
     gyration = section.inertia / section.area * (frame.width[beams] / section.width) ** 2
     flexural = extensional * gyration
     bending = moment.max(axis=1, initial=0.0) * radius / flexural
-    strains = [
-        0.5 * (1.0 - nu) * normal + np.hypot(0.5 * (1.0 + nu) * normal, 0.5 * shear)
-        for normal in (axial + bending, axial - bending)
-    ]
-    largest: Floats = np.maximum(*strains)
-    return largest
+    return axial, bending, shear
 
 
 def without_ends(moments: Floats, share: Floats) -> Floats:
