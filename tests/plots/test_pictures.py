@@ -182,7 +182,7 @@ def test_loose_pieces_and_dead_ends_are_unloaded(motion, tmp_path):
 @pytest.mark.parametrize("name", [name for name in builtin if name not in SIMILAR])
 def test_every_kind_of_problem_can_be_drawn(name, tmp_path):
     design = find_problem(name).full_design()
-    still = np.zeros((design.problem.lattice.node_count, 2))
+    still = np.zeros_like(design.problem.lattice.positions)
     draw_motion(Motion(design, still), tmp_path / "motion.png")
 
 

@@ -41,6 +41,8 @@ def _direction(vectors: list[list[float]]) -> str:
     first = vectors[0]
     if any(vector != first for vector in vectors):
         return "several"
-    axes = {(1.0, 0.0): "+x", (-1.0, 0.0): "-x", (0.0, 1.0): "+y", (0.0, -1.0): "-y"}
-    x, y = (round(value, 6) + 0.0 for value in first)
-    return axes.get((x, y), f"({x:.3g}, {y:.3g})")
+    along = [round(value, 6) + 0.0 for value in first]
+    for axis, value in zip("xyz", along, strict=False):
+        if abs(value) == 1.0:
+            return f"{'+' if value > 0.0 else '-'}{axis}"
+    return f"({', '.join(f'{value:.3g}' for value in along)})"

@@ -23,7 +23,7 @@ Problems are written in TOML (see `bellcrank.model.schema`) and read by `read_pr
 are stored in JSON.
 """
 
-from bellcrank.model.builtin import builtin
+from bellcrank.model.builtin import IN_SPACE, builtin
 from bellcrank.model.conditions import Input, Output, Stiffness, Supports
 from bellcrank.model.files import (
     design_from_dict,
@@ -55,6 +55,7 @@ from bellcrank.model.specification import (
 )
 
 __all__ = [
+    "IN_SPACE",
     "QUANTITIES",
     "Case",
     "Design",

@@ -16,6 +16,7 @@ import numpy as np
 
 from bellcrank.errors import BellcrankError, UnknownName
 from bellcrank.model import (
+    IN_SPACE,
     Design,
     builtin,
     gallery_design,
@@ -119,7 +120,7 @@ class BundledDesigns:
 
 
 def _built_in() -> Iterator[Entry]:
-    for problem in builtin:
+    for problem in (name for name in builtin if name not in IN_SPACE):
         for kind in get_args(Kind):
             design = gallery_design(kind, problem)
             if design is not None:

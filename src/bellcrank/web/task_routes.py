@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from bellcrank.errors import UnknownName
 from bellcrank.machines.elementary import DIRECTIONS, elementary
-from bellcrank.model import builtin, lattices, problem_to_dict
+from bellcrank.model import IN_SPACE, builtin, lattices, problem_to_dict
 from bellcrank.model.calls import call_with_keys
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.web import quick_calls
@@ -18,6 +18,11 @@ from bellcrank.web.limits import check_lattice, check_size
 from bellcrank.web.requests import LatticeBody, SaveBody, TaskBody, TextBody
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of, read_task, write_task
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bellcrank.model import Problem
 
 router = APIRouter(prefix="/api", tags=["tasks"])
 
@@ -29,8 +34,9 @@ ELEMENTARY_COLUMNS = 7
 def list_problems() -> list[dict[str, str]]:
     """Return the bundled tasks, in groups."""
     named = [
-        {"name": name, "group": "Built in", "about": (make.__doc__ or "").strip().split("\n")[0]}
-        for name, make in builtin.items()
+        {"name": name, "group": "Built in", "about": _first_line(builtin[name])}
+        for name in builtin
+        if name not in IN_SPACE
     ]
     parts = [
         {
@@ -43,10 +49,15 @@ def list_problems() -> list[dict[str, str]]:
     return [*named, *parts]
 
 
+def _first_line(make: Callable[[], Problem]) -> str:
+    """Return the first line of the documentation of a function."""
+    return (make.__doc__ or "").strip().split("\n")[0]
+
+
 @router.get("/problems/{name}")
 def get_problem(name: str) -> dict[str, Any]:
     """Return a bundled task."""
-    if name in builtin:
+    if name in builtin and name not in IN_SPACE:
         return problem_to_dict(builtin[name]())
     direction = name.removeprefix("elementary-")
     if direction != name and direction in DIRECTIONS:

@@ -4,7 +4,8 @@ To add one, write a function without parameters that returns a `Problem`, regist
 ``@builtin.register("name")`` in a module of this folder, and import the module below.
 """
 
-from bellcrank.model.builtin import crane, discs, pliers, scaling
+from bellcrank.model.builtin import crane, discs, pliers, scaling, space
 from bellcrank.model.builtin.registry import builtin
+from bellcrank.model.builtin.space import IN_SPACE
 
-__all__ = ["builtin", "crane", "discs", "pliers", "scaling"]
+__all__ = ["IN_SPACE", "builtin", "crane", "discs", "pliers", "scaling", "space"]

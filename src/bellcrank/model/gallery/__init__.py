@@ -80,9 +80,10 @@ def gallery_design(kind: Kind, name: str) -> Design | None:
     table = parse(GalleryTable, read_json(path), path.name)
     if table.problem != name:
         raise InvalidFile(f"{path.name}: problem: expected {name!r}, got {table.problem!r}")
-    problem = replace(
-        builtin[name](), section=section_of(table.section), material=elasticity_of(table.material)
-    )
+    problem = builtin[name]()
+    if table.section is not None:
+        section, material = section_of(table.section), elasticity_of(table.material)
+        problem = replace(problem, section=section, material=material)
     provenance: dict[str, Any] = {"kind": kind, "origin": table.origin}
     if table.part is not None:
         provenance["part"] = table.part
