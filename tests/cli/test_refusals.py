@@ -183,7 +183,7 @@ def test_an_unknown_choice_is_refused_with_the_known_ones(option: str, message: 
         (("--seed", "-1"), "seed: expected a whole number of at least 0, got -1"),
         (("--workers", "-1"), "workers: expected at least 1, got -1"),
         (("--workers", "0"), "workers: expected at least 1, got 0"),
-        (("--cost", "negative"), "search 'basin-hopping' has no setting 'cost'; it has: chains, "),
+        (("--cost", "negative"), "search 'basin-hopping' has no setting 'cost'; it has: before"),
         (("--set", "radius"), "--set radius: expected KEY=VALUE"),
         (("--set", "radius=-1"), "radius: expected a number above 0, got -1"),
         (("--set", "radius=wide"), "radius: expected a number above 0, got 'wide'"),

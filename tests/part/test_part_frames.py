@@ -153,7 +153,7 @@ def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses(tmp_path) 
     for work in (
         lambda: spring_problem(design.problem),
         lambda: PartSpec().of(design).outline(),
-        lambda: validate(design, PartSpec(), [("frame", FemSettings())]),
+        lambda: validate(design, PartSpec(), [("plane", FemSettings())]),
         lambda: make_card(design, PartSpec(), tmp_path / "card.pdf"),
         lambda: Grips(plate=True).applied(PartSpec().of(design)),
         lambda: characterise(design),

@@ -10,12 +10,15 @@ import pytest
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Status
+from bellcrank.model import Item
 from bellcrank.search import (
     HoppingSettings,
     SpecificationEvaluator,
     Verdict,
     chain_blocks,
     make_evaluator,
+    read_settings,
+    relaxed,
     with_stable_initial,
 )
 from bellcrank.search.choice import nondominated
@@ -216,3 +219,40 @@ def test_a_given_design_is_evaluated_as_it_is_even_if_it_lacks_the_symmetry_of_i
     assert results is not None
     left, right = (result.value for result in results if result.item.quantity == "gain")
     assert abs(left - right) > 0.01
+
+
+def test_bounds_that_a_refinement_meets_are_relaxed_before_it(slider: Problem) -> None:
+    wanted = slider.specification
+    assert wanted is not None
+    own = {"case": wanted.case, "output": wanted.output}
+    given = (
+        Item(quantity="off_axis", at_most=0.02, **own),
+        Item(quantity="off_axis", at_most=0.3, **own),
+        Item(quantity="rotation", at_least=-2.0, at_most=1.0, **own),
+        Item(quantity="rotation", at_least=20.0, **own),
+        Item(quantity="gain", at_least=2.99, at_most=3.01, **own),
+        Item(quantity="travel", at_least=-0.1, at_most=0.1, **own),
+        Item(quantity="sag", at_most=0.1, **own),
+    )
+    problem = replace(slider, specification=replace(wanted, items=given, maximise=()))
+    found = relaxed(problem).specification
+    assert found is not None
+    bounds = [(item.quantity, item.at_least, item.at_most) for item in found.items]
+    assert bounds == [
+        ("off_axis", None, 0.1),
+        ("off_axis", None, 0.3),
+        ("rotation", -5.0, 5.0),
+        ("rotation", 20.0, None),
+        ("gain", pytest.approx(2.55), pytest.approx(3.45)),
+        ("travel", -0.1, 0.1),
+        ("sag", None, 0.1),
+    ]
+    assert [(each.quantity, each.output) for each in found.maximise] == [("gain", wanted.output)]
+    assert relaxed(slider).specification.maximise == wanted.maximise
+    settings = read_settings({"before_refinement": True})
+    mask = problem.initial
+    searched = make_evaluator(problem, settings, reserve=0.0)
+    searched.evaluate(mask)
+    bound = SpecificationEvaluator(relaxed(problem))
+    bound.evaluate(mask)
+    assert searched.violations == pytest.approx(bound.violations)

@@ -74,7 +74,7 @@ def relaxed(problem: Problem) -> Problem:
     >>> from bellcrank.task import find_task
     >>> problem = relaxed(find_task("stage").problem)
     >>> [item.at_most for item in problem.specification.items if item.quantity == "rotation"]
-    [5.0, 5.0]
+    [5.0]
     """
     wanted = problem.specification
     if wanted is None:
