@@ -176,9 +176,8 @@ class _Search:
             self.region *= 0.25
             return False
         predicted = found.merit - now
-        known = self.evaluator.soft_states
         change, after = found.change, self._evaluate(found.change)
-        stable = after is not None
+        first = after
         gained = -np.inf if after is None else merit_of(after, size) - now
         if after is not None and gained < GOOD * predicted:
             again = linear_step(corrected(rows, after, change), low, high, size)
@@ -188,10 +187,10 @@ class _Search:
                 if better > gained:
                     change, gained = again.change, better
         if gained < ACCEPTED * predicted:
-            if self.evaluator.soft_states > known:
-                # States that are soft or unstable there are constraints here from now on.
-                self.rows = self._evaluate(np.zeros_like(change), slopes=True) or rows
-            return self._refuse(unstable=not stable)
+            if first is not None and not set(first.keys) <= set(rows.keys):
+                # States that are soft there are constraints here from now on.
+                self.rows = self.evaluator.evaluate(self.vector, slopes=True)
+            return self._refuse(unstable=after is None)
         after = self._evaluate(change, slopes=True)
         if after is None:
             return self._refuse(unstable=True)

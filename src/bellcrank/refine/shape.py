@@ -217,6 +217,6 @@ def _gap_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     count = len(found.value)
     return ShapeRows(
         1.0 - found.value / least, ("gaps between struts",) * count,
-        tuple(map(tuple, found.keys.tolist())),
+        tuple(map(tuple, found.pairs.tolist())),
         -found.fields[..., : problem.lattice.dimension] / least, -found.widths / least,
     )  # fmt: skip

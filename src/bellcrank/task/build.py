@@ -165,7 +165,7 @@ class _Builder:
                 symmetry=_symmetry_names(table.limits.symmetry),
             ),
         )
-        return Task(self._with_designable(problem), self.part, self.units, table.description)
+        return Task(self._with_solid(problem), self.part, self.units, table.description)
 
     def _lattice(self) -> Lattice:
         domain = self.table.domain
@@ -250,22 +250,14 @@ class _Builder:
             )
         return Item(quantity="mass", at_most=self.units.in_problem("volume", mass))
 
-    def _with_designable(self, problem: Problem) -> Problem:
-        """Return the problem with the beams that a search may change: none in solid regions.
-
-        In the plane, none at supports, inputs, outputs and loads. In space, where up to 12 beams
-        meet in a node, none between two such nodes.
-        """
-        in_space = self.lattice.dimension == 3
-        fixed = np.ones(self.lattice.beam_count, dtype=bool)
-        fixed[problem.designable] = False
-        if in_space:
-            ends = np.isin(self.lattice.beams, problem.special_nodes_of_all_cases)
-            fixed[:] = ends.all(axis=1)
-        if self.table.domain.solid:
-            regions = beams_in_space if in_space else in_regions
-            fixed |= regions(self.table.domain.solid, self.lattice, self.part.scale, "domain.solid")
-        return replace(problem, designable=np.flatnonzero(~fixed))
+    def _with_solid(self, problem: Problem) -> Problem:
+        """Return the problem whose solid regions keep all beams."""
+        if not self.table.domain.solid:
+            return problem
+        find = in_regions if self.lattice.dimension == 2 else beams_in_space
+        solid = find(self.table.domain.solid, self.lattice, self.part.scale, "domain.solid")
+        free = problem.designable[~solid[problem.designable]]
+        return replace(problem, designable=free)
 
 
 def _part(table: TaskTable) -> PartSpec:

@@ -188,7 +188,7 @@ def _search(
     progress = partial(report, task)
     if not run_chains(run, search, workers=workers, progress=progress, stop=stop):
         return None
-    return _select(problem, run, search, workers, stop)
+    return _select(problem, run, read_settings(run.settings), workers, stop)
 
 
 def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
@@ -199,7 +199,8 @@ def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
         make_folder(path.parent)
         return start_design(problem, settings, path)
     run = reopen_design(path)
-    if read_settings(run.settings) != settings or run.problem.hash != problem.hash:
+    started = replace(settings, before_refinement=problem.is_specified)
+    if read_settings(run.settings) != started or run.problem.hash != problem.hash:
         raise InvalidSettings(
             f"{path}: the search was started with other settings; use those, or remove the folder"
         )
