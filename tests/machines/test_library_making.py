@@ -183,7 +183,7 @@ def test_a_search_with_other_settings_is_not_mixed_in(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_what_is_better_takes_the_place_of_what_was_there(whole: Path, tmp_path: Path) -> None:
-    short = replace(SETTINGS, kinds=KINDS[:1], steps=100)
+    short = replace(SETTINGS, kinds=KINDS[:1], steps=20)
     (first,) = make(short, tmp_path)
     better = replace(SETTINGS, kinds=KINDS[:1])
     (second,) = make(better, tmp_path, again=True)

@@ -183,12 +183,13 @@ def _search(
     stop: threading.Event | None,
 ) -> tuple[Selection, dict[str, Any]] | None:
     """Search, and select a design with its provenance; None if the search was stopped."""
-    problem, search = task.problem(), settings.search_settings()
-    run = _run(problem, search, path)
+    problem = task.problem()
+    run = _run(problem, settings.search_settings(), path)
+    search = read_settings(run.settings)
     progress = partial(report, task)
     if not run_chains(run, search, workers=workers, progress=progress, stop=stop):
         return None
-    return _select(problem, run, read_settings(run.settings), workers, stop)
+    return _select(problem, run, search, workers, stop)
 
 
 def _run(problem: Problem, settings: SearchSettings, path: Path) -> RunFolder:
