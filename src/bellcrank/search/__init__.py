@@ -52,6 +52,7 @@ from bellcrank.search.registry import (
     searches,
     start_chain,
 )
+from bellcrank.search.relaxation import relaxed
 from bellcrank.search.selection import (
     Candidate,
     Choice,
@@ -67,7 +68,7 @@ from bellcrank.search.selection import (
     select,
 )
 from bellcrank.search.settings import SearchSettings
-from bellcrank.search.specification import SpecificationEvaluator, relaxed
+from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 
 __all__ = [

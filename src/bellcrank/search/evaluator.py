@@ -11,7 +11,8 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import FlipPrediction, Response, check_memory, model_evaluator
 from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
-from bellcrank.search.specification import RESERVE, SpecificationEvaluator, relaxed
+from bellcrank.search.relaxation import relaxed
+from bellcrank.search.specification import RESERVE, SpecificationEvaluator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -25,7 +25,8 @@ from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
 from bellcrank.search.evaluator import verification_evaluator
-from bellcrank.search.specification import SpecificationEvaluator, relaxed
+from bellcrank.search.relaxation import relaxed
+from bellcrank.search.specification import SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
@@ -19,11 +19,6 @@ from bellcrank.web.requests import LatticeBody, SaveBody, TaskBody, TextBody
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of, read_task, write_task
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from bellcrank.model import Problem
-
 router = APIRouter(prefix="/api", tags=["tasks"])
 
 ELEMENTARY_COLUMNS = 7
@@ -34,8 +29,8 @@ ELEMENTARY_COLUMNS = 7
 def list_problems() -> list[dict[str, str]]:
     """Return the bundled tasks, in groups."""
     named = [
-        {"name": name, "group": "Built in", "about": _first_line(builtin[name])}
-        for name in builtin
+        {"name": name, "group": "Built in", "about": (make.__doc__ or "").strip().split("\n")[0]}
+        for name, make in builtin.items()
         if name not in IN_SPACE
     ]
     parts = [
@@ -47,11 +42,6 @@ def list_problems() -> list[dict[str, str]]:
         for direction in DIRECTIONS
     ]
     return [*named, *parts]
-
-
-def _first_line(make: Callable[[], Problem]) -> str:
-    """Return the first line of the documentation of a function."""
-    return (make.__doc__ or "").strip().split("\n")[0]
 
 
 @router.get("/problems/{name}")

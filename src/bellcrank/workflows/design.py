@@ -113,7 +113,6 @@ def start_design(
             settings = replace(settings, goals=(f"no-contact {problem.section.width:g}",))
     if problem.is_specified:
         problem = with_stable_initial(problem, settings)
-        notes["refine"] = refine
         settings = replace(settings, before_refinement=refine)
     prepare(problem, settings)
     return RunFolder.create(out, problem, settings.to_dict(), notes=notes)
@@ -262,7 +261,7 @@ def conclude(
     limit = math.nan if spec is None else spec.registered_material.strain_limit
     selection = select_design(problem, candidates, settings, limit, verifying)
     refinement = None
-    if folder.provenance.get("refine"):
+    if settings.before_refinement:
         selection, refinement = refine_selection(selection, spec, refining, workers, stop)
         if stop is not None and stop.is_set():
             return None

@@ -75,12 +75,16 @@ def refine_selection(
     if len(results) < len(designs):
         return selection, None
     best = max(range(len(results)), key=lambda number: _rank(results[number]))
-    refined = [
-        _verified(finalist, result.design)
-        for finalist, result in zip(finalists, results, strict=True)
+    chosen = _verified(finalists[best], results[best].design)
+    assert chosen.verification is not None
+    if chosen.verification.fault is None:
+        return _with_finalist(selection, chosen), results[best]
+    pairs = [
+        *((finalist, result.design) for finalist, result in zip(finalists, results, strict=True)),
+        *((finalist, finalist.design) for finalist in selection.nearest),
     ]
-    others = [_verified(each, each.design) for each in selection.nearest]
-    return _with_finalist(selection, refined[best], [*refined, *others]), results[best]
+    near = nearest([_verified(finalist, design) for finalist, design in pairs])
+    return _with_finalist(selection, chosen, near), results[best]
 
 
 def _rank(refinement: Refinement) -> tuple[bool, bool, float]:
@@ -104,11 +108,9 @@ def _verified(finalist: Finalist, design: Design) -> Finalist:
 
 
 def _with_finalist(
-    selection: Selection, chosen: Finalist, verified: Sequence[Finalist]
+    selection: Selection, chosen: Finalist, near: Sequence[Finalist] = ()
 ) -> Selection:
-    """Return the selection of a finalist, with the nearest designs where it misses items."""
-    verification = chosen.verification
-    assert verification is not None
+    """Return the selection of a finalist, and of the nearest ones where it misses items."""
     is_own = chosen.found is selection.found
     return replace(
         selection,
@@ -117,9 +119,9 @@ def _with_finalist(
         found=chosen.found,
         efficiency_before=selection.efficiency_before if is_own else chosen.response.efficiency,
         efficiency_after=chosen.response.efficiency,
-        verification=verification,
+        verification=chosen.verification,
         items=chosen.items,
-        nearest=() if verification.fault is None else tuple(nearest(verified)),
+        nearest=tuple(near),
     )
 
 

@@ -214,7 +214,7 @@ def check_plan(design: Design, spec: PartSpec, plan: Plan) -> None:
     Raises
     ------
     InvalidSettings, InvalidProblem
-        If the part cannot be built or analysed; parts in space are analysed as solids alone.
+        If the part cannot be built, or analysed at a level; `plane` is for parts in the plane.
     UnknownName
         If there is no such level, theory or law.
     """
