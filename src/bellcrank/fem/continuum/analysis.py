@@ -15,6 +15,7 @@ from bellcrank.fem.continuum.response import solve_plane, solve_solid
 from bellcrank.fem.levels import Level, levels
 from bellcrank.fem.path import PathStatus
 from bellcrank.fem.results import Analysis, StrokePoint, stroke_point
+from bellcrank.model import require_plane
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -43,6 +44,7 @@ def check_law(settings: FemSettings) -> None:
 
 def check_plane(part: Part, settings: FemSettings) -> None:
     """Raise an error if a part has no valid outline, or cannot be computed with these settings."""
+    require_plane(part.design.problem, "level 'plane'")
     check_law(settings)
     part.outline()
 
