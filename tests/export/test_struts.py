@@ -23,6 +23,12 @@ from bellcrank.model import (
     lattices,
 )
 from bellcrank.part import PartSpec
+from tests.export.reading import read_step
+
+
+def require_kernel() -> None:
+    pytest.importorskip("OCP", reason="the extra step is not installed")
+
 
 KINDS = {
     "octet": {"size": [3, 3, 3]},
@@ -168,3 +174,66 @@ def test_hints_for_printing_in_space() -> None:
 def test_a_wrong_sagitta_is_refused() -> None:
     with pytest.raises(InvalidSettings, match="sagitta: expected a length above 0 mm"):
         struts_solid(PartSpec().of(one_strut((1, 0, 0))), sagitta=0.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_step_is_one_sound_solid_with_exact_cylinders(kind: str, tmp_path) -> None:
+    require_kernel()
+    size = {"kelvin": [4, 4, 4], "cubic": [2, 1, 1]}.get(kind, [2, 2, 2])
+    part = PartSpec(width=1.6).of(design_of(lattices[kind](size)))
+    export(part, tmp_path / "part.step")
+    volume, solids, sound = read_step(tmp_path / "part.step")
+    assert (solids, sound) == (1, True)
+    assert volume == pytest.approx(struts_solid(part, 5e-4).volume, rel=2e-4)
+
+
+def test_step_of_one_strut_has_the_volume_of_a_capsule(tmp_path) -> None:
+    require_kernel()
+    export(PartSpec(width=2.0).of(one_strut((0.3, -0.5, 0.9))), tmp_path / "part.step")
+    volume, _, sound = read_step(tmp_path / "part.step")
+    assert sound
+    capsule = np.pi * 10.0 * np.sqrt(1.15) + 4.0 / 3.0 * np.pi
+    assert volume == pytest.approx(capsule, rel=5e-4)
+
+
+def test_lammps_bonds_have_the_stiffness_of_struts(tmp_path) -> None:
+    """A strut of 10 mm with a diameter of 2 mm and joints of 0.6 mm, E = 12 MPa, nu = 0.48."""
+    part = PartSpec(width=2.0).of(some_of([[0, 0, 0], [1, 0, 0], [0, 0, 1]], 2))
+    export(part, tmp_path / "part.lmp")
+    lines = (tmp_path / "part.lmp").read_text().splitlines()
+    words = [line.split() for line in lines]
+    (bond,) = (each for each in words if each[0] == "bond_coeff")
+    young, shear, free = part.material.young, part.material.shear, 10.0 - part.joints[0].sum()
+    inertia, area = np.pi / 4.0, np.pi
+    soft = 12.0 * young * inertia / (0.9 * shear * area * free**2)
+    wanted = [
+        young * area / free,
+        12.0 * young * inertia / free**3 / (1.0 + soft),
+        2.0 * shear * inertia / free,
+        young * inertia / free,
+    ]
+    assert [float(each) for each in bond[2:6]] == pytest.approx(wanted)
+    made = [each for each in words if each[0] == "create_bonds"]
+    assert [each[3:5] for each in made] == [["1", "2"], ["1", "3"]]
+    atoms = [each for each in words if each[0] == "create_atoms"]
+    assert [[float(x) for x in each[3:6]] for each in atoms] == (10.0 * np.array(
+        [[0, 0, 0], [1, 0, 0], [0, 0, 1]]
+    )).tolist()  # fmt: skip
+    assert "group support id 1" in lines
+    assert "group input id 2" in lines
+    assert "group output id 3" in lines
+    mass = sum(
+        float(each[6]) * np.pi / 6.0 * float(each[4]) ** 3 for each in words if each[0] == "set"
+    )
+    assert mass == pytest.approx(1e-9 * part.material.density * 2.0 * np.pi * 10.0)
+
+
+def test_lammps_files_of_parts_in_the_plane(tmp_path) -> None:
+    part = PartSpec().of(find_problem("crane").full_design())
+    export(part, tmp_path / "crane.lmp")
+    words = [line.split() for line in (tmp_path / "crane.lmp").read_text().splitlines()]
+    assert sum(each[0] == "create_bonds" for each in words) == len(part.struts)
+    stiff = np.array([[float(x) for x in each[2:6]] for each in words if each[0] == "bond_coeff"])
+    section = part.section
+    free = part.material.young * section.area / stiff[:, 0]
+    assert stiff[:, 3] == pytest.approx(part.material.young * section.inertia / free)

@@ -55,7 +55,7 @@ def export(
     design: DesignName,
     out: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="File: stl, 3mf, step, dxf, svg or vtu."),
+        typer.Argument(metavar="FILE", help="File: stl, 3mf, step, dxf, svg, vtu or lmp."),
     ],
     part: PartFile = None,
     width: Width = None,

@@ -4,7 +4,7 @@ To add one, register an `Exporter` with ``exporters.register("name")`` in a modu
 and import it below. The contract tests include every registered format.
 
 >>> exporters.names()
-['stl', '3mf', '3mf-beams', 'step', 'dxf', 'svg', 'vtu']
+['stl', '3mf', '3mf-beams', 'step', 'dxf', 'svg', 'vtu', 'lammps']
 """
 
 from bellcrank.export.formats import stl  # isort: skip
@@ -13,6 +13,7 @@ from bellcrank.export.formats import step  # isort: skip
 from bellcrank.export.formats import dxf  # isort: skip
 from bellcrank.export.formats import svg  # isort: skip
 from bellcrank.export.formats import vtu  # isort: skip
+from bellcrank.export.formats import lammps  # isort: skip
 from bellcrank.export.formats.base import Export, Exporter, export, exporters
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "dxf",
     "export",
     "exporters",
+    "lammps",
     "step",
     "stl",
     "svg",

@@ -1,4 +1,4 @@
-"""STEP: a solid with exact planes and cylinders in mm, for CAD programs."""
+"""STEP: a solid with exact planes, cylinders and spheres in mm, for CAD programs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,14 @@ from bellcrank.export.formats.base import Export, Exporter, exporters
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from bellcrank.part import Part
     from bellcrank.part.outline import Loop, Outline
 
 _TOLERANCE = 1e-7
 """Points closer than this distance, mm, coincide in a STEP file."""
+_JOINT = 1.001
+"""Radius of a joint over that of its widest strut: the kernel loses surfaces that touch without
+crossing each other."""
 
 
 def to_bytes(export: Export) -> bytes:
@@ -31,15 +35,13 @@ def to_bytes(export: Export) -> bytes:
     RunFailed
         If the modelling kernel fails.
     """
-    thickness = export.thickness
-    return solid_to_bytes(export.outline(), thickness, export.name)
+    if export.part.dimension == 3:
+        return struts_to_bytes(export.part, export.name)
+    return solid_to_bytes(export.outline(), export.thickness, export.name)
 
 
 def solid_to_bytes(outline: Outline, thickness: float, name: str) -> bytes:
     """Return the prism over an outline as a STEP file, one solid for each piece.
-
-    The kernel runs in a separate process: NGSolve contains another version of it, and a process
-    that loads both crashes.
 
     Raises
     ------
@@ -50,9 +52,35 @@ def solid_to_bytes(outline: Outline, thickness: float, name: str) -> bytes:
         [[loop.points.tolist(), loop.bulge.tolist()] for loop in kind]
         for kind in (outline.outer, outline.holes)
     ]
-    task = json.dumps({"loops": loops, "thickness": thickness, "name": name})
+    return _served({"loops": loops, "thickness": thickness, "name": name})
+
+
+def struts_to_bytes(part: Part, name: str) -> bytes:
+    """Return the union of the round struts of a part in space, and of their joints.
+
+    Joints are spheres, wider by a thousandth than the widest strut that meets there.
+
+    Raises
+    ------
+    RunFailed
+        If the kernel fails.
+    """
+    radii = 0.5 * part.widths
+    positions = part.positions
+    positions = positions - (positions[part.struts] - radii[:, None, None]).min(axis=(0, 1))
+    struts = [*positions[part.struts].transpose(1, 0, 2).tolist(), radii.tolist()]
+    return _served({"struts": list(zip(*struts, strict=True)), "name": name})
+
+
+def _served(task: dict[str, Any]) -> bytes:
+    """Return the STEP file of a task.
+
+    The kernel runs in a separate process: NGSolve contains another version of it, and a process
+    that loads both crashes.
+    """
     command = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
-    done = subprocess.run(command, input=task.encode(), capture_output=True, check=False)
+    content = json.dumps(task).encode()
+    done = subprocess.run(command, input=content, capture_output=True, check=False)
     if done.returncode or not done.stdout:
         output = done.stderr.decode(errors="replace").strip().splitlines()
         raise RunFailed(
@@ -62,13 +90,49 @@ def solid_to_bytes(outline: Outline, thickness: float, name: str) -> bytes:
 
 
 def serve() -> None:
-    """Read an outline from standard input and write its STEP file to standard output."""
+    """Read a task from standard input and write its STEP file to standard output."""
     from bellcrank.part.outline import Loop, Outline
 
     task = json.load(sys.stdin)
-    outer, holes = (tuple(Loop(*loop) for loop in kind) for kind in task["loops"])
-    content = _written(_prisms(Outline(outer, holes), task["thickness"]), task["name"])
-    sys.stdout.buffer.write(content)
+    if "struts" in task:
+        shape = _united(task["struts"])
+    else:
+        outer, holes = (tuple(Loop(*loop) for loop in kind) for kind in task["loops"])
+        shape = _prisms(Outline(outer, holes), task["thickness"])
+    sys.stdout.buffer.write(_written(shape, task["name"]))
+
+
+def _united(struts: list[tuple[list[float], list[float], float]]) -> Any:
+    """Return the union of cylinders, given by ends and radius, and of spheres at their ends."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
+    from OCP.collections import List_TopoDS_Shape
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+
+    radii: dict[tuple[float, ...], float] = {}
+    shapes = []
+    for first, second, radius in struts:
+        for end in (first, second):
+            radii[tuple(end)] = max(radius, radii.get(tuple(end), 0.0))
+        chord = np.subtract(second, first)
+        axis = gp_Ax2(gp_Pnt(*first), gp_Dir(*chord.tolist()))
+        length = float(np.linalg.norm(chord))
+        shapes.append(BRepPrimAPI_MakeCylinder(axis, radius, length).Shape())
+    shapes += [
+        BRepPrimAPI_MakeSphere(gp_Pnt(*at), _JOINT * radius).Shape() for at, radius in radii.items()
+    ]
+    arguments, tools = List_TopoDS_Shape(), List_TopoDS_Shape()
+    arguments.Append(shapes[0])
+    for shape in shapes[1:]:
+        tools.Append(shape)
+    union = BRepAlgoAPI_Fuse()
+    union.SetArguments(arguments)
+    union.SetTools(tools)
+    union.Build()
+    if not (union.IsDone() and BRepCheck_Analyzer(union.Shape()).IsValid()):
+        raise InvalidSettings("the modelling kernel could not unite the struts of this part")
+    return union.Shape()
 
 
 def _prisms(outline: Outline, thickness: float) -> Any:
