@@ -126,13 +126,13 @@ def _united(struts: list[tuple[list[float], list[float], float]]) -> Any:
     arguments.Append(shapes[0])
     for shape in shapes[1:]:
         tools.Append(shape)
-    union = BRepAlgoAPI_Fuse()
-    union.SetArguments(arguments)
-    union.SetTools(tools)
-    union.Build()
-    if not (union.IsDone() and BRepCheck_Analyzer(union.Shape()).IsValid()):
+    fuse = BRepAlgoAPI_Fuse()
+    fuse.SetArguments(arguments)
+    fuse.SetTools(tools)
+    fuse.Build()
+    if not (fuse.IsDone() and BRepCheck_Analyzer(fuse.Shape()).IsValid()):
         raise InvalidSettings("the modelling kernel could not unite the struts of this part")
-    return union.Shape()
+    return fuse.Shape()
 
 
 def _prisms(outline: Outline, thickness: float) -> Any:
