@@ -98,7 +98,7 @@ def test_the_gain_of_a_free_design_grows(here: Path) -> None:
     [
         (("crane",), "expected a frame; designs of springs are not refined"),
         (("machine:crane", "--evaluations", "0"), "--evaluations: expected at least 1, got 0"),
-        (("machine:crane", "--largest-move", "0.9"), "--largest-move: expected above 0"),
+        (("machine:crane", "--largest-move", "2.5"), "--largest-move: expected above 0"),
         (("machine:crane", "--picture", "both.pic"), "both.pic"),
         (("machine:crane", "--widest", "0.5"), "--widest: expected a number from 1 to 4, got 0.5"),
     ],

@@ -150,7 +150,7 @@ def test_joints_end_where_the_edges_of_neighbours_meet() -> None:
     width = SECTION.width
     # Six beams meet at 60 degrees on both sides, three at 120 degrees, opposite ones nowhere.
     half = 0.5 * width
-    # Rounding next to opposite beams changes the lengths by less than 1 %.
+    # Rounding next to opposite beams and at right angles changes the lengths by less than 1 %.
     approx = partial(pytest.approx, rel=0.01)
     assert joints_of([0, 60, 120, 180, 240, 300]) == approx(np.full(6, half * np.sqrt(3.0)))
     assert joints_of([0, 120, 240]) == approx(np.full(3, half / np.sqrt(3.0)))
@@ -163,6 +163,15 @@ def test_joints_end_where_the_edges_of_neighbours_meet() -> None:
 
 def test_a_joint_takes_at_most_two_fifths_of_a_beam() -> None:
     assert joints_of([0, 10]) == pytest.approx([0.4, 0.4])
+
+
+def test_joints_have_no_kinks() -> None:
+    """Their derivative is continuous, at right angles and near the largest size too."""
+    step = 0.05
+    angles = np.arange(15.0, 120.0, step)
+    lengths = np.array([joints_of([0, angle], [0.2, 0.3]) for angle in angles])
+    bend = np.diff(lengths, 2, axis=0) / step
+    assert np.abs(bend).max() < 1e-3
 
 
 def test_joints_that_are_points_or_in_space_stay_as_they_are() -> None:

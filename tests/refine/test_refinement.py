@@ -11,10 +11,21 @@ import pytest
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.mechanics.frames.joints import with_joints
-from bellcrank.model import Design, Specification, find_problem, gallery_design
+from bellcrank.model import (
+    Design,
+    Input,
+    Lattice,
+    Output,
+    Problem,
+    Section,
+    Specification,
+    Supports,
+    find_problem,
+    gallery_design,
+)
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.refine import RefinementSettings, refine_design, refinement, specified
-from bellcrank.refine.gaps import nearest_points
+from bellcrank.refine.gaps import gaps_of, nearest_points, nearest_to_ends
 from bellcrank.refine.shape import SLENDERNESS, SMALLEST_ANGLE, shape_rows, volume_of
 from bellcrank.refine.steps import linear_step, merit_of
 from bellcrank.refine.variables import variables_of
@@ -212,12 +223,37 @@ def test_the_linear_step_solves_a_small_program() -> None:
 
 def test_the_nearest_points_of_segments_are_found() -> None:
     rng = np.random.default_rng(0)
-    for a, b, c, d in rng.normal(size=(30, 4, 2)):
-        s, t = nearest_points(a, b, c, d)
-        found = np.linalg.norm(a + s * (b - a) - c - t * (d - c))
-        share = np.linspace(0.0, 1.0, 101)
-        first = a + share[:, None] * (b - a)
-        second = c + share[:, None] * (d - c)
-        distance = np.linalg.norm(first[:, None] - second[None], axis=2).min()
-        crossing = distance < 0.02
-        assert crossing or found <= distance + 1e-9
+    share = np.linspace(0.0, 1.0, 101)[:, None]
+    for dimension, nearest in ((2, nearest_to_ends), (3, nearest_points)):
+        for a, b, c, d in rng.normal(size=(30, 4, dimension)):
+            s, t = (each[0, :, None] for each in nearest(*(each[None] for each in (a, b, c, d))))
+            found = np.linalg.norm(a + s * (b - a) - c - t * (d - c), axis=1).min()
+            first, second = a + share * (b - a), c + share * (d - c)
+            distance = np.linalg.norm(first[:, None] - second[None], axis=2).min()
+            crossing = dimension == 2 and distance < 0.02
+            assert crossing or distance - 0.02 <= found <= distance + 1e-9
+
+
+def test_gaps_have_no_kink_where_struts_are_parallel() -> None:
+    lattice = Lattice([[0, 0], [2, 0], [0.2, 0.3], [1.7, 0.3]], [[0, 1], [2, 3], [0, 2], [1, 3]])
+    problem = Problem(
+        name="parallel", lattice=lattice, section=Section(0.1, 0.2), supports=Supports(fixed=[0]),
+        input=Input([3], [0, -1], "displacement", 0.1), output=Output([2], [1, 0]),
+        designable=[3],
+    )  # fmt: skip
+    beams = np.array([0, 1])
+    by_key = []
+    for move in (-1e-3, 0.0, 1e-3):
+        u = np.zeros((4, 3))
+        u[3, 1] = move
+        found = gaps_of(problem, beams, u, 1.0)
+        by_key.append(dict(zip(map(tuple, found.keys.tolist()), found.value, strict=True)))
+        slope = dict(zip(map(tuple, found.keys.tolist()), found.fields[:, 3, 1], strict=True))
+    before, here, after = by_key
+    assert set(before) == set(here) == set(after)
+    for key, value in here.items():
+        assert after[key] - value == pytest.approx(value - before[key], abs=2e-6)
+        assert after[key] - value == pytest.approx(1e-3 * slope[key], abs=2e-6)
+    smallest = [min(each.values()) for each in by_key]
+    assert smallest[1] - smallest[0] > 0.5e-3
+    assert smallest[2] - smallest[1] < 0.5e-3

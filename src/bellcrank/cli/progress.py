@@ -62,15 +62,16 @@ class SearchProgress(Live):
 
     def refining(self, number: int, step: RefinementStep) -> None:
         """Show the objective of a refinement and what it violates."""
-        from bellcrank.workflows.refiners import EVALUATIONS
+        from bellcrank.workflows.refiners import EVALUATIONS, FIRST_EVALUATIONS
 
+        total = FIRST_EVALUATIONS + EVALUATIONS
         with self._lock:
             self._bar.update(self._task, description="refining ")
             rows = step.rows
             figures = f"objective {rows.objective:.3f}, violation {rows.violation:.3f}"
             line = f"refining design {number + 1}: step {step.step}, {figures}"
-            self._refined = max(self._refined, min(step.evaluations, EVALUATIONS))
-            self._show(self._refined, EVALUATIONS, figures, line)
+            self._refined = max(self._refined, min(step.evaluations, total))
+            self._show(self._refined, total, figures, line)
 
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)

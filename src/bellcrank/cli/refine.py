@@ -29,7 +29,7 @@ def refine(
     ] = 1000,
     largest_move: Annotated[
         float, typer.Option(help="Largest change of a coordinate of a node, in beam lengths.")
-    ] = 0.45,
+    ] = 0.9,
     widest: Annotated[
         float,
         typer.Option(help="Largest width of a strut over that of the section; 1 for no change."),
@@ -44,9 +44,9 @@ def refine(
     """Move nodes and widen struts, so that a design meets its specification and its gain grows."""
     if evaluations < 1:
         raise InvalidSettings(f"--evaluations: expected at least 1, got {evaluations}")
-    if not 0.0 < largest_move <= 0.5:
+    if not 0.0 < largest_move <= 2.0:
         raise InvalidSettings(
-            f"--largest-move: expected above 0 and at most 0.5 beam lengths, got {largest_move:g}"
+            f"--largest-move: expected above 0 and at most 2 beam lengths, got {largest_move:g}"
         )
     if not 1.0 <= widest <= 4.0:
         raise InvalidSettings(f"--widest: expected a number from 1 to 4, got {widest:g}")

@@ -65,6 +65,8 @@ def specification_data(specification: Specification, dimension: int) -> dict[str
         data["weight"] = specification.weight.tolist()
     if specification.symmetry:
         data["symmetry"] = list(specification.symmetry)
+    if specification.domain:
+        data["domain"] = [ring.tolist() for ring in specification.domain]
     return data
 
 

@@ -238,6 +238,7 @@ def _specification(lattice: Lattice, table: SpecificationTable | None) -> Specif
         maximise=tuple(ObjectiveTerm(**each.model_dump()) for each in table.maximise),
         weight=table.weight,  # type: ignore[arg-type]  # cast there
         symmetry=tuple(table.symmetry),
+        domain=tuple(table.domain),  # type: ignore[arg-type]  # cast there
     )
 
 

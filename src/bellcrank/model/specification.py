@@ -280,6 +280,9 @@ class Specification:
         ``"x"``, ``"y"`` or in space ``"z"`` for designs that equal their mirror image along this
         axis; in space also ``"2-fold"``, ``"3-fold"``, ``"4-fold"`` or ``"6-fold"`` for those that
         a part of a turn about the vertical axis does not change.
+    domain : sequence of (k, 2) float64
+        Closed rings around the region of the plane in which struts must lie, lattice units. A point
+        is inside if a ray from it crosses them an odd number of times. None by default.
 
     Raises
     ------
@@ -304,6 +307,7 @@ class Specification:
     maximise: tuple[ObjectiveTerm, ...] = ()
     weight: NDArray[np.float64] | None = None
     symmetry: tuple[str, ...] = ()
+    domain: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("cases", "items", "maximise", "symmetry"):
@@ -311,6 +315,10 @@ class Specification:
         object.__setattr__(self, "outputs", dict(self.outputs))
         if self.weight is not None:
             object.__setattr__(self, "weight", locked(real_array("weight", self.weight)))
+        rings = tuple(locked(real_array("domain", ring)) for ring in self.domain)
+        if any(ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3 for ring in rings):
+            raise InvalidProblem("domain: expected rings of at least 3 points [x, y]")
+        object.__setattr__(self, "domain", rings)
         if len(set(self.case_names)) < len(self.case_names):
             raise InvalidProblem(f"cases: names must differ, got {', '.join(self.case_names)}")
         if self.output in self.outputs:

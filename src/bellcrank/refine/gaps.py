@@ -13,16 +13,22 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Problem
 
+    Values = NDArray[np.float64]
+
 
 PARALLEL = 1e-12
 """Square of the sine of the angle between struts below which they are parallel."""
 
 
 class Gaps(NamedTuple):
-    """Gaps between pairs of struts that are near each other."""
+    """Gaps between struts that are near each other.
 
-    pairs: NDArray[np.int64]
-    """(g, 2) the pieces of struts that are near each other."""
+    In the plane, the gaps between the ends of a piece of a strut and another piece, up to four for
+    each pair: the smallest of them has a kink where struts are parallel.
+    """
+
+    keys: NDArray[np.int64]
+    """(g, 3) both pieces, and which of their gaps."""
     value: NDArray[np.float64]
     """(g,) gaps, lattice units."""
     fields: NDArray[np.float64]
@@ -37,6 +43,7 @@ def gaps_of(
     """Return the gaps between struts without a common node that are below a reach.
 
     Struts are bent as in `bellcrank.mechanics.bent_pieces`: two straight pieces each in the plane.
+    Of struts that cross, the derivatives are 0.
 
     Parameters
     ----------
@@ -50,33 +57,39 @@ def gaps_of(
     count, width = len(beams), problem.beam_widths[beams]
     points, pieces = bent_pieces(problem, beams, u)
     pairs, distance = near_pairs(points, pieces, float(width.max()) + reach)
-    strut = pairs % count
-    gap = distance - 0.5 * width[strut].sum(axis=1)
     # Struts that meet in a node overlap there; angles between them are constraints of their own.
-    ends = problem.lattice.beams[beams[strut]]
-    apart_at_rest = ~(ends[:, 0, :, None] == ends[:, 1, None, :]).any(axis=(1, 2))
-    chosen = np.flatnonzero((gap < reach) & apart_at_rest)
-    chosen = chosen[np.lexsort((pairs[chosen, 1], pairs[chosen, 0]))]
+    ends = problem.lattice.beams[beams[pairs % count]]
+    apart = np.flatnonzero(~(ends[:, 0, :, None] == ends[:, 1, None, :]).any(axis=(1, 2)))
+    apart = apart[np.lexsort((pairs[apart, 1], pairs[apart, 0]))]
+    pairs, distance = pairs[apart], distance[apart]
     nodes, dimension = problem.lattice.positions.shape
-    fields = np.zeros((len(chosen), nodes, 3 * (dimension - 1)))
-    widths = np.zeros((len(chosen), problem.lattice.beam_count))
-    for row, index in enumerate(chosen.tolist()):
+    corners = np.moveaxis(points[pieces[pairs]].reshape(-1, 4, dimension), 1, 0)
+    s, t = nearest_to_ends(*corners) if dimension == 2 else nearest_points(*corners)
+    weights = np.stack([1.0 - s, s, t - 1.0, -t], axis=2)
+    across = np.einsum("pkc,cpd->pkd", weights, corners)
+    size = np.linalg.norm(across, axis=2)
+    crossing = distance == 0.0
+    size[crossing] = 0.0
+    strut = pairs % count
+    gap = size - 0.5 * width[strut].sum(axis=1)[:, None]
+    near = gap < reach
+    near[crossing, 1:] = False
+    pair, which = np.nonzero(near)
+    fields = np.zeros((len(pair), nodes, 3 * (dimension - 1)))
+    widths = np.zeros((len(pair), problem.lattice.beam_count))
+    for row, (index, number) in enumerate(zip(pair.tolist(), which.tolist(), strict=True)):
         widths[row, beams[strut[index]]] = -0.5
-        (a, b), (c, d) = (points[pieces[piece]] for piece in pairs[index])
-        s, t = nearest_points(a, b, c, d)
-        apart = a + s * (b - a) - c - t * (d - c)
-        size = float(np.linalg.norm(apart))
-        if size == 0.0:
+        if size[index, number] == 0.0:
             continue
-        normal = apart / size
-        for piece, share, sign in ((pairs[index, 0], s, 1.0), (pairs[index, 1], t, -1.0)):
-            for point, weight in zip(pieces[piece].tolist(), (1.0 - share, share), strict=True):
-                vector = sign * weight * normal
-                if point < nodes:
-                    fields[row, point, :dimension] += vector
-                else:
-                    _add_middle(problem, u, int(beams[point - nodes]), vector, fields[row])
-    return Gaps(pairs[chosen], gap[chosen], fields, widths)
+        normal = across[index, number] / size[index, number]
+        ends_of_pair = pieces[pairs[index]].ravel().tolist()
+        for point, weight in zip(ends_of_pair, weights[index, number].tolist(), strict=True):
+            if point < nodes:
+                fields[row, point, :dimension] += weight * normal
+            else:
+                _add_middle(problem, u, int(beams[point - nodes]), weight * normal, fields[row])
+    keys = np.column_stack([pairs[pair], which])
+    return Gaps(keys, gap[pair, which], fields, widths)
 
 
 def _add_middle(
@@ -100,51 +113,71 @@ def _add_middle(
     field[second, 2] -= slope
 
 
-def nearest_points(
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
-    d: NDArray[np.float64],
-) -> tuple[float, float]:
-    """Return where the segments a b and c d are nearest to each other, as parts of their lengths.
+def nearest_to_ends(a: Values, b: Values, c: Values, d: Values) -> tuple[Values, Values]:
+    """Return where segments are nearest to the ends of each other, as parts of their lengths.
+
+    Parameters
+    ----------
+    a, b, c, d : (m, d)
+        Ends of the segments a b and c d.
+
+    Returns
+    -------
+    s, t : (m, 4)
+        Of a b and of c d: for the ends a, b, c and d.
 
     Examples
     --------
-    >>> origin, x, y = np.zeros(2), np.array([2.0, 0.0]), np.array([1.0, 1.0])
-    >>> nearest_points(origin, x, y, 2.0 * y)
-    (0.5, 0.0)
+    >>> origin, x, y = np.zeros((1, 2)), np.array([[2.0, 0.0]]), np.array([[1.0, 1.0]])
+    >>> s, t = nearest_to_ends(origin, x, y, 2.0 * y)
+    >>> s.tolist(), t.tolist()
+    ([[0.0, 1.0, 0.5, 1.0]], [[0.0, 0.0, 0.0, 1.0]])
     """
-    best, found = np.inf, (0.0, 0.0)
-    for start, end, point, swap, share in (
-        (a, b, c, False, 0.0), (a, b, d, False, 1.0), (c, d, a, True, 0.0), (c, d, b, True, 1.0),
-    ):  # fmt: skip
+
+    def part(point: Values, start: Values, end: Values) -> Values:
         along = end - start
-        part = float(np.clip((point - start) @ along / (along @ along), 0.0, 1.0))
-        distance = float(np.linalg.norm(start + part * along - point))
-        if distance < best:
-            best, found = distance, (share, part) if swap else (part, share)
-    return found if len(a) == 2 else _within(a, b, c, d, best, found)
+        share = ((point - start) * along).sum(axis=1) / (along * along).sum(axis=1)
+        return np.asarray(np.clip(share, 0.0, 1.0))
+
+    zero, one = np.zeros(len(a)), np.ones(len(a))
+    s = np.column_stack([zero, one, part(c, a, b), part(d, a, b)])
+    t = np.column_stack([part(a, c, d), part(b, c, d), zero, one])
+    return s, t
 
 
-def _within(
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
-    d: NDArray[np.float64],
-    best: float,
-    found: tuple[float, float],
-) -> tuple[float, float]:
-    """Return the nearest points of two lines in space if both are within the segments.
+def nearest_points(a: Values, b: Values, c: Values, d: Values) -> tuple[Values, Values]:
+    """Return where segments in space are nearest to each other, as parts of their lengths.
 
-    Else those that are at an end of one of them, whose distance is `best`.
+    Parameters
+    ----------
+    a, b, c, d : (m, 3)
+        Ends of the segments a b and c d.
+
+    Returns
+    -------
+    s, t : (m, 1)
+        Of a b and of c d.
+
+    Examples
+    --------
+    >>> x, y, z = np.eye(3)[:, None]
+    >>> s, t = nearest_points(-x, x, z - y, z + 3.0 * y)
+    >>> s.tolist(), t.tolist()
+    ([[0.5]], [[0.25]])
     """
+    s, t = nearest_to_ends(a, b, c, d)
     one, two, apart = b - a, d - c, a - c
-    square, other, both = one @ one, two @ two, one @ two
-    size = square * other - both * both
-    if size <= PARALLEL * square * other:
-        return found
-    s = float((both * (two @ apart) - other * (one @ apart)) / size)
-    t = float((square * (two @ apart) - both * (one @ apart)) / size)
-    inside = 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0
-    nearer = float(np.linalg.norm(apart + s * one - t * two)) < best
-    return (s, t) if inside and nearer else found
+    size = np.linalg.norm(
+        apart[:, None] + s[..., None] * one[:, None] - t[..., None] * two[:, None], axis=2
+    )
+    best = size.argmin(axis=1)[:, None]
+    s, t = (np.take_along_axis(each, best, axis=1) for each in (s, t))
+    square, other, both = ((u * v).sum(axis=1) for u, v in ((one, one), (two, two), (one, two)))
+    first, second = (one * apart).sum(axis=1), (two * apart).sum(axis=1)
+    product = square * other - both * both
+    skew = product > PARALLEL * square * other
+    product = np.where(skew, product, 1.0)
+    within = np.stack([both * second - other * first, square * second - both * first]) / product
+    inside = skew & (within >= 0.0).all(axis=0) & (within <= 1.0).all(axis=0)
+    s[inside, 0], t[inside, 0] = within[:, inside]
+    return s, t

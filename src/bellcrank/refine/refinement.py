@@ -54,7 +54,7 @@ class RefinementSettings:
 
     steps: int = 400
     evaluations: int = 400
-    largest_move: float = 0.45
+    largest_move: float = 0.9
     narrowest: float = 1.0
     widest: float = 1.8
     first_region: float = 0.02
@@ -176,8 +176,9 @@ class _Search:
             self.region *= 0.25
             return False
         predicted = found.merit - now
+        known = self.evaluator.soft_states
         change, after = found.change, self._evaluate(found.change)
-        first = after
+        stable = after is not None
         gained = -np.inf if after is None else merit_of(after, size) - now
         if after is not None and gained < GOOD * predicted:
             again = linear_step(corrected(rows, after, change), low, high, size)
@@ -187,10 +188,10 @@ class _Search:
                 if better > gained:
                     change, gained = again.change, better
         if gained < ACCEPTED * predicted:
-            if first is not None and not set(first.keys) <= set(rows.keys):
-                # States that are soft there are constraints here from now on.
-                self.rows = self.evaluator.evaluate(self.vector, slopes=True)
-            return self._refuse(unstable=after is None)
+            if self.evaluator.soft_states > known:
+                # States that are soft or unstable there are constraints here from now on.
+                self.rows = self._evaluate(np.zeros_like(change), slopes=True) or rows
+            return self._refuse(unstable=not stable)
         after = self._evaluate(change, slopes=True)
         if after is None:
             return self._refuse(unstable=True)

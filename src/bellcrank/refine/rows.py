@@ -6,6 +6,7 @@ search. Bounds that hold along the stroke are one constraint at each state.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,8 @@ STABLE = 0.5
 bifurcation it falls and rises again, and a small change of the geometry leads to another path."""
 SOFT = 1.2
 """Lowest stiffness, over its bound, below which a state is a constraint."""
+FRACTIONS = 128
+"""Parts of the stroke to whose ends the fraction at which a path loses stability is rounded."""
 GAP_REACH = 0.5
 """Gaps that are constraints, in widths of the section beyond the wanted one."""
 
@@ -146,6 +149,11 @@ class RowEvaluator:
         bounds = [item.at_most for item in self.items if item.quantity == "mass"]
         self.volume = min((bound for bound in bounds if bound is not None), default=np.inf)
 
+    @property
+    def soft_states(self) -> int:
+        """Number of states that were soft or unstable in any geometry, and are constraints."""
+        return sum(map(len, self.soft.values()))
+
     def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
         """Return the rows of a geometry; None if a response is not stable, or a strut too short.
 
@@ -180,9 +188,12 @@ class RowEvaluator:
         except InvalidProblem:
             return None
         evaluator = SpecificationEvaluator(problem)
-        for case in evaluator.cases.values():
+        for name, case in evaluator.cases.items():
             response = case.evaluator.respond(self.mask, LARGEST_INCREMENT)
             if response.status is not Status.CONVERGED:
+                if response.status is Status.SNAPPED:
+                    lost = math.ceil(response.reached * FRACTIONS) / FRACTIONS
+                    self.soft.setdefault((name, 0), set()).add(min(lost, 1.0))
                 return None
         return _Geometry(vector.copy(), problem, evaluator)
 
@@ -280,7 +291,7 @@ class RowEvaluator:
                 here.gaps[name, k] = gaps_of(problem, beams, state.state.u, reach)
             found = here.gaps[name, k]
             values.append((bound - found.value) / width)
-            keys += [(k, *pair) for pair in found.pairs.tolist()]
+            keys += [(k, *pair) for pair in found.keys.tolist()]
             if of_beams is None or not len(found.value):
                 continue
             measured = [(_quantity_of(found.fields), Measures(found.value))]
@@ -305,10 +316,13 @@ class RowEvaluator:
         for index, frame in enumerate(paths):
             soft = self.soft.setdefault((name, index), set())
             state = frame.equilibrium if index else case.state
-            states = here.softest.get((name, index)) or softest_states(state, soft)
-            if states is None:
-                return None
-            found = here.softest[name, index] = states
+            if (name, index) not in here.softest:
+                states, lost = softest_states(state, soft)
+                if lost is not None:
+                    soft.add(lost)
+                    return None
+                here.softest[name, index] = states
+            found = here.softest[name, index]
             values = {fraction: float(each.value[0]) for fraction, (_, each) in found.items()}
             known = references(values)
             least = {each: factor * values[peak] for each, (peak, factor) in known.items()}

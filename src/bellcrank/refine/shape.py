@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from bellcrank.refine.domain import distances_inside
 from bellcrank.refine.gaps import gaps_of
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ MASS_WEIGHT = 20.0
 """Weight of the mass against other constraints, so that it does not grow where these are missed."""
 NEAR_ANGLE = np.radians(45.0)
 """Angles below which they are constraints."""
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Points of a strut, as parts of its length, that must be inside the domain."""
 
 
 class ShapeRows(NamedTuple):
@@ -72,7 +75,8 @@ def shape_rows(problem: Problem, mask: NDArray[np.bool_], volume: float) -> Shap
         Largest volume of its struts, cubed lattice units; infinite without a limit.
     """
     beams = np.flatnonzero(mask)
-    parts = [rows(problem, beams) for rows in (_length_rows, _angle_rows, _hole_rows, _gap_rows)]
+    kinds = (_length_rows, _angle_rows, _hole_rows, _gap_rows, _domain_rows)
+    parts = [rows(problem, beams) for rows in kinds]
     if np.isfinite(volume):
         whole, moved, wider = volume_of(problem, mask)
         scale = volume / MASS_WEIGHT
@@ -217,6 +221,37 @@ def _gap_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     count = len(found.value)
     return ShapeRows(
         1.0 - found.value / least, ("gaps between struts",) * count,
-        tuple(map(tuple, found.pairs.tolist())),
+        tuple(map(tuple, found.keys.tolist())),
         -found.fields[..., : problem.lattice.dimension] / least, -found.widths / least,
+    )  # fmt: skip
+
+
+def _domain_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
+    """Return the constraints on the distances of struts from the boundary of the domain.
+
+    Ends that keep their positions have none: they may be on the boundary, as those at supports.
+    """
+    wanted, lattice = problem.specification, problem.lattice
+    rings = () if wanted is None else wanted.domain
+    held = np.zeros(lattice.node_count, dtype=bool)
+    held[problem.special_nodes_of_all_cases] = True
+    share = np.tile(np.array(SHARES), len(beams))
+    beam = np.repeat(beams, len(SHARES))
+    end = lattice.beams[beam, (share > 0.5).astype(np.int64)]
+    chosen = np.flatnonzero((share % 1.0 > 0.0) | ~held[end] if rings else np.zeros(0, bool))
+    beam, share = beam[chosen], share[chosen]
+    ends, width = lattice.beams[beam], problem.beam_widths[beam]
+    weights = np.stack([1.0 - share, share], axis=1)
+    points = np.einsum("pk,pkd->pd", weights, lattice.positions[ends])
+    value, slope = np.zeros(len(points)), np.zeros(points.shape)
+    if len(points):
+        distance, slope = distances_inside(points, rings)
+        value = 0.5 - distance / width
+    near = np.flatnonzero(value > -0.5)
+    rate = -(slope / width[:, None])[near]
+    return _rows_of(
+        problem, "domain", value[near],
+        np.column_stack([beam, np.rint(4.0 * share).astype(np.int64)])[near],
+        [(ends[near, k], weights[near, k, None] * rate) for k in range(2)],
+        [(beam[near], ((0.5 - value) / width)[near])],
     )  # fmt: skip

@@ -26,8 +26,8 @@ SOFT = 2.0
 
 def softest_states(
     state: Callable[[float], Equilibrium | None], fractions: Iterable[float] = ()
-) -> dict[float, tuple[Equilibrium, Measures]] | None:
-    """Return states along the stroke with their lowest stiffness; None if one is not found.
+) -> tuple[dict[float, tuple[Equilibrium, Measures]], float | None]:
+    """Return states along the stroke with their lowest stiffness.
 
     At equal fractions, and closer to each other about the local minima, since the lowest stiffness
     falls and rises steeply near a bifurcation.
@@ -38,6 +38,13 @@ def softest_states(
         Function from a fraction of the stroke to the equilibrium there.
     fractions
         Fractions of the stroke at which it is computed besides.
+
+    Returns
+    -------
+    states
+        By fraction of the stroke.
+    lost
+        First fraction at which there is no stable state; None if all are stable.
     """
     found: dict[float, tuple[Equilibrium, Measures]] = {}
 
@@ -52,12 +59,16 @@ def softest_states(
     values = {each: at(each) for each in sorted(grid.union(fractions))}
     step = 1.0 / STABLE_STATES
     for _ in range(HALVINGS):
-        if not all(value > 0.0 for value in values.values()):
-            return None
+        if (lost := _first_unstable(values)) is not None:
+            return found, lost
         step *= 0.5
         nearby = {each + move for each in _local_minima(values) for move in (-step, step)}
         values |= {each: at(each) for each in nearby if 0.0 < each <= 1.0 and each not in values}
-    return found if all(value > 0.0 for value in values.values()) else None
+    return found, _first_unstable(values)
+
+
+def _first_unstable(values: Mapping[float, float]) -> float | None:
+    return min((each for each, value in values.items() if not value > 0.0), default=None)
 
 
 def _local_minima(values: dict[float, float]) -> list[float]:
@@ -74,7 +85,9 @@ def references(values: Mapping[float, float]) -> dict[float, tuple[float, float]
 
     In a valley, the largest one before or after it, whichever is smaller; a value counts as before
     and after itself, so that values on a slope are not in a valley. Where a part of the largest
-    one before is more, that: a path that gets ever softer is near its end.
+    one before is more, that: a path that gets ever softer is near its end. Only values at equal
+    fractions are references: the others depend on where the local minima are, so that the largest
+    one of all would jump from one geometry to the next.
 
     Parameters
     ----------
@@ -88,15 +101,14 @@ def references(values: Mapping[float, float]) -> dict[float, tuple[float, float]
 
     Examples
     --------
-    >>> references({0.2: 5.0, 0.4: 1.0, 0.6: 3.0, 0.8: 0.5})
-    {0.2: (0.2, 1.0), 0.4: (0.6, 1.0), 0.6: (0.6, 1.0), 0.8: (0.2, 0.5)}
+    >>> references({0.25: 5.0, 0.5: 1.0, 0.75: 3.0, 0.76: 3.5, 1.0: 0.5})
+    {0.25: (0.25, 1.0), 0.5: (0.75, 1.0), 0.75: (0.75, 1.0), 0.76: (0.76, 1.0), 1.0: (0.25, 0.5)}
     """
-    fractions = sorted(values)
+    equal = [each for each in sorted(values) if float(each * STABLE_STATES).is_integer()]
     found = {}
-    for k, here in enumerate(fractions):
-        before, after = (
-            max(side, key=values.__getitem__) for side in (fractions[: k + 1], fractions[k:])
-        )
+    for here in sorted(values):
+        before = max((*(each for each in equal if each < here), here), key=values.__getitem__)
+        after = max((here, *(each for each in equal if each > here)), key=values.__getitem__)
         choices = (min(before, after, key=values.__getitem__), 1.0), (before, DECLINE)
         found[here] = max(choices, key=lambda each: each[1] * values[each[0]])
     return found

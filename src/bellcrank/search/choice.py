@@ -24,8 +24,12 @@ MOST = 48
 """Largest number of candidates that are verified."""
 MOST_UNMET = 12
 """The same for candidates that do not meet their specification in the model of the search."""
-MOST_OTHERS = 4
-"""Largest number of candidates of each other chain that are verified besides."""
+STARTS = 3
+"""Largest number of designs of each chain that may be refined."""
+MOST_OTHERS = 8
+"""Largest number of candidates of each chain that are verified for them."""
+DIFFERENCE = 0.1
+"""Part of the beams of two designs, at least, in which they differ if both may be refined."""
 MOST_NEAREST = 5
 """Largest number of designs that are reported where none meets the specification."""
 
@@ -78,20 +82,36 @@ class FirstWithoutFault:
     def _others(
         self, chosen: Finalist, verified: list[Finalist], listed: Sequence[Finalist]
     ) -> list[Finalist]:
-        """Return the best finalist of each other chain, the best chain first.
+        """Return further finalists that may be refined, the best first.
 
-        The first one without a fault among a few, or the one that misses least.
+        A few of each chain without a fault that differ from each other, or the one that misses
+        least.
         """
-        found = []
-        for chain in sorted({each.found.chain for each in listed} - {chosen.found.chain}):
-            own = [each for each in verified if each.found.chain == chain]
-            waiting = [each for each in listed[len(verified) :] if each.found.chain == chain]
-            for finalist in waiting[:MOST_OTHERS]:
-                own.append(self._verified(finalist, len(verified), len(listed)))
-                if _verification(own[-1]).fault is None:
+        found: list[Finalist] = []
+        for chain in sorted({each.found.chain for each in listed}):
+            own = [chosen] if chosen.found.chain == chain else []
+            missed: list[Finalist] = []
+            tried = 0
+            for finalist in [*verified, *listed[len(verified) :]]:
+                if len(own) == STARTS or tried == MOST_OTHERS:
                     break
-            found.append(min(own, key=_rank))
+                is_new = all(_differ(finalist, each) for each in [chosen, *found, *own])
+                if finalist.found.chain != chain or not is_new:
+                    continue
+                checked = finalist
+                if checked.verification is None:
+                    checked = self._verified(finalist, len(verified), len(listed))
+                    tried += 1
+                (missed if _verification(checked).fault else own).append(checked)
+            own = own or [min(missed, key=_rank)] if own or missed else []
+            found += [each for each in own if each is not chosen]
         return sorted(found, key=lambda each: (*_rank(each), -each.response.score))
+
+
+def _differ(first: Finalist, second: Finalist) -> bool:
+    """Whether two designs differ in more than a few beams."""
+    one, two = first.design.mask, second.design.mask
+    return int((one != two).sum()) > DIFFERENCE * int((one | two).sum())
 
 
 def nearest(verified: Sequence[Finalist]) -> list[Finalist]:

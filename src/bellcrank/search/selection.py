@@ -100,7 +100,7 @@ class Chosen(NamedTuple):
     nearest: Sequence[Finalist] = ()
     """The nearest ones to a specification that none meets."""
     others: Sequence[Finalist] = ()
-    """For a problem with a specification: the best one of each other chain."""
+    """For a problem with a specification: further ones that may be refined, the best first."""
 
 
 Choice: TypeAlias = "Callable[[Sequence[Finalist]], Chosen]"
@@ -131,7 +131,7 @@ class Selection:
         Where no design meets the specification: verified designs of which none is better in every
         item.
     others
-        For a problem with a specification: the best design of each other chain.
+        For a problem with a specification: further designs that may be refined, the best first.
     """
 
     design: Design

@@ -28,13 +28,15 @@ from bellcrank.model.calls import call_with_keys
 from bellcrank.model.specification import FOLDS
 from bellcrank.part import PartSpec, frame_elasticity, frame_section
 from bellcrank.task.conditions import CaseReader
-from bellcrank.task.domain import fill, in_regions, region_of
+from bellcrank.task.domain import fill, in_regions, region_of, rings_of
 from bellcrank.task.items import ItemReader
 from bellcrank.task.space import beams_in_space, fill_in_space
 from bellcrank.task.units import ProblemUnits, part_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from bellcrank.model import Design
     from bellcrank.model.specification import ObjectiveTerm
@@ -107,6 +109,7 @@ class _Builder:
         self.folder = folder
         self.part = _part(table)
         self.base = _base(table.domain)
+        self.domain: tuple[NDArray[np.float64], ...] = ()
         self.lattice = self._lattice()
         self.section = frame_section(self.part, self.lattice.dimension)
         self.material = frame_elasticity(self.lattice, self.section, self.part)
@@ -163,6 +166,7 @@ class _Builder:
                 maximise=tuple(maximise),
                 weight=weight,
                 symmetry=_symmetry_names(table.limits.symmetry),
+                domain=self.domain,
             ),
         )
         return Task(self._with_solid(problem), self.part, self.units, table.description)
@@ -202,6 +206,7 @@ class _Builder:
                 "domain.cells: expected a domain in space, with a size of 3 lengths"
             )
         region = region_of(domain, self.folder)
+        self.domain = rings_of(region, self.part.scale)
         return fill(region, self.part.scale, self.part.width)
 
     def _limits(self, names: Sequence[str]) -> list[Item]:

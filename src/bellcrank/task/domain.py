@@ -155,6 +155,20 @@ def region_of(domain: DomainSection, folder: Path) -> BaseGeometry:
     return region
 
 
+def rings_of(region: BaseGeometry, spacing: float) -> tuple[NDArray[np.float64], ...]:
+    """Return the rings around a region, and around its holes, in units of the spacing.
+
+    Examples
+    --------
+    >>> (ring,) = rings_of(box(0.0, 0.0, 20.0, 10.0), spacing=10.0)
+    >>> ring.tolist()
+    [[2.0, 0.0], [2.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
+    """
+    polygons = [each for each in getattr(region, "geoms", [region]) if each.geom_type == "Polygon"]
+    rings = [ring for each in polygons for ring in (each.exterior, *each.interiors)]
+    return tuple(np.array(ring.coords)[:-1, :2] / spacing for ring in rings)
+
+
 def _corners(outline: object) -> list[list[float]]:
     """Return the corners of an outline, mm."""
     from bellcrank.errors import InvalidSettings

@@ -16,7 +16,7 @@ from bellcrank.search.choice import nearest
 from bellcrank.search.parallel import default_workers
 from bellcrank.search.selection import Finalist
 from bellcrank.search.verification import Verifier
-from bellcrank.workflows.refiners import refine_designs, sheet_of
+from bellcrank.workflows.refiners import FIRST_EVALUATIONS, refine_designs, sheet_of
 from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.validation import spec_for
 
@@ -30,8 +30,12 @@ if TYPE_CHECKING:
 
 BEFORE_REFINEMENT = {"steps": 8_000}
 """Settings of a search whose design is refined: a longer search gains less than the refinement."""
-MOST_REFINED = 2
-"""Number of designs of a search that are refined, of different chains; the better result counts."""
+MOST_REFINED = 6
+"""Largest number of designs of a search that are refined for `FIRST` geometries."""
+FIRST = RefinementSettings(evaluations=FIRST_EVALUATIONS)
+"""Settings of these refinements, without the sheet."""
+BEST = 2
+"""Number of results that are refined further; the better one counts."""
 
 
 def refine_selection(
@@ -41,12 +45,14 @@ def refine_selection(
     workers: int | None = None,
     stop: threading.Event | None = None,
 ) -> tuple[Selection, Refinement | None]:
-    """Refine the best designs of a search, one of each chain, and select the best result.
+    """Refine designs of a search and select the best result.
+
+    Several designs are refined for a few geometries, and the best results further.
 
     Parameters
     ----------
     selection
-        Selected design of the search, and the best ones of other chains.
+        Selected design of the search, and others that may be refined.
     spec
         Part that is computed in the sheet; None for no sheet.
     report
@@ -71,9 +77,23 @@ def refine_selection(
     designs = [each.design for each in finalists]
     designs = [replace(each, problem=with_joints(each.problem, each.mask)) for each in designs]
     workers, stop = workers or default_workers(), stop or threading.Event()
-    results = refine_designs(designs, spec, report, workers, stop)
+    first = refine_designs(designs, None, report, workers, stop, FIRST)
+    if len(first) < len(designs):
+        return selection, None
+    order = sorted(range(len(first)), key=lambda number: _rank(first[number]), reverse=True)
+    order = order[:BEST]
+
+    def report_further(number: int, progress: Progress) -> None:
+        before = first[order[number]]
+        evaluations = progress.evaluations + before.evaluations
+        report(order[number], replace(progress, evaluations=evaluations))
+
+    designs = [first[number].design for number in order]
+    results = refine_designs(designs, spec, report_further, workers, stop)
     if len(results) < len(designs):
         return selection, None
+    finalists = [finalists[number] for number in order]
+    results = [_joined(first[number], each) for number, each in zip(order, results, strict=True)]
     best = max(range(len(results)), key=lambda number: _rank(results[number]))
     chosen = _verified(finalists[best], results[best].design)
     assert chosen.verification is not None
@@ -91,6 +111,17 @@ def _rank(refinement: Refinement) -> tuple[bool, bool, float]:
     """Return how good a refined design is: items met by frames, and in the sheet; the objective."""
     after = refinement.after
     return after.met, bool(after.met_in_sheet), after.objective
+
+
+def _joined(first: Refinement, second: Refinement) -> Refinement:
+    """Return a refinement and the one of its result as one."""
+    return replace(
+        second,
+        before=first.before,
+        steps=first.steps + second.steps,
+        evaluations=first.evaluations + second.evaluations,
+        improved=first.improved or second.improved,
+    )
 
 
 def _finalist(selection: Selection) -> Finalist:

@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 
     Report = Callable[[int, Progress], None]
 
-EVALUATIONS = 300
-"""Number of geometries that the refinement of a design of a search evaluates."""
+FIRST_EVALUATIONS = 100
+"""Number of geometries that the refinement of each design of a search evaluates."""
+EVALUATIONS = 500
+"""Number of further ones for the best designs."""
 SETTINGS = RefinementSettings(evaluations=EVALUATIONS)
 
 

@@ -25,6 +25,9 @@ LARGEST = 0.4
 """Largest part of a beam that one joint takes."""
 OPPOSITE = 0.05
 """Deviation from opposite directions, twice in radians, within which beams have almost no joint."""
+ROUNDED = 0.05
+"""Half the range in which kinks are rounded, so that responses are smooth in the geometry: of the
+cosine of the angle between beams at a right angle, and of joints near the largest size, over it."""
 COMPLEX_STEP = 1e-30
 
 
@@ -57,13 +60,26 @@ def joint_lengths(problem: Problem, mask: NDArray[np.bool_]) -> NDArray[np.float
 
     Lattice units.
     """
-    lattice, widths = problem.lattice, problem.beam_widths
+    lattice = problem.lattice
     corners = _corners(lattice.positions, lattice.beams, mask)
-    out = np.zeros((lattice.beam_count, 2))
-    shapes = corners.shapes(lattice.positions, lattice.beams, widths)
+    shapes = corners.shapes(lattice.positions, lattice.beams, problem.beam_widths)
+    largest = LARGEST * lattice.rest_length[:, None]
+    below = 1.0 - _lengths(corners, shapes, lattice.beam_count) / largest
+    return np.asarray(largest * (1.0 - _ramp(below)))
+
+
+def _lengths(corners: _Corners, shapes: tuple[Floats, ...], count: int) -> Floats:
+    """Return (M, 2) the lengths of joints without regard to the length of their beams."""
+    out = np.zeros((count, 2))
     for (beams, ends), length in zip(corners.sides, _meeting(*shapes), strict=True):
         np.add.at(out, (beams, ends), 0.5 * length)
-    return np.minimum(out, LARGEST * lattice.rest_length[:, None])
+    return out
+
+
+def _ramp(x: Any) -> Any:
+    """Return the larger of x and 0, with a quadratic rise between -`ROUNDED` and `ROUNDED`."""
+    rise = (x + ROUNDED) ** 2 / (4.0 * ROUNDED)
+    return np.where(x.real > ROUNDED, x, np.where(x.real < -ROUNDED, 0.0, rise))
 
 
 def joint_slopes(problem: Problem, mask: NDArray[np.bool_]) -> csr_matrix:
@@ -106,12 +122,16 @@ def joint_slopes(problem: Problem, mask: NDArray[np.bool_]) -> csr_matrix:
     shape = (2 * len(beams), coordinates + len(beams))
     indices = np.concatenate(rows), np.concatenate(columns)
     slopes: csr_matrix = csr_matrix((np.concatenate(values), indices), shape=shape)
-    # Joints of the largest size follow the length of their beam.
+    # Joints near the largest size L follow the length of their beam: L - L f(1 - x / L).
     length = lattice.rest_length
-    largest = joint_lengths(problem, mask) >= LARGEST * length[:, None]
-    free = csr_matrix(slopes.multiply(~largest.reshape(-1, 1)))
-    beam, end = np.nonzero(largest)
-    axis = LARGEST * (positions[beams[beam, 1]] - positions[beams[beam, 0]]) / length[beam, None]
+    largest = LARGEST * length[:, None]
+    below = 1.0 - _lengths(corners, shapes, len(beams)) / largest
+    rate = np.clip((below + ROUNDED) / (2.0 * ROUNDED), 0.0, 1.0)
+    by_largest = 1.0 - _ramp(below) - (1.0 - below) * rate
+    free = csr_matrix(slopes.multiply(rate.reshape(-1, 1)))
+    beam, end = np.nonzero(by_largest)
+    axis = (positions[beams[beam, 1]] - positions[beams[beam, 0]]) / length[beam, None]
+    axis *= LARGEST * by_largest[beam, end][:, None]
     row = np.repeat(2 * beam + end, 2)
     column = (2 * beams[beam][:, :, None] + np.arange(2)).transpose(1, 0, 2).reshape(2, -1)
     bounded = csr_matrix(
@@ -184,6 +204,6 @@ def _meeting(one: Any, two: Any, width1: Any, width2: Any) -> tuple[Any, Any]:
     convex = sine.real > 0.0
     cotangent = np.where(convex, sine / (1.0 - cosine), 0.0)  # of half the angle
     rounded = cotangent * cotangent / np.sqrt(cotangent * cotangent + OPPOSITE**2)
-    acute = np.where(cosine.real > 0.0, cosine, 0.0)
+    acute = _ramp(cosine)
     factor = 0.5 * rounded / (1.0 + acute)
     return factor * (width2 + width1 * acute), factor * (width1 + width2 * acute)

@@ -1,0 +1,104 @@
+"""Struts stay inside the domain of their task."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from bellcrank.errors import InvalidProblem
+from bellcrank.model import Design, Problem, Specification
+from bellcrank.refine import RefinementSettings, refine_design
+from bellcrank.refine.domain import distances_inside
+from bellcrank.refine.shape import shape_rows
+from bellcrank.task import find_task
+
+
+def region() -> tuple[shapely.Polygon, list[np.ndarray]]:
+    """Return an L with a round hole, and its rings."""
+    corners = [(0, 0), (8, 0), (8, 3), (3, 3), (3, 8), (0, 8)]
+    made = shapely.Polygon(corners).difference(shapely.Point(1.5, 1.5).buffer(0.8))
+    return made, [np.array(made.exterior.coords)[:-1], np.array(made.interiors[0].coords)[:-1]]
+
+
+def test_distances_are_those_of_shapely() -> None:
+    polygon, rings = region()
+    points = np.random.default_rng(0).uniform(-1.0, 9.0, (400, 2))
+    distance, slopes = distances_inside(points, rings)
+    for point, value in zip(points, distance, strict=True):
+        at = shapely.Point(point)
+        sign = 1.0 if polygon.contains(at) else -1.0
+        assert value == pytest.approx(sign * polygon.boundary.distance(at), abs=1e-12)
+    step = 1e-6
+    for axis in range(2):
+        moved = points.copy()
+        moved[:, axis] += step
+        rate = (distances_inside(moved, rings)[0] - distance) / step
+        smooth = np.abs(rate - slopes[:, axis]) < 1e-4
+        assert smooth.mean() > 0.98
+
+
+def domain_values(problem: Problem, mask: np.ndarray) -> np.ndarray:
+    rows = shape_rows(problem, mask, np.inf)
+    return rows.values[[name == "domain" for name in rows.names]]
+
+
+def test_the_derivatives_are_those_of_the_constraints() -> None:
+    task = find_task("gripper")
+    assert task is not None
+    problem = task.problem
+    rng = np.random.default_rng(1)
+    lattice = problem.lattice
+    positions = lattice.positions + 0.05 * rng.standard_normal(lattice.positions.shape)
+    widths = problem.beam_widths * rng.uniform(1.0, 1.5, lattice.beam_count)
+    change = 1e-6 * rng.standard_normal(positions.shape)
+    wider = 1e-6 * rng.standard_normal(widths.shape)
+    here, there = (
+        shape_rows(problem.with_geometry(*each), problem.initial, np.inf)
+        for each in ((positions, widths), (positions + change, widths + wider))
+    )
+    after = {
+        key: value
+        for key, name, value in zip(there.keys, there.names, there.values, strict=True)
+        if name == "domain"
+    }
+    linear = np.einsum("rnd,nd->r", here.positions, change) + here.widths @ wider
+    found = [
+        after[key] - value - rate
+        for key, name, value, rate in zip(here.keys, here.names, here.values, linear, strict=True)
+        if name == "domain" and key in after
+    ]
+    assert len(found) > 50
+    assert np.abs(found).max() < 1e-9
+
+
+def test_a_refined_part_stays_inside_its_domain() -> None:
+    """The bound on nodes and the larger gain would lead the struts outside otherwise."""
+    task = find_task("lever")
+    assert task is not None
+    problem = task.problem
+    wanted = problem.specification
+    assert wanted is not None
+    settings = RefinementSettings(evaluations=25)
+    outside = {}
+    for domain in (wanted.domain, ()):
+        own = replace(problem, specification=replace(wanted, domain=domain))
+        found = refine_design(Design(own, problem.initial), settings)
+        back = replace(found.design.problem, specification=wanted)
+        outside[bool(domain)] = domain_values(back, problem.initial).max()
+    assert outside[True] < 0.01
+    assert outside[False] > 0.02
+
+
+def test_fixed_ends_on_the_boundary_have_no_constraint() -> None:
+    task = find_task("lever")
+    assert task is not None
+    problem = task.problem
+    assert domain_values(problem, problem.initial).max() < 1e-9
+
+
+def test_rings_have_three_points() -> None:
+    with pytest.raises(InvalidProblem, match="domain: expected rings of at least 3 points"):
+        Specification(domain=[[[0.0, 0.0], [1.0, 0.0]]])
