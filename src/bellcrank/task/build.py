@@ -28,7 +28,7 @@ from bellcrank.model.calls import call_with_keys
 from bellcrank.model.specification import FOLDS
 from bellcrank.part import PartSpec, frame_elasticity, frame_section
 from bellcrank.task.conditions import CaseReader
-from bellcrank.task.domain import fill, in_regions, region_of, rings_of
+from bellcrank.task.domain import fill, in_regions, region_of, boundary_of
 from bellcrank.task.items import ItemReader
 from bellcrank.task.space import beams_in_space, fill_in_space
 from bellcrank.task.units import ProblemUnits, part_units
@@ -206,7 +206,7 @@ class _Builder:
                 "domain.cells: expected a domain in space, with a size of 3 lengths"
             )
         region = region_of(domain, self.folder)
-        self.domain = rings_of(region, self.part.scale)
+        self.domain = boundary_of(region, self.part.scale)
         return fill(region, self.part.scale, self.part.width)
 
     def _limits(self, names: Sequence[str]) -> list[Item]:

@@ -155,12 +155,12 @@ def region_of(domain: DomainSection, folder: Path) -> BaseGeometry:
     return region
 
 
-def rings_of(region: BaseGeometry, spacing: float) -> tuple[NDArray[np.float64], ...]:
+def boundary_of(region: BaseGeometry, spacing: float) -> tuple[NDArray[np.float64], ...]:
     """Return the rings around a region, and around its holes, in units of the spacing.
 
     Examples
     --------
-    >>> (ring,) = rings_of(box(0.0, 0.0, 20.0, 10.0), spacing=10.0)
+    >>> (ring,) = boundary_of(box(0.0, 0.0, 20.0, 10.0), spacing=10.0)
     >>> ring.tolist()
     [[2.0, 0.0], [2.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
     """
