@@ -24,9 +24,9 @@ def region() -> tuple[shapely.Polygon, list[np.ndarray]]:
 
 
 def test_distances_are_those_of_shapely() -> None:
-    polygon, rings = region()
+    polygon, boundary = region()
     points = np.random.default_rng(0).uniform(-1.0, 9.0, (400, 2))
-    distance, slopes = distances_inside(points, rings)
+    distance, slopes = distances_inside(points, boundary)
     for point, value in zip(points, distance, strict=True):
         at = shapely.Point(point)
         sign = 1.0 if polygon.contains(at) else -1.0
@@ -35,7 +35,7 @@ def test_distances_are_those_of_shapely() -> None:
     for axis in range(2):
         moved = points.copy()
         moved[:, axis] += step
-        rate = (distances_inside(moved, rings)[0] - distance) / step
+        rate = (distances_inside(moved, boundary)[0] - distance) / step
         smooth = np.abs(rate - slopes[:, axis]) < 1e-4
         assert smooth.mean() > 0.98
 

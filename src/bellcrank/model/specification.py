@@ -315,10 +315,10 @@ class Specification:
         object.__setattr__(self, "outputs", dict(self.outputs))
         if self.weight is not None:
             object.__setattr__(self, "weight", locked(real_array("weight", self.weight)))
-        rings = tuple(locked(real_array("domain", ring)) for ring in self.domain)
-        if any(ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3 for ring in rings):
+        domain = tuple(locked(real_array("domain", ring)) for ring in self.domain)
+        if any(ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3 for ring in domain):
             raise InvalidProblem("domain: expected rings of at least 3 points [x, y]")
-        object.__setattr__(self, "domain", rings)
+        object.__setattr__(self, "domain", domain)
         if len(set(self.case_names)) < len(self.case_names):
             raise InvalidProblem(f"cases: names must differ, got {', '.join(self.case_names)}")
         if self.output in self.outputs:

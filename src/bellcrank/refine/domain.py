@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     Values = NDArray[np.float64]
 
 
-def distances_inside(points: Values, rings: Sequence[Values]) -> tuple[Values, Values]:
+def distances_inside(points: Values, boundary: Sequence[Values]) -> tuple[Values, Values]:
     """Return how far points are inside a region, and the derivatives by their coordinates.
 
     Parameters
     ----------
     points : (n, 2)
         Points.
-    rings : sequence of (k, 2)
+    boundary : sequence of (k, 2)
         Closed rings around the region. A point is inside if a ray from it crosses them an odd
         number of times.
 
@@ -37,13 +37,14 @@ def distances_inside(points: Values, rings: Sequence[Values]) -> tuple[Values, V
     A square with a square hole:
 
     >>> square = np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]])
-    >>> rings = [square, 0.25 * square + 3.0]
-    >>> distance, slopes = distances_inside(np.array([[1.0, 4.0], [4.0, 3.5], [9.0, 4.0]]), rings)
+    >>> boundary = [square, 0.25 * square + 3.0]
+    >>> points = np.array([[1.0, 4.0], [4.0, 3.5], [9.0, 4.0]])
+    >>> distance, slopes = distances_inside(points, boundary)
     >>> distance.tolist(), slopes[0].tolist()
     ([1.0, -0.5, -1.0], [1.0, 0.0])
     """
-    starts = np.concatenate(rings)
-    along = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings]) - starts
+    starts = np.concatenate(boundary)
+    along = np.concatenate([np.roll(ring, -1, axis=0) for ring in boundary]) - starts
     apart = points[:, None] - starts
     square = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
     share = np.clip((apart * along).sum(axis=2) / square, 0.0, 1.0)

@@ -232,20 +232,20 @@ def _domain_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     Ends that keep their positions have none: they may be on the boundary, as those at supports.
     """
     wanted, lattice = problem.specification, problem.lattice
-    rings = () if wanted is None else wanted.domain
+    domain = () if wanted is None else wanted.domain
     held = np.zeros(lattice.node_count, dtype=bool)
     held[problem.special_nodes_of_all_cases] = True
     share = np.tile(np.array(SHARES), len(beams))
     beam = np.repeat(beams, len(SHARES))
     end = lattice.beams[beam, (share > 0.5).astype(np.int64)]
-    chosen = np.flatnonzero((share % 1.0 > 0.0) | ~held[end] if rings else np.zeros(0, bool))
+    chosen = np.flatnonzero((share % 1.0 > 0.0) | ~held[end] if domain else np.zeros(0, bool))
     beam, share = beam[chosen], share[chosen]
     ends, width = lattice.beams[beam], problem.beam_widths[beam]
     weights = np.stack([1.0 - share, share], axis=1)
     points = np.einsum("pk,pkd->pd", weights, lattice.positions[ends])
     value, slope = np.zeros(len(points)), np.zeros(points.shape)
     if len(points):
-        distance, slope = distances_inside(points, rings)
+        distance, slope = distances_inside(points, domain)
         value = 0.5 - distance / width
     near = np.flatnonzero(value > -0.5)
     rate = -(slope / width[:, None])[near]

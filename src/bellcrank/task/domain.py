@@ -165,8 +165,8 @@ def boundary_of(region: BaseGeometry, spacing: float) -> tuple[NDArray[np.float6
     [[2.0, 0.0], [2.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
     """
     polygons = [each for each in getattr(region, "geoms", [region]) if each.geom_type == "Polygon"]
-    rings = [ring for each in polygons for ring in (each.exterior, *each.interiors)]
-    return tuple(np.array(ring.coords)[:-1, :2] / spacing for ring in rings)
+    loops = [loop for each in polygons for loop in (each.exterior, *each.interiors)]
+    return tuple(np.array(loop.coords)[:-1, :2] / spacing for loop in loops)
 
 
 def _corners(outline: object) -> list[list[float]]:
