@@ -28,7 +28,7 @@ from bellcrank.model.calls import call_with_keys
 from bellcrank.model.specification import FOLDS
 from bellcrank.part import PartSpec, frame_elasticity, frame_section
 from bellcrank.task.conditions import CaseReader
-from bellcrank.task.domain import fill, in_regions, region_of, boundary_of
+from bellcrank.task.domain import boundary_of, fill, in_regions, region_of
 from bellcrank.task.items import ItemReader
 from bellcrank.task.space import beams_in_space, fill_in_space
 from bellcrank.task.units import ProblemUnits, part_units
