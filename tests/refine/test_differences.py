@@ -49,6 +49,25 @@ def test_what_a_model_does_not_know_is_not_corrected() -> None:
     assert found.added_to("push", {MOTION: here})[MOTION] == pytest.approx(here)
 
 
+def test_the_motion_lost_under_a_payload_is_multiplied() -> None:
+    loaded = Channel("loaded_motion", "output")
+    motion = np.array([[0.5, 0.0, 0.0], [1.0, 0.1, 0.0]])
+    here = StrokeRecord(FRACTIONS, {MOTION: motion, loaded: np.array([[0.8, 0.1, 0.0]])}, {})
+    better = StrokeRecord(
+        FRACTIONS, {MOTION: 1.1 * motion, loaded: np.array([[0.3, 0.2, 0.0]])}, {}
+    )
+    found = difference({"push": better}, {"push": here}, {})
+    after = found.added_to("push", here.channels)
+    assert after[MOTION] == pytest.approx(1.1 * motion)
+    assert after[loaded] == pytest.approx(np.array([[0.3, 0.2, 0.0]]))
+    # A stiffer geometry, whose payload takes half as much in one model, and so in the other.
+    stiffer = {MOTION: motion, loaded: np.array([[0.9, 0.1, 0.0]])}
+    assert found.added_to("push", stiffer)[loaded][0, 0] == pytest.approx(1.1 - 0.4)
+    many = {each: np.repeat(value[None], 4, axis=0) for each, value in stiffer.items()}
+    assert found.added_to("push", many)[loaded][:, 0, 0] == pytest.approx(0.7)
+    assert stiffer[loaded][0, 0] == 0.9
+
+
 def test_models_on_other_branches_are_recognised() -> None:
     first = np.array([[0.5, 0.0, 0.0], [1.0, 0.1, 0.0]])
     assert on_same_path({"push": record(first)}, {"push": record(1.2 * first)})

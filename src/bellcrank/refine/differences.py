@@ -2,7 +2,8 @@
 
 A refinement has one element in each strut. The difference of the channels of a better model, at one
 geometry, is added to those of nearby geometries, so that the items follow as in the better model,
-to zeroth order in the change of the geometry.
+to zeroth order in the change of the geometry. The motion that is lost under a payload is multiplied
+instead: one model may lose several times as much as the other, and a refinement then reduces both.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.mechanics import Channel
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import Channel, StrokeRecord
+    from bellcrank.mechanics import StrokeRecord
 
     Values = NDArray[np.float64]
     Records = Mapping[str, StrokeRecord]
@@ -38,15 +41,24 @@ class Difference:
         known in both models has none.
     overlaps
         By how much struts overlap beyond the bound on their gaps, by load case; lattice units.
+    lost
+        Ratios of the motion along the direction of an output that is lost under its payload, by
+        load case and output.
     """
 
     channels: Mapping[str, Mapping[Channel, Values]] = field(default_factory=dict)
     overlaps: Mapping[str, float] = field(default_factory=dict)
+    lost: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def added_to(self, case: str, channels: Mapping[Channel, Values]) -> dict[Channel, Values]:
         """Return channels (..., F, ...) of a load case as the better model has them."""
         own = self.channels.get(case, {})
-        return {each: value + own.get(each, 0.0) for each, value in channels.items()}
+        found = {each: value + own.get(each, 0.0) for each, value in channels.items()}
+        for output, ratio in self.lost.get(case, {}).items():
+            loaded = found[Channel("loaded_motion", output)]
+            motion = found[Channel("motion", output)]
+            loaded[..., 0] = motion[..., -1:, 0] - ratio * _lost_motion(channels, output)
+        return found
 
 
 NO_DIFFERENCE = Difference()
@@ -64,6 +76,7 @@ def difference(better: Records, here: Records, gaps: Mapping[str, float]) -> Dif
     """
     channels: dict[str, dict[Channel, Values]] = {}
     overlaps: dict[str, float] = {}
+    lost: dict[str, dict[str, float]] = {}
     for case, record in better.items():
         own = here[case].channels
         found = {
@@ -75,7 +88,20 @@ def difference(better: Records, here: Records, gaps: Mapping[str, float]) -> Dif
         gap = float(record.given.get("clearance", np.inf))
         # Gaps are known where they are small; the refined geometry is at the bound.
         overlaps[case] = max(0.0, gaps.get(case, 0.0) - gap)
-    return Difference(channels, overlaps)
+        lost[case] = {
+            each.output: float(wanted[0] / now[0])
+            for each in channels[case]
+            if each.name == "loaded_motion"
+            and (now := _lost_motion(own, each.output))[0] > 0.0
+            and (wanted := _lost_motion(record.channels, each.output))[0] > 0.0
+        }
+    return Difference(channels, overlaps, lost)
+
+
+def _lost_motion(channels: Mapping[Channel, Values], output: str) -> Values:
+    """Return (..., 1) the motion of an output along its direction that its payload takes."""
+    motion = channels[Channel("motion", output)]
+    return np.asarray(motion[..., -1:, 0] - channels[Channel("loaded_motion", output)][..., 0])
 
 
 def on_same_path(first: Records, second: Records) -> bool:
