@@ -65,6 +65,8 @@ RECORD = Path(__file__).parents[1] / "docs" / "refinement" / "runs.json"
 PARTS = ("crane", "anti-parallel", "discs", "pliers", "scaling-8")
 SEEDS = 8
 """Number of searches of each straight or exact motion."""
+STRAIGHT_CHAINS = 4
+"""Number of chains of the searches for a straight motion."""
 PATHS = ("line", "arc", "corner")
 PATH_SEEDS = 5
 SHARED = {"input_motion", "input_force", "strain"}
@@ -217,11 +219,11 @@ def from_bundled(task: str, problem: Problem, spec: PartSpec) -> dict[str, Any]:
     }
 
 
-def from_search(problem: Problem, spec: PartSpec, seed: int) -> dict[str, Any]:
+def from_search(problem: Problem, spec: PartSpec, seed: int, chains: int = CORES) -> dict[str, Any]:
     """Search and refine a design with a seed."""
     used = core_seconds()
     with TemporaryDirectory() as temporary:
-        settings = read_settings({**BEFORE_REFINEMENT, "seed": seed})
+        settings = read_settings({**BEFORE_REFINEMENT, "seed": seed, "chains": chains})
         folder = start_design(problem, settings, Path(temporary) / "run", spec)
         try:
             report = complete_design(folder, workers=CORES)
@@ -279,8 +281,11 @@ def runs() -> dict[str, Callable[[], dict[str, Any]]]:
             problem, spec = changed(task.problem), task.part
             kind = "exact" if name == "slider" else "straight"
             if isinstance(seed, int):
-                out[f"{kind} {name} {seed}"] = lambda problem=problem, spec=spec, seed=seed: (
-                    from_search(problem, spec, seed)
+                chains = CORES if kind == "exact" else STRAIGHT_CHAINS
+                out[f"{kind} {name} {seed}"] = (
+                    lambda problem=problem, spec=spec, seed=seed, chains=chains: from_search(
+                        problem, spec, seed, chains
+                    )
                 )
             elif kind == "straight":
                 out[f"{kind} {name} {seed}"] = lambda name=name, problem=problem, spec=spec: (

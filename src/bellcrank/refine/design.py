@@ -38,13 +38,13 @@ RESERVE = 0.05
 too."""
 MASS_RESERVE = 2e-3
 """The same for the mass, which is that of all models: more than `MET`."""
-SHEETS = 4
+SHEETS = 6
 """Largest number of geometries that are computed in the sheet: each load case takes up to a
 minute."""
-SHEET_CASES = 6
+SHEET_CASES = 8
 """Largest number of load cases of these geometries, of which there are at least two."""
 REPAIR_REGION = 0.25
-"""First trust region after the sheet misses items, over that of other refinements."""
+"""Trust regions of refinements that are corrected by the sheet, over those of others."""
 SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
 HALVINGS = 2
@@ -251,7 +251,7 @@ class _Job:
             else:
                 models = (*self._models(vector, state.records), *models[1:])
             found = self._refined(
-                vector, models, stable, SHEET_STEPS, 4 * SHEET_STEPS, until_met=True
+                vector, models, stable, SHEET_STEPS, 4 * SHEET_STEPS, by_sheet=True
             )
             if found is None or not found[0].items:
                 return
@@ -293,9 +293,9 @@ class _Job:
         steps: int,
         least: int,
         *,
-        until_met: bool = False,
+        by_sheet: bool = False,
     ) -> tuple[State, NDArray[np.float64], bool] | None:
-        """Refine until all items are met in all given models.
+        """Refine until all items are met in all given models; ends there if one is the sheet.
 
         Returns
         -------
@@ -313,15 +313,19 @@ class _Job:
             steps=steps,
             evaluations=max(least, self.settings.evaluations - self.evaluations),
         )
-        if until_met:
+        if by_sheet:
             # Differences of models hold near the geometry that they were computed for.
-            left = replace(left, first_region=REPAIR_REGION * left.first_region)
+            left = replace(
+                left,
+                first_region=REPAIR_REGION * left.first_region,
+                largest_region=REPAIR_REGION * left.largest_region,
+            )
         path = []
         for progress in refine_rows(rows, left, vector):
             path.append(progress)
             self.goes_on = self.report(progress)
             is_met = progress.rows.violation < MET
-            if not self.goes_on or (is_met and (until_met or self._is_ample(progress))):
+            if not self.goes_on or (is_met and (by_sheet or self._is_ample(progress))):
                 break
         if not path:
             return None

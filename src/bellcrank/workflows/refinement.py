@@ -30,12 +30,8 @@ if TYPE_CHECKING:
 
 BEFORE_REFINEMENT = {"steps": 8_000}
 """Settings of a search whose design is refined: a longer search gains less than the refinement."""
-MOST_REFINED = 6
-"""Largest number of designs of a search that are refined for `FIRST` geometries."""
 FIRST = RefinementSettings(evaluations=FIRST_EVALUATIONS)
-"""Settings of these refinements, without the sheet."""
-BEST = 2
-"""Number of results that are refined further; the better one counts."""
+"""Settings of the first refinement of each design, without the sheet."""
 
 
 def refine_selection(
@@ -47,7 +43,7 @@ def refine_selection(
 ) -> tuple[Selection, Refinement | None]:
     """Refine designs of a search and select the best result.
 
-    Several designs are refined for a few geometries, and the best results further.
+    All are refined for a few geometries, and the best results further, as many as there are chains.
 
     Parameters
     ----------
@@ -73,7 +69,8 @@ def refine_selection(
     """
     if not selection.design.problem.is_specified:
         return selection, None
-    finalists = [_finalist(selection), *selection.others][:MOST_REFINED]
+    finalists = [_finalist(selection), *selection.others]
+    chains = len({each.found.chain for each in finalists})
     designs = [each.design for each in finalists]
     designs = [replace(each, problem=with_joints(each.problem, each.mask)) for each in designs]
     workers, stop = workers or default_workers(), stop or threading.Event()
@@ -81,7 +78,7 @@ def refine_selection(
     if len(first) < len(designs):
         return selection, None
     order = sorted(range(len(first)), key=lambda number: _rank(first[number]), reverse=True)
-    order = order[:BEST]
+    order = order[:chains]
 
     def report_further(number: int, progress: Progress) -> None:
         before = first[order[number]]
