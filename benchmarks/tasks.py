@@ -67,6 +67,7 @@ def task_named(name: str) -> Task:
             maximise=tuple(each for each in wanted.maximise if each.case in {"", case}),
             weight=wanted.weight,
             symmetry=wanted.symmetry,
+            domain=wanted.domain,
         )
     return replace(task, problem=replace(problem, specification=asked))
 
