@@ -48,10 +48,9 @@ ZERO_SCALE = {
 """Scale of the violation of a bound that is zero, by dimension."""
 TWO_SIDED = 4.0
 """Factor of the reserve of items with two bounds, over that of items with one."""
-LARGER_RESERVE = {"strain": 4.0, "clearance": 4.0, "payload": 4.0}
+LARGER_RESERVE = {"strain": 4.0, "clearance": 4.0}
 """The same for quantities that one element in each beam, and few states along the stroke, show
-less accurately, and for the payload: near the largest one that a part carries, the motion is lost
-at once."""
+less accurately."""
 PATH_POINTS = STEPS
 """Number of points at which a path is compared with the wanted one."""
 LARGEST_EXCESS = 1e3
