@@ -15,7 +15,7 @@ from bellcrank.cli.app import NOT_MET
 from bellcrank.model import human_design, read_design, write_design
 
 README = Path(__file__).parents[2] / "README.md"
-START = "pip install . && bellcrank design straight-crane"
+START = "pip install '.[fem]' && bellcrank design straight-crane"
 TEST = "pip install '.[test]' && pytest"
 
 
@@ -60,7 +60,7 @@ def test_the_start_leaves_what_the_readme_says(
     assert summary["refinement"]["met_after"]
     human = summary["human_efficiency"]
     assert design.efficiency is not None
-    assert design.efficiency > 5.0 * human
+    assert design.efficiency > 4.0 * human
 
 
 def test_a_part_of_ones_own_is_designed_and_exported(

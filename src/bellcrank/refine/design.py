@@ -36,8 +36,9 @@ if TYPE_CHECKING:
 RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
-MASS_RESERVE = 2e-3
-"""The same for the mass, which is that of all models: more than `MET`."""
+RESERVES = {"mass": 2e-3, "payload": 0.2}
+"""The same for the mass, that of all models (more than `MET`), and for the payload: near the
+largest one that a part carries, its motion is lost at once."""
 SHEETS = 6
 """Largest number of geometries that are computed in the sheet: each load case takes up to a
 minute."""
@@ -303,10 +304,7 @@ class _Job:
             State and vector of the last geometry that meets all with eight elements, and whether
             it is the last one of all. None if the response is not stable.
         """
-        items = [
-            tightened(item, MASS_RESERVE if item.quantity == "mass" else RESERVE)
-            for item in self.items
-        ]
+        items = [tightened(item, RESERVES.get(item.quantity, RESERVE)) for item in self.items]
         rows = RowEvaluator(self.variables, self.design.mask, items, stable, models)
         left = replace(
             self.settings,

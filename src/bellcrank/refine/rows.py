@@ -187,7 +187,11 @@ class RowEvaluator:
             problem = self.variables.problem_at(vector)
         except InvalidProblem:
             return None
-        evaluator = SpecificationEvaluator(problem)
+        wanted = problem.specification
+        assert wanted is not None
+        # Payloads are those of the items of this refinement.
+        asked = replace(problem, specification=replace(wanted, items=self.items))
+        evaluator = SpecificationEvaluator(asked)
         for name, case in evaluator.cases.items():
             response = case.evaluator.respond(self.mask, LARGEST_INCREMENT)
             if response.status is not Status.CONVERGED:
