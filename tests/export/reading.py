@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import json
 import math
@@ -13,6 +14,7 @@ import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 import shapely
 import trimesh
 
@@ -145,3 +147,9 @@ while explorer.More():
 print()
 print(json.dumps([properties.Mass(), count, BRepCheck_Analyzer(shape).IsValid()]))
 """
+
+
+def require_kernel() -> None:
+    """Skip without Open CASCADE, and do not import it: NGSolve brings another version of it."""
+    if importlib.util.find_spec("OCP") is None:
+        pytest.skip("Open CASCADE is not installed")

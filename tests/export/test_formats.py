@@ -25,7 +25,7 @@ from bellcrank.part import PartSpec
 from bellcrank.part.outline import strut_outline
 from bellcrank.part.outline.grips import filled
 from bellcrank.part.outline.screws import drilled
-from tests.export.reading import area_in_dxf, area_in_svg, read_step
+from tests.export.reading import area_in_dxf, area_in_svg, read_step, require_kernel
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,12 +48,6 @@ def part_of(kind: str, name: str) -> Part:
     assert design is not None
     shortest = float(design.problem.lattice.rest_length[design.mask].min())
     return PartSpec(width=min(2.0, 2.0 * shortest)).of(design)
-
-
-def require_kernel() -> None:
-    """Skip without Open CASCADE, and do not import it: NGSolve brings another version of it."""
-    if importlib.util.find_spec("OCP") is None:
-        pytest.skip("Open CASCADE is not installed")
 
 
 def require(name: str) -> None:

@@ -23,12 +23,7 @@ from bellcrank.model import (
     lattices,
 )
 from bellcrank.part import PartSpec
-from tests.export.reading import read_step
-
-
-def require_kernel() -> None:
-    pytest.importorskip("OCP", reason="the extra step is not installed")
-
+from tests.export.reading import read_step, require_kernel
 
 KINDS = {
     "octet": {"size": [3, 3, 3]},

@@ -59,8 +59,7 @@ def struts_solid(part: Part, sagitta: float = SAGITTA) -> Solid:
     if not 0.0 < sagitta < math.inf:
         raise InvalidSettings(f"sagitta: expected a length above 0 mm, got {sagitta!r}")
     radii = 0.5 * part.widths
-    ball = np.zeros(len(part.positions))
-    np.maximum.at(ball, part.struts, radii[:, None])
+    ball = 0.5 * part.widest
     shapes = [
         _strut(part.positions[first], part.positions[second], float(radius), sagitta)
         for (first, second), radius in zip(part.struts, radii, strict=True)

@@ -80,7 +80,7 @@ class Part:
             raise InvalidSettings(f"scale: expected a length above 0 mm, got {self.scale!r}")
         if not self.design.mask.any():
             raise InvalidSettings("the design has no beams")
-        length = self.design.problem.lattice.rest_length[self.design.mask] * self.scale
+        length = self.lengths
         worst = int(np.argmax(self.widths / length))
         if self.widths[worst] >= length[worst]:
             raise InvalidSettings(
@@ -123,6 +123,18 @@ class Part:
     def widths(self) -> NDArray[np.float64]:
         """Width of each strut, (s,), mm."""
         return self.section.width * self.width_ratios
+
+    @property
+    def lengths(self) -> NDArray[np.float64]:
+        """Distance of the two nodes of each strut, (s,), mm."""
+        return self.design.problem.lattice.rest_length[self.design.mask] * self.scale
+
+    @property
+    def widest(self) -> NDArray[np.float64]:
+        """Width of the widest strut that meets in each node, (N,), mm; 0 where there is none."""
+        found = np.zeros(len(self.positions))
+        np.maximum.at(found, self.struts, self.widths[:, None])
+        return found
 
     @property
     def joints(self) -> NDArray[np.float64]:

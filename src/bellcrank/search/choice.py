@@ -103,7 +103,8 @@ class FirstWithoutFault:
                     checked = self._verified(finalist, len(verified), len(listed))
                     tried += 1
                 (missed if _verification(checked).fault else own).append(checked)
-            own = own or [min(missed, key=_rank)] if own or missed else []
+            if not own and missed:
+                own = [min(missed, key=_rank)]
             found += [each for each in own if each is not chosen]
         return sorted(found, key=lambda each: (*_rank(each), -each.response.score))
 

@@ -64,7 +64,7 @@ def to_bytes(export: Export) -> bytes:
         *(f"set atom {number[k]} diameter {size[k]:.9g} density {density[k]:.9g}" for k in nodes),
         "pair_style zero 0.1 nocoeff",
         "pair_coeff * *",
-        f"comm_modify vel yes cutoff {2.0 * _longest(part):.9g}",
+        f"comm_modify vel yes cutoff {2.0 * part.lengths.max():.9g}",
         "bond_style bpm/rotational break no smooth no normalize no",
         *(f"bond_coeff {k} {_text(row)} {breaking}" for k, row in enumerate(kinds, start=1)),
         *(
@@ -89,15 +89,10 @@ def _text(values: Iterable[float]) -> str:
     return " ".join(f"{each:.9g}" for each in values)
 
 
-def _longest(part: Part) -> float:
-    return float(np.linalg.norm(np.diff(part.positions[part.struts], axis=1), axis=2).max())
-
-
 def _stiffnesses(part: Part) -> NDArray[np.float64]:
     """Return (s, 4) the stiffness of struts: along, across (N/mm), twisting and bending (N mm)."""
     young, shear = part.material.young, part.material.shear
-    chords = part.positions[part.struts[:, 1]] - part.positions[part.struts[:, 0]]
-    free = np.linalg.norm(chords, axis=1) - part.joints.sum(axis=1)
+    free = part.lengths - part.joints.sum(axis=1)
     rows = []
     for length, width in zip(free.tolist(), part.widths.tolist(), strict=True):
         thickness = width if part.dimension == 3 else part.section.thickness
@@ -113,13 +108,9 @@ def _stiffnesses(part: Part) -> NDArray[np.float64]:
 def _spheres(part: Part) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return diameter, mm, and density, t/mm^3, of the sphere of each node, (N,) each."""
     known = 1e-9 * (DENSITY if math.isnan(part.material.density) else part.material.density)
-    chords = part.positions[part.struts[:, 1]] - part.positions[part.struts[:, 0]]
-    volume = part.section.area_of(part.widths) * np.linalg.norm(chords, axis=1)
-    mass = np.zeros(len(part.positions))
-    size = np.zeros(len(part.positions))
-    for end in part.struts.T:
-        np.add.at(mass, end, 0.5 * known * volume)
-        np.maximum.at(size, end, part.widths)
+    volume = part.section.area_of(part.widths) * part.lengths
+    mass, size = np.zeros(len(part.positions)), part.widest
+    np.add.at(mass, part.struts, 0.5 * known * volume[:, None])
     density = np.divide(mass, math.pi / 6.0 * size**3, out=np.zeros_like(mass), where=size > 0.0)
     return size, density
 

@@ -65,11 +65,19 @@ def struts_to_bytes(part: Part, name: str) -> bytes:
     RunFailed
         If the kernel fails.
     """
-    radii = 0.5 * part.widths
-    positions = part.positions
-    positions = positions - (positions[part.struts] - radii[:, None, None]).min(axis=(0, 1))
-    struts = [*positions[part.struts].transpose(1, 0, 2).tolist(), radii.tolist()]
-    return _served({"struts": list(zip(*struts, strict=True)), "name": name})
+    radii, balls = 0.5 * part.widths, 0.5 * part.widest
+    nodes = np.flatnonzero(balls)
+    low = (part.positions - balls[:, None])[nodes].min(axis=0)
+    first, second = (part.positions[part.struts] - low).transpose(1, 0, 2).tolist()
+    return _served(
+        {
+            "struts": list(zip(first, second, radii.tolist(), strict=True)),
+            "joints": list(
+                zip((part.positions - low)[nodes].tolist(), balls[nodes].tolist(), strict=True)
+            ),
+            "name": name,
+        }
+    )
 
 
 def _served(task: dict[str, Any]) -> bytes:
@@ -95,32 +103,32 @@ def serve() -> None:
 
     task = json.load(sys.stdin)
     if "struts" in task:
-        shape = _united(task["struts"])
+        shape = _united(task["struts"], task["joints"])
     else:
         outer, holes = (tuple(Loop(*loop) for loop in kind) for kind in task["loops"])
         shape = _prisms(Outline(outer, holes), task["thickness"])
     sys.stdout.buffer.write(_written(shape, task["name"]))
 
 
-def _united(struts: list[tuple[list[float], list[float], float]]) -> Any:
-    """Return the union of cylinders, given by ends and radius, and of spheres at their ends."""
+def _united(
+    struts: list[tuple[list[float], list[float], float]], joints: list[tuple[list[float], float]]
+) -> Any:
+    """Return the union of cylinders, given by ends and radius, and of spheres in the joints."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
     from OCP.collections import List_TopoDS_Shape
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
-    radii: dict[tuple[float, ...], float] = {}
     shapes = []
     for first, second, radius in struts:
-        for end in (first, second):
-            radii[tuple(end)] = max(radius, radii.get(tuple(end), 0.0))
         chord = np.subtract(second, first)
         axis = gp_Ax2(gp_Pnt(*first), gp_Dir(*chord.tolist()))
         length = float(np.linalg.norm(chord))
         shapes.append(BRepPrimAPI_MakeCylinder(axis, radius, length).Shape())
     shapes += [
-        BRepPrimAPI_MakeSphere(gp_Pnt(*at), _JOINT * radius).Shape() for at, radius in radii.items()
+        BRepPrimAPI_MakeSphere(gp_Pnt(*centre), _JOINT * radius).Shape()
+        for centre, radius in joints
     ]
     arguments, tools = List_TopoDS_Shape(), List_TopoDS_Shape()
     arguments.Append(shapes[0])

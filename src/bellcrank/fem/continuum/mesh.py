@@ -142,8 +142,7 @@ def plane_mesh(part: Part, size: float | None = None, fineness: Fineness = FINE)
         If there is no valid outline, the size is not positive or two hubs touch.
     """
     size = fineness.size * float(part.widths.min()) if size is None else size
-    nodes, widest = hub_nodes(part), np.zeros(len(part.positions))
-    np.maximum.at(widest, part.struts, part.widths[:, None])
+    nodes, widest = hub_nodes(part), part.widest
     hubs = dict(zip(nodes.tolist(), part.positions[nodes], strict=True))
     mesh = triangulated(part.outline(), hubs, HUB * widest[nodes], size, fineness)
     mesh.Curve(2)

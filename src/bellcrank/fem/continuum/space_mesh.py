@@ -118,8 +118,7 @@ def space_mesh(part: Part, size: float | None = None) -> ContinuumMesh:
         raise InvalidSettings(f"size: expected a length above 0 mm, got {size!r}")
     struts = RoundStruts(part.positions[part.struts], 0.5 * part.widths)
     vertices, elements = stuffed(struts, size)
-    nodes, widest = hub_nodes(part), np.zeros(len(part.positions))
-    np.maximum.at(widest, part.struts, part.widths[:, None])
+    nodes, widest = hub_nodes(part), part.widest
     hubs = np.full(len(elements), -1)
     middles = vertices[elements].mean(axis=1)
     for node in nodes.tolist():
