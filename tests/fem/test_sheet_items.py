@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from bellcrank.fem.specification import sheet_items
+from bellcrank.fem.specification import sheet_items, sheet_records
 from bellcrank.mechanics import VERIFICATION_INCREMENT
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import task_from_dict
@@ -60,6 +60,17 @@ DEVIATION = {
 """Largest relative deviation of the sheet from the frame; that of the others is `USUAL`. Hubs make
 the sheet stiffer, and corners strain it more."""
 USUAL = 0.25
+
+
+@pytest.mark.slow
+def test_channels_in_the_sheet_are_the_same_in_each_run() -> None:
+    task = task_from_dict({**TASK, "cases": TASK["cases"][1:]})
+    part = task.part.of(task.problem.full_design())
+    first, second = (sheet_records(part, size=1.5) for _ in range(2))
+    assert first is not None
+    assert second is not None
+    for channel, values in first["pull"].channels.items():
+        assert np.array_equal(values, second["pull"].channels[channel]), channel
 
 
 @pytest.mark.slow

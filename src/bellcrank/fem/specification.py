@@ -46,6 +46,9 @@ STATES = 16
 """Number of states along the stroke at which items are evaluated; between the computed ones,
 channels are interpolated by a cubic spline in each part of the stroke without a kink."""
 LAW = "neo-hookean"
+DIGITS = 10
+"""Number of digits of the channels. NGSolve adds in an order that differs from run to run; later
+digits would make refinements with equal seeds differ."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,6 +169,7 @@ class _Sheet:
         channels = {
             channel: self._channel(channel, main, fractions) for channel in dict.fromkeys(needed)
         }
+        channels = {channel: _rounded(values) for channel, values in channels.items()}
         return StrokeRecord(fractions, channels, self._given(main), self._payloads(), kinks)
 
     def _payloads(self) -> dict[str, float]:
@@ -326,6 +330,14 @@ class _Sheet:
         least = part.widths + bound * part.scale
         overlap = contacts_along(part, main.states, main.fields, least).overlap
         return bound - float(overlap.max()) / part.scale if len(overlap) else math.inf
+
+
+def _rounded(values: Values) -> Values:
+    """Return a channel, rounded to `DIGITS` digits of its largest value."""
+    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    if largest == 0.0:
+        return values
+    return np.round(values, DIGITS - math.ceil(math.log10(largest)))
 
 
 def _angles(rotations: Sequence[Values]) -> Values:
