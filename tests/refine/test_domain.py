@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+import trimesh
 
 from bellcrank.errors import InvalidProblem
 from bellcrank.model import Design, Problem, Specification
 from bellcrank.refine import RefinementSettings, refine_design
 from bellcrank.refine.domain import distances_inside
 from bellcrank.refine.shape import shape_rows
-from bellcrank.task import find_task
+from bellcrank.task import find_task, task_from_dict
 
 
 def region() -> tuple[shapely.Polygon, list[np.ndarray]]:
@@ -40,15 +41,68 @@ def test_distances_are_those_of_shapely() -> None:
         assert smooth.mean() > 0.98
 
 
+def box_with_a_ball() -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
+    return (
+        trimesh.creation.box((8.0, 6.0, 5.0)),
+        trimesh.creation.icosphere(subdivisions=2, radius=1.7),
+    )
+
+
+def test_distances_from_surfaces_are_those_of_another_program() -> None:
+    """The ball is convex: a point is inside if it is below the planes of all its triangles."""
+    box, ball = box_with_a_ball()
+    points = np.random.default_rng(0).uniform(-5.0, 5.0, (300, 3))
+    surfaces = [np.asarray(box.triangles), np.asarray(ball.triangles)]
+    distance, slopes = distances_inside(points, surfaces)
+    triangles = np.concatenate(surfaces)
+    below = ((points[:, None] - ball.triangles[:, 0]) * ball.face_normals).sum(axis=2)
+    inside = (np.abs(points) < [4.0, 3.0, 2.5]).all(axis=1) & (below.max(axis=1) > 0.0)
+    assert np.array_equal(distance > 0.0, inside)
+    for point, value in zip(points, distance, strict=True):
+        every = np.tile(point, (len(triangles), 1))
+        nearest = trimesh.triangles.closest_point(triangles, every)
+        least = np.linalg.norm(nearest - point, axis=1).min()
+        assert abs(value) == pytest.approx(least, abs=1e-12)
+    step = 1e-6
+    for axis in range(3):
+        moved = points.copy()
+        moved[:, axis] += step
+        rate = (distances_inside(moved, surfaces)[0] - distance) / step
+        assert (np.abs(rate - slopes[:, axis]) < 1e-4).mean() > 0.98
+
+
 def domain_values(problem: Problem, mask: np.ndarray) -> np.ndarray:
     rows = shape_rows(problem, mask, np.inf)
     return rows.values[[name == "domain" for name in rows.names]]
 
 
-def test_the_derivatives_are_those_of_the_constraints() -> None:
-    task = find_task("gripper")
-    assert task is not None
-    problem = task.problem
+def block() -> Problem:
+    """Return a block of octets with a hole in its middle."""
+    data = {
+        "name": "block",
+        "domain": {
+            "size": ["44.5 mm", "30.3 mm", "44.5 mm"],
+            "keep_out": [{"sphere": [22, 15, 22], "radius": 7}],
+        },
+        "supports": [{"at": {"face": "bottom"}}],
+        "cases": [
+            {
+                "inputs": [
+                    {"at": {"point": [43, 15, 43]}, "direction": "down", "displacement": 2},
+                ],
+                "outputs": [
+                    {"at": {"point": [1, 15, 43]}, "direction": "left", "gain": "maximise"},
+                ],
+            }
+        ],
+    }  # fmt: skip
+    return task_from_dict(data).problem
+
+
+@pytest.mark.parametrize("name", ["gripper", "block"])
+def test_the_derivatives_are_those_of_the_constraints(name: str) -> None:
+    task = find_task(name)
+    problem = block() if task is None else task.problem
     rng = np.random.default_rng(1)
     lattice = problem.lattice
     positions = lattice.positions + 0.05 * rng.standard_normal(lattice.positions.shape)
@@ -92,6 +146,21 @@ def test_a_refined_part_stays_inside_its_domain() -> None:
     assert outside[False] > 0.02
 
 
+def test_a_refined_part_stays_inside_its_domain_in_space() -> None:
+    problem = block()
+    assert domain_values(problem, problem.initial).max() < 1e-9
+    wanted = problem.specification
+    assert wanted is not None
+    outside = {}
+    for domain in (wanted.domain, ()):
+        own = replace(problem, specification=replace(wanted, domain=domain))
+        found = refine_design(Design(own, problem.initial), RefinementSettings(evaluations=10))
+        back = replace(found.design.problem, specification=wanted)
+        outside[bool(domain)] = domain_values(back, problem.initial).max()
+    assert outside[True] < 0.01
+    assert outside[False] > 0.05
+
+
 def test_ends_that_keep_their_positions_have_no_constraint() -> None:
     """Wide struts at the boundary are outside; at held nodes this is not a constraint."""
     task = find_task("lever")
@@ -113,3 +182,5 @@ def test_ends_that_keep_their_positions_have_no_constraint() -> None:
 def test_rings_have_three_points() -> None:
     with pytest.raises(InvalidProblem, match="domain: expected rings of at least 3 points"):
         Specification(domain=[[[0.0, 0.0], [1.0, 0.0]]])
+    with pytest.raises(InvalidProblem, match=r"triangles with corners \[x, y, z\]"):
+        Specification(domain=[[[0.0, 0.0, 0.0]] * 4])

@@ -6,6 +6,7 @@ import copy
 import json
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,8 @@ from bellcrank.errors import InvalidFile, InvalidProblem
 from bellcrank.mechanics import FrameEvaluator, Status
 from bellcrank.search import read_settings
 from bellcrank.task import read_task, task_from_dict
+from bellcrank.task.schema import DomainSection, Shape
+from bellcrank.task.space import body_of
 from bellcrank.task.surfaces import Surface, read_surface
 from bellcrank.workflows import complete_design, start_design
 
@@ -97,6 +100,47 @@ def test_no_strut_is_in_a_hole() -> None:
         assert np.linalg.norm(points - 23.0, axis=1).min() > 9.9  # the radius of a strut is 1 mm
         assert not (points[:, :2] < 9.0).all(axis=1).any()
     assert made.problem.lattice.beam_count < task().problem.lattice.beam_count
+
+
+def volume_of(triangles: np.ndarray) -> float:
+    return float(np.linalg.det(triangles).sum()) / 6.0
+
+
+def test_the_boundary_of_a_domain_is_that_of_its_box_without_holes() -> None:
+    made = task(
+        holes=[{"sphere": [23, 23, 46], "radius": 9}],
+        keep_out=[{"box": [0, 0, 0, 9, 9, 46]}, {"cylinder": [40, 40], "radius": 3}],
+    )
+    (triangles,) = made.problem.specification.domain
+    half_ball, column = 2.0 / 3.0 * np.pi * 0.9**3, np.pi * 0.3**2 * 4.6
+    wanted = 4.6**3 - half_ball - 0.9**2 * 4.6 - column
+    assert volume_of(triangles) == pytest.approx(wanted, rel=2e-3)
+    assert volume_of(triangles) > wanted  # holes are polyhedra within the round ones
+    (plain,) = task().problem.specification.domain
+    assert volume_of(plain) == pytest.approx(4.6**3)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_boundary_of_an_outline_is_its_surface(tmp_path: Path, turned: bool) -> None:
+    """Fine triangles are joined; a surface whose triangles are turned is one, too."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=25.0)
+    ball.apply_translation([30.0, 20.0, 25.0])
+    faces = ball.faces[:, ::-1] if turned else ball.faces
+    meshio.write(tmp_path / "ball.stl", meshio.Mesh(ball.vertices, [("triangle", faces)]))
+    body = body_of(DomainSection(outline="ball.stl"), tmp_path)
+    triangles = body.boundary(10.0, 0.1)
+    assert volume_of(triangles) == pytest.approx(ball.volume / 1000.0, rel=0.01)
+    assert len(triangles) < len(ball.faces)
+    holes = {"hole": Shape(sphere=[30, 20, 25], radius=5)}
+    whole, cut = (each.boundary(10.0, 0.01) for each in (body, replace(body, holes=holes)))
+    assert volume_of(whole) - volume_of(cut) == pytest.approx(4 / 3 * np.pi * 0.5**3, rel=0.02)
+
+
+def test_only_beams_between_two_ports_stay() -> None:
+    problem = task().problem
+    kept = np.setdiff1d(np.arange(problem.lattice.beam_count), problem.designable)
+    ports = np.isin(problem.lattice.beams, problem.special_nodes_of_all_cases)
+    assert np.array_equal(kept, np.flatnonzero(ports.all(axis=1)))
 
 
 def test_a_region_may_leave_out_the_nodes_of_a_shape() -> None:

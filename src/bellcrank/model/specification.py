@@ -280,9 +280,10 @@ class Specification:
         ``"x"``, ``"y"`` or in space ``"z"`` for designs that equal their mirror image along this
         axis; in space also ``"2-fold"``, ``"3-fold"``, ``"4-fold"`` or ``"6-fold"`` for those that
         a part of a turn about the vertical axis does not change.
-    domain : sequence of (k, 2) float64
-        Closed rings around the region of the plane in which struts must lie, lattice units. A point
-        is inside if a ray from it crosses them an odd number of times. None by default.
+    domain : sequence of (k, 2) or (k, 3, 3) float64
+        Closed rings around the region of the plane in which struts must lie, lattice units; in
+        space triangles of closed surfaces. A point is inside if a ray from it crosses them an odd
+        number of times. None by default.
 
     Raises
     ------
@@ -315,9 +316,12 @@ class Specification:
         object.__setattr__(self, "outputs", dict(self.outputs))
         if self.weight is not None:
             object.__setattr__(self, "weight", locked(real_array("weight", self.weight)))
-        domain = tuple(locked(real_array("domain", ring)) for ring in self.domain)
-        if any(ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3 for ring in domain):
-            raise InvalidProblem("domain: expected rings of at least 3 points [x, y]")
+        domain = tuple(locked(real_array("domain", each)) for each in self.domain)
+        if any(each.shape[1:] not in {(2,), (3, 3)} or len(each) < 3 for each in domain):
+            raise InvalidProblem(
+                "domain: expected rings of at least 3 points [x, y], or closed surfaces of "
+                "triangles with corners [x, y, z]"
+            )
         object.__setattr__(self, "domain", domain)
         if len(set(self.case_names)) < len(self.case_names):
             raise InvalidProblem(f"cases: names must differ, got {', '.join(self.case_names)}")

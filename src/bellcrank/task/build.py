@@ -30,7 +30,7 @@ from bellcrank.part import PartSpec, frame_elasticity, frame_section
 from bellcrank.task.conditions import CaseReader
 from bellcrank.task.domain import boundary_of, fill, in_regions, region_of
 from bellcrank.task.items import ItemReader
-from bellcrank.task.space import beams_in_space, fill_in_space
+from bellcrank.task.space import beams_in_space, body_of, fill_in_space
 from bellcrank.task.units import ProblemUnits, part_units
 
 if TYPE_CHECKING:
@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 
 NARROWEST = 0.1
 """Smallest width and thickness of a strut, mm."""
+SAGITTA = 0.05
+"""Distance of the polyhedra of round holes from their surfaces, widths of struts."""
 LARGEST_PART = 5000.0
 """Largest length of a part, mm."""
 
@@ -169,7 +171,7 @@ class _Builder:
                 domain=self.domain,
             ),
         )
-        return Task(self._with_solid(problem), self.part, self.units, table.description)
+        return Task(self._with_designable(problem), self.part, self.units, table.description)
 
     def _lattice(self) -> Lattice:
         domain = self.table.domain
@@ -200,10 +202,12 @@ class _Builder:
             return made
         is_surface = isinstance(domain.outline, str) and domain.outline.lower().endswith(".stl")
         if is_surface or (domain.size is not None and len(domain.size) == 3):
-            return fill_in_space(domain, self.part, self.folder)
+            body = body_of(domain, self.folder)
+            self.domain = (body.boundary(self.part.scale, SAGITTA * self.part.width),)
+            return fill_in_space(body, domain, self.part)
         if domain.cells is not None:
             raise InvalidProblem(
-                "domain.cells: expected a domain in space, with a size of 3 lengths"
+                "domain.cells: expected a domain in space, with a size of 3 lengths or an STL file"
             )
         region = region_of(domain, self.folder)
         self.domain = boundary_of(region, self.part.scale)
@@ -255,14 +259,22 @@ class _Builder:
             )
         return Item(quantity="mass", at_most=self.units.in_problem("volume", mass))
 
-    def _with_solid(self, problem: Problem) -> Problem:
-        """Return the problem whose solid regions keep all beams."""
-        if not self.table.domain.solid:
-            return problem
-        find = in_regions if self.lattice.dimension == 2 else beams_in_space
-        solid = find(self.table.domain.solid, self.lattice, self.part.scale, "domain.solid")
-        free = problem.designable[~solid[problem.designable]]
-        return replace(problem, designable=free)
+    def _with_designable(self, problem: Problem) -> Problem:
+        """Return the problem with the beams that a search may change: none in solid regions.
+
+        In the plane, none at supports, inputs, outputs and loads. In space, where up to 12 beams
+        meet in a node, none between two such nodes.
+        """
+        in_space = self.lattice.dimension == 3
+        fixed = np.ones(self.lattice.beam_count, dtype=bool)
+        fixed[problem.designable] = False
+        if in_space:
+            ends = np.isin(self.lattice.beams, problem.special_nodes_of_all_cases)
+            fixed[:] = ends.all(axis=1)
+        if self.table.domain.solid:
+            regions = beams_in_space if in_space else in_regions
+            fixed |= regions(self.table.domain.solid, self.lattice, self.part.scale, "domain.solid")
+        return replace(problem, designable=np.flatnonzero(~fixed))
 
 
 def _part(table: TaskTable) -> PartSpec:

@@ -53,8 +53,10 @@ def kind_of(region: Shape, names: Sequence[str], key: str) -> str:
     every = {*REGIONS[2], *REGIONS[3]}
     given = [name for name in sorted(every) if getattr(region, name, None) is not None]
     if len(given) != 1 or given[0] not in names:
+        where = "space" if "sphere" in names else "the plane"
         raise InvalidProblem(
-            f"{key}: expected one of {', '.join(names)}, got {' and '.join(given) or 'none'}"
+            f"{key}: expected one of {', '.join(names)} in {where}, got "
+            f"{' and '.join(given) or 'none'}"
         )
     if (region.radius is not None) != (given[0] in ROUND):
         rounded = " or ".join(name for name in ROUND if name in names)

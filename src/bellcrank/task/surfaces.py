@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 TILT = np.array([[1.0, 3.1e-5, 7.3e-5], [-3.1e-5, 1.0, 4.7e-5], [-7.3e-5, -4.7e-5, 1.0]])
 """A small turn, so that no ray meets an edge of a regular surface."""
+DIGITS = 7
+"""Digits, of the size of a surface, in which equal corners agree."""
+TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +44,29 @@ class Surface:
         """(3,) largest coordinates."""
         high: NDArray[np.float64] = self.corners.max(axis=(0, 1))
         return high
+
+    def joined(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return (p, 3) different corners and (T, 3) their numbers in each triangle."""
+        corners = self.corners.reshape(-1, 3)
+        size = np.ptp(corners, axis=0).max()
+        _, first, number = np.unique(
+            (corners / max(size, TINY)).round(DIGITS), axis=0, return_index=True,
+            return_inverse=True,
+        )  # fmt: skip
+        return corners[first], number.reshape(-1, 3)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether each edge belongs to as many triangles in one direction as in the other."""
+        if len(self.corners) < 4:
+            return False
+        _, triangles = self.joined()
+        edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        edges = edges[edges[:, 0] != edges[:, 1]]
+        forward, count = np.unique(edges, axis=0, return_counts=True)
+        backward, other = np.unique(edges[:, ::-1], axis=0, return_counts=True)
+        closed = np.array_equal(forward, backward) and np.array_equal(count, other)
+        return bool(len(edges)) and closed
 
     def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return (n,) which points (n, 3) the surface encloses.
@@ -95,20 +121,7 @@ def read_surface(path: Path) -> Surface:
     except (meshio.ReadError, ValueError, IndexError, OSError) as error:
         raise InvalidFile(f"domain.outline: {path}: not a valid STL file ({error})") from None
     corners = np.asarray(mesh.points, dtype=np.float64)[triangles]
-    if not np.isfinite(corners).all() or not _is_closed(corners):
+    surface = Surface(corners)
+    if not np.isfinite(corners).all() or not surface.is_closed:
         raise InvalidFile(f"domain.outline: {path}: expected a closed surface, got one with gaps")
-    return Surface(corners)
-
-
-def _is_closed(corners: NDArray[np.float64]) -> bool:
-    """Return whether each edge belongs to as many triangles in one direction as in the other."""
-    size = np.ptp(corners, axis=(0, 1)).max()
-    if len(corners) < 4 or size == 0.0:
-        return False
-    _, number = np.unique((corners.reshape(-1, 3) / size).round(7), axis=0, return_inverse=True)
-    triangles = number.reshape(-1, 3)
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    forward, count = np.unique(edges, axis=0, return_counts=True)
-    backward, other = np.unique(edges[:, ::-1], axis=0, return_counts=True)
-    return np.array_equal(forward, backward) and np.array_equal(count, other)
+    return surface
