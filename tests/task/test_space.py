@@ -17,6 +17,7 @@ import trimesh
 
 from bellcrank.errors import InvalidFile, InvalidProblem
 from bellcrank.mechanics import FrameEvaluator, Status
+from bellcrank.model import read_problem, write_problem
 from bellcrank.search import read_settings
 from bellcrank.task import read_task, task_from_dict
 from bellcrank.task.schema import DomainSection, Shape
@@ -134,6 +135,14 @@ def test_the_boundary_of_an_outline_is_its_surface(tmp_path: Path, turned: bool)
     holes = {"hole": Shape(sphere=[30, 20, 25], radius=5)}
     whole, cut = (each.boundary(10.0, 0.01) for each in (body, replace(body, holes=holes)))
     assert volume_of(whole) - volume_of(cut) == pytest.approx(4 / 3 * np.pi * 0.5**3, rel=0.02)
+
+
+def test_the_boundary_is_written_and_read(tmp_path: Path) -> None:
+    problem = task(holes=[{"sphere": [23, 23, 46], "radius": 9}]).problem
+    write_problem(problem, tmp_path / "problem.json")
+    again = read_problem(tmp_path / "problem.json")
+    (before,), (after,) = problem.specification.domain, again.specification.domain
+    assert np.array_equal(before, after)
 
 
 def test_only_beams_between_two_ports_stay() -> None:

@@ -112,7 +112,7 @@ class SpecificationTable(Table):
     maximise: list[ObjectiveTable] = Field(default_factory=list)
     weight: list[float] | None = None
     symmetry: list[str] = Field(default_factory=list)
-    domain: list[list[list[float]]] = Field(default_factory=list)
+    domain: list[list[Any]] = Field(default_factory=list)
 
 
 class SectionTable(Table):
