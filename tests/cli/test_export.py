@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from bellcrank.export import Export, exporters, slicer
@@ -119,6 +120,25 @@ def test_the_crane_is_sliced_into_as_much_plastic_as_it_has(here: Path) -> None:
 
 @pytest.mark.slow
 @SLICER
+@pytest.mark.parametrize("name", ["human:orthogonal", "human:space-anti-parallel"])
+def test_parts_in_space_are_sliced_with_supports(name: str, here: Path) -> None:
+    outcome = call("print", name, "part.gcode")
+    assert outcome.code == 0, outcome.err
+    lines = (here / "part.gcode").read_text().splitlines()
+    deposit = read_gcode(lines, profiles["ninjaflex"].filament_diameter)
+    share = float(next(w for w in outcome.out.split() if w.endswith("%")).rstrip("%"))
+    assert 95.0 <= share <= 105.0
+    assert deposit.support > 0.0
+    assert "to be removed" in outcome.out
+    solid = Export(part=PartSpec().of(human_design(name.partition(":")[2]))).solid()
+    size, high = np.ptp(solid.vertices, axis=0), deposit.high - deposit.low
+    assert np.abs(high - size)[:2].max() < 1.0
+    assert deposit.layers == pytest.approx(size[2] / 0.32, abs=1.5)
+    assert "flatter than 40 degrees" in outcome.err
+
+
+@pytest.mark.slow
+@SLICER
 def test_stl_is_sliced_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slicer, "PERIMETERS", (4,))
     part = PartSpec(width=2.0).of(find_problem("crane").full_design())
@@ -161,6 +181,15 @@ G92 E0
 G1 X10 Y10 E0.5
 ; estimated printing time (normal mode) = 1h 2m 3s
 """
+
+
+def test_moves_of_supports_are_counted_apart() -> None:
+    supports = [";TYPE:Support material interface", "G1 Z0.2", "G1 X90 Y10 E1.0", ";TYPE:Perimeter"]
+    moves = ["M83", "G1 Z0.3", "G1 X10 Y0", *supports, "G1 Z0.3", "G1 X10 Y0", "G1 X20 Y0 E1.0"]
+    deposit = read_gcode(moves, 1.75)
+    assert deposit.support == pytest.approx(deposit.volume)
+    assert deposit.high.tolist() == [20.0, 0.0, 0.3]
+    assert deposit.layers == 1
 
 
 def test_gcode_with_absolute_filament_is_read_back() -> None:

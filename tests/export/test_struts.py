@@ -74,7 +74,9 @@ def test_a_finer_surface_is_nearer_to_the_volume() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 25))]
+)
 def test_random_parts_are_closed_and_have_the_loops_of_their_graph(kind: str, seed: int) -> None:
     lattice = lattices[kind](**KINDS[kind])
     rng = np.random.default_rng(seed)

@@ -91,6 +91,8 @@ def _print(job: PrintJob) -> None:
     table.add_row("solid", f"{job.volume / 1000.0:.2f} cm3")
     share = deposit.volume / job.volume
     table.add_row("deposited", f"{deposit.volume / 1000.0:.2f} cm3, {share:.1%} of the solid")
+    if deposit.support:
+        table.add_row("supports", f"{deposit.support / 1000.0:.2f} cm3, to be removed")
     if math.isfinite(job.mass):
         table.add_row("mass", f"{job.mass:.1f} g")
     if math.isfinite(deposit.seconds):

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 ESTIMATE = re.compile(r"; estimated printing time \(normal mode\) = (.*)")
+TYPE = ";TYPE:"
+"""Comment of PrusaSlicer before lines of one kind."""
 SPAN = re.compile(r"(\d+)([dhms])")
 SECONDS = {"d": 86400, "h": 3600, "m": 60, "s": 1}
 
@@ -28,16 +30,19 @@ class Deposit:
     Parameters
     ----------
     volume
-        Volume of the extruded filament, mm^3.
+        Volume of the extruded filament of the part, mm^3.
+    support
+        Volume of that of supports, mm^3.
     low, high : (3,)
-        Corners of the bounding box of extruding moves, mm.
+        Corners of the bounding box of extruding moves of the part, mm.
     layers
-        Number of distinct heights of extruding moves.
+        Number of distinct heights of these moves.
     seconds
         Printing time estimated by the slicer; nan if unknown.
     """
 
     volume: float
+    support: float
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     layers: int
@@ -49,6 +54,7 @@ def read_gcode(lines: Iterable[str], filament_diameter: float) -> Deposit:
 
     Extrusion is counted on straight moves in the plane, which excludes retractions and their
     reversal. Filament coordinates may be absolute or relative, nozzle coordinates are absolute.
+    Moves after ``;TYPE:Support material`` are those of supports.
 
     Parameters
     ----------
@@ -66,15 +72,17 @@ def read_gcode(lines: Iterable[str], filament_diameter: float) -> Deposit:
     --------
     >>> lines = ["M83", "G1 Z0.3", "G1 X10 Y0", "G1 X20 Y0 E1.0", "G1 E-2", "; estimated"]
     >>> found = read_gcode(lines, 1.75)
-    >>> round(found.volume, 3), found.low.tolist(), found.layers
-    (2.405, [10.0, 0.0, 0.3], 1)
+    >>> round(found.volume, 3), found.support, found.low.tolist(), found.layers
+    (2.405, 0.0, [10.0, 0.0, 0.3], 1)
     """
     relative, filament, position = False, 0.0, {"X": 0.0, "Y": 0.0, "Z": 0.0}
-    extruded, seconds = 0.0, math.nan
+    extruded, seconds, is_support = {False: 0.0, True: 0.0}, math.nan, False
     visited: list[tuple[float, float, float]] = []
     for number, line in enumerate(lines, start=1):
         if found := ESTIMATE.match(line):
             seconds = float(sum(int(n) * SECONDS[unit] for n, unit in SPAN.findall(found[1])))
+        if line.startswith(TYPE):
+            is_support = line.removeprefix(TYPE).startswith("Support")
         fields = line.split(";", 1)[0].split()
         if not fields:
             continue
@@ -94,16 +102,17 @@ def read_gcode(lines: Iterable[str], filament_diameter: float) -> Deposit:
         amount = given["E"] if relative else given["E"] - filament
         filament = given["E"]
         if amount > 0.0 and ("X" in given or "Y" in given):
-            extruded += amount
-            visited.append((before["X"], before["Y"], position["Z"]))
-            visited.append((position["X"], position["Y"], position["Z"]))
+            extruded[is_support] += amount
+            if not is_support:
+                visited.append((before["X"], before["Y"], position["Z"]))
+                visited.append((position["X"], position["Y"], position["Z"]))
     if not visited:
         raise InvalidFile("the G-code deposits no material")
     points = np.array(visited)
     heights = np.unique(np.round(points[:, 2], 4))
     section = math.pi * filament_diameter**2 / 4.0
-    volume = extruded * section
-    return Deposit(volume, points.min(axis=0), points.max(axis=0), len(heights), seconds)
+    volume, support = (section * extruded[each] for each in (False, True))
+    return Deposit(volume, support, points.min(axis=0), points.max(axis=0), len(heights), seconds)
 
 
 def _numbers(fields: list[str], line: int) -> dict[str, float]:

@@ -215,7 +215,7 @@ def print_design(
     slicer: str | None = None,
     overwrite: bool = False,
 ) -> PrintJob:
-    """Slice a part and write its G-code.
+    """Slice a part and write its G-code; overhangs of a part in space are supported.
 
     Raises
     ------
@@ -232,11 +232,13 @@ def print_design(
     if path.exists() and not overwrite:
         raise already_exists(path)
     check_folder(path)
-    left, bottom, right, top = bundle.outline().bounds
     solid = bundle.solid()
     content = exporters.for_path("part.3mf").to_bytes(bundle)
-    size = (right - left, top - bottom)
-    sliced = slice_solid(content, ".3mf", profile, size, solid.volume, program)
+    wide, deep, _ = np.ptp(solid.vertices, axis=0).tolist()
+    in_space = bundle.part.dimension == 3
+    sliced = slice_solid(
+        content, ".3mf", profile, (wide, deep), solid.volume, program, supports=in_space
+    )
     write_bytes(path, sliced.gcode, overwrite=overwrite)
     mass = solid.volume * bundle.part.material.density / 1000.0
     return PrintJob(sliced, solid.volume, mass, profile)

@@ -145,14 +145,24 @@ def item_rows(
                 item_label(item, problem),
                 wanted_text(item, units),
                 *(
-                    number_text(item, each.value, units) + mark
+                    number_text(item, _shown(each), units) + mark
                     for each, mark in zip(values, after, strict=True)
                 ),
-                f"{100.0 * last.margin:+.0f} %" if math.isfinite(last.margin) else "-",
+                f"{100.0 * last.margin:+.0f} %" if math.isfinite(_shown(last)) else "-",
                 "yes" if last.met else "NO",
             ]
         )
     return rows
+
+
+def _shown(result: ItemResult) -> float:
+    """Return the value of an item; infinite for more than a wanted payload.
+
+    That is extrapolated from the motion under the wanted one, and larger ones may be carried less
+    well.
+    """
+    least = result.item.at_least if result.item.quantity == "payload" else None
+    return result.value if least is None or result.value <= least else math.inf
 
 
 def item_data(
