@@ -23,8 +23,8 @@ from bellcrank.machines.bridges import bridge
 from bellcrank.machines.curves import Load, PortCurve, trace
 from bellcrank.machines.node_merging import merge_nodes, unique_rows
 from bellcrank.machines.placement import place_parts
-from bellcrank.machines.plan import PORTS, PortName
 from bellcrank.machines.ports import mean_ports
+from bellcrank.mechanics.contact import near_pairs
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Design, Lattice, Problem
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.machines.placement import Part
-    from bellcrank.machines.plan import Plan
+    from bellcrank.machines.plan import Plan, PortName
     from bellcrank.model import Section
 
 END_INSET = 1e-6
@@ -70,11 +70,11 @@ class Machine:
     @property
     def ports(self) -> list[PortName]:
         """All ports of all parts."""
-        return [PortName(name, port) for name in self.parts for port in PORTS]
+        return self.plan.ports
 
     def port_nodes(self, port: PortName) -> NDArray[np.int64]:
         """Return the machine's node numbers of a port."""
-        return self.nodes[port.part][self.parts[port.part].region(port.port).nodes]
+        return self.nodes[port.part][self.parts[port.part].nodes(port.port)]
 
 
 def assemble(plan: Plan, find: Callable[[str], Design]) -> Machine:
@@ -172,6 +172,27 @@ def first_crossing(
     return (int(first[bad[0]]), int(second[bad[0]])) if len(bad) else None
 
 
+def first_touching(
+    positions: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    owner: NDArray[np.int64],
+    width: float,
+) -> tuple[int, int] | None:
+    """Return two beams in space of different owners that touch; None if no two do.
+
+    Parameters
+    ----------
+    positions : (N, 3) float64
+    beams : (M, 2) int64
+    owner : (M,) int64
+    width
+        Distance of the beams below which they touch.
+    """
+    pairs, _ = near_pairs(positions, beams, width)
+    found = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
+    return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
+
+
 def _merge_beams(
     plan: Plan,
     parts: dict[str, Part],
@@ -190,13 +211,17 @@ def _merge_beams(
     for index, (name, part) in enumerate(parts.items()):
         owner[numbers[name]] = index
         present[numbers[name][part.design.mask]] = True
-    crossing = first_crossing(positions, beams, owner)
+    section = parts[names[0]].design.problem.section
+    if positions.shape[1] == 3:
+        assert section is not None
+        crossing = first_touching(positions, beams, owner, section.width)
+    else:
+        crossing = first_crossing(positions, beams, owner)
     if crossing is not None:
         one, other = (names[owner[beam]] for beam in crossing)
-        x, y = positions[beams[crossing[0]]].mean(axis=0)
+        point = ", ".join(f"{each:.4g}" for each in positions[beams[crossing[0]]].mean(axis=0))
         raise InvalidFile(
-            f"{plan.source}: parts {one} and {other} overlap: their beams cross near "
-            f"({x:.4g}, {y:.4g})"
+            f"{plan.source}: parts {one} and {other} overlap: their beams cross near ({point})"
         )
     return beams, numbers, present
 
@@ -241,8 +266,13 @@ def _add_bridges(
     """Return positions and beams with those of all bridges appended."""
     for link in plan.links:
         if link.kind == "bridge":
+            if positions.shape[1] == 3:
+                raise InvalidFile(
+                    f"{plan.source}: bridge from {link.first} to {link.second}: expected parts in "
+                    "the plane; in space weld ports"
+                )
             ports = [
-                nodes[port.part][parts[port.part].region(port.port).nodes]
+                nodes[port.part][parts[port.part].nodes(port.port)]
                 for port in (link.first, link.second)
             ]
             positions, made = bridge(

@@ -32,21 +32,22 @@ def machine_supports(
         If a part on rollers is rotated by other than a multiple of 180 degrees.
     """
     fixed: list[NDArray[np.int64]] = []
-    rollers: dict[str, list[NDArray[np.int64]]] = {"x": [], "y": []}
+    rollers: dict[str, list[NDArray[np.int64]]] = {"x": [], "y": [], "z": []}
     for name, part in parts.items():
         if not part.supported:
             continue
         own = part.design.problem.supports
         fixed.append(nodes[name][own.fixed])
-        for axis, given in (("x", own.fixed_x), ("y", own.fixed_y)):
-            if len(given) and part.placement.rotate % 180:
+        for axis, given in (("x", own.fixed_x), ("y", own.fixed_y), ("z", own.fixed_z)):
+            if len(given) and part.placement.rotate % 180 and axis != "z":
                 raise InvalidFile(
                     f"{plan.source}: part {name} has roller supports and cannot be rotated by "
                     f"{part.placement.rotate} degrees; expected a multiple of 180"
                 )
             rollers[axis].append(nodes[name][given])
     return Supports(
-        fixed=_unique(fixed), fixed_x=_unique(rollers["x"]), fixed_y=_unique(rollers["y"])
+        fixed=_unique(fixed),
+        **{f"fixed_{axis}": _unique(each) for axis, each in rollers.items()},
     )
 
 
@@ -93,7 +94,7 @@ def designable_beams(
     free = ~np.isin(beams, region_nodes).any(axis=1)
     for link in plan.links:
         for port in (link.first, link.second):
-            own = nodes[port.part][parts[port.part].region(port.port).nodes]
+            own = nodes[port.part][parts[port.part].nodes(port.port)]
             free &= ~np.isin(beams, own).all(axis=1)
     return np.flatnonzero(free)
 
@@ -152,11 +153,13 @@ def _region(
     direction: Directions | None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the nodes of some ports, each once, with their unit directions."""
-    given = None if direction is None else np.broadcast_to(direction, (len(ports), 2))
+    given = (
+        None if direction is None else np.broadcast_to(direction, (len(ports), len(direction[0])))
+    )
     ids, directions = [], []
     for number, port in enumerate(ports):
         part = parts[port.part]
-        own = nodes[port.part][part.region(port.port).nodes]
+        own = nodes[port.part][part.nodes(port.port)]
         ids.append(own)
         if given is None:
             directions.append(part.direction(port.port))

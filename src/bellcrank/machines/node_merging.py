@@ -37,7 +37,7 @@ def merge_nodes(
     -------
     nodes
         For each part, the machine's number of each of its nodes.
-    positions : (N, 2) float64, lattice units of the machine
+    positions : (N, d) float64, lattice units of the machine
         Position of each node; of merged nodes, that of the first.
 
     Raises
@@ -135,10 +135,10 @@ class _NodeMerger:
             return
         node, other = self.near[np.flatnonzero(~self.merged)[0]]
         names = list(self.parts)
-        x, y = self.positions[node]
+        point = ", ".join(f"{each:.4g}" for each in self.positions[node])
         raise InvalidFile(
             f"{self.plan.source}: parts {names[self.owner[node]]} and {names[self.owner[other]]} "
-            f"overlap near ({x:.4g}, {y:.4g}); only welded ports and supports may coincide"
+            f"overlap near ({point}); only welded ports and supports may coincide"
         )
 
     def result(self) -> tuple[dict[str, NDArray[np.int64]], NDArray[np.float64]]:
@@ -161,7 +161,7 @@ class _NodeMerger:
         return pairs
 
     def _port(self, port: PortName) -> NDArray[np.int64]:
-        nodes: NDArray[np.int64] = self.parts[port.part].region(port.port).nodes
+        nodes: NDArray[np.int64] = self.parts[port.part].nodes(port.port)
         return np.asarray(nodes + self.offset[port.part])
 
     def _supports(self, name: str) -> NDArray[np.int64]:

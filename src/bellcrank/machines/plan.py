@@ -18,11 +18,14 @@ A plan is a TOML file::
     ports = ["second.output"]
 
 The ``entry`` of a part is a library entry or a design file. The part is reflected (``mirror``: x
-changes its sign), rotated by a multiple of 60 degrees and scaled, in that order and about its
-input. Its input is then placed at the point ``at``; or its input (or the port given by ``by``) is
-placed on the port given by ``join``, and welded to it. Further links are tables ``[[links]]`` with
-``from``, ``to`` and ``kind``: a ``weld`` merges coincident nodes of two ports; a ``bridge`` fills
-the space between two ports with beams.
+changes its sign), in space turned over (``upside_down``: y and z change their signs), rotated and
+scaled, in that order and about its input. Rotations are counter-clockwise, in the plane by a
+multiple of 60 degrees, in space by a multiple of 30 about the vertical axis. Its input is then
+placed at the point ``at``; or its input (or the port given by ``by``) is placed on the port given
+by ``join``, and welded to it. Further links are tables ``[[links]]`` with ``from``, ``to`` and
+``kind``: a ``weld`` merges coincident nodes of two ports; in the plane a ``bridge`` fills the space
+between two ports with beams. The supports of a part with ``supports = false`` are a port too, by
+which it stands on another part.
 """
 
 from __future__ import annotations
@@ -41,11 +44,13 @@ if TYPE_CHECKING:
     import os
 
 PORTS = ("input", "output")
-ROTATION_STEP = 60
-"""Symmetry angle of the triangular lattice, in degrees."""
+ROTATION_STEP = {2: 60, 3: 30}
+"""Smallest rotations in the plane (a symmetry of the triangular lattice) and in space, degrees."""
+BASE = "supports"
+"""Port of the supports of a part, for links."""
 
 Kind = Literal["weld", "bridge"]
-Vector = Annotated[list[float], Field(min_length=2, max_length=2)]
+Vector = Annotated[list[float], Field(min_length=2, max_length=3)]
 
 
 def _directions(given: object) -> object:
@@ -56,12 +61,13 @@ def _directions(given: object) -> object:
     except (TypeError, ValueError):
         vectors = np.empty(0)
     if (
-        vectors.shape != (len(rows), 2)
+        vectors.shape not in {(len(rows), 2), (len(rows), 3)}
         or not np.isfinite(vectors).all()
         or not vectors.any(axis=1).all()
     ):
         raise PydanticCustomError(
-            "vectors", "Input should be a nonzero vector [x, y], or one for each port"
+            "vectors",
+            "Input should be a nonzero vector [x, y] ([x, y, z] in space), or one for each port",
         )
     return vectors.tolist()
 
@@ -76,8 +82,9 @@ class PartTable(Table):
     entry: str = Field(min_length=1)
     at: Vector | None = None
     join: str | None = None
-    by: Literal["input", "output"] = "input"
+    by: Literal["input", "output", "supports"] = "input"
     mirror: bool = False
+    upside_down: bool = False
     rotate: int = 0
     scale: float = Field(default=1.0, gt=0.0)
     supports: bool = True
@@ -130,7 +137,7 @@ class PortName:
     part
         Name of the part in the plan.
     port
-        ``input`` or ``output``.
+        ``input`` or ``output``; in links also ``supports``.
     """
 
     part: str
@@ -188,6 +195,13 @@ class Plan:
         """Output ports of the machine."""
         return [port_name(text) for text in self.table.output.ports]
 
+    @property
+    def ports(self) -> list[PortName]:
+        """All ports: input and output of each part, and the supports that are linked."""
+        linked = [port for link in self.links for port in (link.first, link.second)]
+        bases = dict.fromkeys(port for port in linked if port.port == BASE)
+        return [*(PortName(name, port) for name in self.table.parts for port in PORTS), *bases]
+
 
 def read_plan(path: str | os.PathLike[str]) -> Plan:
     """Read a plan from a TOML file.
@@ -220,10 +234,15 @@ def plan_of(table: MachineTable, source: str) -> Plan:
     plan = Plan(source, table, tuple(links), _in_order(table, source))
     named = [port for link in links for port in (link.first, link.second)]
     for port in (*named, *plan.inputs, *plan.outputs):
-        if port.part not in table.parts or port.port not in PORTS:
+        is_base = port.port == BASE and port not in (*plan.inputs, *plan.outputs)
+        if port.part not in table.parts or not (port.port in PORTS or is_base):
             raise InvalidFile(
-                f"{source}: unknown port {str(port)!r}; expected PART.input or PART.output, with "
-                f"PART one of {', '.join(table.parts)}"
+                f"{source}: unknown port {str(port)!r}; expected PART.input or PART.output, in "
+                f"links also PART.supports, with PART one of {', '.join(table.parts)}"
+            )
+        if is_base and table.parts[port.part].supports:
+            raise InvalidFile(
+                f"{source}: parts.{port.part}: its supports are linked; expected supports = false"
             )
     for name, region in (("input", table.input), ("output", table.output)):
         if region.direction and len(region.direction) not in (1, len(region.ports)):
@@ -264,8 +283,7 @@ def welded_ports(plan: Plan) -> tuple[tuple[PortName, ...], ...]:
     >>> [" ".join(map(str, ports)) for ports in welded_ports(plan_of(table, "fork.toml"))]
     ['a.input', 'a.output b.input c.input', 'b.output', 'c.output']
     """
-    every = [PortName(name, port) for name in plan.table.parts for port in PORTS]
-    together: dict[PortName, tuple[PortName, ...]] = {port: (port,) for port in every}
+    together: dict[PortName, tuple[PortName, ...]] = {port: (port,) for port in plan.ports}
     for link in plan.links:
         first, second = together[link.first], together[link.second]
         if link.kind == "weld" and first != second:
@@ -276,10 +294,10 @@ def welded_ports(plan: Plan) -> tuple[tuple[PortName, ...], ...]:
 def _check_part(name: str, part: PartTable, source: str) -> None:
     if "." in name:
         raise InvalidFile(f"{source}: parts.{name}: the name of a part must not contain a dot")
-    if part.rotate % ROTATION_STEP:
+    if part.rotate % ROTATION_STEP[3]:
         raise InvalidFile(
-            f"{source}: parts.{name}.rotate: expected a multiple of {ROTATION_STEP} degrees, a "
-            f"symmetry of the triangular lattice, got {part.rotate}"
+            f"{source}: parts.{name}.rotate: expected a multiple of {ROTATION_STEP[2]} degrees in "
+            f"the plane, and of {ROTATION_STEP[3]} in space, got {part.rotate}"
         )
     if part.at is not None and part.join is not None:
         raise InvalidFile(f"{source}: parts.{name}: placed twice, by 'at' and by 'join'")

@@ -35,9 +35,9 @@ class Port:
     Parameters
     ----------
     nodes : (n,) int64
-    centre : (2,)
+    centre : (d,)
         Mean position of the nodes at rest.
-    direction : (2,)
+    direction : (d,)
         Mean of the unit directions of the nodes.
     """
 
@@ -106,11 +106,12 @@ def mean_ports(design: Design, unloaded_beams: UnloadedBeams = "keep") -> Supere
     """
     check_one_motion(design.problem)
     given, wanted = design.problem.input, design.problem.output
+    dimension = design.problem.lattice.dimension
     if given.drive == "displacement":
         entry, weights = uniform_motion(given.nodes, given.direction), np.ones(1)
     else:
-        entry, weights = free_nodes(given.nodes), _mean_weights(given)
-    exit_ = free_nodes(wanted.nodes)
+        entry, weights = free_nodes(given.nodes, dimension), _mean_weights(given)
+    exit_ = free_nodes(wanted.nodes, dimension)
     measures = np.zeros((2, entry.count + exit_.count))
     measures[INPUT, : entry.count] = weights
     measures[OUTPUT, entry.count :] = _mean_weights(wanted)
@@ -123,6 +124,6 @@ def mean_ports(design: Design, unloaded_beams: UnloadedBeams = "keep") -> Supere
 
 
 def _mean_weights(region: Input | Output) -> NDArray[np.float64]:
-    """(2 n,) weights of the mean displacement along the directions."""
+    """(d n,) weights of the mean displacement along the directions."""
     weights: NDArray[np.float64] = region.direction.ravel() / len(region.nodes)
     return weights

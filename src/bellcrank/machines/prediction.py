@@ -20,7 +20,6 @@ import numpy as np
 from bellcrank.errors import BellcrankError, InvalidFile
 from bellcrank.machines.bridges import between_ports
 from bellcrank.machines.curves import Load, trace
-from bellcrank.machines.plan import PORTS
 from bellcrank.machines.ports import INPUT, OUTPUT
 from bellcrank.mechanics import Condensed, LinearEquations, Superelement, free_nodes, state_of
 from bellcrank.model import Input, Lattice, Output, Problem, Supports
@@ -122,7 +121,7 @@ class Assembly:
     def __init__(self, design: Design, nodes: NDArray[np.int64], pieces: list[Piece]) -> None:
         self.design = design
         problem = design.problem
-        size = 2 if problem.section is None else 3
+        size = _unknowns(problem)
         present = Lattice(problem.lattice.positions, problem.lattice.beams[design.mask])
         reached = present.reachable(problem.input.nodes)[nodes]
         self.pieces = [each for each in pieces if reached[each.ports].any()]
@@ -238,8 +237,9 @@ def _basis(
         return np.asarray((basis * moving[..., None]).reshape(moving.size, -1))
     inputs = np.searchsorted(nodes, problem.input.nodes)
     together = np.zeros(moving.shape)
-    together[inputs, :2] = problem.input.direction
-    basis[inputs, :2] = 0.0
+    dimension = problem.lattice.dimension
+    together[inputs, :dimension] = problem.input.direction
+    basis[inputs, :dimension] = 0.0
     whole = np.concatenate([together[..., None], basis], axis=2) * moving[..., None]
     return np.asarray(whole.reshape(moving.size, -1))
 
@@ -248,9 +248,8 @@ def _means(problem: Problem, nodes: NDArray[np.int64], size: int) -> NDArray[np.
     """Return (2, n) the mean motions of input and output per unit of each unknown."""
     weights = np.zeros((2, len(nodes), size))
     for port, region in ((INPUT, problem.input), (OUTPUT, problem.output)):
-        weights[port, np.searchsorted(nodes, region.nodes), :2] = region.direction / len(
-            region.nodes
-        )
+        own = np.searchsorted(nodes, region.nodes)
+        weights[port, own, : problem.lattice.dimension] = region.direction / len(own)
     return weights.reshape(2, -1)
 
 
@@ -260,7 +259,7 @@ def _pieces(machine: Machine) -> Iterator[tuple[str, NDArray[np.bool_], NDArray[
     for name, part in machine.parts.items():
         own = np.zeros(len(present), np.bool_)
         own[machine.beams[name][part.design.mask]] = True
-        ends = [machine.nodes[name][part.region(port).nodes] for port in PORTS]
+        ends = [machine.port_nodes(port) for port in machine.ports if port.part == name]
         yield f"part {name}", own, np.concatenate(ends)
     for link in machine.plan.links:
         if link.kind == "bridge":
@@ -284,14 +283,14 @@ def _condensed(
     held = Supports(
         **{
             name: np.searchsorted(subset, np.intersect1d(getattr(supports, name), subset))
-            for name in ("fixed", "fixed_x", "fixed_y")
+            for name in ("fixed", "fixed_x", "fixed_y", "fixed_z")
         }
     )
     # A superelement contains what its input reaches, and a problem needs an output.
     inside = own.reachable(grip)
     inside[np.concatenate([grip, held.nodes])] = False
     given, watched = (grip, np.flatnonzero(inside)[:1]) if inside.any() else (grip[:-1], grip[-1:])
-    along = np.array([1.0, 0.0])
+    along = np.eye(lattice.dimension)[0]
     piece = Problem(
         name=problem.name,
         lattice=own,
@@ -305,5 +304,11 @@ def _condensed(
         joints=None if problem.joints is None else problem.joints[selected],
         designable=np.array([0]),
     )
-    unknowns = 2 if problem.section is None else 3
-    return Superelement(piece.full_design(), [free_nodes(grip, unknowns)])
+    return Superelement(piece.full_design(), [free_nodes(grip, _unknowns(problem))])
+
+
+def _unknowns(problem: Problem) -> int:
+    """Return the number of unknowns of a node: displacements, and in frames rotations."""
+    if problem.section is None:
+        return 2
+    return 3 if problem.lattice.dimension == 2 else 6
