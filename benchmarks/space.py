@@ -28,13 +28,13 @@ from bellcrank.model import Design, Item, find_problem, human_design
 from bellcrank.model.builtin.space import IN_SPACE
 from bellcrank.provenance import provenance
 from bellcrank.search import SpecificationEvaluator, read_settings
-from bellcrank.task import bundled_tasks, find_task
+from bellcrank.task import find_task
 from bellcrank.workflows import complete_design, start_design
 from bellcrank.workflows.refinement import BEFORE_REFINEMENT
 from bellcrank.workflows.specification import binding, item_data
 
 from .frames import DESIGNS, PROPOSALS, diluted, octet, step_time
-from .tasks import CORES, core_seconds
+from .tasks import CORES, core_seconds, tasks_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -51,11 +51,6 @@ BY_HAND = {
 }  # fmt: skip
 """Bundled problems with a design by hand for the motion of a task."""
 SEED = 0
-
-
-def tasks_in_space() -> list[str]:
-    """Return the names of the bundled tasks in space."""
-    return [name for name in bundled_tasks() if _named(name).problem.lattice.dimension == 3]
 
 
 def _named(name: str) -> Task:
@@ -160,7 +155,7 @@ def cost() -> dict[str, Any]:
 def runs() -> dict[str, Callable[[], dict[str, Any]]]:
     """Return all runs by name."""
     out: dict[str, Callable[[], dict[str, Any]]] = {
-        f"tasks {name}": lambda name=name: designed(name) for name in tasks_in_space()
+        f"tasks {name}": lambda name=name: designed(name) for name in tasks_in(3)
     }
     return {**out, "cost": cost}
 

@@ -31,20 +31,20 @@ spacing = "10 mm"                       # their length
 material = "ninjaflex"
 
 [domain]
-size = ["43 mm", "43 mm", "52 mm"]
+size = ["33 mm", "33 mm", "52 mm"]
 cells = { kind = "octet", up = [1, 1, 1], envelope = "cylinder" }
-solid = [{ box = [0, 0, 45, 43, 43, 52] }]
+solid = [{ box = [0, 0, 45, 33, 33, 52] }]
 
 [[supports]]
 at = { face = "bottom" }
 
 [[cases]]
-inputs = [{ at = { point = [21.5, 21.5, 50] }, direction = "down", displacement = "3 mm" }]
+inputs = [{ at = { point = [16.5, 16.5, 50] }, direction = "down", displacement = "3 mm" }]
 
 [[cases.outputs]]
-at = { face = "top", without = { cylinder = [21.5, 21.5], radius = "5 mm" } }
+at = { face = "top", without = { cylinder = [16.5, 16.5], radius = "5 mm" } }
 direction = "down"
-rotation = { maximise = true, at_least = "5 deg" }
+rotation = { maximise = true, at_least = "24 deg" }
 off_axis = "5%"
 
 [limits]

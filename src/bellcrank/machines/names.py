@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bellcrank.machines.bundled import bundled_machine, bundled_machines
+from bellcrank.machines.bundled import PREFIX, bundled_machine, bundled_machines, bundled_part
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.library import library
 
@@ -19,7 +19,7 @@ def design_from_name(name: str) -> Design | None:
     ----------
     name
         ``strut-LENGTH``; a library entry by its name, the beginning of its name, or its hash; or
-        a bundled machine, with or without ``machine:`` before its name.
+        a bundled machine or part, with or without ``machine:`` before its name.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def design_from_name(name: str) -> Design | None:
     >>> design_from_name("strut-6").problem.name, design_from_name("crane")
     ('strut-6', None)
     """
-    machine = name.removeprefix("machine:")
+    machine = name.removeprefix(PREFIX)
     if machine in bundled_machines():
         return bundled_machine(machine).design
-    return strut_named(name) or library().design(name)
+    return strut_named(name) or bundled_part(name) or library().design(name)

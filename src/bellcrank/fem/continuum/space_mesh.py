@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -45,6 +45,21 @@ FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 """Corners of the faces of a tetrahedron."""
 
 
+class Body(Protocol):
+    """A body that can be meshed."""
+
+    @property
+    def low(self) -> Values:
+        """(3,) smallest coordinates, mm."""
+
+    @property
+    def high(self) -> Values:
+        """(3,) largest coordinates, mm."""
+
+    def distance(self, points: Values) -> Values:
+        """Return (n,) values of points (n, 3) that are negative inside and 0 on the surface."""
+
+
 class RoundStruts:
     """The union of struts with spherical ends.
 
@@ -64,6 +79,16 @@ class RoundStruts:
 
     def __init__(self, ends: Values, radii: Values) -> None:
         self.ends, self.radii = ends, radii
+
+    @property
+    def low(self) -> Values:
+        """(3,) smallest coordinates, mm."""
+        return np.asarray((self.ends - self.radii[:, None, None]).min(axis=(0, 1)))
+
+    @property
+    def high(self) -> Values:
+        """(3,) largest coordinates, mm."""
+        return np.asarray((self.ends + self.radii[:, None, None]).max(axis=(0, 1)))
 
     def distance(self, points: Values) -> Values:
         """Return (n,) the distance of points (n, 3) from the surface, negative inside.
@@ -118,6 +143,28 @@ def space_mesh(part: Part, size: float | None = None) -> ContinuumMesh:
         raise InvalidSettings(f"size: expected a length above 0 mm, got {size!r}")
     struts = RoundStruts(part.positions[part.struts], 0.5 * part.widths)
     vertices, elements = stuffed(struts, size)
+    mesh = with_hubs(part, vertices, elements, size)
+    return replace(mesh, curves=_curved(mesh, struts, elements, size))
+
+
+def with_hubs(part: Part, vertices: Values, elements: Numbers, size: float) -> ContinuumMesh:
+    """Return the mesh of a body with straight edges, and with the hubs of the ports of a part.
+
+    Parameters
+    ----------
+    part
+        Part with the ports; its struts may be others.
+    vertices : (n, 3), mm
+    elements : (e, 4)
+        Tetrahedra that fill the body.
+    size
+        Edge of the cubes of the grid, mm, for errors.
+
+    Raises
+    ------
+    InvalidSettings
+        If no element is near a port.
+    """
     nodes, widest = hub_nodes(part), part.widest
     hubs = np.full(len(elements), -1)
     middles = vertices[elements].mean(axis=1)
@@ -130,30 +177,29 @@ def space_mesh(part: Part, size: float | None = None) -> ContinuumMesh:
             f"size: no element within the joint of node {missing[0]} with cubes of {size:.3g} mm; "
             "choose a smaller size"
         )
-    mesh = solid_of(vertices, elements, hubs, part.design.problem.lattice.node_count)
-    return replace(mesh, curves=_curved(mesh, struts, elements, size))
+    return solid_of(vertices, elements, hubs, part.design.problem.lattice.node_count)
 
 
-def stuffed(struts: RoundStruts, size: float) -> tuple[Values, Numbers]:
-    """Return (n, 3) vertices and (e, 4) tetrahedra that fill a union of struts.
+def stuffed(body: Body, size: float) -> tuple[Values, Numbers]:
+    """Return (n, 3) vertices and (e, 4) tetrahedra that fill a body.
 
     Parameters
     ----------
-    struts
-        The struts.
+    body
+        The body.
     size
         Edge of the cubes of the grid, mm.
     """
-    vertices, elements = _grid(struts, size)
-    distance = struts.distance(vertices)
+    vertices, elements = _grid(body, size)
+    distance = body.distance(vertices)
     used, numbers = np.unique(elements[distance[elements].min(axis=1) < 0.0], return_inverse=True)
     vertices, distance = vertices[used], distance[used]
     elements = numbers.reshape(-1, 4)
     sides = np.array(list(combinations(range(4), 2)))
     edges = np.unique(np.sort(elements[:, sides].reshape(-1, 2), axis=1), axis=0)
-    vertices, side = _moved(struts, vertices, edges, np.sign(distance), size)
+    vertices, side = _moved(body, vertices, edges, np.sign(distance), size)
     crossed = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0.0]
-    cuts = _cuts(struts, vertices, crossed)
+    cuts = _cuts(body, vertices, crossed)
     numbers_of = {
         (one, other): len(vertices) + k for k, (one, other) in enumerate(crossed.tolist())
     }
@@ -172,11 +218,10 @@ def stuffed(struts: RoundStruts, size: float) -> tuple[Values, Numbers]:
     return points[used], numbers.reshape(-1, 4).astype(np.int64)
 
 
-def _grid(struts: RoundStruts, size: float) -> tuple[Values, Numbers]:
-    """Return vertices and tetrahedra of a body-centred cubic grid over the struts."""
-    reach = float(struts.radii.max()) + 1.01 * size
-    low = struts.ends.min(axis=(0, 1)) - reach
-    counts = np.ceil((struts.ends.max(axis=(0, 1)) + reach - low) / size).astype(np.int64) + 1
+def _grid(body: Body, size: float) -> tuple[Values, Numbers]:
+    """Return vertices and tetrahedra of a body-centred cubic grid over a body."""
+    low = body.low - 1.01 * size
+    counts = np.ceil((body.high + 1.01 * size - low) / size).astype(np.int64) + 1
     corners = np.stack(np.meshgrid(*map(np.arange, counts + 1), indexing="ij"), axis=-1)
     cubes = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1)
     corners, cubes = corners.reshape(-1, 3), cubes.reshape(-1, 3)
@@ -202,11 +247,11 @@ def _grid(struts: RoundStruts, size: float) -> tuple[Values, Numbers]:
 
 
 def _moved(
-    struts: RoundStruts, vertices: Values, edges: Numbers, side: Values, size: float
+    body: Body, vertices: Values, edges: Numbers, side: Values, size: float
 ) -> tuple[Values, Values]:
     """Move vertices that are close to the surface onto it; return them and all signs."""
     crossed = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0.0]
-    cuts = _cuts(struts, vertices, crossed)
+    cuts = _cuts(body, vertices, crossed)
     length = np.linalg.norm(vertices[crossed[:, 1]] - vertices[crossed[:, 0]], axis=1)
     part = np.linalg.norm(cuts - vertices[crossed[:, 0]], axis=1) / length
     least = np.where(length > 0.95 * size, NEAR["long"], NEAR["short"])
@@ -221,14 +266,14 @@ def _moved(
     return vertices, side
 
 
-def _cuts(struts: RoundStruts, vertices: Values, crossed: Numbers) -> Values:
+def _cuts(body: Body, vertices: Values, crossed: Numbers) -> Values:
     """Return (c, 3) the points at which edges cross the surface."""
     first, second = vertices[crossed[:, 0]], vertices[crossed[:, 1]]
-    inside = struts.distance(first) < 0.0
+    inside = body.distance(first) < 0.0
     inner, outer = np.where(inside[:, None], [first, second], [second, first])
     for _ in range(BISECTIONS):
         middle = 0.5 * (inner + outer)
-        within = (struts.distance(middle) < 0.0)[:, None]
+        within = (body.distance(middle) < 0.0)[:, None]
         inner, outer = np.where(within, middle, inner), np.where(within, outer, middle)
     return np.asarray(0.5 * (inner + outer))
 

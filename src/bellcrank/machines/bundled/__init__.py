@@ -1,4 +1,6 @@
-"""Bundled machines: plans made of library entries and struts, by name.
+"""Bundled machines: plans made of library entries, struts and bundled parts, by name.
+
+The parts are designs of bundled tasks in space, as `bellcrank design` finds them.
 
 Examples
 --------
@@ -18,8 +20,10 @@ from bellcrank.machines.assembly import Machine, assemble
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.library import find_entry
 from bellcrank.machines.plan import Plan, read_plan
+from bellcrank.model import Design, read_design
 
 SUFFIX = ".toml"
+PREFIX = "machine:"
 
 
 def bundled_machines() -> list[str]:
@@ -61,4 +65,23 @@ def bundled_machine(name: str) -> Machine:
     >>> len(bundled_machine("wave").parts)
     10
     """
-    return assemble(find_plan(name), lambda entry: strut_named(entry) or find_entry(entry).design)
+    return assemble(find_plan(name), _design_named)
+
+
+def bundled_part(name: str) -> Design | None:
+    """Return the bundled part of a name, with or without ``machine:`` before it; None if none.
+
+    Examples
+    --------
+    >>> bundled_part("machine:twist-column").problem.lattice.dimension
+    3
+    """
+    file = files(__package__) / "parts" / f"{name.removeprefix(PREFIX)}.json"
+    if not file.is_file():
+        return None
+    with as_file(file) as path:
+        return read_design(path)
+
+
+def _design_named(entry: str) -> Design:
+    return strut_named(entry) or bundled_part(entry) or find_entry(entry).design
