@@ -24,10 +24,18 @@ def region() -> tuple[shapely.Polygon, list[np.ndarray]]:
     return made, [np.array(made.exterior.coords)[:-1], np.array(made.interiors[0].coords)[:-1]]
 
 
+def nearest(points: np.ndarray, boundary: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distances of points from the nearest face, and their derivatives."""
+    found = distances_inside(points, boundary, 0.5)
+    _, first = np.unique(found.point, return_index=True)
+    assert len(first) == len(points)
+    return found.value[first], found.slopes[first]
+
+
 def test_distances_are_those_of_shapely() -> None:
     polygon, boundary = region()
     points = np.random.default_rng(0).uniform(-1.0, 9.0, (400, 2))
-    distance, slopes = distances_inside(points, boundary)
+    distance, slopes = nearest(points, boundary)
     for point, value in zip(points, distance, strict=True):
         at = shapely.Point(point)
         sign = 1.0 if polygon.contains(at) else -1.0
@@ -36,7 +44,7 @@ def test_distances_are_those_of_shapely() -> None:
     for axis in range(2):
         moved = points.copy()
         moved[:, axis] += step
-        rate = (distances_inside(moved, boundary)[0] - distance) / step
+        rate = (nearest(moved, boundary)[0] - distance) / step
         smooth = np.abs(rate - slopes[:, axis]) < 1e-4
         assert smooth.mean() > 0.98
 
@@ -53,21 +61,21 @@ def test_distances_from_surfaces_are_those_of_another_program() -> None:
     box, ball = box_with_a_ball()
     points = np.random.default_rng(0).uniform(-5.0, 5.0, (300, 3))
     surfaces = [np.asarray(box.triangles), np.asarray(ball.triangles)]
-    distance, slopes = distances_inside(points, surfaces)
+    distance, slopes = nearest(points, surfaces)
     triangles = np.concatenate(surfaces)
     below = ((points[:, None] - ball.triangles[:, 0]) * ball.face_normals).sum(axis=2)
     inside = (np.abs(points) < [4.0, 3.0, 2.5]).all(axis=1) & (below.max(axis=1) > 0.0)
     assert np.array_equal(distance > 0.0, inside)
     for point, value in zip(points, distance, strict=True):
         every = np.tile(point, (len(triangles), 1))
-        nearest = trimesh.triangles.closest_point(triangles, every)
-        least = np.linalg.norm(nearest - point, axis=1).min()
+        feet = trimesh.triangles.closest_point(triangles, every)
+        least = np.linalg.norm(feet - point, axis=1).min()
         assert abs(value) == pytest.approx(least, abs=1e-12)
     step = 1e-6
     for axis in range(3):
         moved = points.copy()
         moved[:, axis] += step
-        rate = (distances_inside(moved, surfaces)[0] - distance) / step
+        rate = (nearest(moved, surfaces)[0] - distance) / step
         assert (np.abs(rate - slopes[:, axis]) < 1e-4).mean() > 0.98
 
 
@@ -97,6 +105,17 @@ def block() -> Problem:
         ],
     }  # fmt: skip
     return task_from_dict(data).problem
+
+
+def test_all_faces_of_a_corner_count_once() -> None:
+    """Each face of a cube consists of two triangles, and has points on their common edge."""
+    cube = [np.asarray(trimesh.creation.box((8.0, 8.0, 8.0)).triangles)]
+    points = np.array([[3.5, 3.5, 3.5], [3.5, 3.0, 0.0], [3.5, 0.0, 0.0], [4.5, 3.9, 0.0]])
+    found = distances_inside(points, cube, 2.0)
+    values = [np.sort(found.value[found.point == k]).tolist() for k in range(len(points))]
+    assert values == [[0.5, 0.5, 0.5], [0.5, 1.0], [0.5], [-0.5]]
+    corner = found.slopes[found.point == 0]
+    assert np.array_equal(np.sort(corner, axis=0), [[-1, -1, -1], [0, 0, 0], [0, 0, 0]])
 
 
 @pytest.mark.parametrize("name", ["gripper", "block"])

@@ -31,6 +31,8 @@ MASS_WEIGHT = 20.0
 """Weight of the mass against other constraints, so that it does not grow where these are missed."""
 NEAR_ANGLE = np.radians(45.0)
 """Angles below which they are constraints."""
+NEAR_DOMAIN = 0.5
+"""Distance of the surface of a strut from the domain, over its width, below which it counts."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Points of a strut, as parts of its length, that must be inside the domain."""
 
@@ -243,15 +245,20 @@ def _domain_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     ends, width = lattice.beams[beam], problem.beam_widths[beam]
     weights = np.stack([1.0 - share, share], axis=1)
     points = np.einsum("pk,pkd->pd", weights, lattice.positions[ends])
-    value, slope = np.zeros(len(points)), np.zeros(points.shape)
-    if len(points):
-        distance, slope = distances_inside(points, domain)
-        value = 0.5 - distance / width
-    near = np.flatnonzero(value > -0.5)
-    rate = -(slope / width[:, None])[near]
+    if not len(points):
+        none = np.zeros(0, dtype=np.int64)
+        return _rows_of(
+            problem, "domain", np.zeros(0), np.zeros((0, 3), np.int64), [(none, points)]
+        )
+    found = distances_inside(points, domain, (0.5 + NEAR_DOMAIN) * float(width.max()))
+    beam, share, width = beam[found.point], share[found.point], width[found.point]
+    ends, weights = ends[found.point], weights[found.point]
+    value = 0.5 - found.value / width
+    near = np.flatnonzero(value > -NEAR_DOMAIN)
+    rate = -(found.slopes / width[:, None])[near]
     return _rows_of(
         problem, "domain", value[near],
-        np.column_stack([beam, np.rint(4.0 * share).astype(np.int64)])[near],
+        np.column_stack([beam, np.rint(4.0 * share).astype(np.int64), found.face])[near],
         [(ends[near, k], weights[near, k, None] * rate) for k in range(2)],
         [(beam[near], ((0.5 - value) / width)[near])],
     )  # fmt: skip
