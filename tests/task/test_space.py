@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from bellcrank.errors import InvalidFile, InvalidProblem
+from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings
 from bellcrank.mechanics import FrameEvaluator, Status
 from bellcrank.model import read_problem, write_problem
 from bellcrank.search import read_settings
@@ -323,3 +323,50 @@ def test_the_column_of_the_page_turns_as_it_says(tmp_path: Path) -> None:
     assert figures["travel_mm"] == pytest.approx(3.0, abs=0.15)
     assert all(item.met for item in dict(report.items)["frames, 8 elements"])
     assert (folder.path / "motion.png").stat().st_size > 50_000
+
+
+@pytest.mark.parametrize(
+    ("supports", "changes"),
+    [
+        # Rollers on a plane leave two translations and a rotation free, those on two planes a
+        # translation; an input of one node holds no rotation.
+        ([{"at": {"face": "bottom"}, "hold": "z"}], {"displacement": 3, "count": 1}),
+        ([{"at": {"face": "bottom"}, "hold": "z"}], {"force": "0.1 N"}),
+        (
+            [{"at": {"face": "bottom"}, "hold": "z"}, {"at": {"face": "left"}, "hold": "x"}],
+            {"force": "0.1 N"},
+        ),
+        ([{"at": {"point": [9, 2, 2]}, "hold": "z"}], {"force": "0.1 N"}),
+    ],
+)
+def test_supports_that_leave_a_motion_free_are_refused(
+    tmp_path: Path, supports: Any, changes: dict[str, Any]
+) -> None:
+    data = copy.deepcopy(TASK)
+    data["supports"] = supports
+    given = data["cases"][0]["inputs"][0]
+    given["at"]["count"] = changes.pop("count", 3)
+    del given["displacement"]
+    given.update(changes)
+    made = task_from_dict(data)
+    with pytest.raises(InvalidSettings, match="not supported against rigid-body motion"):
+        start_design(made.problem, read_settings({"steps": 10}), tmp_path / "run", made.part)
+
+
+@pytest.mark.parametrize(
+    ("domain", "message"),
+    [
+        ({"problem": "crane"}, "expected one of point, edge, .* in the plane, got face"),
+        ({"size": ["46 mm", "46 mm"]}, "in the plane, got face"),
+        (
+            {"size": ["46 mm", "46 mm"], "cells": "octet"},
+            "domain.cells: expected a domain in space",
+        ),
+        ({"outline": "part.dxf"}, "part.dxf: no such file"),
+    ],
+)
+def test_a_domain_in_the_plane_for_a_task_in_space_is_refused(domain: Any, message: str) -> None:
+    data = copy.deepcopy(TASK)
+    data["domain"] = domain
+    with pytest.raises((InvalidFile, InvalidProblem), match=message):
+        task_from_dict(data)

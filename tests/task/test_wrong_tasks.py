@@ -110,6 +110,8 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("a path and an arc", {f"{OUTPUT}.path": {}}, "path: expected points or arc, and not both"),
     ("strain of 10", {"limits.strain": 10}, "limits.strain: 10 is 1000%; write '10%'"),
     ("a mass of 2 kg", {"limits.mass": "2 kg"}, "limits.mass: expected a mass above 0 and below"),
+    ("a third of a turn", {"limits.symmetry": "3-fold"}, "limits.symmetry: expected x, y or xy in"),
+    ("a mirror in depth", {"limits.symmetry": "z"}, "limits.symmetry: expected x, y or xy in the"),
     ("a short stroke", {"limits.stable_stroke": 0.5}, "stable_stroke: expected a part of the"),
     ("sag of unknown density", {"part.material": {"young": 9.0, "poisson": 0.4},
                                 f"{OUTPUT}.sag": "10%"}, "the density of custom is unknown"),

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.mechanics import FlipPrediction, Response, check_memory, model_evaluator
+from bellcrank.mechanics import (
+    FlipPrediction,
+    Response,
+    Status,
+    check_memory,
+    model_evaluator,
+)
 from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
 from bellcrank.search.relaxation import relaxed
 from bellcrank.search.specification import RESERVE, SpecificationEvaluator
@@ -140,7 +146,9 @@ def with_stable_initial(problem: Problem, settings: SearchSettings) -> Problem:
         Unchanged if its own initial design is stable, or if no stable one is found.
     """
     evaluator = make_evaluator(problem, settings)
-    if evaluator.evaluate(evaluator.problem.initial).is_admissible:
+    found = evaluator.evaluate(evaluator.problem.initial)
+    # Fewer beams do not support a mechanism either.
+    if found.is_admissible or found.status is Status.MECHANISM:
         return problem
     rng = np.random.default_rng(settings.seed)
     for density in DENSITIES:

@@ -167,7 +167,7 @@ class _Builder:
                 items=tuple(items),
                 maximise=tuple(maximise),
                 weight=weight,
-                symmetry=_symmetry_names(table.limits.symmetry),
+                symmetry=_symmetry_names(table.limits.symmetry, self.lattice.dimension),
                 domain=self.domain,
             ),
         )
@@ -320,9 +320,12 @@ def _base(domain: DomainSection) -> Problem | None:
     return builtin[domain.problem]()
 
 
-def _symmetry_names(key: str | None) -> tuple[str, ...]:
+def _symmetry_names(key: str | None, dimension: int) -> tuple[str, ...]:
     """Return the names of the symmetries that the key of the limits stands for."""
-    return (key,) if key in FOLDS else tuple(key or "")
+    names = (key,) if key in FOLDS else tuple(key or "")
+    if dimension == 2 and not {"x", "y"}.issuperset(names):
+        raise InvalidProblem(f"limits.symmetry: expected x, y or xy in the plane, got {key!r}")
+    return names
 
 
 def _bounds_sag(items: Sequence[Item]) -> bool:
