@@ -6,7 +6,8 @@
 - ``cost``: the time of a step of a search on one core, against the number of beams.
 
 Each run is added to ``docs/space/runs.json`` as soon as it is done; runs that are in the record are
-not repeated. ``--only tasks`` makes one comparison.
+not repeated. ``--only`` gives the beginnings of the names of runs, such as ``tasks`` or
+``tasks twist-column``.
 """
 
 from __future__ import annotations
@@ -221,7 +222,7 @@ def main() -> None:
     if RECORD.exists():
         rows = json.loads(RECORD.read_text(encoding="utf-8"))["runs"]
     for name, job in runs().items():
-        if name in rows or name.split()[0] not in given.only.split(","):
+        if name in rows or not name.startswith(tuple(given.only.split(","))):
             continue
         rows[name] = job()
         RECORD.parent.mkdir(exist_ok=True)
