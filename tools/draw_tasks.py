@@ -1,8 +1,8 @@
 """Pictures and movies of the bundled tasks for the documentation: ``python tools/draw_tasks.py``.
 
-For each task, the run of ``docs/tasks/runs.json`` that meets the most (by frames, then in the
-sheet) with the smallest seed is drawn: ``docs/tasks/NAME.png`` with the paths of the outputs, and
-``docs/tasks/NAME.gif``. ``--only NAME,NAME`` draws some.
+For each task, the run of ``docs/tasks/runs.json`` or ``docs/space/runs.json`` that meets the most
+(by frames, then in the sheet) with the smallest seed is drawn: ``docs/tasks/NAME.png`` with the
+paths of the outputs, and ``docs/tasks/NAME.gif``. ``--only NAME,NAME`` draws some.
 """
 
 from __future__ import annotations
@@ -28,7 +28,10 @@ from bellcrank.workflows.pictures import case_motions
 if TYPE_CHECKING:
     from bellcrank.task import Task
 
-FOLDER = Path(__file__).parents[1] / "docs" / "tasks"
+DOCS = Path(__file__).parents[1] / "docs"
+FOLDER = DOCS / "tasks"
+RECORD = FOLDER / "runs.json"
+RECORD_IN_SPACE = DOCS / "space" / "runs.json"
 MOVIE = MovieSettings(seconds=2.0, fps=10, size=(640, 360))
 
 
@@ -39,6 +42,17 @@ def design_of(task: Task, run: dict[str, Any]) -> Design:
     mask = bits[: problem.lattice.beam_count].astype(bool)
     moved = problem.with_geometry(np.array(run["positions"]), np.array(run["widths"]))
     return Design(with_joints(moved, mask), mask, provenance={"part": task.part.to_dict()})
+
+
+def recorded_runs() -> list[dict[str, Any]]:
+    """Return the runs of the records of tasks in the plane and in space."""
+    runs: list[dict[str, Any]] = json.loads(RECORD.read_text(encoding="utf-8"))["runs"]
+    in_space = json.loads(RECORD_IN_SPACE.read_text(encoding="utf-8"))["runs"]
+    for name, run in in_space.items():
+        kind, _, task = name.partition(" ")
+        if kind == "tasks":
+            runs.append({**run, "task": task, "met_in_sheet": run["met_in_solid"]})
+    return runs
 
 
 def best(runs: list[dict[str, Any]]) -> dict[str, Any]:
@@ -75,7 +89,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", default="")
     given = parser.parse_args()
-    runs = json.loads((FOLDER / "runs.json").read_text(encoding="utf-8"))["runs"]
+    runs = recorded_runs()
     names = given.only.split(",") if given.only else sorted({run["task"] for run in runs})
     for name in names:
         task = find_task(name)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from bellcrank.machines.bundled import bundled_machine, bundled_machines
+from bellcrank.machines.bundled import bundled_machine, machines_in
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import library
 from bellcrank.model import unpack_mask
@@ -38,13 +38,13 @@ def test_every_actuator_of_the_library_is_listed(collections: dict[str, Any]) ->
 
 
 def test_machines_have_a_description_and_their_contact(collections: dict[str, Any]) -> None:
-    assert [entry["key"] for entry in collections["machines"]] == bundled_machines()
+    assert [entry["key"] for entry in collections["machines"]] == machines_in(2)
     notes = {entry["key"]: entry["note"] for entry in collections["machines"]}
     assert all(len(note) > 20 for note in notes.values())
     assert all(bundled_contact(name).message in note for name, note in notes.items())
 
 
-@pytest.mark.parametrize("name", bundled_machines())
+@pytest.mark.parametrize("name", machines_in(2))
 def test_the_plan_of_a_machine_builds_that_machine(client: TestClient, name: str) -> None:
     plan = client.get(f"/api/machines/{name}").json()
     built = client.post("/api/machines", json={"plan": plan}).json()

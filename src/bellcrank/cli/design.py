@@ -357,9 +357,18 @@ def _print_report(report: DesignReport) -> None:
     table.add_row("designs evaluated", f"{report.proposals}")
     table.add_row("results", plain(f"{report.folder}/"))
     results.print(table)
-    sheet = report.all_items.get("sheet", ())
-    if missed := [each.item.name for each in sheet if not each.met]:
-        notes.print(f"[bold yellow]warning:[/] in the sheet the design misses {', '.join(missed)}")
+    for words, name in (("in the sheet", "sheet"), ("with imperfections", "imperfections")):
+        items = report.all_items.get(name, ())
+        if missed := [each.item.name for each in items if not each.met]:
+            notes.print(f"[bold yellow]warning:[/] {words} the design misses {', '.join(missed)}")
+    found = report.refinement
+    if found is not None and found.sheets and not found.after.sheet:
+        in_plane = selection.design.problem.lattice.dimension == 2
+        where = "in the sheet" if in_plane else "with displaced nodes and other joints"
+        notes.print(
+            f"[bold yellow]warning:[/] {where} the design is not stable along its stroke, or moves "
+            "otherwise"
+        )
     if report.missed:
         first, *others = report.missed
         rest = f", then {', '.join(each.item.name for each in others)}" if others else ""

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 LARGEST_DEPARTURE = 0.5
 """Largest difference of the motions of two models on the same path, over the motion."""
+LARGE_ROTATION = 30.0
+"""Rotation below which differences are compared with it, degrees."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,15 +106,25 @@ def _lost_motion(channels: Mapping[Channel, Values], output: str) -> Values:
     return np.asarray(motion[..., -1:, 0] - channels[Channel("loaded_motion", output)][..., 0])
 
 
-def on_same_path(first: Records, second: Records) -> bool:
-    """Whether the motions of two models are so near to each other that they are on one path."""
+def on_same_path(first: Records, second: Records, departure: float = LARGEST_DEPARTURE) -> bool:
+    """Whether the motions of two models are so near to each other that they are on one path.
+
+    Parameters
+    ----------
+    first, second
+        Channels by load case.
+    departure
+        Largest difference, over the motion.
+    """
     for case, record in first.items():
         inputs = [v for c, v in record.channels.items() if c.name == "input_motion"]
         for channel, value in record.channels.items():
-            if channel.name not in {"motion", "displacement"}:
+            if channel.name not in {"motion", "displacement", "rotation"}:
                 continue
             other = second[case].channels[channel]
             size = max(float(np.abs(each).max(initial=0.0)) for each in (value, *inputs))
-            if not float(np.abs(other - value).max()) <= LARGEST_DEPARTURE * size:
+            if channel.name == "rotation":
+                size = max(float(np.abs(value).max(initial=0.0)), LARGE_ROTATION)
+            if not float(np.abs(other - value).max()) <= departure * size:
                 return False
     return True

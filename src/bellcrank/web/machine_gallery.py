@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import BellcrankError, UnknownName
-from bellcrank.machines.bundled import bundled_machine, bundled_machines, find_plan
+from bellcrank.machines.bundled import bundled_machine, find_plan, machines_in
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.elementary import strut_named
 from bellcrank.machines.library import kind_title, library
@@ -97,7 +97,7 @@ class Machines:
         UnknownName
             If there is no machine of that name.
         """
-        if key not in bundled_machines():
+        if key not in self._known():
             raise UnknownName(f"there is no machine {key!r}")
         plan = find_plan(key).table.model_dump(by_alias=True, exclude_defaults=True)
         for part in plan["parts"].values():
@@ -107,7 +107,7 @@ class Machines:
 
 
 def _machines() -> Iterator[Entry]:
-    for name in bundled_machines():
+    for name in machines_in(2):
         machine = bundled_machine(name)
         table = machine.plan.table
         note = f"{table.about}; {bundled_contact(name).message}"

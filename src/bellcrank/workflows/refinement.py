@@ -16,14 +16,19 @@ from bellcrank.search.choice import nearest
 from bellcrank.search.parallel import default_workers
 from bellcrank.search.selection import Finalist
 from bellcrank.search.verification import Verifier
-from bellcrank.workflows.refiners import FIRST_EVALUATIONS, refine_designs, sheet_of
+from bellcrank.workflows.refiners import (
+    FIRST_EVALUATIONS,
+    refine_designs,
+    second_model,
+    sheet_of,
+)
 from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.validation import spec_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from bellcrank.model import Design
+    from bellcrank.model import Design, Problem
     from bellcrank.part import PartSpec
     from bellcrank.refine.refinement import Progress
     from bellcrank.search import Selection
@@ -160,12 +165,17 @@ def refinement_data(refinement: Refinement) -> dict[str, Any]:
         "objective_after": finite(refinement.after.objective),
         "met_before": refinement.before.met,
         "met_after": refinement.after.met,
-        "met_in_sheet": refinement.after.met_in_sheet,
+        _met_key(refinement.design.problem): refinement.after.met_in_sheet,
         "steps": refinement.steps,
         "evaluations": refinement.evaluations,
         "sheets": refinement.sheets,
         "reason": refinement.reason,
     }
+
+
+def _met_key(problem: Problem) -> str:
+    """Return the name of whether the second model of a refinement meets all items."""
+    return {2: "met_in_sheet", 3: "met_with_imperfections"}[problem.lattice.dimension]
 
 
 def refinement_text(refinement: Refinement) -> str:
@@ -232,6 +242,6 @@ def refinement_rows(design: Design, refinement: Refinement) -> list[list[str]]:
     """Return the items before and after as rows of texts, the first with the names of columns."""
     spec = spec_for(design)
     problem = specified(design.problem, spec.registered_material.strain_limit)
-    after = refinement.after
-    states = {"before": refinement.before.items, "after": after.items, "sheet": after.sheet}
+    after, name = refinement.after, second_model(problem)
+    states = {"before": refinement.before.items, "after": after.items, name: after.sheet}
     return item_rows(problem, spec, {name: items for name, items in states.items() if items})

@@ -13,6 +13,7 @@ from bellcrank.mechanics import model_name, objective_name
 from bellcrank.model.storage import write_text
 from bellcrank.workflows.figures import figure_text, model_words
 from bellcrank.workflows.refinement import refinement_data
+from bellcrank.workflows.refiners import second_model
 from bellcrank.workflows.specification import binding, item_data, item_rows
 
 if TYPE_CHECKING:
@@ -102,9 +103,10 @@ class DesignReport:
 
     @property
     def all_items(self) -> dict[str, Sequence[ItemResult]]:
-        """The same, with those in the sheet where they were computed."""
-        sheet = () if self.refinement is None else self.refinement.after.sheet
-        return {**self.items, **({"sheet": sheet} if sheet else {})}
+        """The same, with those in the sheet (in space with imperfections) where they are known."""
+        second = () if self.refinement is None else self.refinement.after.sheet
+        name = second_model(self.selection.design.problem)
+        return {**self.items, **({name: second} if second else {})}
 
     @property
     def missed(self) -> list[ItemResult]:

@@ -5,7 +5,7 @@ The parts are designs of bundled tasks in space, as `bellcrank design` finds the
 Examples
 --------
 >>> bundled_machines()
-['amplifier', 'gripper', 'reverser', 'sorter-left', 'sorter-right', 'wave']
+['amplifier', 'gripper', 'reverser', 'sorter-left', 'sorter-right', 'three-jaws', 'twister', 'wave']
 >>> find_plan("gripper").table.input.ports
 ['left.input']
 """
@@ -30,6 +30,23 @@ def bundled_machines() -> list[str]:
     """Return the names of the bundled machines, sorted."""
     names = (Path(each.name) for each in files(__package__).iterdir())
     return sorted(name.stem for name in names if name.suffix == SUFFIX)
+
+
+def machines_in(dimension: int) -> list[str]:
+    """Return the names of the bundled machines in the plane (2) or in space (3), sorted.
+
+    Examples
+    --------
+    >>> machines_in(3)
+    ['three-jaws', 'twister']
+    """
+    return [name for name in bundled_machines() if _dimension(find_plan(name)) == dimension]
+
+
+def _dimension(plan: Plan) -> int:
+    """Return the dimension of a machine, that of its first part."""
+    first = next(iter(plan.table.parts.values()))
+    return _design_named(first.entry).problem.lattice.dimension
 
 
 def find_plan(name_or_path: str) -> Plan:
