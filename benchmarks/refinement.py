@@ -419,8 +419,10 @@ def specified_rows(rows: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def _median(rows: list[dict[str, Any]], key: str, style: str) -> str:
-    """Return the median of a figure as text; a dash where it is not known."""
+    """Return the median of a figure (of a rotation, its size) as text; a dash if not known."""
     values = [row[key] for row in rows if row.get(key) is not None]
+    if key.startswith("rotation"):
+        values = list(map(abs, values))
     return format(median(values), style).replace("%", " %") if values else "-"
 
 

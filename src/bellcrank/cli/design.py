@@ -324,6 +324,22 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
         raise InvalidSettings(f"{option} {text}: expected numbers separated by commas") from None
 
 
+def _warn_of_second_model(report: DesignReport) -> None:
+    """Print what a refined design misses in the sheet, or in space with imperfections."""
+    refinement = report.refinement
+    in_plane = report.selection.design.problem.lattice.dimension == 2
+    where = "in the sheet" if in_plane else "with displaced nodes and other joints"
+    if refinement is None or not refinement.sheets:
+        return
+    if not (items := refinement.after.sheet):
+        text = "is not stable along its stroke, or moves otherwise"
+    elif missed := [each.item.name for each in items if not each.met]:
+        text = f"misses {', '.join(missed)}"
+    else:
+        return
+    notes.print(f"[bold yellow]warning:[/] {where} the design {text}")
+
+
 def _print_report(report: DesignReport) -> None:
     """Print the results in a table, with warnings."""
     from bellcrank.workflows.refinement import refinement_text
@@ -357,18 +373,7 @@ def _print_report(report: DesignReport) -> None:
     table.add_row("designs evaluated", f"{report.proposals}")
     table.add_row("results", plain(f"{report.folder}/"))
     results.print(table)
-    for words, name in (("in the sheet", "sheet"), ("with imperfections", "imperfections")):
-        items = report.all_items.get(name, ())
-        if missed := [each.item.name for each in items if not each.met]:
-            notes.print(f"[bold yellow]warning:[/] {words} the design misses {', '.join(missed)}")
-    found = report.refinement
-    if found is not None and found.sheets and not found.after.sheet:
-        in_plane = selection.design.problem.lattice.dimension == 2
-        where = "in the sheet" if in_plane else "with displaced nodes and other joints"
-        notes.print(
-            f"[bold yellow]warning:[/] {where} the design is not stable along its stroke, or moves "
-            "otherwise"
-        )
+    _warn_of_second_model(report)
     if report.missed:
         first, *others = report.missed
         rest = f", then {', '.join(each.item.name for each in others)}" if others else ""
