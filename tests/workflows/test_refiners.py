@@ -8,11 +8,21 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 
+from bellcrank.machines.bundled import bundled_part
 from bellcrank.model import Design, gallery_design
+from bellcrank.part import PartSpec
 from bellcrank.refine import RefinementSettings
+from bellcrank.refine.state import state_of
 from bellcrank.task import find_task
-from bellcrank.workflows.refiners import refine_designs
+from bellcrank.workflows import refiners
+from bellcrank.workflows.refiners import (
+    refine_designs,
+    second_model,
+    sheet_of,
+    with_imperfections,
+)
 
 if TYPE_CHECKING:
     from bellcrank.refine.refinement import Progress
@@ -73,3 +83,42 @@ def test_a_stop_ends_the_processes() -> None:
     results = refine_designs(designs(), None, report, 2, stop, RefinementSettings(steps=400))
     assert len(results) < 2
     assert time.monotonic() - stopped[0] < 20.0
+
+
+def column() -> Design:
+    design = bundled_part("twist-column")
+    assert design is not None
+    return design
+
+
+def test_parts_in_space_are_verified_with_imperfections() -> None:
+    design = column()
+    check = sheet_of(PartSpec(), design)
+    assert check is not None
+    first, second = check(design), check(design)
+    assert first is not None
+    assert second is not None
+    own = state_of(design.problem, design.mask).records
+    for channel, values in first["case"].channels.items():
+        assert np.array_equal(values, second["case"].channels[channel])
+        assert values.shape == own["case"].channels[channel].shape
+    rotations = [each["case"].of("rotation", "output")[-1] for each in (own, first)]
+    assert rotations[0] != rotations[1]
+    assert rotations[0] == pytest.approx(rotations[1], rel=0.05)
+    assert second_model(design.problem) == "imperfections"
+
+
+def test_parts_whose_imperfections_matter_are_on_another_path(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    design = column()
+    assert with_imperfections(design, 0.01) is not None
+    assert with_imperfections(design, 0.06) is None
+    monkeypatch.setattr(refiners, "DEPARTURE", 1e-6)
+    assert with_imperfections(design, 0.01) is None
+
+
+def test_in_the_plane_the_second_model_is_the_sheet() -> None:
+    (design, _) = designs()
+    assert second_model(design.problem) == "sheet"
+    assert sheet_of(None, design) is None
