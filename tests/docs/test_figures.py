@@ -16,6 +16,7 @@ from bellcrank.machines.bundled import find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder, kinds
 from benchmarks.refinement import mass_rows, specified_rows
+from benchmarks.space import cost_rows, task_rows
 from benchmarks.tasks import summary
 
 ROOT = Path(__file__).parents[2]
@@ -274,12 +275,18 @@ def refined_specifications() -> Rows:
     yield from specified_rows(read("refinement/runs")["runs"])
 
 
+def space() -> Rows:
+    rows = read("space/runs")["runs"]
+    yield from [*task_rows(rows), *cost_rows(rows)]
+
+
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (search_comparison, move_comparison),
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),
     "refinement": (equal_mass, refined_specifications),
+    "space": (space,),
     "machines": (bundled, contact, entries, lengths, two_ports),
     "surrogate": (costs, shipped, training_set_size, surrogate_search, independent_simulation),
 }

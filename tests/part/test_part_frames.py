@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from bellcrank.errors import BellcrankError, InvalidProblem, InvalidSettings, UnknownName
 from bellcrank.fem import FemSettings
 from bellcrank.machines.characterisation import characterise
-from bellcrank.machines.placement import place_parts
-from bellcrank.machines.plan import MachineTable, plan_of
 from bellcrank.model import (
     Elasticity,
     Input,
@@ -143,13 +141,6 @@ def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses(tmp_path) 
     message = "problem 'tower' is in space; only problems in the plane are accepted here"
     data = problem_to_dict(design.problem)
     write_design(design, tmp_path / "tower.json")
-    table = {
-        "name": "towers",
-        "parts": {"a": {"entry": "tower", "at": [0.0, 0.0]}},
-        "input": {"ports": ["a.input"]},
-        "output": {"ports": ["a.output"]},
-    }
-    plan = plan_of(MachineTable.model_validate(table), "towers.toml")
     for work in (
         lambda: spring_problem(design.problem),
         lambda: PartSpec().of(design).outline(),
@@ -157,7 +148,6 @@ def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses(tmp_path) 
         lambda: make_card(design, PartSpec(), tmp_path / "card.pdf"),
         lambda: Grips(plate=True).applied(PartSpec().of(design)),
         lambda: characterise(design),
-        lambda: place_parts(plan, lambda _: design),
         lambda: problem_of(data),
         lambda: read_task((tmp_path / "tower.json").read_text(), ".json"),
     ):

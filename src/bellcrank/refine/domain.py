@@ -63,20 +63,20 @@ def distances_inside(points: Values, boundary: Sequence[Values], reach: float) -
     nearest = _from_surfaces if points.shape[1] == 3 else _from_rings
     across, face, is_inside = nearest(points, boundary, reach)
     face[~is_inside, 1:] = -1
-    point, place = np.nonzero(face >= 0)
-    across = across[point, place]
+    point, column = np.nonzero(face >= 0)
+    across = across[point, column]
     size = np.linalg.norm(across, axis=1)
     sign = np.where(is_inside[point], 1.0, -1.0)
     unit = np.divide(across, size[:, None], out=np.zeros_like(across), where=size[:, None] > 0.0)
-    return Distances(point, face[point, place], sign * size, sign[:, None] * unit)
+    return Distances(point, face[point, column], sign * size, sign[:, None] * unit)
 
 
 def _from_rings(
-    points: Values, rings: Sequence[Values], reach: float
+    points: Values, boundary: Sequence[Values], reach: float
 ) -> tuple[Values, NDArray[np.int64], NDArray[np.bool_]]:
     """Return vectors (n, m, 2) from edges of rings, their numbers, and which points are inside."""
-    starts = np.concatenate(rings)
-    along = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings]) - starts
+    starts = np.concatenate(boundary)
+    along = np.concatenate([np.roll(ring, -1, axis=0) for ring in boundary]) - starts
     apart = points[:, None] - starts
     square = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
     share = (apart * along).sum(axis=2) / square

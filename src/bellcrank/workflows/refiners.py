@@ -221,8 +221,7 @@ def with_imperfections(design: Design, displaced: float) -> Records | None:
         if not evaluator.evaluate(design.mask, VERIFICATION_INCREMENT).is_admissible:
             return None
         found.append(evaluator.records)
-    shorter, longer = found
-    return shorter if on_same_path(shorter, longer, DEPARTURE) else None
+    return found[0] if on_same_path(found[0], found[1], DEPARTURE) else None
 
 
 def second_model(problem: Problem) -> str:

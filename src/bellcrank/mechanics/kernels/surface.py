@@ -81,25 +81,25 @@ def insert(
     A point on the edge of two triangles of a plane is inserted once.
     """
     most = len(distance[i])
-    place = most
+    index = most
     for number in range(most):
         if face[i, number] < 0 or away < distance[i, number]:
-            place = number
+            index = number
             break
         same = True
         for axis in range(3):
             same &= abs(across[i, number, axis] - vector[axis]) <= ROUNDING * (1.0 + away)
         if same:
             return
-    if place == most:
+    if index == most:
         return
-    for number in range(most - 1, place, -1):
+    for number in range(most - 1, index, -1):
         distance[i, number], face[i, number] = distance[i, number - 1], face[i, number - 1]
         for axis in range(3):
             across[i, number, axis] = across[i, number - 1, axis]
-    distance[i, place], face[i, place] = away, k
+    distance[i, index], face[i, index] = away, k
     for axis in range(3):
-        across[i, place, axis] = vector[axis]
+        across[i, index, axis] = vector[axis]
 
 
 @entry
