@@ -214,7 +214,7 @@ def with_imperfections(design: Design, displaced: float) -> Records | None:
         moved = positions + displaced / np.sqrt(3.0) * rng.standard_normal(positions.shape)
         problem = replace(
             design.problem.with_geometry(moved, design.problem.beam_widths),
-            section=replace(section, joint=factor * section.joint),
+            section=replace(section, joint=min(factor * section.joint, 0.5 * section.width)),
             specification=wanted,
         )
         evaluator = SpecificationEvaluator(problem, elements=ELEMENTS)
