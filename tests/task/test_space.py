@@ -16,8 +16,8 @@ import pytest
 import trimesh
 
 from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings
-from bellcrank.mechanics import FrameEvaluator, Status
-from bellcrank.model import read_problem, write_problem
+from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator, Status
+from bellcrank.model import read_problem, unpack_mask, write_problem
 from bellcrank.search import read_settings
 from bellcrank.task import read_task, task_from_dict
 from bellcrank.task.schema import DomainSection, Shape
@@ -28,6 +28,8 @@ from bellcrank.workflows import complete_design, start_design
 if TYPE_CHECKING:
     from bellcrank.task import Task
 
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "tasks.md").read_text(encoding="utf-8")
 TASK: dict[str, Any] = {
     "name": "orthogonal",
     "domain": {"size": ["46 mm", "46 mm", "46 mm"]},
@@ -303,23 +305,39 @@ def test_what_is_of_space_is_refused_in_the_plane(changes: dict[str, Any], messa
         task_from_dict({**data, **changes})
 
 
-@pytest.mark.slow
-def test_the_column_of_the_page_turns_as_it_says(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "tasks.md").read_text(encoding="utf-8")
+def column_of_the_page() -> Task:
     (text,) = [
         each
-        for each in re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+        for each in re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
         if 'name = "twist-column"' in each
     ]
-    made = task_from_dict(tomllib.loads(text))
+    return task_from_dict(tomllib.loads(text))
+
+
+def test_the_column_of_the_record_turns_as_the_page_says() -> None:
+    problem = column_of_the_page().problem
+    record = json.loads((DOCS / "space" / "runs.json").read_text())["runs"]["tasks twist-column"]
+    moved = problem.with_geometry(np.array(record["positions"]), np.array(record["widths"]))
+    mask = unpack_mask(record["mask"], problem.lattice.beam_count)
+    evaluator = FrameEvaluator(moved, elements=8)
+    assert evaluator.evaluate(mask, VERIFICATION_INCREMENT).status is Status.CONVERGED
+    found = evaluator.output_motion()
+    turn = float(np.linalg.norm(found.rotation))
+    assert f"the plate turns by {turn:.1f} degrees by frames" in PAGE
+    assert f"by {record['objective_in_solid']:.1f} degrees in the solid" in PAGE
+    assert found.off_axis < 1e-6  # positions of the record are rounded
+
+
+@pytest.mark.slow
+def test_a_short_search_finds_a_column_that_turns(tmp_path: Path) -> None:
+    made = column_of_the_page()
     settings = read_settings({"steps": 300, "chains": 1, "seed": 0})
     folder = start_design(made.problem, settings, tmp_path / "run", made.part, refine=False)
     report = complete_design(folder)
     assert report is not None
     (figures,) = report.part_figures
-    assert figures["rotation_deg"] == pytest.approx(41.0, abs=0.5)
+    assert figures["rotation_deg"] > 24.0
     assert figures["off_axis"] < 1e-9
-    assert figures["strain"] == pytest.approx(0.04, abs=5e-3)
     assert figures["travel_mm"] == pytest.approx(3.0, abs=0.15)
     assert all(item.met for item in dict(report.items)["frames, 8 elements"])
     assert (folder.path / "motion.png").stat().st_size > 50_000
