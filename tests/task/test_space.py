@@ -338,7 +338,6 @@ def test_a_short_search_finds_a_column_that_turns(tmp_path: Path) -> None:
     (figures,) = report.part_figures
     assert figures["rotation_deg"] > 24.0
     assert figures["off_axis"] < 1e-9
-    assert figures["travel_mm"] == pytest.approx(3.0, abs=0.15)
     assert all(item.met for item in dict(report.items)["frames, 8 elements"])
     assert (folder.path / "motion.png").stat().st_size > 50_000
 
