@@ -23,9 +23,7 @@ Each run is added to ``docs/space/inverters.json``; runs that are in the record 
 from __future__ import annotations
 
 import argparse
-import json
 import time
-import warnings
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -34,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bellcrank.errors import InvalidSettings
 from bellcrank.fem.continuum.response import solve_mesh
 from bellcrank.fem.continuum.space_mesh import RoundStruts, stuffed, with_hubs
 from bellcrank.mechanics import VERIFICATION_INCREMENT
@@ -42,8 +41,9 @@ from bellcrank.search import SpecificationEvaluator, read_settings
 from bellcrank.task import task_from_dict
 from bellcrank.workflows import complete_design, start_design
 from bellcrank.workflows.refinement import BEFORE_REFINEMENT
-from reproduction.topology import LEAST, POISSON, pymoto
+from reproduction.topology import largest_motion, pymoto
 
+from .record import add_runs
 from .tasks import CORES, core_seconds
 
 if TYPE_CHECKING:
@@ -202,8 +202,9 @@ def optimised(box: Inverter, springs: tuple[float, float]) -> tuple[Values, floa
     points[numbers] = corners * step
     far = np.array([*(shape[:2] * step[:2]), 0.0])
     ports = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, box.size[2]], far])
-    held = [3 * np.flatnonzero(np.linalg.norm(points - far, axis=1) < PAD)[:, None] + np.arange(3)]
-    held += [3 * np.flatnonzero(points[:, axis] == 0.0)[:, None] + axis for axis in (0, 1)]
+    fixed = np.flatnonzero(np.linalg.norm(points - far, axis=1) < PAD)
+    sides = [3 * np.flatnonzero(points[:, axis] == 0.0) + axis for axis in (0, 1)]
+    held = np.unique(np.concatenate([(3 * fixed[:, None] + np.arange(3)).ravel(), *sides]))
     elements = np.stack(
         np.meshgrid(*(np.arange(count) for count in shape), indexing="ij"), axis=-1
     ).reshape(-1, 3)
@@ -214,39 +215,15 @@ def optimised(box: Inverter, springs: tuple[float, float]) -> tuple[Values, floa
     load, output = np.zeros(3 * domain.nnodes), np.zeros(3 * domain.nnodes)
     for vector, port, sign in ((load, ports[0], 1.0), (output, ports[1], -1.0)):
         vector[3 * int(np.linalg.norm(points - port, axis=1).argmin()) + 2] = sign
-    density = module.Signal("x", state=np.full(domain.nel, box.volume))
     began = time.thread_time()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # its solvers warn at each matrix conversion
-        with module.Network() as network:
-            chosen = module.SetValue(indices=solid, value=1.0)(density)
-            smooth = module.DensityFilter(domain, radius=box.radius)(chosen)
-            stiff = module.MathExpression(f"{LEAST} + {1.0 - LEAST}*inp0^3")(smooth)
-            matrix = module.AssembleStiffness(
-                domain, e_modulus=1.0, poisson_ratio=POISSON,
-                bc=np.unique(np.concatenate([each.ravel() for each in held])),
-                add_constant=_springs(load, output, springs),
-            )(stiff)  # fmt: skip
-            moved = module.LinSolve(symmetric=True, positive_definite=True)(
-                matrix, module.Signal("f", state=load)
-            )
-            reached = module.EinSum("i,i->")(moved, module.Signal("l", state=-output))
-            objective = module.Scaling(scaling=10.0)(reached)
-            used = module.EinSum("i->")(smooth)
-            limit = module.Scaling(scaling=10.0, maxval=box.volume * domain.nel)(used)
-        module.minimize_mma(density, [objective, limit], network, maxit=ITERATIONS, verbosity=0)
-    quarter = np.asarray(smooth.state)[order].reshape(box.elements)
+    smooth, _ = largest_motion(
+        domain, load, output, held, solid, np.zeros(0, np.int64), box.volume,
+        (0.25 * springs[0], 0.25 * springs[1]), box.radius, ITERATIONS,
+    )  # fmt: skip
+    quarter = smooth[order].reshape(box.elements)
     half = np.concatenate([quarter[::-1], quarter], axis=0)
     whole = np.concatenate([half[:, ::-1], half], axis=1)
     return whole, time.thread_time() - began
-
-
-def _springs(load: Values, output: Values, springs: tuple[float, float]) -> Any:
-    """Return the stiffness matrix of a quarter of the springs at input and output."""
-    from scipy.sparse import csr_matrix
-
-    vectors = [csr_matrix(vector) for vector in (load, output)]
-    return sum(0.25 * k * (v.T @ v) for k, v in zip(springs, vectors, strict=True))
 
 
 def judged(part: Part, body: Any) -> dict[str, Any]:
@@ -265,7 +242,13 @@ def judged(part: Part, body: Any) -> dict[str, Any]:
     used, numbers = np.unique(elements, return_inverse=True)
     vertices, elements = vertices[used], numbers.reshape(-1, 4)
     sides = vertices[elements][:, 1:] - vertices[elements][:, :1]
-    found = solve_mesh(part, with_hubs(part, vertices, elements, SIZE), "neo-hookean")
+    volume = round(float(np.abs(np.linalg.det(sides)).sum()) / 6.0, 1)
+    try:
+        mesh = with_hubs(part, vertices, elements, SIZE)
+    except InvalidSettings:
+        status = "input, output and supports are not connected"
+        return {"status": status, "gains": [None] * len(STROKES), "volume_mm3": volume}
+    found = solve_mesh(part, mesh, "neo-hookean")
     problem = part.design.problem
     loads = np.array([state.load for state in found.states])
     motion = np.array(
@@ -284,7 +267,7 @@ def judged(part: Part, body: Any) -> dict[str, Any]:
             round(float(gain), 4) if share <= loads[-1] else None
             for gain, share in zip(gains, at, strict=True)
         ],
-        "volume_mm3": round(float(np.abs(np.linalg.det(sides)).sum()) / 6.0, 1),
+        "volume_mm3": volume,
         "strain": round(max(state.strain for state in found.states), 4),
         "input_force_N": round(float(found.states[-1].input_force), 4),
         "elements": len(elements),
@@ -298,7 +281,7 @@ def by_densities(name: str, springs: tuple[float, float]) -> dict[str, Any]:
     values, seconds = optimised(box, springs)
     part = _part(box.task(name))
     body = at_volume(values, box.size, box.volume)
-    row = {"method": "densities", "springs": list(springs), "seconds": round(seconds, 1)}
+    row = {"commit": provenance()["commit"], "springs": list(springs), "seconds": round(seconds, 1)}
     return {**row, "level": round(body.level, 3), **judged(part, body)}
 
 
@@ -315,7 +298,7 @@ def by_lattice(name: str, seed: int) -> dict[str, Any]:
     design = report.selection.design
     part = task.part.of(design)
     return {
-        "method": "lattice",
+        "commit": provenance()["commit"],
         "seed": seed,
         "seconds": round(seconds, 1),
         "struts": int(design.mask.sum()),
@@ -360,9 +343,10 @@ def rows_of(rows: dict[str, dict[str, Any]]) -> list[str]:
     lines = []
     for name, row in sorted(rows.items()):
         gains = " | ".join("-" if gain is None else f"{gain:.2f}" for gain in row["gains"])
+        strain = f"{100.0 * row['strain']:.0f} %" if "strain" in row else "-"
         lines.append(
             f"| {name} | {gains} | {row['volume_mm3'] / 1000.0:.2f} "
-            f"| {100.0 * row['strain']:.0f} % | {row['seconds']:.0f} s |"
+            f"| {strain} | {row['seconds']:.0f} s |"
         )
     return lines
 
@@ -370,21 +354,9 @@ def rows_of(rows: dict[str, dict[str, Any]]) -> list[str]:
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="", help="beginning of the names of runs")
+    parser.add_argument("--only", default="", help="first words of the names of runs")
     given = parser.parse_args()
-    rows: dict[str, dict[str, Any]] = {}
-    if RECORD.exists():
-        rows = json.loads(RECORD.read_text(encoding="utf-8"))["runs"]
-    for name, job in runs().items():
-        if name in rows or not name.startswith(given.only):
-            continue
-        rows[name] = {"commit": provenance()["commit"], **job()}
-        RECORD.parent.mkdir(exist_ok=True)
-        data = {"provenance": provenance(), "runs": dict(sorted(rows.items()))}
-        RECORD.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-        print(
-            name, {key: rows[name][key] for key in ("gains", "volume_mm3", "seconds")}, flush=True
-        )
+    rows = add_runs(RECORD, runs(), given.only)
     for line in rows_of(rows):
         print(line)
 

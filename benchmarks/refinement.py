@@ -23,7 +23,6 @@ record are not repeated. Times are those of one core. ``--only mass`` makes one 
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from dataclasses import replace
 from functools import partial
@@ -44,7 +43,6 @@ from bellcrank.mechanics.frames.case import CHANNELS, CaseEvaluator, Channel
 from bellcrank.mechanics.frames.geometry import BeamSlopes, beam_slopes, geometry_slopes
 from bellcrank.model import Design, Item, gallery_design
 from bellcrank.part import PartSpec, models
-from bellcrank.provenance import provenance
 from bellcrank.refine import RefinementSettings, refine_design, specified
 from bellcrank.search import read_settings
 from bellcrank.task import find_task
@@ -54,6 +52,7 @@ from bellcrank.workflows.refiners import EVALUATIONS, sheet_of
 from bellcrank.workflows.specification import binding
 
 from .frames import diluted, octet
+from .record import add_runs
 from .tasks import CORES, core_seconds
 
 if TYPE_CHECKING:
@@ -334,19 +333,9 @@ def runs() -> dict[str, Callable[[], dict[str, Any]]]:
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="cost,mass,straight,straight-sheet,exact,path")
+    parser.add_argument("--only", default="", help="first words of the names of runs")
     given = parser.parse_args()
-    rows: dict[str, dict[str, Any]] = {}
-    if RECORD.exists():
-        rows = json.loads(RECORD.read_text(encoding="utf-8"))["runs"]
-    for name, job in runs().items():
-        if name in rows or name.split()[0] not in given.only.split(","):
-            continue
-        rows[name] = job()
-        RECORD.parent.mkdir(exist_ok=True)
-        data = {"provenance": provenance(), "runs": dict(sorted(rows.items()))}
-        RECORD.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-        print(name, rows[name], flush=True)
+    rows = add_runs(RECORD, runs(), given.only)
     for line in summary(rows):
         print(line)
 

@@ -6,14 +6,13 @@
 - ``cost``: the time of a step of a search on one core, against the number of beams.
 
 Each run is added to ``docs/space/runs.json`` as soon as it is done; runs that are in the record are
-not repeated. ``--only`` gives the beginnings of the names of runs, such as ``tasks`` or
+not repeated. ``--only`` gives the first words of the names of runs, such as ``tasks`` or
 ``tasks twist-column``.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +34,7 @@ from bellcrank.workflows.refinement import BEFORE_REFINEMENT
 from bellcrank.workflows.specification import binding, item_data
 
 from .frames import DESIGNS, PROPOSALS, diluted, octet, step_time
+from .record import add_runs
 from .tasks import CORES, core_seconds, tasks_in
 
 if TYPE_CHECKING:
@@ -216,19 +216,9 @@ def _percent(value: float | None) -> str:
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="tasks,cost")
+    parser.add_argument("--only", default="", help="first words of the names of runs")
     given = parser.parse_args()
-    rows: dict[str, dict[str, Any]] = {}
-    if RECORD.exists():
-        rows = json.loads(RECORD.read_text(encoding="utf-8"))["runs"]
-    for name, job in runs().items():
-        if name in rows or not name.startswith(tuple(given.only.split(","))):
-            continue
-        rows[name] = job()
-        RECORD.parent.mkdir(exist_ok=True)
-        data = {"provenance": provenance(), "runs": dict(sorted(rows.items()))}
-        RECORD.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-        print(name, {key: rows[name].get(key) for key in ("seconds", "objective", "met")})
+    rows = add_runs(RECORD, runs(), given.only)
     for line in (*task_rows(rows), *cost_rows(rows)):
         print(line)
 

@@ -95,9 +95,51 @@ def optimise(
     step = size / np.array([across, up])
     solid, empty = _passive(box, domain, step, (across, up))
     load, output, held = _ports(box, domain, step)
+    began = time.thread_time()
+    smooth, motion = largest_motion(
+        domain, load, output, held, solid, empty, volume, springs, radius, iterations, off_axis
+    )
+    return {
+        "density": smooth.reshape(up, across).round(4).tolist(),
+        "elements": [across, up],
+        "seconds": round(time.thread_time() - began, 2),
+        "springs": list(springs),
+        "output_over_input": float(output @ motion) / float(load @ motion),
+        "across_over_output": abs(float(_across(output) @ motion) / float(output @ motion)),
+    }
+
+
+def largest_motion(
+    domain: Any,
+    load: NDArray[np.float64],
+    output: NDArray[np.float64],
+    held: NDArray[np.int64],
+    solid: NDArray[np.int64],
+    empty: NDArray[np.int64],
+    volume: float,
+    springs: tuple[float, float],
+    radius: float,
+    iterations: int,
+    off_axis: float | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return filtered densities (e,) with a large output displacement, and displacements (n,).
+
+    Parameters
+    ----------
+    domain
+        Elements of pyMOTO, in the plane or in space.
+    load, output : (n,)
+        Unit load at the input, and mean output.
+    held : (h,)
+        Fixed degrees of freedom.
+    solid, empty
+        Numbers of the fixed solid and of the fixed void elements.
+    volume, springs, radius, iterations, off_axis
+        As for `optimise`; `off_axis` in the plane.
+    """
+    module = pymoto()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # its solvers warn at each matrix conversion
-        began = time.thread_time()
         density = module.Signal("x", state=np.full(domain.nel, volume))
         constant = _springs(load, output, springs)
         with module.Network() as network:
@@ -133,15 +175,7 @@ def optimise(
                 ]
         with contextlib.redirect_stdout(io.StringIO()):
             module.minimize_mma(density, responses, network, maxit=iterations, verbosity=0)
-    motion = np.asarray(moved.state)
-    return {
-        "density": np.asarray(smooth.state).reshape(up, across).round(4).tolist(),
-        "elements": [across, up],
-        "seconds": round(time.thread_time() - began, 2),
-        "springs": list(springs),
-        "output_over_input": -float(reached.state) / float(load @ motion),
-        "across_over_output": abs(float(_across(output) @ motion) / float(output @ motion)),
-    }
+    return np.asarray(smooth.state), np.asarray(moved.state)
 
 
 def _passive(

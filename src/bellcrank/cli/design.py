@@ -343,7 +343,7 @@ def _warn_of_second_model(report: DesignReport) -> None:
 def _print_report(report: DesignReport) -> None:
     """Print the results in a table, with warnings."""
     from bellcrank.workflows.refinement import refinement_text
-    from bellcrank.workflows.report import (
+    from bellcrank.workflows.report_tables import (
         figure_table,
         item_table,
         nearest_table,

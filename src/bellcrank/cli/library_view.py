@@ -146,7 +146,7 @@ def _designed_for(entry: Entry) -> str:
 
 def _part_rows(entry: Entry) -> list[tuple[str, str]]:
     """Return the figures of the part as rows; of springs, the efficiency alone."""
-    from bellcrank.workflows.report import figure_texts
+    from bellcrank.workflows.report_tables import figure_texts
 
     if not entry.figures:
         return [("  efficiency", _figure(entry.efficiency))]

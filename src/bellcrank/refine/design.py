@@ -117,7 +117,7 @@ def refine_design(
         Largest strain for a problem without a specification.
     sheet
         Function from a design to its channels in the sheet by load case, None where it is not
-        stable.
+        stable; in space to those of another model, such as one with imperfections.
 
     Raises
     ------

@@ -122,9 +122,8 @@ def on_same_path(first: Records, second: Records, departure: float = LARGEST_DEP
             if channel.name not in {"motion", "displacement", "rotation"}:
                 continue
             other = second[case].channels[channel]
-            size = max(float(np.abs(each).max(initial=0.0)) for each in (value, *inputs))
-            if channel.name == "rotation":
-                size = max(float(np.abs(value).max(initial=0.0)), LARGE_ROTATION)
+            scales = [LARGE_ROTATION] if channel.name == "rotation" else inputs
+            size = max(float(np.abs(each).max(initial=0.0)) for each in (value, *scales))
             if not float(np.abs(other - value).max()) <= departure * size:
                 return False
     return True

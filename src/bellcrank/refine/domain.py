@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from bellcrank.task.surfaces import Surface
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -13,8 +15,6 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-TILT = np.array([[1.0, -3.1e-5, -7.3e-5], [3.1e-5, 1.0, -4.7e-5], [7.3e-5, 4.7e-5, 1.0]])
-"""A small turn, so that no ray meets an edge of a regular surface."""
 FACES = 3
 """Largest number of faces that bound a point."""
 
@@ -106,8 +106,6 @@ def _from_surfaces(
     balls = np.column_stack([centre, radius])
     count = len(points)
     across, distance = np.zeros((count, FACES, 3)), np.empty((count, FACES))
-    face, inside = np.empty((count, FACES), dtype=np.int64), np.empty(count, dtype=bool)
-    find_nearest(
-        points, corners, balls, points @ TILT, corners @ TILT, reach, across, distance, face, inside
-    )
-    return across, face, inside
+    face = np.empty((count, FACES), dtype=np.int64)
+    find_nearest(points, corners, balls, reach, across, distance, face)
+    return across, face, Surface(corners).contains(points)

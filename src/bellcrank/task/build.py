@@ -265,12 +265,11 @@ class _Builder:
         In the plane, none at supports, inputs, outputs and loads. In space, where up to 12 beams
         meet in a node, none between two such nodes.
         """
-        in_space = self.lattice.dimension == 3
-        fixed = np.ones(self.lattice.beam_count, dtype=bool)
-        fixed[problem.designable] = False
+        in_space, beams = self.lattice.dimension == 3, self.lattice.beams
         if in_space:
-            ends = np.isin(self.lattice.beams, problem.special_nodes_of_all_cases)
-            fixed[:] = ends.all(axis=1)
+            fixed = np.isin(beams, problem.special_nodes_of_all_cases).all(axis=1)
+        else:
+            fixed = ~np.isin(np.arange(len(beams)), problem.designable)
         if self.table.domain.solid:
             regions = beams_in_space if in_space else in_regions
             fixed |= regions(self.table.domain.solid, self.lattice, self.part.scale, "domain.solid")

@@ -1,6 +1,6 @@
 """Bundled machines: plans made of library entries, struts and bundled parts, by name.
 
-The parts are designs of bundled tasks in space, as `bellcrank design` finds them.
+The parts are designs that `bellcrank design` has found for bundled tasks in space.
 
 Examples
 --------

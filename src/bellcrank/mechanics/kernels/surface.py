@@ -9,9 +9,6 @@ from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.contact import limited
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from bellcrank.mechanics.kernels.arrays import Floats, Ints
 
     Vector = tuple[float, float, float]
@@ -57,22 +54,6 @@ def nearest_shares(corners: Floats, k: int, points: Floats, i: int) -> tuple[flo
 
 
 @kernel
-def is_above(corners: Floats, k: int, points: Floats, i: int) -> bool:
-    """Whether a vertical ray upward from a point meets a triangle."""
-    x, y = points[i, 0] - corners[k, 0, 0], points[i, 1] - corners[k, 0, 1]
-    bx, by = corners[k, 1, 0] - corners[k, 0, 0], corners[k, 1, 1] - corners[k, 0, 1]
-    cx, cy = corners[k, 2, 0] - corners[k, 0, 0], corners[k, 2, 1] - corners[k, 0, 1]
-    size = bx * cy - cx * by
-    if size == 0.0:
-        return False
-    s, t = (x * cy - y * cx) / size, (y * bx - x * by) / size
-    if s < 0.0 or t < 0.0 or s + t > 1.0:
-        return False
-    height = s * (corners[k, 1, 2] - corners[k, 0, 2]) + t * (corners[k, 2, 2] - corners[k, 0, 2])
-    return corners[k, 0, 2] + height > points[i, 2]
-
-
-@kernel
 def insert(
     across: Floats, distance: Floats, face: Ints, i: int, vector: Vector, away: float, k: int
 ) -> None:
@@ -104,8 +85,8 @@ def insert(
 
 @entry
 def find_nearest(
-    points: Floats, corners: Floats, balls: Floats, turned: Floats, turned_corners: Floats,
-    reach: float, across: Floats, distance: Floats, face: Ints, inside: NDArray[np.bool_],
+    points: Floats, corners: Floats, balls: Floats, reach: float, across: Floats, distance: Floats,
+    face: Ints,
 ) -> None:  # fmt: skip
     """Fill the vectors from the nearest points of triangles to points.
 
@@ -116,26 +97,19 @@ def find_nearest(
         Corners of the triangles of closed surfaces.
     balls : (k, 4)
         Centre and radius of a ball around each triangle.
-    turned, turned_corners : (n, 3) and (k, 3, 3)
-        The same after a small turn, so that no ray meets an edge of a regular surface.
     reach
         Distance up to which all triangles count on which a perpendicular from the point ends.
         The nearest triangle counts anyway.
     across, distance, face : (n, m, 3), (n, m) and (n, m)
         Filled with the vectors, their lengths and the numbers of the triangles, in ascending order
         of the length; -1 is the number of none.
-    inside : (n,)
-        Filled with whether a ray from the point meets the surface an odd number of times.
     """
     for i in range(len(points)):
         nearest, least = -1, 1e300
-        inside[i] = False
         first = (0.0, 0.0, 0.0)
         for number in range(len(distance[i])):
             face[i, number] = -1
         for k in range(len(corners)):
-            if is_above(turned_corners, k, turned, i):
-                inside[i] = not inside[i]
             farthest = max(least, reach) + balls[k, 3]
             square = 0.0
             for axis in range(3):
