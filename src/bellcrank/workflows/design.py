@@ -44,7 +44,8 @@ from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows.figures import figures_of, model_record
 from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.refinement import refine_selection, refinement_data
-from bellcrank.workflows.report import RESULTS, DesignReport, write_report
+from bellcrank.workflows.report import RESULTS, DesignReport
+from bellcrank.workflows.report_tables import write_report
 from bellcrank.workflows.validation import Validation, replace_record, validate
 
 if TYPE_CHECKING:

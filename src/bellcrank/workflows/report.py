@@ -1,8 +1,7 @@
-"""Report of a design job: its figures, and the summary in the result folder."""
+"""Report of a design job: its figures, and the summary as plain data."""
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from dataclasses import dataclass, field
@@ -10,11 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.fem.results import finite
 from bellcrank.mechanics import model_name
-from bellcrank.model.storage import write_text
 from bellcrank.workflows.figures import model_words
 from bellcrank.workflows.refinement import refinement_data
 from bellcrank.workflows.refiners import second_model
-from bellcrank.workflows.report_tables import summary_text
 from bellcrank.workflows.specification import binding, item_data
 
 if TYPE_CHECKING:
@@ -26,7 +23,6 @@ if TYPE_CHECKING:
     from bellcrank.part import PartSpec
     from bellcrank.refine import Refinement
     from bellcrank.search import SearchSettings, Selection
-    from bellcrank.storage import RunFolder
     from bellcrank.workflows.validation import Validation
 
 
@@ -232,10 +228,3 @@ def _verification(report: DesignReport) -> dict[str, Any] | None:
         "principal_strain": finite(found.strain),
         "fault": found.fault,
     }
-
-
-def write_report(report: DesignReport, folder: RunFolder) -> None:
-    """Write ``summary.json`` and ``summary.md`` into the result folder."""
-    path = folder.path
-    write_text(path / "summary.json", json.dumps(summary_data(report), indent=1), overwrite=True)
-    write_text(path / "summary.md", summary_text(report), overwrite=True)

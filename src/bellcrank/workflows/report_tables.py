@@ -1,17 +1,21 @@
-"""Report of a design job as tables of texts, for the terminal and for ``summary.md``."""
+"""Report of a design job as tables of texts, and its files in the result folder."""
 
 from __future__ import annotations
 
+import json
 import math
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.mechanics import objective_name
+from bellcrank.model.storage import write_text
 from bellcrank.workflows.figures import figure_text, model_words
+from bellcrank.workflows.report import summary_data
 from bellcrank.workflows.specification import item_rows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from bellcrank.storage import RunFolder
     from bellcrank.workflows.report import DesignReport
 
 
@@ -174,3 +178,10 @@ def _markdown(rows: list[list[str]]) -> str:
     head, *body = (" | ".join(row) for row in rows)
     rule = "|---" * len(rows[0])
     return "\n".join([f"| {head} |", f"{rule}|", *(f"| {row} |" for row in body)]) + "\n\n"
+
+
+def write_report(report: DesignReport, folder: RunFolder) -> None:
+    """Write ``summary.json`` and ``summary.md`` into the result folder."""
+    path = folder.path
+    write_text(path / "summary.json", json.dumps(summary_data(report), indent=1), overwrite=True)
+    write_text(path / "summary.md", summary_text(report), overwrite=True)
