@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 RECORD = Path(__file__).parents[1] / "docs" / "space" / "inverters.json"
 STROKES = (0.01, 0.05, 0.1)
 """Strokes over the height of the box."""
-SPRINGS = ((0.01, 0.01), (0.1, 0.01), (0.1, 0.001))
+SPRINGS = ((0.1, 0.01), (1.0, 0.1), (1.0, 0.01))
 """Stiffness of the springs at input and output, Young's modulus times the edge of an element."""
 ITERATIONS = 100
 PAD = 2.5
@@ -119,7 +119,7 @@ class Inverter:
                         {
                             "at": {"point": [wide / 2, deep / 2, high - edge]},
                             "direction": "down",
-                            "gain": "maximise",
+                            "gain": {"maximise": True, "at_least": 1.0},
                         }
                     ],
                 }

@@ -37,6 +37,7 @@ from bellcrank.plots.scene import (
     of_one_height,
     outline_around,
     output_arrows,
+    output_displacements,
     spacing,
 )
 from bellcrank.plots.space import add_drawing_in_space, frame_in_space
@@ -297,6 +298,6 @@ def legend_entries(parts: list[Drawing]) -> list[tuple[str, Any]]:
     if any(len(path) for motion in motions for path in motion.wanted_paths):
         entries.append(("output, wanted path", strut_entry(style.WANTED, 3.2)))
     without = [part for part in parts if not part.motion.paths]
-    if any(part.displaced and displacement_arrows(part.motion) for part in without):
+    if any(part.displaced and len(output_displacements(part.motion)) for part in without):
         entries.append(("output, displacement", arrow_entry(style.OUTPUT)))
     return entries

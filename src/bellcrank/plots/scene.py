@@ -203,12 +203,19 @@ def _arrows_of(problem: Problem, region: Output, moved: NDArray[np.float64]) -> 
 
 
 def displacement_arrows(motion: Motion) -> list[Arrow]:
-    """Return the displacements of the output nodes as arrows, if they are visible."""
+    """Return the displacements of the output nodes in the plane as arrows, if they are visible."""
+    return [Arrow(_pair(a), _pair(b)) for a, b in output_displacements(motion)]
+
+
+def output_displacements(motion: Motion) -> NDArray[np.float64]:
+    """Return (n, 2, d) the positions of output nodes, at rest and displaced, if this is visible."""
     problem = motion.design.problem
     nodes = np.concatenate([output.nodes for output in problem.outputs.values()])
-    pairs = zip(problem.lattice.positions[nodes], motion.moved[nodes], strict=True)
-    least = 0.15 * spacing(problem)
-    return [Arrow(_pair(a), _pair(b)) for a, b in pairs if np.linalg.norm(b - a) > least]
+    ends = np.stack([problem.lattice.positions[nodes], motion.moved[nodes]], axis=1)
+    found: NDArray[np.float64] = ends[
+        np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > 0.15 * spacing(problem)
+    ]
+    return found
 
 
 def outline_around(points: NDArray[np.float64], radius: float) -> NDArray[np.float64]:

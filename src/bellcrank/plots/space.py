@@ -18,6 +18,7 @@ from bellcrank.plots.scene import (
     beam_kinds,
     extent,
     outline_around,
+    output_displacements,
     spacing,
     support_groups,
 )
@@ -117,6 +118,9 @@ def add_drawing_in_space(
         add_nodes(panel, view.screen(moved[nodes] if displaced else rest[nodes]), colour)
     add_arrows(panel, input_arrows(motion, view), style.INPUT, bold=True)
     add_arrows(panel, output_arrows(motion, view), style.WANTED, bold=True)
+    if displaced and not motion.paths:
+        arrows = [_projected(view, *ends) for ends in output_displacements(motion)]
+        add_arrows(panel, arrows, style.OUTPUT, level=5.5)
     if displaced:
         for path in motion.drawn_paths(wanted=True):
             add_path(panel, view.screen(path), style.WANTED, wanted=True)

@@ -7,6 +7,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bellcrank.export import Export, check_print
 from bellcrank.fem import FemSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, model_evaluator, objective_name
@@ -121,13 +123,21 @@ def card_of(
 
 
 def _part_table(bundle: Export, part: Part) -> Table:
-    outline = bundle.outline()
-    left, bottom, right, top = outline.bounds
-    volume = outline.area * bundle.thickness
+    if part.dimension == 3:
+        solid = bundle.solid()
+        wide, deep, high = np.ptp(solid.vertices, axis=0).tolist()
+        volume = solid.volume
+        struts = f"diameter {_widths(part)} mm"
+    else:
+        outline = bundle.outline()
+        left, bottom, right, top = outline.bounds
+        wide, deep, high = right - left, top - bottom, bundle.thickness
+        volume = outline.area * high
+        struts = f"{_widths(part)} mm wide, fillets {part.fillet_radius:.2f} mm"
     mass = volume * part.material.density / 1000.0
     rows = [
-        ("size", f"{right - left:.1f} x {top - bottom:.1f} x {bundle.thickness:.2f} mm"),
-        ("struts", f"{_widths(part)} mm wide, fillets {part.fillet_radius:.2f} mm"),
+        ("size", f"{wide:.1f} x {deep:.1f} x {high:.2f} mm"),
+        ("struts", struts),
         ("spacing", f"{part.scale:g} mm"),
         ("material", f"{part.material.name}, E {part.material.young:g} MPa"),
         ("volume", f"{volume / 1000.0:.2f} cm3"),

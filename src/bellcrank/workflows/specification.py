@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from bellcrank.part import PartSpec
     from bellcrank.task import ProblemUnits
 
+ROUNDING = 1e-9
+"""Size below which a number is written as 0: rounding of symmetric designs."""
+
 LABELS = {
     "off_axis": "off-axis motion", "path_error": "path error", "blocked_force": "blocked force",
     "input_force": "input force", "stable_stroke": "stable stroke",
@@ -68,6 +71,8 @@ def number_text(item: Item, value: float, units: ProblemUnits) -> str:
     number = 100.0 * value if unit == "%" else value
     if item.of != "spread":
         number = units.in_part(QUANTITIES[item.quantity].dimension, number)
+    if abs(number) < ROUNDING:
+        number = 0.0
     return f"{number:.3g} {unit}".rstrip()
 
 

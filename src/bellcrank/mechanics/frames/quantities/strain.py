@@ -60,8 +60,9 @@ def _strain_slopes(equilibrium: Equilibrium, measures: Measures) -> Slopes:
     moves = np.repeat(np.concatenate([moves, -moves]), count, axis=0)
     ends = equilibrium.ends(np.tile(beams, 4 * size))
     moved = [moved_state(state, moves[:, end]) for end, state in enumerate(ends)]
-    found = deformations(frame, np.tile(beams, 4 * size), *moved).reshape(2, 2 * size, count, -1)
-    rates = (found[0] - found[1]) / (2.0 * MOTION_STEP)
+    found = deformations(frame, np.tile(beams, 4 * size), *moved)
+    ahead, behind = found.reshape(2, 2 * size, count, found.shape[1])
+    rates = (ahead - behind) / (2.0 * MOTION_STEP)
     deformation = deformations(frame, beams, *equilibrium.ends(beams))
     slope = _slope_by_deformation(equilibrium, beams, deformation)
     by_ends = np.einsum("akd,kd->ka", rates, slope).reshape(count, 2, size)
