@@ -17,7 +17,7 @@ from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
 from bellcrank.refine.shape import volume_of
-from bellcrank.refine.state import State, is_better, latest_met, state_of
+from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
 
@@ -39,6 +39,9 @@ too."""
 RESERVES = {"mass": 2e-3, "payload": 0.2}
 """The same for the mass, that of all models (more than `MET`), and for the payload: near the
 largest one that a part carries, its motion is lost at once."""
+LOST_PAYLOAD = 3.0
+"""Factor of the payload of one element in each strut where better models lose their path under
+it."""
 SHEETS = 6
 """Largest number of geometries that are computed in the sheet: each load case takes up to a
 minute."""
@@ -192,6 +195,7 @@ class _Job:
         self.chosen = np.zeros(self.variables.count)
         self.path = self.tried = [self.chosen]
         self.stable = STABLE
+        self.payload = 1.0
         self.steps = self.evaluations = self.sheets = 0
         self.reason = "the response of the design is not stable"
         self.goes_on = True
@@ -214,11 +218,13 @@ class _Job:
             is_last = is_last or self.evaluations >= self.settings.evaluations
             if not state.items or not self.goes_on or (state.met and is_last):
                 return
-            if state.met or not state.is_stable:
+            if state.is_stable and not state.met:
+                self.payload, models = 1.0, self._models(vector, state.records)
+            elif loses_payload(state.items):
+                self.payload *= LOST_PAYLOAD
+            else:
                 # Eight elements lose their stability, or touch, before one element does.
                 stable = _stricter(stable)
-            else:
-                models = self._models(vector, state.records)
 
     def by_sheet(self, sheet: Sheet) -> None:
         """Refine until all items are met in the sheet too; keeps the best in the sheet.
@@ -246,11 +252,14 @@ class _Job:
         most = min(SHEETS, max(2, SHEET_CASES // len(self.design.problem.cases)))
         while self.goes_on and self.sheets < most and state.missed_in_sheet > 0.0:
             if state.is_on_path_of_sheet:
+                self.payload = 1.0
                 models = self._models(vector, state.records, state.sheet_records)
-            elif state.met or not state.is_stable:
-                stable = _stricter(stable)
-            else:
+            elif state.is_stable and not state.met:
                 models = (*self._models(vector, state.records), *models[1:])
+            elif loses_payload(state.items) or loses_payload(state.sheet):
+                self.payload *= LOST_PAYLOAD
+            else:
+                stable = _stricter(stable)
             found = self._refined(
                 vector, models, stable, SHEET_STEPS, 4 * SHEET_STEPS, by_sheet=True
             )
@@ -304,7 +313,7 @@ class _Job:
             State and vector of the last geometry that meets all with eight elements, and whether
             it is the last one of all. None if the response is not stable.
         """
-        items = [tightened(item, RESERVES.get(item.quantity, RESERVE)) for item in self.items]
+        items = [self._tightened(item) for item in self.items]
         rows = RowEvaluator(self.variables, self.design.mask, items, stable, models)
         left = replace(
             self.settings,
@@ -334,6 +343,13 @@ class _Job:
         state, number = latest_met(self.variables, self.design.mask, vectors)
         self.tried = vectors[: number + 1]
         return state, vectors[number], number == len(vectors) - 1
+
+    def _tightened(self, item: Item) -> Item:
+        """Return an item as the model of the refinement has to meet it."""
+        tight = tightened(item, RESERVES.get(item.quantity, RESERVE))
+        if item.quantity != "payload" or tight.at_least is None:
+            return tight
+        return replace(tight, at_least=self.payload * tight.at_least)
 
     def _is_ample(self, progress: Progress) -> bool:
         """Whether there is no objective, and the smallest margin is large."""

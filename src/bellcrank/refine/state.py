@@ -91,6 +91,11 @@ def _is_stable(items: tuple[ItemResult, ...]) -> bool:
     return bool(items) and not any(math.isnan(item.value) for item in items)
 
 
+def loses_payload(items: tuple[ItemResult, ...]) -> bool:
+    """Whether a path is lost under a payload."""
+    return any(each.item.quantity == "payload" and math.isnan(each.value) for each in items)
+
+
 def total_violation(items: tuple[ItemResult, ...]) -> float:
     """Return the sum of the violations of items; infinite without any."""
     return sum(item.violation for item in items) if items else math.inf
