@@ -5,9 +5,11 @@ from __future__ import annotations
 from itertools import combinations
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from matplotlib.transforms import Bbox
 
+from bellcrank.export import Export
 from bellcrank.model import find_problem, human_design
 from bellcrank.plots.card import card_figure
 from bellcrank.workflows import find_design, spec_for
@@ -61,7 +63,12 @@ def overlaps(boxes: list[tuple[str, Bbox]]) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(
-    "name", ["human:crane", pytest.param("human:pliers", marks=pytest.mark.slow)]
+    "name",
+    [
+        "human:crane",
+        pytest.param("human:pliers", marks=pytest.mark.slow),
+        pytest.param("machine:twist-column", marks=pytest.mark.slow),
+    ],
 )
 def test_nothing_on_a_card_overlaps_and_nothing_is_cut(name: str) -> None:
     design = find_design(name)
@@ -83,6 +90,19 @@ def test_nothing_on_a_card_overlaps_and_nothing_is_cut(name: str) -> None:
     for label, box in boxes:
         assert page.x0 <= box.x0 <= box.x1 <= page.x1, label
         assert page.y0 <= box.y0 <= box.y1 <= page.y1, label
+
+
+def test_a_card_in_space_has_the_size_and_volume_of_the_solid() -> None:
+    design = find_design("human:orthogonal")
+    spec = spec_for(design)
+    tables = dict(card_of(design, spec, []).tables)
+    part = dict(tables["Part"])
+    solid = Export(part=spec.of(design)).solid()
+    wide, deep, high = np.ptp(solid.vertices, axis=0)
+    assert part["size"] == f"{wide:.1f} x {deep:.1f} x {high:.2f} mm"
+    assert part["struts"] == "diameter 2 mm"
+    assert part["volume"] == f"{solid.volume / 1000.0:.2f} cm3"
+    assert dict(tables["Printing"])["warnings"] == "overhangs"
 
 
 def test_cards_are_refused_like_all_pictures(here: Path) -> None:

@@ -38,6 +38,9 @@ from .designs import straight_crane, unloaded_crane
 if TYPE_CHECKING:
     from bellcrank.refine.steps import Step
 
+ARC = "fffffd2342ac601f80148012006400873f80000e84001a000801a4d2b007a858203a0010590700"
+"""Beams that a search found for the task `arc`."""
+
 
 @pytest.fixture(scope="module")
 def refined() -> Design:
@@ -172,6 +175,20 @@ def test_an_optimiser_that_fails_leaves_the_last_good_design(
     worst = sum(item.violation for item in found.before.items)
     assert sum(item.violation for item in found.after.items) < worst
     assert found.improved
+
+
+@pytest.mark.slow
+def test_a_payload_that_only_one_element_carries_is_not_taken() -> None:
+    """The first geometry carries it by one element in each strut; by eight its path is lost."""
+    task = find_task("arc")
+    assert task is not None
+    beams = task.problem.lattice.beam_count
+    bits = np.unpackbits(np.frombuffer(bytes.fromhex(ARC), np.uint8))
+    design = Design(task.problem, bits[:beams].astype(bool))
+    found = refine_design(design, RefinementSettings(evaluations=600))
+    assert found.after.met
+    payload = next(each for each in found.after.items if each.item.quantity == "payload")
+    assert payload.value >= payload.item.at_least
 
 
 def test_a_design_that_cannot_be_improved_is_returned_as_it_is(

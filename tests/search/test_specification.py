@@ -23,7 +23,7 @@ from bellcrank.search import (
 )
 from bellcrank.search.choice import nondominated
 from bellcrank.search.stroke_states import fractions_of
-from bellcrank.task import find_task
+from bellcrank.task import find_task, task_from_dict
 from bellcrank.workflows.specification import results_for
 
 if TYPE_CHECKING:
@@ -256,3 +256,27 @@ def test_bounds_that_a_refinement_meets_are_relaxed_before_it(slider: Problem) -
     bound = SpecificationEvaluator(relaxed(problem))
     bound.evaluate(mask)
     assert searched.violations == pytest.approx(bound.violations)
+
+
+def test_flips_of_a_design_without_beams_are_predicted() -> None:
+    """In space all beams may leave, where the ports are single nodes."""
+    data = {
+        "name": "small",
+        "domain": {"size": [24, 24, 24], "cells": "cubic"},
+        "supports": [{"at": {"face": "bottom"}}],
+        "cases": [
+            {
+                "inputs": [
+                    {"at": {"point": [2, 2, 22]}, "direction": "down", "displacement": "1 mm"}
+                ],
+                "outputs": [{"at": {"point": [22, 22, 22]}, "direction": "up", "gain": "maximise"}],
+            }
+        ],
+    }
+    problem = task_from_dict(data).problem
+    evaluator = SpecificationEvaluator(problem)
+    none = np.zeros(problem.lattice.beam_count, dtype=bool)
+    assert evaluator.evaluate(none).is_admissible
+    found = evaluator.predict_flips(none)
+    assert found is not None
+    assert not found.change.any()
