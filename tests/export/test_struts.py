@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import lib3mf
 import meshio
 import numpy as np
@@ -22,9 +24,17 @@ from bellcrank.model import (
     find_problem,
     lattices,
 )
-from bellcrank.part import PartSpec
+from bellcrank.part import Part, PartSpec
+from bellcrank.workflows import find_design, spec_for
 from tests.export.reading import read_step, require_kernel
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bellcrank.export.solid import Solid
+
+IN_SPACE = ("twist-column", "straight-orthogonal", "three-jaws", "twister")
+"""Bundled parts and machines in space."""
 KINDS = {
     "octet": {"size": [3, 3, 3]},
     "cubic": {"size": [2, 2, 2]},
@@ -73,6 +83,53 @@ def test_a_finer_surface_is_nearer_to_the_volume() -> None:
     assert sides_of(1.0, 0.1) < sides_of(1.0, 0.01) < sides_of(1.0, 0.001)
 
 
+def closed_solid(part: Part) -> Solid:
+    """Return the solid of a part; it is watertight and has the loops of its graph.
+
+    It is also watertight as an STL file, from which equal vertices in single precision are joined.
+    """
+    solid = struts_solid(part)
+    mesh = trimesh.Trimesh(solid.vertices, solid.triangles, process=False)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(solid.volume)
+    _, joined = np.unique(solid.on_bed().vertices.astype(np.float32), axis=0, return_inverse=True)
+    assert trimesh.Trimesh(solid.vertices, joined[solid.triangles], process=False).is_watertight
+    nodes = len(np.unique(part.struts))
+    assert solid.euler_number == 2 * (nodes - len(part.struts))
+    return solid
+
+
+def mesh_in(path: Path) -> Any:
+    """Return the mesh in a 3MF file."""
+    model = lib3mf.get_wrapper().CreateModel()
+    model.QueryReader("3mf").ReadFromFile(str(path))
+    objects = model.GetMeshObjects()
+    assert objects.MoveNext()
+    return objects.GetCurrentMeshObject()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(f"machine:{name}" for name in IN_SPACE),
+        "human:orthogonal",
+        "human:space-anti-parallel",
+    ],
+)
+def test_bundled_designs_in_space_are_watertight_files(name: str, tmp_path) -> None:
+    design = find_design(name)
+    part = spec_for(design).of(design)
+    solid = closed_solid(part)
+    for suffix in ("stl", "3mf"):
+        export(Export(part=part), tmp_path / f"part.{suffix}")
+    stored = trimesh.load_mesh(tmp_path / "part.stl")
+    assert stored.is_watertight
+    assert stored.volume == pytest.approx(solid.volume, rel=1e-5)
+    found = mesh_in(tmp_path / "part.3mf")
+    assert found.IsManifoldAndOriented()
+    assert found.GetTriangleCount() == len(solid.triangles)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 25))]
@@ -82,12 +139,7 @@ def test_random_parts_are_closed_and_have_the_loops_of_their_graph(kind: str, se
     rng = np.random.default_rng(seed)
     mask = rng.random(lattice.beam_count) < rng.uniform(0.3, 0.9)
     part = PartSpec(width=1.6).of(design_of(lattice, mask))
-    solid = struts_solid(part)
-    mesh = trimesh.Trimesh(solid.vertices, solid.triangles, process=False)
-    assert mesh.is_watertight
-    assert mesh.volume == pytest.approx(solid.volume)
-    nodes = len(np.unique(part.struts))
-    assert solid.euler_number == 2 * (nodes - len(part.struts))
+    solid = closed_solid(part)
     low = part.positions[np.unique(part.struts)].min(axis=0)
     assert solid.vertices.min(axis=0) == pytest.approx(low - 0.8, abs=0.02)
 
@@ -117,11 +169,7 @@ def test_files_of_a_part_in_space(tmp_path) -> None:
     assert stored.is_watertight
     assert stored.volume == pytest.approx(solid.volume, rel=1e-5)
     export(bundle, tmp_path / "part.3mf")
-    model = lib3mf.get_wrapper().CreateModel()
-    model.QueryReader("3mf").ReadFromFile(str(tmp_path / "part.3mf"))
-    objects = model.GetMeshObjects()
-    assert objects.MoveNext()
-    found = objects.GetCurrentMeshObject()
+    found = mesh_in(tmp_path / "part.3mf")
     assert found.IsManifoldAndOriented()
     assert found.GetTriangleCount() == len(solid.triangles)
     export(bundle, tmp_path / "part.beams.3mf")

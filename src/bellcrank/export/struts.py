@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
 SLIVER = 1e-6
 """Volume, over the cube of the radius of the struts, below which a closed surface is left out."""
+GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
+"""Angle by which the prism of each strut is turned against the one before: prisms in the same
+position meet in points and edges, where readers of STL files join surfaces that only touch."""
+ATTEMPTS = 8
+"""Number of unions, each turned otherwise, until all vertices differ in single precision."""
 LEAST_SIDES = 12
 """Smallest number of sides of the prism of a strut."""
 
@@ -54,15 +59,24 @@ def struts_solid(part: Part, sagitta: float = SAGITTA) -> Solid:
     >>> struts_solid(PartSpec().of(problem.full_design())).euler_number
     -8
     """
-    import manifold3d
-
     if not 0.0 < sagitta < math.inf:
         raise InvalidSettings(f"sagitta: expected a length above 0 mm, got {sagitta!r}")
+    for attempt in range(ATTEMPTS):
+        solid = _union(part, sagitta, turned=float(attempt))
+        if _is_distinct(solid):
+            break
+    return solid
+
+
+def _union(part: Part, sagitta: float, turned: float) -> Solid:
+    """Return the union of struts and joints, whose first prism is turned by an angle."""
+    import manifold3d
+
     radii = 0.5 * part.widths
     ball = 0.5 * part.widest
     shapes = [
-        _strut(part.positions[first], part.positions[second], float(radius), sagitta)
-        for (first, second), radius in zip(part.struts, radii, strict=True)
+        _strut(part.positions[ends], float(radius), sagitta, turned + GOLDEN_ANGLE * number)
+        for number, (ends, radius) in enumerate(zip(part.struts, radii, strict=True))
     ]
     shapes += [
         _sphere(part.positions[node], float(ball[node]), sagitta) for node in np.flatnonzero(ball)
@@ -73,6 +87,12 @@ def struts_solid(part: Part, sagitta: float = SAGITTA) -> Solid:
     pieces = [piece for piece in whole.decompose() if piece.volume() > least]
     mesh = manifold3d.Manifold.compose(pieces).to_mesh64()
     return Solid(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))
+
+
+def _is_distinct(solid: Solid) -> bool:
+    """Whether all vertices differ in single precision, from which STL files are read."""
+    vertices = solid.on_bed().vertices.astype(np.float32)
+    return len(np.unique(vertices, axis=0)) == len(vertices)
 
 
 def sides_of(radius: float, sagitta: float) -> int:
@@ -89,21 +109,20 @@ def sides_of(radius: float, sagitta: float) -> int:
     return max(LEAST_SIDES, 4 * math.ceil(count / 4.0))
 
 
-def _strut(
-    first: NDArray[np.float64], second: NDArray[np.float64], radius: float, sagitta: float
-) -> Any:
-    """Return the prism of a strut."""
+def _strut(ends: NDArray[np.float64], radius: float, sagitta: float, turned: float) -> Any:
+    """Return the prism of a strut between two ends (2, 3), turned about its axis by an angle."""
     import manifold3d
 
     sides = sides_of(radius, sagitta)
     angle = 2.0 * math.pi / sides
     around = radius * math.sqrt(angle / math.sin(angle))
-    chord = second - first
+    first, chord = ends[0], ends[1] - ends[0]
     length = float(np.linalg.norm(chord))
     axis = chord / length
     up = np.array([0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
     side = np.cross(up, axis)
     side /= np.linalg.norm(side)
+    side = math.cos(turned) * side + math.sin(turned) * np.cross(axis, side)
     turn = np.column_stack([side, np.cross(axis, side), axis, first])
     return manifold3d.Manifold.cylinder(length, around, around, sides).transform(turn)
 
