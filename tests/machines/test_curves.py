@@ -26,7 +26,14 @@ from .test_two_port import actuator, unstable_actuator
 
 
 @pytest.mark.parametrize(
-    "name", ["human:crane", "machine:crane", "machine:anti-parallel", "machine:scaling-8"]
+    "name",
+    [
+        "human:crane",
+        "machine:crane",
+        "machine:anti-parallel",
+        "machine:scaling-8",
+        "human:orthogonal",
+    ],
 )
 def test_a_free_curve_is_that_of_the_responses(name: str) -> None:
     design = actuator(name)

@@ -12,7 +12,6 @@ from bellcrank.machines.curves import Load, PortCurve, trace
 from bellcrank.machines.ports import Port, mean_ports, ports_of
 from bellcrank.machines.two_port import TwoPort, two_port_at
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Status, model_evaluator, model_name
-from bellcrank.model import require_plane
 from bellcrank.provenance import provenance
 
 if TYPE_CHECKING:
@@ -111,8 +110,6 @@ def characterise(
     ------
     InvalidSettings
         If the design is a mechanism without resistance, or a load is impossible.
-    InvalidProblem
-        If the problem is in space.
 
     Examples
     --------
@@ -123,7 +120,6 @@ def characterise(
     >>> print(f"{lever.rest.efficiency:.3f} {lever.curves[0].efficiency[-1]:.3f}")
     0.818 1.010
     """
-    require_plane(design.problem, "characterisation")
     element = mean_ports(design, unloaded_beams)
     rest = two_port_at(element, element.rest())
     chosen = default_loads(rest) if loads is None else tuple(loads)
