@@ -146,7 +146,7 @@ def arrow_length(problem: Problem) -> float:
     """Return the length of the arrows at input and output, lattice units."""
     extents = np.ptp(problem.lattice.positions, axis=0)
     size = float(np.prod(extents) ** (1.0 / len(extents)))
-    return max(1.5 * spacing(problem), size / 9.0)
+    return max(min(1.5 * spacing(problem), size / 4.0), size / 9.0)
 
 
 def input_arrows(problem: Problem) -> list[Arrow]:

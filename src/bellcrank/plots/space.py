@@ -210,17 +210,27 @@ def input_arrows(motion: Motion, view: View) -> list[Arrow]:
 
 
 def output_arrows(motion: Motion, view: View) -> list[Arrow]:
-    """Return arrows that start at the outputs, beyond their displaced nodes."""
+    """Return arrows that start at the outputs, beyond their displaced nodes.
+
+    Those of several outputs that would point into the part, such as the jaws of a gripper, end at
+    the outputs.
+    """
     problem = motion.design.problem
+    positions = problem.lattice.positions
     length, gap = arrow_length(problem), 0.4 * spacing(problem)
+    centre = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
     arrows = []
     for output in problem.outputs.values():
         there = _places(output, motion.moved)
-        for (middle, direction, _, high), (gone, _, _, far) in zip(
-            _places(output, problem.lattice.positions), there, strict=True
+        for (middle, direction, low, high), (gone, _, _, far) in zip(
+            _places(output, positions), there, strict=True
         ):
-            reach = max(high, float((gone - middle) @ direction) + far)
-            tail = middle + (reach + gap) * direction
+            inward = float((centre - middle) @ direction) > length
+            if inward and len(problem.outputs) > 1:
+                tail = middle + (low - gap - length) * direction
+            else:
+                reach = max(high, float((gone - middle) @ direction) + far)
+                tail = middle + (reach + gap) * direction
             arrows.append(_projected(view, tail, tail + length * direction))
     return arrows
 
