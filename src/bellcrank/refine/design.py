@@ -17,7 +17,14 @@ from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
 from bellcrank.refine.shape import volume_of
-from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
+from bellcrank.refine.state import (
+    State,
+    is_better,
+    latest_met,
+    loses_payload,
+    state_of,
+    total_violation,
+)
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
 
@@ -51,6 +58,8 @@ REPAIR_REGION = 0.25
 """Trust regions of refinements that are corrected by the sheet, over those of others."""
 SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
+PROGRESS = 0.9
+"""Ratio of the violations by frames of two geometries above which the sheet is given up."""
 HALVINGS = 2
 """Number of times the path of a refinement that is not near the sheet is halved."""
 MET = 1e-3
@@ -248,7 +257,7 @@ class _Job:
         """Refine with the differences from the sheet until all items are met in it."""
         vector, state = self.chosen, self.best
         models: Models = (NO_DIFFERENCE,)
-        stable = self.stable
+        stable, missed = self.stable, math.inf
         most = min(SHEETS, max(2, SHEET_CASES // len(self.design.problem.cases)))
         while self.goes_on and self.sheets < most and state.missed_in_sheet > 0.0:
             if state.is_on_path_of_sheet:
@@ -267,7 +276,10 @@ class _Job:
                 return
             state, vector, _ = found
             if not state.met:
-                self.sheets += 1
+                # Frames and the sheet differ by more than both bounds of an item allow.
+                if total_violation(state.items) > PROGRESS * missed:
+                    return
+                self.sheets, missed = self.sheets + 1, total_violation(state.items)
             elif self.goes_on:
                 state = self._in_sheet(sheet, vector, state)
                 if state.rank_in_sheet < self.best.rank_in_sheet:

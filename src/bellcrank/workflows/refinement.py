@@ -38,6 +38,9 @@ BEFORE_REFINEMENT = {"steps": 8_000}
 FIRST = RefinementSettings(evaluations=FIRST_EVALUATIONS)
 """Settings of the first refinement of each design, without the sheet."""
 
+BATCHES = 2
+"""Largest number of times as many designs as there are chains are refined further."""
+
 
 def refine_selection(
     selection: Selection,
@@ -48,7 +51,8 @@ def refine_selection(
 ) -> tuple[Selection, Refinement | None]:
     """Refine designs of a search and select the best result.
 
-    All are refined for a few geometries, and the best results further, as many as there are chains.
+    All are refined for a few geometries, and the best results further, as many as there are chains;
+    as many again if all of those miss items in the sheet only.
 
     Parameters
     ----------
@@ -83,19 +87,21 @@ def refine_selection(
     if len(first) < len(designs):
         return selection, None
     order = sorted(range(len(first)), key=lambda number: _rank(first[number]), reverse=True)
-    order = order[:chains]
 
-    def report_further(number: int, progress: Progress) -> None:
-        before = first[order[number]]
-        evaluations = progress.evaluations + before.evaluations
-        report(order[number], replace(progress, evaluations=evaluations))
+    results: list[Refinement] = []
+    while len(results) < min(len(order), BATCHES * chains) and not _is_enough(results):
+        batch = order[len(results) : len(results) + chains]
 
-    designs = [first[number].design for number in order]
-    results = refine_designs(designs, spec, report_further, workers, stop)
-    if len(results) < len(designs):
-        return selection, None
-    finalists = [finalists[number] for number in order]
-    results = [_joined(first[number], each) for number, each in zip(order, results, strict=True)]
+        def report_further(index: int, progress: Progress, batch: list[int] = batch) -> None:
+            evaluations = progress.evaluations + first[batch[index]].evaluations
+            report(batch[index], replace(progress, evaluations=evaluations))
+
+        designs = [first[number].design for number in batch]
+        found = refine_designs(designs, spec, report_further, workers, stop)
+        if len(found) < len(batch):
+            return selection, None
+        results += [_joined(first[n], each) for n, each in zip(batch, found, strict=True)]
+    finalists = [finalists[number] for number in order[: len(results)]]
     best = max(range(len(results)), key=lambda number: _rank(results[number]))
     chosen = _verified(finalists[best], results[best].design)
     assert chosen.verification is not None
@@ -107,6 +113,17 @@ def refine_selection(
     ]
     near = nearest([_verified(finalist, design) for finalist, design in pairs])
     return _with_finalist(selection, chosen, near), results[best]
+
+
+def _is_enough(results: Sequence[Refinement]) -> bool:
+    """Whether no more designs are refined: unless all that meet the items miss some in the sheet.
+
+    In space, with imperfections.
+    """
+    met = [each for each in results if each.after.met]
+    if not met:
+        return bool(results)
+    return any(not each.sheets or each.after.met_in_sheet for each in met)
 
 
 def _rank(refinement: Refinement) -> tuple[bool, bool, float]:
