@@ -66,7 +66,7 @@ ITERATIONS = 100
 PAD = 2.5
 """Radius of the solid regions around ports, mm."""
 SEEDS = 2
-SIZE = 1.1
+SIZE = 1.4
 """Edge of the cubes of the grid of tetrahedra, mm."""
 
 
@@ -119,7 +119,10 @@ class Inverter:
                         {
                             "at": {"point": [wide / 2, deep / 2, high - edge]},
                             "direction": "down",
-                            "gain": {"maximise": True, "at_least": 1.0},
+                            "gain": [
+                                {"maximise": True, "at_least": 1.0},
+                                {"of": "spread", "at_most": 0.3, "from": 0},
+                            ],
                         }
                     ],
                 }
