@@ -1,0 +1,88 @@
+"""Which designs of a search are refined."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from bellcrank.mechanics import ItemResult
+from bellcrank.model import Design, Item
+from bellcrank.part import PartSpec
+from bellcrank.refine import Refinement
+from bellcrank.refine.state import State
+from bellcrank.search.selection import Candidate, Finalist, Selection
+from bellcrank.task import find_task
+from bellcrank.workflows import refinement
+from bellcrank.workflows.refinement import BATCHES, refine_selection
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+CHAINS = 2
+ITEM = Item(quantity="gain", case="case", output="output", at_least=1.0)
+GOOD, BAD = ItemResult(ITEM, 2.0, 0.0, 1.0), ItemResult(ITEM, 0.5, 0.5, -0.5)
+
+
+def selection() -> Selection:
+    """Return six copies of the full slider, three for each chain."""
+    task = find_task("slider")
+    assert task is not None
+    design: Any = Design(task.problem, task.problem.initial)
+    response: Any = SimpleNamespace(efficiency=1.0)
+    candidates = [Candidate(1.0, chain, 0, b"") for chain in (0, 1, 0, 1, 0, 1)]
+    others = tuple(Finalist(each, design, response) for each in candidates[1:])
+    return Selection(design, response, candidates[0], 1.0, 1.0, {}, others=others)
+
+
+@pytest.mark.parametrize(
+    ("frames", "sheet", "sheets", "batches", "best"),
+    [
+        ([True] * 4, [BAD, GOOD, BAD, BAD], 1, 1, 1),
+        ([True] * 4, [BAD, BAD, BAD, GOOD], 1, BATCHES, 3),
+        ([True] * 4, [BAD] * 4, 1, BATCHES, 0),
+        ([True] * 4, [None] * 4, 1, BATCHES, 0),
+        ([True] * 4, [None] * 4, 0, 1, 0),
+        ([False] * 4, [None] * 4, 0, 1, 0),
+        ([False, True, True, True], [None, BAD, GOOD, BAD], 1, BATCHES, 2),
+    ],
+    ids=["first", "second", "none", "unstable", "without a sheet", "infeasible", "one"],
+)
+def test_others_are_refined_if_the_best_miss_items_in_the_sheet_only(
+    monkeypatch: pytest.MonkeyPatch,
+    frames: list[bool],
+    sheet: list[ItemResult | None],
+    sheets: int,
+    batches: int,
+    best: int,
+) -> None:
+    given = selection()
+    state = State(1.0, (GOOD,), met=True)
+    plain = Refinement(given.design, state, state, 1, 1, 0, "500 geometries", improved=True)
+    further: list[Refinement] = []
+
+    def refine(designs: Sequence[Design], spec: PartSpec | None, *_: Any) -> list[Refinement]:
+        if spec is None:
+            return [plain] * len(designs)
+        found = []
+        for _ in designs:
+            number = len(further)
+            own = sheet[number]
+            after = replace(state, met=frames[number], sheet=() if own is None else (own,))
+            further.append(replace(plain, after=after, sheets=sheets, steps=number))
+            found.append(further[-1])
+        return found
+
+    monkeypatch.setattr(refinement, "refine_designs", refine)
+    verification: Any = SimpleNamespace(fault=None)
+    monkeypatch.setattr(
+        refinement,
+        "_verified",
+        lambda finalist, _design: replace(finalist, verification=verification),
+    )
+    _, chosen = refine_selection(given, PartSpec())
+    assert len(further) == CHAINS * batches
+    assert chosen is not None
+    assert chosen.after is further[best].after
