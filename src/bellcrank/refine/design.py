@@ -257,7 +257,7 @@ class _Job:
         """Refine with the differences from the sheet until all items are met in it."""
         vector, state = self.chosen, self.best
         models: Models = (NO_DIFFERENCE,)
-        stable, missed = self.stable, math.inf
+        stable, missed, earlier = self.stable, math.inf, False
         most = min(SHEETS, max(2, SHEET_CASES // len(self.design.problem.cases)))
         while self.goes_on and self.sheets < most and state.missed_in_sheet > 0.0:
             if state.is_on_path_of_sheet:
@@ -274,16 +274,29 @@ class _Job:
             )
             if found is None or not found[0].items:
                 return
-            state, vector, _ = found
+            state, refined, _ = found
+            is_same, vector = np.array_equal(refined, vector), refined
+            if is_same and not earlier:
+                # No step helps from here.
+                earlier = True
+                vector, state = self._earlier(sheet, vector, state)
+                self._keep_better(vector, state)
+                continue
             if not state.met:
                 # Frames and the sheet differ by more than both bounds of an item allow.
                 if total_violation(state.items) > PROGRESS * missed:
                     return
                 self.sheets, missed = self.sheets + 1, total_violation(state.items)
+            elif is_same:
+                return
             elif self.goes_on:
                 state = self._in_sheet(sheet, vector, state)
-                if state.rank_in_sheet < self.best.rank_in_sheet:
-                    self.best, self.chosen = state, vector
+                self._keep_better(vector, state)
+
+    def _keep_better(self, vector: NDArray[np.float64], state: State) -> None:
+        """Make a geometry the best one if it is nearer to meeting all items in the sheet."""
+        if state.met and state.rank_in_sheet < self.best.rank_in_sheet:
+            self.best, self.chosen = state, vector
 
     def _earlier(
         self, sheet: Sheet, vector: NDArray[np.float64], state: State

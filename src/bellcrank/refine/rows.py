@@ -329,26 +329,39 @@ class RowEvaluator:
             found = here.softest[name, index]
             values = {fraction: float(each.value[0]) for fraction, (_, each) in found.items()}
             known = references(values)
-            least = {each: factor * values[peak] for each, (peak, factor) in known.items()}
-            ratio = {each: value / least[each] for each, value in values.items()}
             # States that were soft in one geometry remain constraints in all others.
-            soft |= {each for each in ratio if ratio[each] < SOFT * self.stable}
-            near = [each for each in sorted(soft) if known[each][0] != each]
-            constraints.append(1.0 - np.array([ratio[each] for each in near]) / self.stable)
-            keys += [(index, round(1e6 * each)) for each in near]
+            soft |= {
+                each
+                for each, pairs in known.items()
+                for peak, factor in pairs
+                if values[each] < SOFT * self.stable * factor * values[peak]
+            }
+            # All references of a state are constraints: the largest one may be another one in the
+            # next geometry.
+            near = [
+                (each, peak, factor)
+                for each in sorted(soft)
+                for peak, factor in known[each]
+                if peak != each
+            ]
+            least = np.array([factor * values[peak] for _, peak, factor in near])
+            ratios = np.array([values[each] for each, *_ in near]) / least
+            constraints.append(1.0 - ratios / self.stable)
+            keys += [(index, *(round(1e6 * each) for each in row)) for row in near]
             if not slopes or not near:
                 continue
             rates, of_beams = {}, here.beam_slopes(self.mask)
-            for fraction in {*near, *(known[each][0] for each in near)}:
+            for fraction in {state for each, peak, _ in near for state in (each, peak)}:
                 equilibrium, measures = found[fraction]
                 slope = geometry_slopes(equilibrium, [(LOWEST_STIFFNESS, measures)], of_beams)
                 if slope is None:
                     return None
                 rates[fraction] = self.variables.gradient(*slope[0])[0]
-            for each in near:
-                peak, factor = known[each]
-                rate = rates[each] - ratio[each] * factor * rates[peak]
-                gradients.append(-rate[None] / (least[each] * self.stable))
+            for (each, peak, factor), ratio, size in zip(
+                near, ratios.tolist(), least.tolist(), strict=True
+            ):
+                rate = rates[each] - ratio * factor * rates[peak]
+                gradients.append(-rate[None] / (size * self.stable))
         rows = np.concatenate(constraints)
         names = ("stability",) * len(rows)
         return Rows(np.zeros(0), rows, names, tuple(keys), none, np.concatenate(gradients))

@@ -20,6 +20,8 @@ HALVINGS = 3
 """Number of times the distance of states about a soft one is halved."""
 DECLINE = 0.5
 """Part of the largest stiffness before a state with which it is compared where it only falls."""
+FAR = 0.5
+"""Reference over the lowest stiffness below which it is not compared with it."""
 SOFT = 2.0
 """Lowest stiffness over the smallest one up to which a local minimum is searched more closely."""
 
@@ -80,14 +82,14 @@ def _local_minima(values: dict[float, float]) -> list[float]:
     return [each for each, low in zip(fractions, is_low.tolist(), strict=True) if low]
 
 
-def references(values: Mapping[float, float]) -> dict[float, tuple[float, float]]:
+def references(values: Mapping[float, float]) -> dict[float, tuple[tuple[float, float], ...]]:
     """Return what the lowest stiffness at each fraction of the stroke is compared with.
 
-    In a valley, the largest one before or after it, whichever is smaller; a value counts as before
-    and after itself, so that values on a slope are not in a valley. Where a part of the largest
-    one before is more, that: a path that gets ever softer is near its end. Only values at equal
-    fractions are references: the others depend on where the local minima are, so that the largest
-    one of all would jump from one geometry to the next.
+    In a valley, the largest one before or a later one, whichever is smaller; a value counts as
+    before itself, so that values on a slope are not in a valley. And a part of the largest one
+    before: a path that gets ever softer is near its end. Only values at equal fractions are
+    references: the others depend on where the local minima are, so that the largest one of all
+    would jump from one geometry to the next.
 
     Parameters
     ----------
@@ -97,18 +99,22 @@ def references(values: Mapping[float, float]) -> dict[float, tuple[float, float]
     Returns
     -------
     dict
-        The fraction of the reference, and its factor: 1, or `DECLINE` for one before.
+        The fractions of the references, and their factors: 1, or `DECLINE`. Those that are far
+        smaller than the value itself are left out (`FAR`).
 
     Examples
     --------
-    >>> references({0.25: 5.0, 0.5: 1.0, 0.75: 3.0, 0.76: 3.5, 1.0: 0.5})
-    {0.25: (0.25, 1.0), 0.5: (0.75, 1.0), 0.75: (0.75, 1.0), 0.76: (0.76, 1.0), 1.0: (0.25, 0.5)}
+    >>> found = references({0.25: 5.0, 0.5: 1.0, 0.75: 3.0, 1.0: 0.4})
+    >>> found[0.5], found[0.75], found[1.0]
+    (((0.25, 0.5), (0.75, 1.0)), ((0.25, 0.5),), ((0.25, 0.5),))
     """
     equal = [each for each in sorted(values) if float(each * STABLE_STATES).is_integer()]
-    found = {}
+    found: dict[float, tuple[tuple[float, float], ...]] = {}
     for here in sorted(values):
         before = max((*(each for each in equal if each < here), here), key=values.__getitem__)
-        after = max((here, *(each for each in equal if each > here)), key=values.__getitem__)
-        choices = (min(before, after, key=values.__getitem__), 1.0), (before, DECLINE)
-        found[here] = max(choices, key=lambda each: each[1] * values[each[0]])
+        valleys = {min(before, each, key=values.__getitem__) for each in equal if each > here}
+        pairs = [(before, DECLINE), *((each, 1.0) for each in sorted(valleys))]
+        found[here] = tuple(
+            (peak, factor) for peak, factor in pairs if factor * values[peak] > FAR * values[here]
+        )
     return found
