@@ -14,9 +14,12 @@ from .designs import unloaded_crane
 
 
 def ratios(values: list[float]) -> list[float]:
-    """Return the values over their references."""
+    """Return the values over their largest reference, at most 1."""
     given = dict(enumerate(values))
-    return [given[k] / (factor * given[peak]) for k, (peak, factor) in references(given).items()]
+    return [
+        min([1.0, *(given[k] / (factor * given[peak]) for peak, factor in pairs)])
+        for k, pairs in references(given).items()
+    ]
 
 
 def test_a_valley_is_compared_with_the_lower_of_its_sides() -> None:
@@ -33,6 +36,12 @@ def test_a_path_that_gets_softer_is_compared_with_a_part_of_its_largest_stiffnes
 
 def test_a_path_that_gets_stiffer_is_free() -> None:
     assert ratios([1.0, 2.0, 9.0]) == pytest.approx([1.0, 1.0, 1.0])
+
+
+def test_each_later_state_is_a_reference() -> None:
+    """So that a step is refused by the model if it makes another one the largest."""
+    found = references(dict(enumerate([9.0, 1.0, 4.0, 5.0])))
+    assert found[1] == ((0, DECLINE), (2, 1.0), (3, 1.0))
 
 
 @pytest.mark.parametrize("decline", [DECLINE, 1.2])
