@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from bellcrank.errors import BellcrankError, InvalidProblem, InvalidSettings, UnknownName
 from bellcrank.fem import FemSettings
-from bellcrank.machines.characterisation import characterise
 from bellcrank.model import (
     Elasticity,
     Input,
@@ -25,7 +24,6 @@ from bellcrank.model import (
 )
 from bellcrank.part import Material, Part, PartSpec, frame_problem, materials, spring_problem
 from bellcrank.web.task_files import problem_of, read_task
-from bellcrank.workflows.card import make_card
 from bellcrank.workflows.fabricate import Grips
 from bellcrank.workflows.validation import validate
 
@@ -145,9 +143,7 @@ def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses(tmp_path) 
         lambda: spring_problem(design.problem),
         lambda: PartSpec().of(design).outline(),
         lambda: validate(design, PartSpec(), [("plane", FemSettings())]),
-        lambda: make_card(design, PartSpec(), tmp_path / "card.pdf"),
         lambda: Grips(plate=True).applied(PartSpec().of(design)),
-        lambda: characterise(design),
         lambda: problem_of(data),
         lambda: read_task((tmp_path / "tower.json").read_text(), ".json"),
     ):
