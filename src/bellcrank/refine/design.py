@@ -14,7 +14,7 @@ from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Item
 from bellcrank.refine.default_specification import specified
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
-from bellcrank.refine.refinement import RefinementSettings, refine_rows
+from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
 from bellcrank.refine.shape import volume_of
 from bellcrank.refine.state import (
@@ -225,7 +225,8 @@ class _Job:
                 self.best, self.chosen = state, vector
                 self.path, self.stable = path, stable
             is_last = is_last or self.evaluations >= self.settings.evaluations
-            if not state.items or not self.goes_on or (state.met and is_last):
+            is_edge = self.reason == UNSTABLE and self.evaluations < self.settings.evaluations
+            if not state.items or not self.goes_on or (state.met and is_last and not is_edge):
                 return
             if state.is_stable and not state.met:
                 self.payload, models = 1.0, self._models(vector, state.records)

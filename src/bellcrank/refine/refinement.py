@@ -65,6 +65,10 @@ class RefinementSettings:
     same_mass: bool = False
 
 
+UNSTABLE = "no step is stable"
+"""Reason for which a refinement ends where all further geometries lose the stability of a path."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Progress:
     """A state of a refinement.
@@ -152,6 +156,7 @@ class _Search:
             "no node may move and no width may change": not self.variables.count,
             f"{settings.steps} steps": self.step >= settings.steps,
             f"{settings.evaluations} geometries": self.evaluations >= settings.evaluations,
+            UNSTABLE: self.region < settings.smallest_region and self.refused > 0,
             "no step improves the design": self.region < settings.smallest_region,
             f"less than {settings.least_gain:g} gained in {past} steps": stalled,
         }
