@@ -62,13 +62,13 @@ def struts_solid(part: Part, sagitta: float = SAGITTA) -> Solid:
     if not 0.0 < sagitta < math.inf:
         raise InvalidSettings(f"sagitta: expected a length above 0 mm, got {sagitta!r}")
     for attempt in range(ATTEMPTS):
-        solid = _whole(part, sagitta, turned=float(attempt))
+        solid = _surface(part, sagitta, turned=float(attempt))
         if _is_distinct(solid):
             break
     return solid
 
 
-def _whole(part: Part, sagitta: float, turned: float) -> Solid:
+def _surface(part: Part, sagitta: float, turned: float) -> Solid:
     """Return the union of struts and joints, whose first prism is turned by an angle."""
     import manifold3d
 

@@ -65,8 +65,8 @@ class RefinementSettings:
     same_mass: bool = False
 
 
-UNSTABLE = "no step is stable"
-"""Reason for which a refinement ends where all further geometries lose the stability of a path."""
+UNSTABLE = "no step improves the design, and some lose the stability of a path"
+"""Reason for which a refinement ends at the edge of a stable region."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

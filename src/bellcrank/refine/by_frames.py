@@ -1,0 +1,197 @@
+"""Refinement of a design until frames with eight elements in each strut meet its specification."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.mechanics import VERIFICATION_INCREMENT, tightened
+from bellcrank.refine.differences import NO_DIFFERENCE, difference
+from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
+from bellcrank.refine.rows import STABLE, RowEvaluator
+from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
+from bellcrank.refine.variables import variables_of
+from bellcrank.search import SpecificationEvaluator
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Design, Item
+    from bellcrank.refine.differences import Difference, Records
+    from bellcrank.refine.refinement import Progress
+
+    Values = NDArray[np.float64]
+    Models = tuple[Difference, ...]
+
+RESERVE = 0.05
+"""Part of their size by which bounds are tightened, so that more elements and the sheet meet them
+too."""
+RESERVES = {"mass": 2e-3, "payload": 0.2}
+"""The same for the mass, that of all models (more than `MET`), and for the payload: near the
+largest one that a part carries, its motion is lost at once."""
+LOST_PAYLOAD = 3.0
+"""Factor of the payload of one element in each strut where better models lose their path under
+it."""
+REPAIR_REGION = 0.25
+"""Trust regions of refinements that are corrected by the sheet, over those of others."""
+MET = 1e-3
+"""Sum of violations at which they are."""
+AMPLE = 0.25
+"""Margin at which a specification without objectives is met: a part of the size of each bound.
+Larger margins by frames are lost in the sheet, since geometries with large margins by frames have
+large differences."""
+ROUNDS = 3
+"""Number of times a design is refined, each corrected by the result of the one before."""
+
+
+def stricter(stable: float) -> float:
+    """Return a larger bound of the lowest stiffness, over its reference; less than 1."""
+    return 0.5 * (1.0 + stable)
+
+
+class FrameRefinement:
+    """Refinements of one design, each corrected by the result of the one before.
+
+    Attributes
+    ----------
+    before, best
+        States of the given design, and of the best geometry.
+    chosen : (n,)
+        Variables of the best geometry.
+    path
+        Variables of the geometries that led to it.
+    stable
+        Bound of the lowest stiffness, over its reference, with which it was found.
+    payload
+        Factor of the payload that one element in each strut has to carry.
+    goes_on
+        Whether the refinement has not been stopped.
+    """
+
+    def __init__(
+        self,
+        design: Design,
+        settings: RefinementSettings,
+        report: Callable[[Progress], bool],
+    ) -> None:
+        self.design, self.settings, self.report = design, settings, report
+        problem = design.problem
+        assert problem.section is not None
+        assert problem.specification is not None
+        self.items = problem.specification.items
+        width = problem.section.width
+        bounds = (settings.narrowest * width, settings.widest * width)
+        self.variables = variables_of(design, settings.largest_move, bounds)
+        self.before = self.best = state_of(problem, design.mask)
+        self.chosen = np.zeros(self.variables.count)
+        self.path = self.tried = [self.chosen]
+        self.stable = STABLE
+        self.payload = 1.0
+        self.steps = self.evaluations = 0
+        self.reason = "the response of the design is not stable"
+        self.goes_on = True
+
+    def run(self) -> None:
+        """Refine until all items are met with eight elements."""
+        vector, stable = self.chosen, STABLE
+        path: list[Values] = []
+        models: Models = (NO_DIFFERENCE,)
+        for _ in range(ROUNDS):
+            least = self.settings.evaluations // 4
+            found = self.refined(vector, models, stable, self.settings.steps, least)
+            if found is None:
+                return
+            state, vector, is_last = found
+            path = [*path, *self.tried]
+            if is_better(state, self.best):
+                self.best, self.chosen = state, vector
+                self.path, self.stable = path, stable
+            is_last = is_last or self.evaluations >= self.settings.evaluations
+            is_edge = self.reason == UNSTABLE and self.evaluations < self.settings.evaluations
+            if not state.items or not self.goes_on or (state.met and is_last and not is_edge):
+                return
+            if state.is_stable and not state.met:
+                self.payload, models = 1.0, self.models(vector, state.records)
+            elif loses_payload(state.items):
+                self.payload *= LOST_PAYLOAD
+            else:
+                # Eight elements lose their stability, or touch, before one element does.
+                stable = stricter(stable)
+
+    def refined(
+        self,
+        vector: Values,
+        models: Models,
+        stable: float,
+        steps: int,
+        least: int,
+        *,
+        near: bool = False,
+    ) -> tuple[State, Values, bool] | None:
+        """Refine until all items are met in all given models.
+
+        With `near`, by small steps, and only until they are met.
+
+        Returns
+        -------
+        tuple of State, (n,) and bool, or None
+            State and vector of the last geometry that meets all with eight elements, and whether
+            it is the last one of all. None if the response is not stable.
+        """
+        items = [self._tightened(item) for item in self.items]
+        rows = RowEvaluator(self.variables, self.design.mask, items, stable, models)
+        left = replace(
+            self.settings,
+            steps=steps,
+            evaluations=max(least, self.settings.evaluations - self.evaluations),
+        )
+        if near:
+            # Differences of models hold near the geometry that they were computed for.
+            left = replace(
+                left,
+                first_region=REPAIR_REGION * left.first_region,
+                largest_region=REPAIR_REGION * left.largest_region,
+            )
+        path = []
+        for progress in refine_rows(rows, left, vector):
+            path.append(progress)
+            self.goes_on = self.report(progress)
+            is_met = progress.rows.violation < MET
+            if not self.goes_on or (is_met and (near or self._is_ample(progress))):
+                break
+        if not path:
+            return None
+        last = path[-1]
+        self.reason = last.reason or ("stopped" if not self.goes_on else "all items are met")
+        self.steps, self.evaluations = self.steps + last.step, self.evaluations + last.evaluations
+        vectors = [each.vector for each in path]
+        state, number = latest_met(self.variables, self.design.mask, vectors)
+        self.tried = vectors[: number + 1]
+        return state, vectors[number], number == len(vectors) - 1
+
+    def _tightened(self, item: Item) -> Item:
+        """Return an item as the model of the refinement has to meet it."""
+        tight = tightened(item, RESERVES.get(item.quantity, RESERVE))
+        if item.quantity != "payload" or tight.at_least is None:
+            return tight
+        return replace(tight, at_least=self.payload * tight.at_least)
+
+    def _is_ample(self, progress: Progress) -> bool:
+        """Whether there is no objective, and the smallest margin is large."""
+        wanted = self.design.problem.specification
+        assert wanted is not None
+        return not wanted.maximise and progress.rows.objective > AMPLE
+
+    def models(self, vector: Values, *better: Records) -> Models:
+        """Return the differences of better models from one element in each strut."""
+        evaluator = SpecificationEvaluator(self.variables.problem_at(vector))
+        if not evaluator.evaluate(self.design.mask, VERIFICATION_INCREMENT).is_admissible:
+            return (NO_DIFFERENCE,)
+        gaps = {
+            item.case: item.at_least or 0.0 for item in self.items if item.quantity == "clearance"
+        }
+        return tuple(difference(records, evaluator.records, gaps) for records in better)
