@@ -285,7 +285,7 @@ class SpringEvaluator:
         response = self.evaluate(mask)
         found = None
         if response.status in (Status.CONVERGED, Status.SNAPPED):
-            workspace = allocate_flip_workspace(self.system, self.structure, first_order=True)
+            workspace = allocate_flip_workspace(self.system, first_order=True)
             found = self._predict(mask, np.arange(len(self.system.beams)), workspace)
         if found is None:
             raise InvalidSettings(f"no sensitivity: {response.status.message}")
@@ -314,7 +314,7 @@ class SpringEvaluator:
         Raises
         ------
         InvalidSettings
-            If the dense inverse of the stiffness does not fit into the available memory.
+            If the inverse of the stiffness does not fit into the available memory.
 
         Examples
         --------
@@ -333,7 +333,7 @@ class SpringEvaluator:
         chosen = self.problem.designable if beams is None else np.asarray(beams, dtype=np.int64)
         if self._workspace is None:
             check_memory(self.problem, predict_flips=True)
-            self._workspace = allocate_flip_workspace(self.system, self.structure)
+            self._workspace = allocate_flip_workspace(self.system)
         return self._predict(mask, chosen, self._workspace)
 
     def _predict(
@@ -343,7 +343,7 @@ class SpringEvaluator:
 
         change, strain = np.zeros(len(beams)), np.zeros(len(beams))
         found = predict_flips(
-            self.system, self._checked(mask), self.core, beams, not len(workspace.inverse),
+            self.system, self._checked(mask), self.core, beams, not len(workspace.inverse.parent),
             self.structure, self.displacement, self.scratch, workspace, change, strain,
         )  # fmt: skip
         return FlipPrediction(beams, change, strain) if found else None
@@ -351,7 +351,7 @@ class SpringEvaluator:
     def inverse_blocks(
         self, rows: NDArray[np.int64], columns: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        """Return blocks of the inverse stiffness of the last flip prediction.
+        """Return blocks of the inverse stiffness of a flip prediction, directly after it.
 
         Parameters
         ----------
@@ -367,11 +367,14 @@ class SpringEvaluator:
         InvalidSettings
             If no flips were predicted yet.
         """
+        from bellcrank.mechanics.kernels.inverse import find_blocks
+
         if self._workspace is None:
             raise InvalidSettings("inverse_blocks: call predict_flips first")
-        low, high = np.minimum(rows, columns), np.maximum(rows, columns)
-        found = self._workspace.inverse[high, low].reshape(*low.shape, 2, 2)
-        # Diagonal blocks are symmetric to rounding; their lower triangle is used.
-        found[..., 0, 1] = np.where(low == high, found[..., 1, 0], found[..., 0, 1])
-        transposed = np.swapaxes(found, -1, -2)
-        return np.where((rows < columns)[..., None, None], transposed, found)
+        rows, columns = np.broadcast_arrays(rows, columns)
+        found = np.zeros((rows.size, 4))
+        find_blocks(
+            self.structure, self.scratch, self._workspace.inverse,
+            rows.flatten(), columns.flatten(), found,
+        )  # fmt: skip
+        return found.reshape(*rows.shape, 2, 2)

@@ -1,8 +1,8 @@
-"""Elimination order of the free nodes, and the capacity that their factor needs."""
+"""Elimination order of the free nodes, and the size of their factor."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -88,12 +88,21 @@ def elimination_order(beams: Ints, held: NDArray[np.bool_], *, springs: bool = T
     return block
 
 
-def factor_capacity(beams: Ints, block: Ints, *, springs: bool = True) -> int:
-    """Return an upper bound on the blocks below the diagonal of the factor of any design.
+class FactorSize(NamedTuple):
+    """Upper bounds on the factor of any design."""
+
+    entries: int
+    """Blocks below the diagonal."""
+    height: int
+    """Blocks on the longest path of the elimination tree."""
+
+
+def factor_size(beams: Ints, block: Ints, *, springs: bool = True) -> FactorSize:
+    """Return upper bounds on the size of the factor of any design.
 
     For each row of the factor, the nonzero entries are the columns on the paths from the entries
     of the pattern to the row in the elimination tree (Liu, SIAM J. Matrix Anal. Appl. 11, 134,
-    1990).
+    1990). The ancestors of a node in the tree of a design are ancestors in this tree, too.
 
     Parameters
     ----------
@@ -120,4 +129,41 @@ def factor_capacity(beams: Ints, block: Ints, *, springs: bool = True) -> int:
                 visited[column] = row
                 column = parent[column]
                 total += 1
-    return total
+    height = [0] * (len(parent) + 1)
+    for column in range(len(parent) - 1, -1, -1):
+        height[column] = height[parent[column]] + 1
+    return FactorSize(total, max(height))
+
+
+def near_blocks(beams: Ints, block: Ints) -> tuple[Ints, Ints]:
+    """List the free nodes at most three beams away from each free node.
+
+    Parameters
+    ----------
+    beams : (M, 2) int64
+    block : (N,) int64
+        Elimination index of each node, -1 for held nodes.
+
+    Returns
+    -------
+    start : (n + 1,) int64
+    near : (k,) int64
+        The blocks near block i with no smaller number are ``near[start[i]:start[i + 1]]``.
+
+    Examples
+    --------
+    >>> near_blocks(np.array([[0, 1], [1, 2]]), np.array([1, -1, 0]))
+    (array([0, 2, 3]), array([0, 1, 1]))
+    """
+    from scipy.sparse import csr_matrix, triu
+
+    count = len(block)
+    nodes = np.arange(count)
+    rows = np.concatenate([nodes, beams[:, 0], beams[:, 1]])
+    columns = np.concatenate([nodes, beams[:, 1], beams[:, 0]])
+    one_beam = csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    free = np.flatnonzero(block >= 0)
+    free = free[np.argsort(block[free])]
+    found = csr_matrix(triu((one_beam @ one_beam @ one_beam)[free][:, free]))
+    found.sort_indices()
+    return found.indptr.astype(np.int64), found.indices.astype(np.int64)

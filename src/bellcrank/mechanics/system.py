@@ -21,9 +21,9 @@ from bellcrank.mechanics.kernels.arrays import (
     System,
     Vectors,
 )
-from bellcrank.mechanics.kernels.cholesky import PANEL
 from bellcrank.mechanics.kernels.flip_prediction import RANK, FlipWorkspace
-from bellcrank.mechanics.ordering import elimination_order, factor_capacity
+from bellcrank.mechanics.kernels.inverse import Inverse
+from bellcrank.mechanics.ordering import elimination_order, factor_size, near_blocks
 from bellcrank.model import require_plane
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def allocate_structure(system: System) -> Structure:
         column_bits=np.zeros((blocks, width), np.uint64),
         word_start=np.zeros((blocks, width), np.int64),
         column_start=np.zeros(blocks + 1, np.int64),
-        row=np.zeros(factor_capacity(system.beams, system.block), np.int64),
+        row=np.zeros(factor_size(system.beams, system.block).entries, np.int64),
         sizes=np.zeros(5, np.int64),
     )
 
@@ -205,26 +205,42 @@ def _allocate_vectors(nodes: int) -> Vectors:
     )
 
 
-def allocate_flip_workspace(
-    system: System, structure: Structure, *, first_order: bool = False
-) -> FlipWorkspace:
+def allocate_flip_workspace(system: System, *, first_order: bool = False) -> FlipWorkspace:
     """Allocate working memory for flip prediction.
 
     Parameters
     ----------
     first_order
-        Leave out the dense inverse of the stiffness, which the sensitivity does not need.
+        Leave out the inverse of the stiffness, which the sensitivity does not need.
     """
-    blocks = 0 if first_order else len(structure.column_bits)
+    block = np.full_like(system.block, -1) if first_order else system.block
     return FlipWorkspace(
-        inverse=np.zeros((blocks, blocks, 4)),
-        panel=np.zeros((blocks, 2, 2 * PANEL)),
+        inverse=_allocate_inverse(system, block),
         anchored=np.zeros(len(system.positions), np.uint8),
         around=np.zeros(RANK, np.int64),
+        nodes=np.zeros(RANK, np.int64),
         ends=np.zeros((RANK, 2), np.int64),
+        entry=np.zeros((RANK, RANK), np.int64),
         vectors=np.zeros((RANK, 2)),
         change=np.zeros((RANK, RANK)),
         coupling=np.zeros((RANK, RANK)),
         matrix=np.zeros((RANK, RANK + 1)),
         force=np.zeros(RANK),
+    )
+
+
+def _allocate_inverse(system: System, block: Ints) -> Inverse:
+    """Allocate the inverse stiffness at the free nodes, those with a block."""
+    blocks = int(block.max(initial=-1)) + 1
+    near_start, near = near_blocks(system.beams, block)
+    return Inverse(
+        parent=np.full(blocks, -1),
+        level=np.zeros(blocks, np.int64),
+        half=np.zeros((blocks, factor_size(system.beams, block).height, 4)),
+        half_is_known=np.zeros(blocks, np.uint8),
+        column=np.zeros((blocks, 4)),
+        near_start=near_start,
+        near=near,
+        near_block=np.zeros((len(near), 4)),
+        near_is_known=np.zeros(len(near), np.uint8),
     )

@@ -84,9 +84,9 @@ def make_evaluator(
         If the problem needs more memory than is available, or the objective or a goal does not
         apply to it.
     """
-    # Only the spring model predicts flips by a dense inverse.
-    dense = settings.predicts_flips and problem.section is None
-    check_memory(problem, evaluators=len(settings.strokes), predict_flips=dense)
+    # Frames predict flips without additional memory.
+    inverse = settings.predicts_flips and problem.section is None
+    check_memory(problem, evaluators=len(settings.strokes), predict_flips=inverse)
     options = settings.objective, settings.unloaded_beams, elements
     if problem.is_specified:
         if settings.goals or settings.strokes != (1.0,):

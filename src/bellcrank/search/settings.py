@@ -52,7 +52,7 @@ class SearchSettings:
     name: ClassVar[str]
     """Name in the registry of searches."""
     predicts_flips: ClassVar[bool] = False
-    """Whether the search predicts all flips, which needs a dense inverse of the stiffness."""
+    """Whether the search predicts all flips, which needs parts of the inverse stiffness."""
 
     steps: int = 25_000
     chains: int = 2

@@ -22,7 +22,7 @@ from bellcrank.mechanics.frames.kernels.arrays import (
     State,
     Structure,
 )
-from bellcrank.mechanics.ordering import elimination_order, factor_capacity
+from bellcrank.mechanics.ordering import elimination_order, factor_size
 from bellcrank.mechanics.system import EFFICIENCY_TOLERANCE, incident_beams
 from bellcrank.model.stroke_ranges import WHOLE
 
@@ -58,7 +58,7 @@ def allocate_structure(frame: Frame) -> Structure:
         column_bits=np.zeros((blocks, width), np.uint64),
         word_start=np.zeros((blocks, width), np.int64),
         column_start=np.zeros(blocks + 1, np.int64),
-        row=np.zeros(factor_capacity(frame.beams, frame.block, springs=False), np.int64),
+        row=np.zeros(factor_size(frame.beams, frame.block, springs=False).entries, np.int64),
         sizes=np.zeros(2, np.int64),
     )
 

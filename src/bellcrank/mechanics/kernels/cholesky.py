@@ -15,15 +15,8 @@ from typing import TYPE_CHECKING
 from bellcrank.mechanics.kernels._compile import kernel
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from bellcrank.mechanics.kernels.arrays import Scratch, Structure
 
-    Panel = NDArray[np.float64]
-
-PANEL = 8
-"""Number of blocks of right-hand sides that are solved together."""
 SMALLEST_PIVOT = 1e-13
 """Pivot, relative to the diagonal, below which a stiffness counts as singular."""
 
@@ -125,74 +118,3 @@ def solve(structure: Structure, scratch: Scratch) -> None:
         b *= diagonal[column, 3]
         x[column, 1] = b
         x[column, 0] = (a - diagonal[column, 1] * b) * diagonal[column, 0]
-
-
-@kernel
-def set_unit_vectors(x: Panel, first: int, width: int) -> None:
-    """Fill the panel with the unit vectors of the blocks from `first` on."""
-    for column in range(first, len(x)):
-        for k in range(width):
-            x[column, 0, k] = 0.0
-            x[column, 1, k] = 0.0
-    for k in range(0, width, 2):
-        x[first + k // 2, 0, k] = 1.0
-        x[first + k // 2, 1, k + 1] = 1.0
-
-
-@kernel
-def solve_panel(structure: Structure, scratch: Scratch, x: Panel, first: int, width: int) -> None:
-    """Solve for the panel, whose rows before `first` are zero; rows from `first` on are valid."""
-    row, start = structure.row, structure.column_start
-    factor, diagonal = scratch.factor, scratch.factor_diagonal
-    for column in range(first, len(diagonal)):
-        d0, l10, d1 = diagonal[column, 0], diagonal[column, 1], diagonal[column, 3]
-        for k in range(width):
-            a = x[column, 0, k] * d0
-            x[column, 0, k] = a
-            x[column, 1, k] = (x[column, 1, k] - l10 * a) * d1
-        for t in range(start[column], start[column + 1]):
-            i = row[t]
-            f0, f1, f2, f3 = factor[t, 0], factor[t, 1], factor[t, 2], factor[t, 3]
-            for k in range(width):
-                x[i, 0, k] -= f0 * x[column, 0, k] + f1 * x[column, 1, k]
-                x[i, 1, k] -= f2 * x[column, 0, k] + f3 * x[column, 1, k]
-    for column in range(len(diagonal) - 1, first - 1, -1):
-        for t in range(start[column], start[column + 1]):
-            i = row[t]
-            f0, f1, f2, f3 = factor[t, 0], factor[t, 1], factor[t, 2], factor[t, 3]
-            for k in range(width):
-                x[column, 0, k] -= f0 * x[i, 0, k] + f2 * x[i, 1, k]
-                x[column, 1, k] -= f1 * x[i, 0, k] + f3 * x[i, 1, k]
-        d0, l10, d1 = diagonal[column, 0], diagonal[column, 1], diagonal[column, 3]
-        for k in range(width):
-            b = x[column, 1, k] * d1
-            x[column, 1, k] = b
-            x[column, 0, k] = (x[column, 0, k] - l10 * b) * d0
-
-
-@kernel
-def find_inverse(structure: Structure, scratch: Scratch, x: Panel, inverse: Panel) -> None:
-    """Fill the lower triangle of the inverse stiffness from the current factor.
-
-    By panels of unit vectors. Rows before the first column of a panel are skipped, since the
-    inverse is symmetric.
-
-    Parameters
-    ----------
-    x
-        (n, 2, 2 PANEL) working memory.
-    inverse
-        (n, n, 4) blocks of the inverse.
-    """
-    columns = len(x)
-    for first in range(0, columns, PANEL):
-        width = 2 * min(PANEL, columns - first)
-        set_unit_vectors(x, first, width)
-        solve_panel(structure, scratch, x, first, width)
-        for row in range(first, columns):
-            for k in range(0, width, 2):
-                column = first + k // 2
-                inverse[row, column, 0] = x[row, 0, k]
-                inverse[row, column, 1] = x[row, 0, k + 1]
-                inverse[row, column, 2] = x[row, 1, k]
-                inverse[row, column, 3] = x[row, 1, k + 1]

@@ -12,8 +12,9 @@ equilibrium is
 
     du = -(K + V C V')^-1 V h = -K^-1 V (I + C G)^-1 h,   G = V' K^-1 V.
 
-All flips share K^-1, of which G needs the blocks of the ends of those beams, and the adjoint
-a = K^-1 d(efficiency)/du; each flip costs a system of six equations. The effect of a change of
+All flips share K^-1, of which G needs the blocks of the ends of those beams, at most three beams
+apart (`bellcrank.mechanics.kernels.inverse`), and the adjoint a = K^-1 d(efficiency)/du; each flip
+costs a system of six equations. The effect of a change of
 torque on the stiffness of the neighbours is left out: with it, in rank ten, the predictions for
 the crane rank the flips no better (correlations equal to 0.002). The first-order change, the
 sensitivity, is -a.(V h).
@@ -28,9 +29,9 @@ from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.adjoint import find_anchored, neighbours_around, solve_adjoint
 from bellcrank.mechanics.kernels.arrays import ACTIVE
 from bellcrank.mechanics.kernels.bundle import Bundle
-from bellcrank.mechanics.kernels.cholesky import find_inverse
 from bellcrank.mechanics.kernels.energy import measure_beam
 from bellcrank.mechanics.kernels.fields import clear
+from bellcrank.mechanics.kernels.inverse import Inverse, forget, near_entry
 from bellcrank.mechanics.kernels.tangents import stiffness_is_definite
 
 if TYPE_CHECKING:
@@ -45,18 +46,19 @@ stress, instead of making the equations singular."""
 
 @dataclass(frozen=True, eq=False)
 class FlipWorkspace(Bundle):
-    """Working memory of `predict_flips`. n blocks, N nodes."""
+    """Working memory of `predict_flips`. N nodes."""
 
-    inverse: Floats
-    """(n, n, 4) lower triangle of the inverse stiffness, in blocks."""
-    panel: Floats
-    """(n, 2, 2 PANEL) right-hand sides and solutions."""
+    inverse: Inverse
     anchored: Bytes
     """(N,) nodes that are moved by the drive or connected to a support."""
     around: Ints
     """(RANK,) the beam that each column of V belongs to, -1 for none."""
+    nodes: Ints
+    """(RANK,) blocks of the end nodes of those beams, -1 for none and where a node is held."""
     ends: Ints
-    """(RANK, 2) blocks of its end nodes, -1 for one that does not move."""
+    """(RANK, 2) its end nodes, as numbers in `nodes`."""
+    entry: Ints
+    """(RANK, RANK) entry of the inverse between two of `nodes`, -1 where it is zero."""
     vectors: Floats
     """(RANK, 2) the columns of V, at the beam's second end; the negative at its first."""
     change: Floats
@@ -70,19 +72,32 @@ class FlipWorkspace(Bundle):
 
 
 @kernel
+def find_entries(structure: Structure, scratch: Scratch, space: FlipWorkspace) -> None:
+    """Find the blocks of the inverse between all nodes of the current flip."""
+    for p in range(RANK):
+        i = space.nodes[p]
+        for q in range(p + 1):
+            j = space.nodes[q]
+            entry = -1
+            if i >= 0 and j >= 0:
+                entry = near_entry(structure, scratch, space.inverse, min(i, j), max(i, j))
+            space.entry[p, q] = space.entry[q, p] = entry
+
+
+@kernel
 def add_coupling(space: FlipWorkspace, i: int, j: int, p: int, q: int, sign: float) -> float:
-    """Return the contribution of one end of each of two beams, as blocks, to v_p' K^-1 v_q."""
-    if i < 0 or j < 0:
+    """Return the contribution of node i of beam p and node j of beam q to v_p' K^-1 v_q."""
+    entry = space.entry[i, j]
+    if entry < 0:
         return 0.0
     px, py = space.vectors[p, 0], space.vectors[p, 1]
     qx, qy = space.vectors[q, 0], space.vectors[q, 1]
-    if i < j:
-        i, j = j, i
+    if space.nodes[i] > space.nodes[j]:
         px, qx = qx, px
         py, qy = qy, py
-    inverse = space.inverse
-    along = inverse[i, j, 0] * qx + inverse[i, j, 1] * qy
-    across = inverse[i, j, 2] * qx + inverse[i, j, 3] * qy
+    block = space.inverse.near_block
+    along = block[entry, 0] * qx + block[entry, 1] * qy
+    across = block[entry, 2] * qx + block[entry, 3] * qy
     return sign * (px * along + py * across)
 
 
@@ -110,13 +125,19 @@ def set_column(
     column: int,
     beam: int,
     directions: Floats,
+    flipped: int,
 ) -> None:
-    """Set a column of V to a gradient of `beam`."""
+    """Set a column of V to a gradient of `beam`, which is or shares a node with `flipped`."""
     space.around[column] = beam
     for end in range(2):
         node = system.beams[beam, end]
+        number = column
+        for known in range(2):
+            if node == system.beams[flipped, known]:
+                number = known
         moves = structure.active[node] == ACTIVE
-        space.ends[column, end] = system.block[node] if moves else -1
+        space.nodes[number] = system.block[node] if moves else -1
+        space.ends[column, end] = number
     space.vectors[column, 0] = directions[beam, 0]
     space.vectors[column, 1] = directions[beam, 1]
 
@@ -203,11 +224,12 @@ def find_change(
     for p in range(RANK):
         space.force[p] = 0.0
         space.around[p] = -1
+        space.nodes[p] = -1
     first, second = system.beams[beam, 0], system.beams[beam, 1]
     dead_end = not (space.anchored[first] and space.anchored[second])
     length = scratch.length[beam]
-    set_column(system, structure, space, 0, beam, scratch.axis)
-    set_column(system, structure, space, 1, beam, scratch.turn)
+    set_column(system, structure, space, 0, beam, scratch.axis, beam)
+    set_column(system, structure, space, 1, beam, scratch.turn, beam)
     torque = 0.0
     for end in range(2):
         node = system.beams[beam, end]
@@ -215,8 +237,8 @@ def find_change(
         if before < 0 or not space.anchored[node]:
             continue
         column = 2 + 2 * end
-        set_column(system, structure, space, column, before, scratch.turn)
-        set_column(system, structure, space, column + 1, after, scratch.turn)
+        set_column(system, structure, space, column, before, scratch.turn, beam)
+        set_column(system, structure, space, column + 1, after, scratch.turn, beam)
         if dead_end:
             weight = -sign * system.angle
             c, h = space.change, space.force
@@ -286,7 +308,7 @@ def predict_flips(
     adjoint = scratch.vectors.adjoint
     solve_adjoint(system, structure, u, adjoint, scratch)
     if not first_order:
-        find_inverse(structure, scratch, space.panel, space.inverse)
+        forget(structure, space.inverse)
     for beam in range(len(mask)):
         measure_beam(system, u, beam, scratch)
     find_anchored(system, structure, space.anchored)
@@ -302,6 +324,7 @@ def predict_flips(
         removed = -1.0 if first_order else -(1.0 - REMAINDER)
         find_change(system, structure, scratch, space, beam, removed if mask[beam] else 1.0)
         if not first_order:
+            find_entries(structure, scratch, space)
             find_coupling(space)
             if not solve_small(space):
                 continue
