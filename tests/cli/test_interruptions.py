@@ -171,7 +171,7 @@ def test_a_search_of_frames_stops_with_its_processes_and_resumes_to_the_same_end
     tmp_path: Path, number: signal.Signals
 ) -> None:
     folder, whole = tmp_path / "run", tmp_path / "whole"
-    words = ("scaling-8", "--steps", 1000, "--goal", "mass <= 0.9")
+    words = ("scaling-8", "--steps", 3000, "--goal", "mass <= 0.9")
     with job(folder, *words, "--out", folder, "--workers", 2, program=FRAMES) as running:
         wait_until(lambda: segments(folder) >= 2, running)
         os.kill(running.pid, number)

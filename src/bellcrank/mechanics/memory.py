@@ -45,7 +45,7 @@ def memory_needed(nodes: int, beams: int, *, predict_flips: bool = False) -> int
     Examples
     --------
     >>> print(f"{memory_needed(40_000, 119_000, predict_flips=True) / GIB:.1f} GiB")
-    4.1 GiB
+    5.5 GiB
     """
     needed = BYTES_PER_NODE * nodes + BYTES_PER_BEAM * beams + BYTES_OF_PATTERN * nodes**2
     needed += BYTES_PER_FACTOR_BLOCK * FACTOR_BLOCKS * nodes**1.5
