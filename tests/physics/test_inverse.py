@@ -41,6 +41,8 @@ def test_blocks_of_the_inverse(name: str, share: float) -> None:
         mask[problem.designable] &= rng.random(len(problem.designable)) < share
         if evaluator.evaluate(mask).is_admissible and evaluator.predict_flips(mask) is not None:
             break
+    else:
+        pytest.fail("no design has a stable response")
     count = len(evaluator.scratch.diagonal)
     everything = np.arange(count)
     blocks = evaluator.inverse_blocks(everything[:, None], everything)
@@ -50,9 +52,17 @@ def test_blocks_of_the_inverse(name: str, share: float) -> None:
 
 
 def test_blocks_need_a_prediction() -> None:
-    evaluator = SpringEvaluator(find_problem("crane"))
+    crane = find_problem("crane")
+    evaluator = SpringEvaluator(crane)
+    node = np.array([0])
     with pytest.raises(InvalidSettings, match="call predict_flips first"):
-        evaluator.inverse_blocks(np.array([0]), np.array([0]))
+        evaluator.inverse_blocks(node, node)
+    evaluator.evaluate(crane.initial)
+    evaluator.predict_flips(crane.initial)
+    assert np.isfinite(evaluator.inverse_blocks(node, node)).all()
+    evaluator.evaluate(crane.initial)
+    with pytest.raises(InvalidSettings, match="call predict_flips first"):
+        evaluator.inverse_blocks(node, node)
 
 
 def test_near_blocks_are_at_most_three_beams_away() -> None:

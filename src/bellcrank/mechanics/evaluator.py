@@ -159,6 +159,7 @@ class SpringEvaluator:
         self.reference: Reference = allocate_reference(self.system)
         self.displacement = np.zeros_like(self.system.positions)
         self._workspace: FlipWorkspace | None = None
+        self._factor_is_of_prediction = False
 
     def _checked(self, mask: ArrayLike) -> NDArray[np.uint8]:
         given = np.asarray(mask)
@@ -210,6 +211,7 @@ class SpringEvaluator:
     ) -> Response:
         from bellcrank.mechanics.kernels.response import respond
 
+        self._factor_is_of_prediction = False
         status, efficiency, energy = respond(
             self.system, self._checked(mask), core, self.reference, warm_start, lower_bound,
             largest_increment, self.structure, self.displacement, self.scratch,
@@ -346,6 +348,7 @@ class SpringEvaluator:
             self.system, self._checked(mask), self.core, beams, not len(workspace.inverse.parent),
             self.structure, self.displacement, self.scratch, workspace, change, strain,
         )  # fmt: skip
+        self._factor_is_of_prediction = found and workspace is self._workspace
         return FlipPrediction(beams, change, strain) if found else None
 
     def inverse_blocks(
@@ -365,11 +368,11 @@ class SpringEvaluator:
         Raises
         ------
         InvalidSettings
-            If no flips were predicted yet.
+            If the last call did not predict flips.
         """
         from bellcrank.mechanics.kernels.inverse import find_blocks
 
-        if self._workspace is None:
+        if self._workspace is None or not self._factor_is_of_prediction:
             raise InvalidSettings("inverse_blocks: call predict_flips first")
         rows, columns = np.broadcast_arrays(rows, columns)
         found = np.zeros((rows.size, 4))

@@ -27,7 +27,7 @@ BYTES_OF_PATTERN = 0.25
 BYTES_OF_INVERSE_PER_NODE = 850
 """Blocks of the inverse stiffness between neighbours, for the prediction of flips."""
 BYTES_PER_ANCESTOR = 32
-ANCESTORS, POWER = 1.9, 0.71
+HEIGHT, HEIGHT_POWER = 1.9, 0.71
 """Upper bound on the height of the elimination tree of triangular lattices of n nodes,
 1.9 n^0.71; measured from 64 nodes (32) to 40,000 (2,240)."""
 
@@ -51,7 +51,7 @@ def memory_needed(nodes: int, beams: int, *, predict_flips: bool = False) -> int
     needed += BYTES_PER_FACTOR_BLOCK * FACTOR_BLOCKS * nodes**1.5
     if predict_flips:
         needed += BYTES_OF_INVERSE_PER_NODE * nodes
-        needed += BYTES_PER_ANCESTOR * ANCESTORS * nodes ** (1.0 + POWER)
+        needed += BYTES_PER_ANCESTOR * HEIGHT * nodes ** (1.0 + HEIGHT_POWER)
     return int(needed)
 
 

@@ -13,6 +13,16 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.kernels.arrays import Ints
 
 
+def one_beam_apart(beams: Ints, count: int) -> csc_matrix:
+    """Return the (N, N) matrix with ones on the diagonal and where a beam joins two nodes."""
+    from scipy.sparse import csc_matrix
+
+    nodes = np.arange(count)
+    rows = np.concatenate([nodes, beams[:, 0], beams[:, 1]])
+    columns = np.concatenate([nodes, beams[:, 1], beams[:, 0]])
+    return csc_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+
+
 def coupled_nodes(beams: Ints, held: NDArray[np.bool_], *, springs: bool = True) -> csc_matrix:
     """Return the pattern of the nodes that share a beam or an angular spring in some design.
 
@@ -34,14 +44,8 @@ def coupled_nodes(beams: Ints, held: NDArray[np.bool_], *, springs: bool = True)
     """
     from scipy.sparse import csc_matrix
 
-    nodes, free = np.arange(len(held)), np.flatnonzero(~held)
-    index = np.full(len(held), -1)
-    index[free] = np.arange(len(free))
-    rows = np.concatenate([nodes, beams[:, 0], beams[:, 1]])
-    columns = index[np.concatenate([nodes, beams[:, 1], beams[:, 0]])]
-    free_entry = columns >= 0
-    entries = (np.ones(int(free_entry.sum())), (rows[free_entry], columns[free_entry]))
-    around = csc_matrix(entries, shape=(len(held), len(free)))
+    free = np.flatnonzero(~held)
+    around = one_beam_apart(beams, len(held))[:, free]
     pattern = csc_matrix(around.T @ around if springs else around[free])
     pattern.sum_duplicates()
     pattern.sort_indices()
@@ -129,7 +133,7 @@ def factor_size(beams: Ints, block: Ints, *, springs: bool = True) -> FactorSize
                 visited[column] = row
                 column = parent[column]
                 total += 1
-    height = [0] * (len(parent) + 1)
+    height = [0] * (len(parent) + 1)  # the last one is above the roots, whose parent is -1
     for column in range(len(parent) - 1, -1, -1):
         height[column] = height[parent[column]] + 1
     return FactorSize(total, max(height))
@@ -157,13 +161,9 @@ def near_blocks(beams: Ints, block: Ints) -> tuple[Ints, Ints]:
     """
     from scipy.sparse import csr_matrix, triu
 
-    count = len(block)
-    nodes = np.arange(count)
-    rows = np.concatenate([nodes, beams[:, 0], beams[:, 1]])
-    columns = np.concatenate([nodes, beams[:, 1], beams[:, 0]])
-    one_beam = csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
     free = np.flatnonzero(block >= 0)
     free = free[np.argsort(block[free])]
-    found = csr_matrix(triu((one_beam @ one_beam @ one_beam)[free][:, free]))
+    one_beam = one_beam_apart(beams, len(block))
+    found = csr_matrix(triu(one_beam[free] @ one_beam @ one_beam[:, free]))
     found.sort_indices()
     return found.indptr.astype(np.int64), found.indices.astype(np.int64)

@@ -31,7 +31,7 @@ from bellcrank.mechanics.kernels.arrays import ACTIVE
 from bellcrank.mechanics.kernels.bundle import Bundle
 from bellcrank.mechanics.kernels.energy import measure_beam
 from bellcrank.mechanics.kernels.fields import clear
-from bellcrank.mechanics.kernels.inverse import Inverse, forget, near_entry
+from bellcrank.mechanics.kernels.inverse import Inverse, near_index, reset
 from bellcrank.mechanics.kernels.tangents import stiffness_is_definite
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ class FlipWorkspace(Bundle):
     """(RANK,) blocks of the end nodes of those beams, -1 for none and where a node is held."""
     ends: Ints
     """(RANK, 2) its end nodes, as numbers in `nodes`."""
-    entry: Ints
-    """(RANK, RANK) entry of the inverse between two of `nodes`, -1 where it is zero."""
+    near: Ints
+    """(RANK, RANK) index in `inverse.near` of two of `nodes`, -1 where one of them is held."""
     vectors: Floats
     """(RANK, 2) the columns of V, at the beam's second end; the negative at its first."""
     change: Floats
@@ -72,23 +72,23 @@ class FlipWorkspace(Bundle):
 
 
 @kernel
-def find_entries(structure: Structure, scratch: Scratch, space: FlipWorkspace) -> None:
+def find_blocks_between(structure: Structure, scratch: Scratch, space: FlipWorkspace) -> None:
     """Find the blocks of the inverse between all nodes of the current flip."""
     for p in range(RANK):
         i = space.nodes[p]
         for q in range(p + 1):
             j = space.nodes[q]
-            entry = -1
+            index = -1
             if i >= 0 and j >= 0:
-                entry = near_entry(structure, scratch, space.inverse, min(i, j), max(i, j))
-            space.entry[p, q] = space.entry[q, p] = entry
+                index = near_index(structure, scratch, space.inverse, min(i, j), max(i, j))
+            space.near[p, q] = space.near[q, p] = index
 
 
 @kernel
 def add_coupling(space: FlipWorkspace, i: int, j: int, p: int, q: int, sign: float) -> float:
     """Return the contribution of node i of beam p and node j of beam q to v_p' K^-1 v_q."""
-    entry = space.entry[i, j]
-    if entry < 0:
+    index = space.near[i, j]
+    if index < 0:
         return 0.0
     px, py = space.vectors[p, 0], space.vectors[p, 1]
     qx, qy = space.vectors[q, 0], space.vectors[q, 1]
@@ -96,8 +96,8 @@ def add_coupling(space: FlipWorkspace, i: int, j: int, p: int, q: int, sign: flo
         px, qx = qx, px
         py, qy = qy, py
     block = space.inverse.near_block
-    along = block[entry, 0] * qx + block[entry, 1] * qy
-    across = block[entry, 2] * qx + block[entry, 3] * qy
+    along = block[index, 0] * qx + block[index, 1] * qy
+    across = block[index, 2] * qx + block[index, 3] * qy
     return sign * (px * along + py * across)
 
 
@@ -308,7 +308,7 @@ def predict_flips(
     adjoint = scratch.vectors.adjoint
     solve_adjoint(system, structure, u, adjoint, scratch)
     if not first_order:
-        forget(structure, space.inverse)
+        reset(structure, space.inverse)
     for beam in range(len(mask)):
         measure_beam(system, u, beam, scratch)
     find_anchored(system, structure, space.anchored)
@@ -324,7 +324,7 @@ def predict_flips(
         removed = -1.0 if first_order else -(1.0 - REMAINDER)
         find_change(system, structure, scratch, space, beam, removed if mask[beam] else 1.0)
         if not first_order:
-            find_entries(structure, scratch, space)
+            find_blocks_between(structure, scratch, space)
             find_coupling(space)
             if not solve_small(space):
                 continue

@@ -1,10 +1,10 @@
 """Blocks of the inverse stiffness, each from the factor alone.
 
 With K = L L', block (i, j) of the inverse is H_i' H_j, where H_i are the columns of L^-1 that
-belong to node i. They vanish except at the node and its ancestors in the elimination tree, of
-which there are some tens among hundreds of nodes (Liu, SIAM J. Matrix Anal. Appl. 11, 134, 1990),
-and H_i and H_j share the ancestors of both. Time and memory of all blocks between neighbours
-therefore grow with n^1.5 in the plane, those of the whole inverse with n^2.
+belong to node i. They vanish except at the node and its ancestors in the elimination tree (Liu,
+SIAM J. Matrix Anal. Appl. 11, 134, 1990), so that only the ancestors of both nodes contribute. On
+triangular lattices of n nodes the number of ancestors grows with n^0.71
+(`bellcrank.mechanics.memory`), the memory with n^1.71; a dense inverse needs n^2.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ class Inverse(Bundle):
     """(n,) parent of each block in the elimination tree, -1 for a root."""
     level: Ints
     """(n,) number of its ancestors."""
-    half: Floats
+    columns: Floats
     """(n, h, 4) columns of L^-1: the blocks at the ancestors of a node, by level."""
-    half_is_known: Bytes
+    columns_are_known: Bytes
     """(n,)"""
-    column: Floats
-    """(n, 4) zeros between two calls."""
+    work: Floats
+    """(n, 4) memory, zero between two calls."""
     near_start: Ints
     """(n + 1,) index in `near` at which the blocks near each block begin."""
     near: Ints
@@ -44,11 +44,11 @@ class Inverse(Bundle):
 
 
 @kernel
-def forget(structure: Structure, inverse: Inverse) -> None:
-    """Begin with a new factor: find the elimination tree."""
+def reset(structure: Structure, inverse: Inverse) -> None:
+    """Find the elimination tree of a new factor, and mark all parts of the inverse as unknown."""
     start = structure.column_start
     for column in range(len(inverse.parent) - 1, -1, -1):
-        inverse.half_is_known[column] = 0
+        inverse.columns_are_known[column] = 0
         if start[column] < start[column + 1]:
             parent = structure.row[start[column]]
             inverse.parent[column] = parent
@@ -61,9 +61,9 @@ def forget(structure: Structure, inverse: Inverse) -> None:
 
 
 @kernel
-def find_half(structure: Structure, scratch: Scratch, inverse: Inverse, node: int) -> None:
+def find_columns(structure: Structure, scratch: Scratch, inverse: Inverse, node: int) -> None:
     """Compute the columns of L^-1 that belong to a node."""
-    x, row = inverse.column, structure.row
+    x, row = inverse.work, structure.row
     factor, diagonal = scratch.factor, scratch.factor_diagonal
     x[node, 0] = x[node, 3] = 1.0
     column = node
@@ -73,8 +73,8 @@ def find_half(structure: Structure, scratch: Scratch, inverse: Inverse, node: in
         c = (x[column, 2] - corner * a) * second
         d = (x[column, 3] - corner * b) * second
         level = inverse.level[column]
-        inverse.half[node, level, 0], inverse.half[node, level, 1] = a, b
-        inverse.half[node, level, 2], inverse.half[node, level, 3] = c, d
+        inverse.columns[node, level, 0], inverse.columns[node, level, 1] = a, b
+        inverse.columns[node, level, 2], inverse.columns[node, level, 3] = c, d
         for k in range(4):
             x[column, k] = 0.0
         for t in range(structure.column_start[column], structure.column_start[column + 1]):
@@ -85,7 +85,7 @@ def find_half(structure: Structure, scratch: Scratch, inverse: Inverse, node: in
             x[i, 2] -= f2 * a + f3 * c
             x[i, 3] -= f2 * b + f3 * d
         column = inverse.parent[column]
-    inverse.half_is_known[node] = 1
+    inverse.columns_are_known[node] = 1
 
 
 @kernel
@@ -93,10 +93,10 @@ def find_block(
     structure: Structure, scratch: Scratch, inverse: Inverse, row: int, column: int, out: Floats
 ) -> None:
     """Compute a block of the inverse."""
-    if not inverse.half_is_known[row]:
-        find_half(structure, scratch, inverse, row)
-    if not inverse.half_is_known[column]:
-        find_half(structure, scratch, inverse, column)
+    if not inverse.columns_are_known[row]:
+        find_columns(structure, scratch, inverse, row)
+    if not inverse.columns_are_known[column]:
+        find_columns(structure, scratch, inverse, column)
     # A parent has a larger number than its children.
     first, second = row, column
     while first != second and first >= 0 and second >= 0:
@@ -105,7 +105,7 @@ def find_block(
         else:
             second = inverse.parent[second]
     shared = inverse.level[first] + 1 if first == second else 0
-    left, right = inverse.half[row], inverse.half[column]
+    left, right = inverse.columns[row], inverse.columns[column]
     a = b = c = d = 0.0
     for k in range(shared):
         a += left[k, 0] * right[k, 0] + left[k, 2] * right[k, 2]
@@ -116,17 +116,17 @@ def find_block(
 
 
 @kernel
-def near_entry(
+def near_index(
     structure: Structure, scratch: Scratch, inverse: Inverse, first: int, second: int
 ) -> int:
-    """Return the entry of the block of two near nodes, the first with the smaller number."""
-    entry = inverse.near_start[first]
-    while inverse.near[entry] != second:
-        entry += 1
-    if not inverse.near_is_known[entry]:
-        find_block(structure, scratch, inverse, first, second, inverse.near_block[entry])
-        inverse.near_is_known[entry] = 1
-    return entry
+    """Return the index in `near` of two near blocks, of which `first` is no larger; compute it."""
+    index = inverse.near_start[first]
+    while inverse.near[index] != second:
+        index += 1
+    if not inverse.near_is_known[index]:
+        find_block(structure, scratch, inverse, first, second, inverse.near_block[index])
+        inverse.near_is_known[index] = 1
+    return index
 
 
 @entry
