@@ -3,8 +3,8 @@
 With K = L L', block (i, j) of the inverse is H_i' H_j, where H_i are the columns of L^-1 that
 belong to node i. They vanish except at the node and its ancestors in the elimination tree (Liu,
 SIAM J. Matrix Anal. Appl. 11, 134, 1990), so that only the ancestors of both nodes contribute. On
-triangular lattices of n nodes the number of ancestors grows with n^0.71
-(`bellcrank.mechanics.memory`), the memory with n^1.71; a dense inverse needs n^2.
+triangular lattices of n nodes these are at most about 1.9 n^0.71 (`bellcrank.mechanics.memory`), so
+that the memory grows no faster than n^1.71; a dense inverse needs n^2.
 """
 
 from __future__ import annotations
