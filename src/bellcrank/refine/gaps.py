@@ -75,42 +75,49 @@ def gaps_of(
     near = gap < reach
     near[crossing, 1:] = False
     pair, which = np.nonzero(near)
+    size = size[pair, which]
+    normal = across[pair, which] / np.where(size > 0.0, size, np.inf)[:, None]
+    motion = weights[pair, which][:, :, None] * normal[:, None]
+    point, row = pieces[pairs[pair]].reshape(-1, 4), np.arange(len(pair))[:, None]
+    at_node, rows = point < nodes, np.broadcast_to(row, point.shape)
     fields = np.zeros((len(pair), nodes, 3 * (dimension - 1)))
+    np.add.at(fields[..., :dimension], (rows[at_node], point[at_node]), motion[at_node])
+    if not at_node.all():
+        bent = beams[point[~at_node] - nodes]
+        _add_middles(problem, u, bent, motion[~at_node], rows[~at_node], fields)
     widths = np.zeros((len(pair), problem.lattice.beam_count))
-    for row, (index, number) in enumerate(zip(pair.tolist(), which.tolist(), strict=True)):
-        widths[row, beams[strut[index]]] = -0.5
-        if size[index, number] == 0.0:
-            continue
-        normal = across[index, number] / size[index, number]
-        ends_of_pair = pieces[pairs[index]].ravel().tolist()
-        for point, weight in zip(ends_of_pair, weights[index, number].tolist(), strict=True):
-            if point < nodes:
-                fields[row, point, :dimension] += weight * normal
-            else:
-                _add_middle(problem, u, int(beams[point - nodes]), weight * normal, fields[row])
-    keys = np.column_stack([pairs[pair], which])
-    return Gaps(keys, gap[pair, which], fields, widths)
+    widths[row, beams[strut[pair]]] = -0.5
+    return Gaps(np.column_stack([pairs[pair], which]), gap[pair, which], fields, widths)
 
 
-def _add_middle(
+def _add_middles(
     problem: Problem,
     u: NDArray[np.float64],
-    beam: int,
-    vector: NDArray[np.float64],
-    field: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    vectors: NDArray[np.float64],
+    rows: NDArray[np.int64],
+    fields: NDArray[np.float64],
 ) -> None:
-    """Add the derivatives of the motion of the middle of a bent strut along a vector."""
-    first, second = problem.lattice.beams[beam].tolist()
-    positions = problem.lattice.positions
-    chord = positions[second] + u[second, :2] - positions[first] - u[first, :2]
+    """Add the derivatives of the motions of the middles of bent struts along vectors.
+
+    Parameters
+    ----------
+    beams : (n,) int64
+        The struts.
+    vectors : (n, 2) float64
+    rows : (n,) int64
+        Rows of the fields to which they are added.
+    fields : (g, N, 3) float64
+    """
+    first, second = problem.lattice.beams[beams].T
+    places = problem.lattice.positions + u[:, :2]
+    chord = places[second] - places[first]
     bend = (u[first, 2] - u[second, 2] + np.pi) % (2.0 * np.pi) - np.pi
     # The middle is that of the chord, and the chord turned by 90 degrees times bend / 8.
-    turned = bend / 8.0 * np.array([vector[1], -vector[0]])
-    field[first, :2] += 0.5 * vector - turned
-    field[second, :2] += 0.5 * vector + turned
-    slope = float(-chord[1] * vector[0] + chord[0] * vector[1]) / 8.0
-    field[first, 2] += slope
-    field[second, 2] -= slope
+    turned = bend[:, None] / 8.0 * np.column_stack([vectors[:, 1], -vectors[:, 0]])
+    slope = (chord[:, 0] * vectors[:, 1] - chord[:, 1] * vectors[:, 0])[:, None] / 8.0
+    np.add.at(fields, (rows, first), np.column_stack([0.5 * vectors - turned, slope]))
+    np.add.at(fields, (rows, second), np.column_stack([0.5 * vectors + turned, -slope]))
 
 
 def nearest_to_ends(a: Values, b: Values, c: Values, d: Values) -> tuple[Values, Values]:
