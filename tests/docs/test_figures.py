@@ -15,6 +15,7 @@ from bellcrank.machines import TwoPort
 from bellcrank.machines.bundled import find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder, kinds
+from benchmarks.inverters import rows_of as inverter_rows
 from benchmarks.refinement import mass_rows, specified_rows
 from benchmarks.space import cost_rows, task_rows
 from benchmarks.tasks import summary
@@ -277,7 +278,7 @@ def refined_specifications() -> Rows:
 
 def space() -> Rows:
     rows = read("space/runs")["runs"]
-    yield from [*task_rows(rows), *cost_rows(rows)]
+    yield from [*task_rows(rows), *cost_rows(rows), *inverter_rows(read("space/inverters")["runs"])]
 
 
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
