@@ -65,7 +65,7 @@ SPRINGS = ((0.1, 0.01), (1.0, 0.1), (1.0, 0.01))
 ITERATIONS = 100
 PAD = 2.5
 """Radius of the solid regions around ports, mm."""
-SEEDS = 2
+SEEDS = 1
 SIZE = 1.1
 """Edge of the cubes of the grid of tetrahedra, mm; with 1.4 mm struts of 2 mm are cut."""
 

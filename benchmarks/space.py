@@ -3,6 +3,7 @@
 - ``tasks``: every bundled task in space, designed as by `bellcrank design TASK` on two cores. Its
   objective by frames with eight elements in each strut, and in the solid, beside that of the full
   lattice and that of a design by hand where there is one; its items in both models.
+- ``mesh``: the objective of the gripper of the record in solids with finer grids.
 - ``cost``: the time of a step of a search on one core, against the number of beams.
 
 Each run is added to ``docs/space/runs.json`` as soon as it is done; runs that are in the record are
@@ -13,8 +14,10 @@ not repeated. ``--only`` gives the first words of the names of runs, such as ``t
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -35,7 +38,7 @@ from bellcrank.workflows.specification import binding, item_data
 
 from .frames import DESIGNS, PROPOSALS, diluted, octet, step_time
 from .record import add_runs
-from .tasks import CORES, core_seconds, tasks_in
+from .tasks import CORES, core_seconds, recorded_design, tasks_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -52,6 +55,9 @@ BY_HAND = {
 }  # fmt: skip
 """Bundled problems with a design by hand for the motion of a task."""
 SEED = 0
+GRIPPER = "three-jaw-gripper"
+GRIDS = (0.95, 0.85)
+"""Edges of the cubes of finer grids, mm; that of the record is 1.1 mm."""
 
 
 def _named(name: str) -> Task:
@@ -133,6 +139,25 @@ def _by_hand(name: str) -> float | None:
     return evaluator.evaluate(design.mask, VERIFICATION_INCREMENT).efficiency
 
 
+def with_grid(name: str, size: float) -> dict[str, Any]:
+    """Return the objectives of the recorded design of a task in a solid with another grid."""
+    task = _named(name)
+    row = json.loads(RECORD.read_text(encoding="utf-8"))["runs"][f"tasks {name}"]
+    design = recorded_design(task, row)
+    wanted = design.problem.specification
+    assert wanted is not None
+    problem = _with_objectives(replace(design.problem, specification=replace(wanted, items=())))
+    started = time.perf_counter()
+    items = sheet_items(task.part.of(replace(design, problem=problem)), size)
+    return {
+        "commit": provenance()["commit"],
+        "grid_mm": size,
+        "seconds": round(time.perf_counter() - started, 1),
+        "frames": row["objective"],
+        "objectives": None if items is None else [round(each.value, 4) for each in items],
+    }
+
+
 def cost() -> dict[str, Any]:
     """Return the time of a step of lattices, diluted at random, and the exponent of its growth."""
     problems = [octet(2), octet(3), *(find_problem(name) for name in IN_SPACE[2:])]
@@ -158,6 +183,8 @@ def runs() -> dict[str, Callable[[], dict[str, Any]]]:
     out: dict[str, Callable[[], dict[str, Any]]] = {
         f"tasks {name}": lambda name=name: designed(name) for name in tasks_in(3)
     }
+    for size in GRIDS:
+        out[f"mesh {GRIPPER} {size:g}"] = partial(with_grid, GRIPPER, size)
     return {**out, "cost": cost}
 
 

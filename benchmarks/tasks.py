@@ -21,9 +21,13 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bellcrank.errors import InvalidSettings, NoDesignFound
 from bellcrank.fem.continuum.mesh import COARSE
 from bellcrank.fem.specification import sheet_items
+from bellcrank.mechanics.frames.joints import with_joints
+from bellcrank.model import Design, unpack_mask
 from bellcrank.provenance import provenance
 from bellcrank.search import read_settings
 from bellcrank.task import Task, bundled_tasks, find_task
@@ -133,6 +137,13 @@ def run(name: str, seed: int) -> dict[str, Any]:
     row["proposals"] = report.proposals
     row["items"] = item_data(design.problem, task.part, models)
     return row
+
+
+def recorded_design(task: Task, row: dict[str, Any]) -> Design:
+    """Return the refined design of a run of a task in the record."""
+    problem, mask = task.problem, unpack_mask(row["mask"], task.problem.lattice.beam_count)
+    moved = problem.with_geometry(np.array(row["positions"]), np.array(row["widths"]))
+    return Design(with_joints(moved, mask), mask, provenance={"part": task.part.to_dict()})
 
 
 def _in_sheet(report: DesignReport, task: Task) -> Sequence[ItemResult] | None:

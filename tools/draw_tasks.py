@@ -1,4 +1,4 @@
-"""Pictures and movies of the bundled tasks for the documentation: ``python tools/draw_tasks.py``.
+"""Pictures and movies of the bundled tasks for the documentation: ``python -m tools.draw_tasks``.
 
 For each task, the run of ``docs/tasks/runs.json`` or ``docs/space/runs.json`` that meets the most
 (by frames, then in the sheet) with the smallest seed is drawn: ``docs/tasks/NAME.png`` with the
@@ -10,38 +10,23 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 from PIL import Image, ImageSequence
 
-from bellcrank.mechanics.frames.joints import with_joints
-from bellcrank.model import Design
-from bellcrank.part import models
 from bellcrank.plots import draw_cases
 from bellcrank.plots.movies import MovieSettings
 from bellcrank.task import find_task
 from bellcrank.workflows.animate import animate_motion
 from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.pictures import case_motions
-
-if TYPE_CHECKING:
-    from bellcrank.task import Task
+from benchmarks.tasks import recorded_design
 
 DOCS = Path(__file__).parents[1] / "docs"
 FOLDER = DOCS / "tasks"
 RECORD = FOLDER / "runs.json"
 RECORD_IN_SPACE = DOCS / "space" / "runs.json"
 MOVIE = MovieSettings(seconds=2.0, fps=10, size=(640, 360))
-
-
-def design_of(task: Task, run: dict[str, Any]) -> Design:
-    """Return the design of a run of the record."""
-    problem = models["frames"](task.problem, task.part)
-    bits = np.unpackbits(np.frombuffer(bytes.fromhex(run["mask"]), np.uint8))
-    mask = bits[: problem.lattice.beam_count].astype(bool)
-    moved = problem.with_geometry(np.array(run["positions"]), np.array(run["widths"]))
-    return Design(with_joints(moved, mask), mask, provenance={"part": task.part.to_dict()})
 
 
 def recorded_runs() -> list[dict[str, Any]]:
@@ -95,7 +80,7 @@ def main() -> None:
         task = find_task(name)
         if task is None:  # a load case alone
             continue
-        design = design_of(task, best([run for run in runs if run["task"] == name]))
+        design = recorded_design(task, best([run for run in runs if run["task"] == name]))
         motions = case_motions(design, task.part, part_figures(design, task.part))
         draw_cases(motions, FOLDER / f"{name}.png", overwrite=True)
         shrink(FOLDER / f"{name}.png")
