@@ -2,17 +2,19 @@
 
 For each task, the run of ``docs/tasks/runs.json`` or ``docs/space/runs.json`` that meets the most
 (by frames, then in the sheet) with the smallest seed is drawn: ``docs/tasks/NAME.png`` with the
-paths of the outputs, and ``docs/tasks/NAME.gif``. ``--only NAME,NAME`` draws some.
+paths of the outputs, and ``docs/tasks/NAME.gif``. Both contain the identity of the run, by which a
+test finds those of earlier runs. ``--only NAME,NAME`` draws some.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
 
-from PIL import Image, ImageSequence
+from PIL import Image, ImageSequence, PngImagePlugin
 
 from bellcrank.plots import draw_cases
 from bellcrank.plots.movies import MovieSettings
@@ -46,8 +48,24 @@ def best(runs: list[dict[str, Any]]) -> dict[str, Any]:
     return min(made, key=lambda run: (not run["met"], not run["met_in_sheet"], run["seed"]))
 
 
-def shrink(path: Path, largest: int = 800) -> None:
-    """Make a picture or a movie smaller: at most `largest` pixels, one palette of 64 colours."""
+def identity(run: dict[str, Any]) -> str:
+    """Return a hash of the design of a run."""
+    design = [run["mask"], run["positions"], run["widths"]]
+    return hashlib.sha256(json.dumps(design).encode()).hexdigest()
+
+
+def identity_in(path: Path) -> str | None:
+    """Return the identity of the run that a picture or a movie shows; None if it has none."""
+    with Image.open(path) as picture:
+        found = picture.info.get("comment")
+    return found.decode() if isinstance(found, bytes) else found
+
+
+def shrink(path: Path, comment: str, largest: int = 800) -> None:
+    """Make a picture or a movie smaller, and add a comment.
+
+    At most `largest` pixels, one palette of 64 colours.
+    """
     source = Image.open(path)
     frames, durations = [], []
     for frame in ImageSequence.Iterator(source):
@@ -64,9 +82,13 @@ def shrink(path: Path, largest: int = 800) -> None:
         picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in frames
     )
     if path.suffix == ".gif":
-        first.save(path, save_all=True, append_images=others, duration=durations, loop=0)
+        first.save(
+            path, save_all=True, append_images=others, duration=durations, loop=0, comment=comment
+        )
     else:
-        first.save(path, optimize=True)
+        texts = PngImagePlugin.PngInfo()
+        texts.add_text("comment", comment)
+        first.save(path, optimize=True, pnginfo=texts)
 
 
 def main() -> None:
@@ -80,12 +102,13 @@ def main() -> None:
         task = find_task(name)
         if task is None:  # a load case alone
             continue
-        design = recorded_design(task, best([run for run in runs if run["task"] == name]))
+        run = best([run for run in runs if run["task"] == name])
+        design = recorded_design(task, run)
         motions = case_motions(design, task.part, part_figures(design, task.part))
         draw_cases(motions, FOLDER / f"{name}.png", overwrite=True)
-        shrink(FOLDER / f"{name}.png")
+        shrink(FOLDER / f"{name}.png", identity(run))
         animate_motion([(name, design)], FOLDER / f"{name}.gif", MOVIE, overwrite=True)
-        shrink(FOLDER / f"{name}.gif")
+        shrink(FOLDER / f"{name}.gif", identity(run))
         print(name, flush=True)
 
 

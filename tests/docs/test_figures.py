@@ -17,8 +17,9 @@ from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder, kinds
 from benchmarks.inverters import rows_of as inverter_rows
 from benchmarks.refinement import mass_rows, specified_rows
-from benchmarks.space import cost_rows, task_rows
-from benchmarks.tasks import summary
+from benchmarks.space import cost_rows, mesh_rows, task_rows
+from benchmarks.tasks import counts, summary
+from tools.draw_tasks import best, identity, identity_in, recorded_runs
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -278,7 +279,8 @@ def refined_specifications() -> Rows:
 
 def space() -> Rows:
     rows = read("space/runs")["runs"]
-    yield from [*task_rows(rows), *cost_rows(rows), *inverter_rows(read("space/inverters")["runs"])]
+    yield from [*task_rows(rows), *mesh_rows(rows), *cost_rows(rows)]
+    yield from inverter_rows(read("space/inverters")["runs"])
 
 
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
@@ -298,6 +300,25 @@ def test_rows_of_tables_are_what_the_records_say(page: str) -> None:
     text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
     rows = [each for table in TABLES[page] for each in table()]
     assert [each for each in rows if each not in text] == []
+
+
+def test_the_counts_of_runs_of_tasks_are_those_of_the_record() -> None:
+    text = " ".join((DOCS / "tasks.md").read_text(encoding="utf-8").split())
+    text = text.replace("other fourteen tasks", "other 14 tasks")
+    for each in counts(read("tasks/runs")["runs"]):
+        assert each in text
+
+
+def test_pictures_and_movies_of_tasks_show_runs_of_the_record() -> None:
+    runs = recorded_runs()
+    names = {run["task"] for run in runs if ":" not in run["task"]}
+    assert len(names) > 15
+    expected = {
+        name: identity(best([run for run in runs if run["task"] == name])) for name in names
+    }
+    for kind in ("png", "gif"):
+        shown = {name: identity_in(DOCS / "tasks" / f"{name}.{kind}") for name in names}
+        assert shown == expected
 
 
 NUMBER = re.compile(r"\| [-+]?\d[\d.,]*( (%|s|ms|mm|MB|kB))?(?= \|)")
