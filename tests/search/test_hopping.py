@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
+from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem, unpack_mask
 from bellcrank.search import (
@@ -19,8 +21,10 @@ from bellcrank.search import (
     make_evaluator,
     start_chain,
 )
-from bellcrank.search.hopping.basin_hopping import BasinHopping, perturb
+from bellcrank.search.hopping.basin_hopping import BasinHopping
 from bellcrank.search.hopping.local_search import MIN_GAIN, LocalSearch, start_local_search
+from bellcrank.search.hopping.state import Member
+from bellcrank.search.hopping.variation import perturb, recombine
 from tests.search.snapping import Snapping
 
 if TYPE_CHECKING:
@@ -126,7 +130,8 @@ def in_phase(parts: list[tuple[HoppingState, Proposals]]) -> np.ndarray:
 def test_phases_begin_when_progress_stalls_and_take_their_share(small: Problem) -> None:
     settings = HoppingSettings(steps=8000, **EAGER)
     evaluator = make_evaluator(small, settings)
-    unbeatable = replace(start_chain(evaluator, settings, 0), best=1e3)
+    first = start_chain(evaluator, settings, 0)
+    unbeatable = replace(first, best=1e3, population=(Member(first.mask, 1e3),))
     steps = in_phase(list(chain_blocks(evaluator, settings, 0, unbeatable)))
     first = np.flatnonzero(steps)[0]
     assert 0 <= first - EAGER["min_stall"] < 300  # a local search is not interrupted
@@ -165,7 +170,8 @@ def test_a_phase_continues_from_the_last_one_until_there_is_progress(small: Prob
         hopping.state = replace(hopping.state, phase_end=0)
     hopping.finish_local_search(replace(resume(evaluator, small.initial), efficiency=1e3))
     assert hopping.state.phase_mask == reached
-    hopping.state = replace(hopping.state, best=0.0)
+    worse = (Member(hopping.state.mask, 0.0),)
+    hopping.state = replace(hopping.state, best=0.0, population=worse)
     hopping.finish_local_search(resume(evaluator, unpack_mask(reached, len(small.initial))))
     assert hopping.state.best > 0.0
     assert hopping.state.phase_mask is None
@@ -219,3 +225,88 @@ def test_a_run_shorter_than_one_local_search_still_accepts_a_design(small: Probl
     *_, (state, proposals) = chain_blocks(make_evaluator(small, settings), settings, 0)
     assert state.step == 5
     assert proposals.accepted.any()
+
+
+RESTARTS: dict[str, Any] = {"restart_after": 2.0, "restart_patience": 0.5, "restart_steps": 0.5}
+"""Settings with which short runs of a small problem restart several times."""
+
+
+def test_restarts_fill_an_archive_of_verified_designs(small: Problem) -> None:
+    evaluator = SpringEvaluator(small, unloaded_beams="prune_all")
+    stages, best = [], -np.inf
+    settings = HoppingSettings(steps=8000, archive=3, **RESTARTS)
+    for state, _ in blocks(small, settings):
+        if state.stage not in stages[-1:]:
+            stages.append(state.stage)
+        assert len(state.archive) <= settings.archive
+        assert len({member.mask for member in state.archive}) == len(state.archive)
+        assert state.best >= best
+        best = state.best
+    assert stages[:3] == ["first", "restart", "archive"]
+    assert stages.count("restart") > 2
+    assert len(state.archive) == settings.archive
+    for member in state.archive:
+        assert member.score <= state.best
+        mask = unpack_mask(member.mask, small.lattice.beam_count)
+        response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
+        assert response.status is Status.CONVERGED
+        assert response.efficiency == pytest.approx(member.score, abs=1e-8)
+
+
+def test_a_restart_runs_its_chains_from_the_initial_design(small: Problem) -> None:
+    settings = HoppingSettings(steps=4000, **RESTARTS)
+    evaluator = make_evaluator(small, settings)
+    first = start_chain(evaluator, settings, 0)
+    state = replace(first, step=3000, progress_step=0, local_searches=5)
+    patience = settings.patience(small)
+    hopping = BasinHopping(evaluator, settings, patience, state, np.random.default_rng(1), 4000)
+    hopping.leave()
+    assert hopping.state.stage == "restart"
+    assert hopping.state.archive == first.population
+    assert hopping.state.phase_mask == first.mask
+    assert hopping.state.phase_steps_left == round(0.5 * len(small.designable))
+    while hopping.state.chains_left:
+        hopping.advance()
+    assert len({member.mask for member in hopping.state.population}) == settings.restart_chains
+    assert hopping.state.best == max(first.best, hopping.state.champion.score)
+
+
+def test_without_patience_the_first_stage_does_not_end(small: Problem) -> None:
+    assert {state.stage for state, _ in blocks(small, HoppingSettings(steps=3000))} == {"first"}
+
+
+def test_a_search_with_restarts_resumes_to_the_bit(small: Problem) -> None:
+    settings = HoppingSettings(steps=5000, **RESTARTS)
+    states, rows = zip(*blocks(small, settings), strict=True)
+    stages = [state.stage for state in states]
+    for stage in ("restart", "archive"):
+        at = stages.index(stage)
+        stored = HoppingState.from_dict(json.loads(json.dumps(states[at].to_dict())))
+        assert stored == states[at]
+        again = list(chain_blocks(make_evaluator(small, settings), settings, 0, stored))
+        assert [state for state, _ in again] == list(states[at + 1 :])
+        for (_, proposals), before in zip(again, rows[at + 1 :], strict=True):
+            assert (proposals.mask == before.mask).all()
+            np.testing.assert_array_equal(proposals.efficiency, before.efficiency)
+
+
+def test_a_recombination_copies_a_disc_of_another_design(small: Problem) -> None:
+    rng = np.random.default_rng(2)
+    middle = small.lattice.positions[small.lattice.beams].mean(axis=1)
+    mask = np.ones(len(small.initial), dtype=bool)
+    other = mask.copy()
+    other[small.designable] = False
+    for _ in range(100):
+        copied = np.flatnonzero(~recombine(small, mask, other, rng))
+        count = len(small.designable)
+        assert 0.1 * count - 1 <= len(copied) <= 0.5 * count + 1
+        kept = np.setdiff1d(small.designable, copied)
+        # Some beam is the centre: none that is left out is closer to it than the farthest copy.
+        distance = np.linalg.norm(middle[copied][:, None] - middle[None], axis=2)
+        assert (distance[:, copied].max(axis=1) <= distance[:, kept].min(axis=1) + 1e-9).any()
+
+
+@pytest.mark.parametrize("wrong", [{"restart_after": 0.0}, {"archive": 0}, {"recombination": 1.5}])
+def test_wrong_settings_of_restarts_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidSettings, match=next(iter(wrong))):
+        HoppingSettings(**wrong)

@@ -179,10 +179,7 @@ def _number(value: float | None) -> float:
 
 def _current_mask(state: Any) -> str:
     """Return the current design of a chain, during a local search that of the local search."""
-    for name in ("search_mask", "phase_mask"):
-        if getattr(state, name, None):
-            return str(getattr(state, name))
-    return _best_mask(state)
+    return str(getattr(state, "current", None) or _best_mask(state))
 
 
 def _best_mask(state: Any) -> str:

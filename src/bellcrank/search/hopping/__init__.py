@@ -1,7 +1,14 @@
-"""Basin hopping, the default search: local search by predicted flips, and perturbations."""
+"""Basin hopping, the default search: local search by predicted flips, and restarts."""
 
-from bellcrank.search.hopping.basin_hopping import HoppingState
+from bellcrank.search.hopping.basin_hopping import BasinHopping
 from bellcrank.search.hopping.local_search import LocalSearch, start_local_search
 from bellcrank.search.hopping.settings import HoppingSettings
+from bellcrank.search.hopping.state import HoppingState
 
-__all__ = ["HoppingSettings", "HoppingState", "LocalSearch", "start_local_search"]
+__all__ = [
+    "BasinHopping",
+    "HoppingSettings",
+    "HoppingState",
+    "LocalSearch",
+    "start_local_search",
+]

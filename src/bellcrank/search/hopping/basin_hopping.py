@@ -10,12 +10,18 @@ On some lattices the next improvement needs many flips that each change the effi
 When progress stalls, most steps therefore go to low-temperature Metropolis phases. The first one
 starts from the best design, and each later one where the phase before ended, until there is
 progress. A local search from the design that the phase has reached follows each phase.
+
+With `restart_after`, the search restarts when the first stage has made no progress for that long.
+A restart runs a few Metropolis chains from the initial design at a low temperature, and a local
+search from the end of each. Local searches then start from perturbations of the designs found and
+from combinations of two of them, until there is no more progress. The best design goes to an
+archive, whose designs are combined in the same way before the next restart.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Self
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,6 +37,8 @@ from bellcrank.search.blocks import (
 from bellcrank.search.constraints.evaluator import without_base_penalty
 from bellcrank.search.hopping.local_search import LocalSearch, start_local_search
 from bellcrank.search.hopping.settings import HoppingSettings
+from bellcrank.search.hopping.state import HoppingState, Member
+from bellcrank.search.hopping.variation import perturb, recombine
 from bellcrank.search.markov.metropolis import ChainState, MetropolisSettings, metropolis_phase
 from bellcrank.search.registry import Search, searches
 from bellcrank.search.selection import confirmed
@@ -39,7 +47,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics import Response
-    from bellcrank.model import Problem
     from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.hopping.settings import Patience
     from bellcrank.storage import Proposals
@@ -48,69 +55,10 @@ PROGRESS = 1e-3
 """Relative gain of efficiency that counts as progress."""
 
 
-@dataclass(frozen=True, slots=True)
-class HoppingState:
-    """State of basin hopping between two blocks.
-
-    Parameters
-    ----------
-    step
-        Proposals made so far.
-    mask
-        The best verified design, in hexadecimal; the initial design until the result of a local
-        search has been verified.
-    best
-        Its score: the efficiency less the penalty for violated goals.
-    progress_step
-        Step of the last gain that counts as progress.
-    phase_end
-        Step at which the last Metropolis phase ended.
-    phase_steps_left
-        Steps left of a Metropolis phase; 0 outside such phases.
-    phase_mask
-        The design reached by Metropolis phases, in hexadecimal; None if the next one starts from
-        the best design.
-    search_mask
-        The design reached by a local search in progress, in hexadecimal; None if there is none.
-    failed
-        Beams whose flips failed since the last gain of the local search.
-    accepted
-        Accepted proposals so far.
-    local_searches
-        Completed local searches so far.
-    """
-
-    step: int
-    mask: str
-    best: float
-    progress_step: int = 0
-    phase_end: int = 0
-    phase_steps_left: int = 0
-    phase_mask: str | None = None
-    search_mask: str | None = None
-    failed: tuple[int, ...] = ()
-    accepted: int = 0
-    local_searches: int = 0
-
-    @property
-    def efficiency(self) -> float:
-        """Score of the best design."""
-        return self.best
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the state as plain data."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Rebuild the state from plain data."""
-        return cls(**{**data, "failed": tuple(data["failed"])})
-
-
 def start(evaluator: Evaluator, _settings: HoppingSettings, _chain: int) -> HoppingState:
     """Return the state before the first local search, at the problem's initial design."""
-    efficiency = initial_response(evaluator).score
-    return HoppingState(0, pack_mask(evaluator.problem.initial), efficiency)
+    score, mask = initial_response(evaluator).score, pack_mask(evaluator.problem.initial)
+    return HoppingState(0, mask, score, population=(Member(mask, score),))
 
 
 def is_done(state: HoppingState, settings: HoppingSettings) -> bool:
@@ -118,30 +66,9 @@ def is_done(state: HoppingState, settings: HoppingSettings) -> bool:
     return state.step >= settings.steps
 
 
-def perturb(
-    problem: Problem, mask: NDArray[np.bool_], settings: HoppingSettings, rng: np.random.Generator
-) -> NDArray[np.bool_]:
-    """Redraw the designable beams of a disc at random, until the design differs.
-
-    The disc is centred at the midpoint of a random designable beam, and the midpoints of the
-    beams lie in it. Its radius is between a half and one and a half times the mean radius.
-    """
-    lattice = problem.lattice
-    middle = lattice.positions[lattice.beams[problem.designable]].mean(axis=1)
-    length = float(np.mean(lattice.rest_length))
-    while True:
-        centre = middle[int(rng.integers(len(middle)))]
-        radius = settings.radius * length * rng.uniform(0.5, 1.5)
-        inside = problem.designable[np.linalg.norm(middle - centre, axis=1) < radius]
-        perturbed = mask.copy()
-        perturbed[inside] = rng.random(len(inside)) < rng.uniform(settings.min_density, 1.0)
-        if (perturbed != mask).any():
-            return perturbed
-
-
 def phase_is_due(state: HoppingState, settings: HoppingSettings, patience: Patience) -> bool:
     """Whether a Metropolis phase is due in place of a perturbation."""
-    if not settings.phase_steps:
+    if state.stage != "first" or not settings.phase_steps:
         return False
     stalled = state.step - state.progress_step > max(
         patience.min_stall, patience.stall * state.step
@@ -172,7 +99,7 @@ class BasinHopping:
     rows: ProposalRows = field(default_factory=ProposalRows)
 
     def advance(self) -> None:
-        """Make a perturbation, a flip, the verification of a local search, or a phase."""
+        """Make a chain's steps, a flip, the verification of a local search, or start one."""
         if self.state.phase_steps_left:
             self.run_phase()
         elif self.local is None:
@@ -186,11 +113,21 @@ class BasinHopping:
                 self._record(mask, response, accepted)
 
     def leave(self) -> None:
-        """Begin a Metropolis phase if one is due; otherwise start a local search.
+        """Begin a Metropolis chain if one is due; otherwise start a local search.
 
-        It starts from a perturbation of the best design, the first time from the initial design.
+        The first local search starts from the initial design, each other one from a perturbation
+        of a design of the population or from a combination of two.
         """
+        if self.stage_is_over():
+            self.begin_next_stage()
         state = self.state
+        if state.chains_left:
+            problem = self.evaluator.problem
+            steps = max(1, round(self.settings.restart_steps * len(problem.designable)))
+            self.state = replace(
+                state, phase_steps_left=steps, phase_mask=pack_mask(problem.initial)
+            )
+            return
         if phase_is_due(state, self.settings, self.patience):
             self.state = replace(
                 state,
@@ -198,9 +135,7 @@ class BasinHopping:
                 phase_mask=state.phase_mask or state.mask,
             )
             return
-        mask = self._bits(state.mask)
-        if state.local_searches > 0:
-            mask = perturb(self.evaluator.problem, mask, self.settings, self.rng)
+        mask = self.next_start()
         response = self.evaluator.evaluate(mask)
         self._record(mask, response, response.is_admissible)
         if response.is_admissible:
@@ -210,29 +145,80 @@ class BasinHopping:
                 self.patience.max_failures, self.settings.max_predicted_loss, [],
             )  # fmt: skip
 
+    def next_start(self) -> NDArray[np.bool_]:
+        """Return the design from which the next local search starts."""
+        population = self.state.population
+        if self.state.local_searches == 0:
+            return self._bits(population[0].mask)
+        problem = self.evaluator.problem
+        if len(population) == 1:
+            return perturb(problem, self._bits(population[0].mask), self.settings, self.rng)
+        parent, other = self.rng.choice(len(population), 2, replace=False).tolist()
+        self.state = replace(self.state, parent=parent)
+        mask, partner = self._bits(population[parent].mask), self._bits(population[other].mask)
+        if self.rng.random() < self.settings.recombination and (mask != partner).any():
+            return recombine(problem, mask, partner, self.rng)
+        return perturb(problem, mask, self.settings, self.rng)
+
+    def stage_is_over(self) -> bool:
+        """Whether the stage has made no progress for long enough."""
+        state, settings = self.state, self.settings
+        if settings.restart_after is None or state.chains_left:
+            return False
+        patience = settings.restart_after
+        if state.stage != "first":
+            patience = settings.restart_patience * len(state.population)
+        stalled = state.step - state.progress_step
+        return stalled > patience * len(self.evaluator.problem.designable)
+
+    def begin_next_stage(self) -> None:
+        """Begin a restart, or combine the archive after a restart."""
+        state = self.state
+        if state.stage == "archive":
+            archive = state.population
+        else:
+            distinct = dict((*state.archive, state.champion))
+            members = [Member(*each) for each in distinct.items()]
+            members.sort(key=lambda member: -member.score)
+            archive = tuple(members[: self.settings.archive])
+        combine = state.stage == "restart" and len(archive) > 1
+        self.state = replace(
+            state,
+            stage="archive" if combine else "restart",
+            population=archive if combine else (),
+            archive=archive,
+            chains_left=0 if combine else self.settings.restart_chains,
+            progress_step=state.step,
+            phase_mask=None,
+            parent=0,
+        )
+
     def finish_local_search(self, local: LocalSearch) -> None:
         """Keep the result if it is no worse and stable when followed in small increments.
 
         The last step of a run records the design reached.
         """
-        if local.efficiency >= self.state.best:
+        state = self.state
+        filling = state.chains_left > 0
+        required = -np.inf if filling else state.population[state.parent].score
+        if local.efficiency >= required:
             response = self.evaluator.evaluate(local.mask, VERIFICATION_INCREMENT)
-            verified = response.is_admissible and response.score >= self.state.best
+            verified = response.is_admissible and response.score >= required
             self._record(local.mask, response, verified)
             if verified:
                 self._keep(local.mask, response.score)
-        elif self.state.step == self.settings.steps - 1:
+        elif state.step == self.settings.steps - 1:
             self._record(local.mask, self.evaluator.evaluate(local.mask), False)
         self.local = None
         self.state = replace(self.state, local_searches=self.state.local_searches + 1)
 
     def run_phase(self) -> None:
-        """Run a Metropolis phase to its end or to that of the block.
+        """Run a Metropolis chain to its end or to that of the block.
 
-        At the end of the phase, start a local search.
+        At its end, start a local search.
 
-        A design may have a stable response from its neighbour but none from rest. The phase then
-        ends, and the next one starts from the best design.
+        A design may have a stable response from its neighbour but none from rest. The chain then
+        ends, and the next one starts elsewhere.
         """
         state = self.state
         assert state.phase_mask is not None
@@ -240,10 +226,15 @@ class BasinHopping:
         if not response.is_admissible:
             self.state = replace(state, phase_steps_left=0, phase_end=state.step, phase_mask=None)
             return
+        factor = (
+            self.settings.restart_temperature
+            if state.chains_left
+            else self.settings.temperature_factor
+        )
         settings = MetropolisSettings(
             cost="negative",
             schedule="constant",
-            cold=self.settings.temperature_factor * (abs(without_base_penalty(state.best)) or 1.0),
+            cold=factor * (abs(without_base_penalty(state.best)) or 1.0),
             unloaded_beams=self.settings.unloaded_beams,
         )
         score = response.score
@@ -279,11 +270,27 @@ class BasinHopping:
             self.state, step=self.state.step + 1, accepted=self.state.accepted + accepted
         )
 
-    def _keep(self, mask: NDArray[np.bool_], efficiency: float) -> None:
+    def _keep(self, mask: NDArray[np.bool_], score: float) -> None:
+        """Add a verified design to a population that is not complete, or replace its parent."""
         state = self.state
-        self.state = replace(state, mask=pack_mask(mask), best=efficiency)
-        if efficiency >= state.best + PROGRESS * abs(efficiency):
-            self.state = replace(self.state, progress_step=state.step, phase_mask=None)
+        member = Member(pack_mask(mask), score)
+        if state.chains_left:
+            self.state = replace(
+                state,
+                population=(*state.population, member),
+                chains_left=state.chains_left - 1,
+                progress_step=state.step,
+                phase_mask=None,
+            )
+        else:
+            population = list(state.population)
+            population[state.parent] = member
+            self.state = replace(state, population=tuple(population))
+            best = state.champion.score
+            if score >= best + PROGRESS * abs(score):
+                self.state = replace(self.state, progress_step=state.step, phase_mask=None)
+        if score >= self.state.best:
+            self.state = replace(self.state, mask=member.mask, best=score)
 
     def _bits(self, mask: str) -> NDArray[np.bool_]:
         return unpack_mask(mask, self.evaluator.problem.lattice.beam_count).copy()

@@ -53,6 +53,23 @@ class HoppingSettings(SearchSettings):
         Steps without progress after which Metropolis phases begin: at least this number, and at
         least this fraction of all steps so far. They may depend on the model, too.
 
+    restart_after
+        Steps without progress that end the first stage, for each designable beam; None for no
+        restarts.
+    restart_patience
+        Steps without progress that end any later stage, for each designable beam and design of the
+        population.
+    restart_chains
+        Metropolis chains of a restart, each from the initial design.
+    restart_steps
+        Steps of such a chain for each designable beam.
+    restart_temperature
+        Temperature of such a chain, as a fraction of the best score.
+    recombination
+        Fraction of the local searches that start from a combination of two designs.
+    archive
+        Largest number of designs in the archive.
+
     Raises
     ------
     InvalidSettings, UnknownName
@@ -70,15 +87,30 @@ class HoppingSettings(SearchSettings):
     phase_share: float = 0.7
     min_stall: int | None = None
     stall: float | None = None
+    restart_after: float | None = None
+    restart_patience: float = 3.0
+    restart_chains: int = 4
+    restart_steps: float = 7.5
+    restart_temperature: float = 0.003
+    recombination: float = 0.5
+    archive: int = 8
 
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
-        for name, least in (("max_failures", 1), ("phase_steps", 0), ("min_stall", 0)):
+        for name, least in (
+            ("max_failures", 1), ("phase_steps", 0), ("min_stall", 0),
+            ("restart_chains", 1), ("archive", 1),
+        ):  # fmt: skip
             if getattr(self, name) is not None:
                 check_whole(name, getattr(self, name), least)
-        for name in ("radius", "temperature_factor", "phase_share"):
+        for name in (
+            "radius", "temperature_factor", "phase_share",
+            "restart_patience", "restart_steps", "restart_temperature",
+        ):  # fmt: skip
             check_positive(name, getattr(self, name))
-        for name in ("min_density", "max_predicted_loss", "stall", "phase_share"):
+        if self.restart_after is not None:
+            check_positive("restart_after", self.restart_after)
+        for name in ("min_density", "max_predicted_loss", "stall", "phase_share", "recombination"):
             if getattr(self, name) is not None:
                 check_fraction(name, getattr(self, name))
 
