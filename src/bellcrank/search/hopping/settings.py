@@ -90,7 +90,7 @@ class HoppingSettings(SearchSettings):
     restart_after: float | None = None
     restart_patience: float = 3.0
     restart_chains: int = 4
-    restart_steps: float = 7.5
+    restart_steps: float = 30.0
     restart_temperature: float = 0.003
     recombination: float = 0.5
     archive: int = 8
