@@ -268,7 +268,7 @@ def test_a_restart_runs_its_chains_from_the_initial_design(small: Problem) -> No
     while hopping.state.chains_left:
         hopping.advance()
     assert len({member.mask for member in hopping.state.population}) == settings.restart_chains
-    assert hopping.state.best == max(first.best, hopping.state.champion.score)
+    assert hopping.state.best == max(first.best, hopping.state.best_member.score)
 
 
 def test_without_patience_the_first_stage_does_not_end(small: Problem) -> None:
@@ -288,6 +288,26 @@ def test_a_search_with_restarts_resumes_to_the_bit(small: Problem) -> None:
         for (_, proposals), before in zip(again, rows[at + 1 :], strict=True):
             assert (proposals.mask == before.mask).all()
             np.testing.assert_array_equal(proposals.efficiency, before.efficiency)
+
+
+def test_a_state_from_before_restarts_is_read(small: Problem) -> None:
+    state, _ = blocks(small, HoppingSettings(steps=1000))[-1]
+    added = ("stage", "population", "archive", "chains_left", "parent")
+    former = {key: value for key, value in state.to_dict().items() if key not in added}
+    assert HoppingState.from_dict(former) == state
+
+
+def test_designs_of_the_archive_that_become_equal_count_once(small: Problem) -> None:
+    settings = HoppingSettings(steps=4000, **RESTARTS)
+    evaluator = make_evaluator(small, settings)
+    first = start_chain(evaluator, settings, 0)
+    low, high = first.population[0], Member("00" * len(bytes.fromhex(first.mask)), 9.0)
+    state = replace(first, step=3000, stage="archive", population=(low, high, low))
+    patience = settings.patience(small)
+    hopping = BasinHopping(evaluator, settings, patience, state, np.random.default_rng(1), 4000)
+    hopping.begin_next_stage()
+    assert hopping.state.archive == (high, low)
+    assert hopping.state.stage == "restart"
 
 
 def test_a_recombination_copies_a_disc_of_another_design(small: Problem) -> None:

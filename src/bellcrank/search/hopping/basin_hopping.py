@@ -99,7 +99,7 @@ class BasinHopping:
     rows: ProposalRows = field(default_factory=ProposalRows)
 
     def advance(self) -> None:
-        """Make a chain's steps, a flip, the verification of a local search, or start one."""
+        """Make steps of a Metropolis chain, a flip or a verification, or start a local search."""
         if self.state.phase_steps_left:
             self.run_phase()
         elif self.local is None:
@@ -174,13 +174,11 @@ class BasinHopping:
     def begin_next_stage(self) -> None:
         """Begin a restart, or combine the archive after a restart."""
         state = self.state
-        if state.stage == "archive":
-            archive = state.population
-        else:
-            distinct = dict((*state.archive, state.champion))
-            members = [Member(*each) for each in distinct.items()]
-            members.sort(key=lambda member: -member.score)
-            archive = tuple(members[: self.settings.archive])
+        in_archive = state.stage == "archive"
+        found = state.population if in_archive else (*state.archive, state.best_member)
+        distinct = [Member(*each) for each in dict(found).items()]
+        distinct.sort(key=lambda member: -member.score)
+        archive = tuple(distinct[: self.settings.archive])
         combine = state.stage == "restart" and len(archive) > 1
         self.state = replace(
             state,
@@ -286,7 +284,7 @@ class BasinHopping:
             population = list(state.population)
             population[state.parent] = member
             self.state = replace(state, population=tuple(population))
-            best = state.champion.score
+            best = state.best_member.score
             if score >= best + PROGRESS * abs(score):
                 self.state = replace(self.state, progress_step=state.step, phase_mask=None)
         if score >= self.state.best:
@@ -327,6 +325,6 @@ searches.register("basin-hopping")(
         confirmed,
         plot_running_best=True,
         title="Basin hopping",
-        summary="Local search with restarts from perturbed designs. The best in most cases.",
+        summary="Local searches from perturbed designs. The best in most cases.",
     )
 )

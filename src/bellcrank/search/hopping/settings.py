@@ -52,7 +52,6 @@ class HoppingSettings(SearchSettings):
     min_stall, stall
         Steps without progress after which Metropolis phases begin: at least this number, and at
         least this fraction of all steps so far. They may depend on the model, too.
-
     restart_after
         Steps without progress that end the first stage, for each designable beam; None for no
         restarts.

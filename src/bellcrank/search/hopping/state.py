@@ -33,7 +33,7 @@ class HoppingState:
     population
         The designs from which local searches start.
     archive
-        The best designs of the stages so far.
+        The best designs of the stages so far, best first.
     chains_left
         Metropolis chains whose result the population of a restart still lacks.
     progress_step
@@ -85,7 +85,7 @@ class HoppingState:
         return self.search_mask or self.phase_mask or self.mask
 
     @property
-    def champion(self) -> Member:
+    def best_member(self) -> Member:
         """The best design of the population."""
         return max(self.population, key=lambda member: member.score)
 
@@ -95,8 +95,13 @@ class HoppingState:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Rebuild the state from plain data."""
-        members = {
-            name: tuple(Member(*each) for each in data[name]) for name in ("population", "archive")
-        }
-        return cls(**{**data, **members, "failed": tuple(data["failed"])})
+        """Rebuild the state from plain data, also from that of a version without restarts."""
+        population = data.get("population", [(data["mask"], data["best"])])
+        return cls(
+            **{
+                **data,
+                "population": tuple(Member(*each) for each in population),
+                "archive": tuple(Member(*each) for each in data.get("archive", ())),
+                "failed": tuple(data["failed"]),
+            }
+        )

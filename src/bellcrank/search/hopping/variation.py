@@ -13,6 +13,15 @@ if TYPE_CHECKING:
     from bellcrank.search.hopping.settings import HoppingSettings
 
 
+def designable_midpoints(problem: Problem) -> NDArray[np.float64]:
+    """Return the midpoints of the designable beams."""
+    lattice = problem.lattice
+    midpoints: NDArray[np.float64] = lattice.positions[lattice.beams[problem.designable]].mean(
+        axis=1
+    )
+    return midpoints
+
+
 def perturb(
     problem: Problem, mask: NDArray[np.bool_], settings: HoppingSettings, rng: np.random.Generator
 ) -> NDArray[np.bool_]:
@@ -21,9 +30,8 @@ def perturb(
     The disc is centred at the midpoint of a random designable beam, and the midpoints of the
     beams lie in it. Its radius is between a half and one and a half times the mean radius.
     """
-    lattice = problem.lattice
-    middle = lattice.positions[lattice.beams[problem.designable]].mean(axis=1)
-    length = float(np.mean(lattice.rest_length))
+    middle = designable_midpoints(problem)
+    length = float(np.mean(problem.lattice.rest_length))
     while True:
         centre = middle[int(rng.integers(len(middle)))]
         radius = settings.radius * length * rng.uniform(0.5, 1.5)
@@ -45,8 +53,7 @@ def recombine(
     The disc is centred at the midpoint of a random beam in which the designs differ, and contains
     between a tenth and a half of the designable beams.
     """
-    lattice = problem.lattice
-    middle = lattice.positions[lattice.beams[problem.designable]].mean(axis=1)
+    middle = designable_midpoints(problem)
     differs = np.flatnonzero(mask[problem.designable] != other[problem.designable])
     centre = middle[differs[int(rng.integers(len(differs)))]]
     order = np.argsort(np.linalg.norm(middle - centre, axis=1), kind="stable")
