@@ -234,17 +234,17 @@ RESTARTS: dict[str, Any] = {"restart_after": 2.0, "restart_patience": 0.5, "rest
 def test_restarts_fill_an_archive_of_verified_designs(small: Problem) -> None:
     evaluator = SpringEvaluator(small, unloaded_beams="prune_all")
     stages, best = [], -np.inf
-    settings = HoppingSettings(steps=8000, archive=3, **RESTARTS)
+    settings = HoppingSettings(steps=8000, restart_archive=3, **RESTARTS)
     for state, _ in blocks(small, settings):
         if state.stage not in stages[-1:]:
             stages.append(state.stage)
-        assert len(state.archive) <= settings.archive
+        assert len(state.archive) <= settings.restart_archive
         assert len({member.mask for member in state.archive}) == len(state.archive)
         assert state.best >= best
         best = state.best
     assert stages[:3] == ["first", "restart", "archive"]
     assert stages.count("restart") > 2
-    assert len(state.archive) == settings.archive
+    assert len(state.archive) == settings.restart_archive
     for member in state.archive:
         assert member.score <= state.best
         mask = unpack_mask(member.mask, small.lattice.beam_count)
@@ -326,7 +326,9 @@ def test_a_recombination_copies_a_disc_of_another_design(small: Problem) -> None
         assert (distance[:, copied].max(axis=1) <= distance[:, kept].min(axis=1) + 1e-9).any()
 
 
-@pytest.mark.parametrize("wrong", [{"restart_after": 0.0}, {"archive": 0}, {"recombination": 1.5}])
+@pytest.mark.parametrize(
+    "wrong", [{"restart_after": 0.0}, {"restart_archive": 0}, {"restart_recombination": 1.5}]
+)
 def test_wrong_settings_of_restarts_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidSettings, match=next(iter(wrong))):
         HoppingSettings(**wrong)

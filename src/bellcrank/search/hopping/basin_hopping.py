@@ -156,7 +156,7 @@ class BasinHopping:
         parent, other = self.rng.choice(len(population), 2, replace=False).tolist()
         self.state = replace(self.state, parent=parent)
         mask, partner = self._bits(population[parent].mask), self._bits(population[other].mask)
-        if self.rng.random() < self.settings.recombination and (mask != partner).any():
+        if self.rng.random() < self.settings.restart_recombination and (mask != partner).any():
             return recombine(problem, mask, partner, self.rng)
         return perturb(problem, mask, self.settings, self.rng)
 
@@ -178,7 +178,7 @@ class BasinHopping:
         found = state.population if in_archive else (*state.archive, state.best_member)
         distinct = [Member(*each) for each in dict(found).items()]
         distinct.sort(key=lambda member: -member.score)
-        archive = tuple(distinct[: self.settings.archive])
+        archive = tuple(distinct[: self.settings.restart_archive])
         combine = state.stage == "restart" and len(archive) > 1
         self.state = replace(
             state,

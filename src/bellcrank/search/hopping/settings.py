@@ -64,9 +64,9 @@ class HoppingSettings(SearchSettings):
         Steps of such a chain for each designable beam.
     restart_temperature
         Temperature of such a chain, as a fraction of the best score.
-    recombination
+    restart_recombination
         Fraction of the local searches that start from a combination of two designs.
-    archive
+    restart_archive
         Largest number of designs in the archive.
 
     Raises
@@ -91,14 +91,14 @@ class HoppingSettings(SearchSettings):
     restart_chains: int = 4
     restart_steps: float = 30.0
     restart_temperature: float = 0.003
-    recombination: float = 0.5
-    archive: int = 8
+    restart_recombination: float = 0.5
+    restart_archive: int = 8
 
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
         for name, least in (
             ("max_failures", 1), ("phase_steps", 0), ("min_stall", 0),
-            ("restart_chains", 1), ("archive", 1),
+            ("restart_chains", 1), ("restart_archive", 1),
         ):  # fmt: skip
             if getattr(self, name) is not None:
                 check_whole(name, getattr(self, name), least)
@@ -109,7 +109,13 @@ class HoppingSettings(SearchSettings):
             check_positive(name, getattr(self, name))
         if self.restart_after is not None:
             check_positive("restart_after", self.restart_after)
-        for name in ("min_density", "max_predicted_loss", "stall", "phase_share", "recombination"):
+        for name in (
+            "min_density",
+            "max_predicted_loss",
+            "stall",
+            "phase_share",
+            "restart_recombination",
+        ):
             if getattr(self, name) is not None:
                 check_fraction(name, getattr(self, name))
 
