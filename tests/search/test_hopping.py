@@ -22,7 +22,13 @@ from bellcrank.search import (
     start_chain,
 )
 from bellcrank.search.hopping.basin_hopping import BasinHopping
-from bellcrank.search.hopping.local_search import MIN_GAIN, LocalSearch, start_local_search
+from bellcrank.search.hopping.local_search import (
+    LARGEST_BATCH,
+    MIN_GAIN,
+    SEPARATION,
+    LocalSearch,
+    start_local_search,
+)
 from bellcrank.search.hopping.state import Member
 from bellcrank.search.hopping.variation import perturb, recombine
 from tests.search.snapping import Snapping
@@ -42,8 +48,8 @@ def small() -> Problem:
 
 def run_to_the_end(local: LocalSearch) -> list[float]:
     efficiencies = [local.efficiency]
-    while (beam := local.next_beam()) is not None:
-        local.try_flip(beam)
+    while (beams := local.next_flips()) is not None:
+        local.try_flips(beams)
         efficiencies.append(local.efficiency)
     return efficiencies
 
@@ -83,6 +89,52 @@ def test_a_local_search_ends_after_the_given_number_of_failures(small: Problem) 
     assert local is not None
     run_to_the_end(local)
     assert len(local.failed) == 3
+
+
+def test_flips_made_together_are_distant_and_their_number_follows_their_success() -> None:
+    crane = find_problem("crane")
+    evaluator = SpringEvaluator(crane, unloaded_beams="prune_all")
+    local = start_local_search(evaluator, crane.initial.copy(), 12, 0.01)
+    assert local is not None
+    middle = crane.lattice.positions[crane.lattice.beams].mean(axis=1)
+    sizes, outcomes = [], []
+    while (beams := local.next_flips()) is not None:
+        before, efficiency, most = local.mask, local.efficiency, local.batch
+        apart = np.linalg.norm(middle[beams][:, None] - middle[beams][None], axis=2)
+        assert apart[~np.eye(len(beams), dtype=bool)].min(initial=np.inf) >= SEPARATION
+        assert 1 <= len(beams) <= most
+        mask, response, accepted = local.try_flips(beams)
+        assert np.flatnonzero(mask != before).tolist() == sorted(beams.tolist())
+        if accepted:
+            assert response.efficiency == local.efficiency > efficiency
+            assert local.batch == min(2 * len(beams), LARGEST_BATCH)
+        else:
+            assert local.mask is before
+            assert local.batch == (len(beams) // 2 or most)
+        sizes.append(len(beams))
+        outcomes.append(accepted)
+    together = np.array(sizes) > 1
+    # Several flips are made together with and without success, and single ones, too.
+    assert {*np.array(outcomes)[together].tolist()} == {False, True}
+    assert np.array(outcomes)[~together].any()
+
+
+def test_flips_that_failed_together_are_tried_again_alone(small: Problem) -> None:
+    evaluator = SpringEvaluator(small, unloaded_beams="prune_all")
+    local = start_local_search(evaluator, small.initial.copy(), 12, 0.01)
+    assert local is not None
+    first = local.next_flips()
+    assert first is not None
+    assert len(first) > 1
+    local.efficiency = 1e3  # no design gains enough
+    while True:
+        beams = local.next_flips()
+        assert beams is not None
+        assert beams[0] == first[0]
+        local.try_flips(beams)
+        if len(beams) == 1:
+            break
+    assert local.failed == [first[0]]
 
 
 def test_a_local_search_cannot_start_from_a_mechanism() -> None:

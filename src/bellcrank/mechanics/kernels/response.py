@@ -152,7 +152,8 @@ def find_response(
     With `warm_start`, start from the reference equilibrium. If no moving beam differs from the
     reference, that is the equilibrium. Another one must be verified to be the one reached from
     rest; otherwise the design is loaded from rest. An equilibrium that is no more efficient than
-    `lower_bound` is not verified, and UNVERIFIED.
+    `lower_bound` is not verified, and UNVERIFIED. With a bound, no design is loaded from rest, and
+    one that is not verified is UNVERIFIED too: most such designs snap.
     """
     clear(u, len(u))
     status = build_structure(system, mask, core, structure)
@@ -175,6 +176,8 @@ def find_response(
         if status == CONVERGED and efficiency_of(system, u) <= lower_bound:
             return UNVERIFIED, efficiency_of(system, u)
     if status != CONVERGED or not is_reached_from_rest(system, structure, guess, u, scratch):
+        if warm_start and lower_bound > -math.inf:
+            return UNVERIFIED, efficiency_of(system, u)
         status = follow_path(system, structure, u, scratch, largest_increment)
     place_hanging_pieces(system, structure, u)
     return status, efficiency_of(system, u)

@@ -1,10 +1,10 @@
 """Basin hopping: local search, perturbation, local search again; the better design is kept.
 
-A local search ends when several flips in succession fail, or when no flip left is predicted to
-help. Then the beams of a disc are redrawn at random, and another local search follows; its result
-replaces the design if its score is at least as high and its response is stable when loaded in
-small increments (Wales and Doye, J. Phys. Chem. A 101, 5111, 1997; iterated local search, Lourenco
-et al. 2003).
+A local search (`local_search`) ends when several flips in succession fail, or when no flip left is
+predicted to help. Then the beams of a disc are redrawn at random, and another local search
+follows; its result replaces the design if its score is at least as high and its response is stable
+when loaded in small increments (Wales and Doye, J. Phys. Chem. A 101, 5111, 1997; iterated local
+search, Lourenco et al. 2003).
 
 On some lattices the next improvement needs many flips that each change the efficiency little.
 When progress stalls, most steps therefore go to low-temperature Metropolis phases. The first one
@@ -35,7 +35,7 @@ from bellcrank.search.blocks import (
     steps_in_block,
 )
 from bellcrank.search.constraints.evaluator import without_base_penalty
-from bellcrank.search.hopping.local_search import LocalSearch, start_local_search
+from bellcrank.search.hopping.local_search import LARGEST_BATCH, LocalSearch, start_local_search
 from bellcrank.search.hopping.settings import HoppingSettings
 from bellcrank.search.hopping.state import HoppingState, Member
 from bellcrank.search.hopping.variation import perturb, recombine
@@ -105,11 +105,11 @@ class BasinHopping:
         elif self.local is None:
             self.leave()
         else:
-            beam = self.local.next_beam()
-            if beam is None or self.state.step == self.settings.steps - 1:
+            beams = self.local.next_flips()
+            if beams is None or self.state.step == self.settings.steps - 1:
                 self.finish_local_search(self.local)
             else:
-                mask, response, accepted = self.local.try_flip(beam)
+                mask, response, accepted = self.local.try_flips(beams)
                 self._record(mask, response, accepted)
 
     def leave(self) -> None:
@@ -253,11 +253,13 @@ class BasinHopping:
         if not self.state.phase_steps_left:
             self.resume_local_search(chain.mask)
 
-    def resume_local_search(self, mask: str, failed: tuple[int, ...] = ()) -> None:
+    def resume_local_search(
+        self, mask: str, failed: tuple[int, ...] = (), batch: int = LARGEST_BATCH
+    ) -> None:
         """Start a local search from a packed design, if its response is stable."""
         self.local = start_local_search(
             self.evaluator, self._bits(mask),
-            self.patience.max_failures, self.settings.max_predicted_loss, failed,
+            self.patience.max_failures, self.settings.max_predicted_loss, failed, batch,
         )  # fmt: skip
 
     def _record(self, mask: NDArray[np.bool_], response: Response, accepted: bool) -> None:
@@ -303,7 +305,7 @@ def advance(
     patience = settings.patience(evaluator.problem)
     hopping = BasinHopping(evaluator, settings, patience, state, rng, last)
     if state.search_mask is not None:
-        hopping.resume_local_search(state.search_mask, state.failed)
+        hopping.resume_local_search(state.search_mask, state.failed, state.batch)
     while hopping.state.step < last:
         hopping.advance()
     local = hopping.local
@@ -311,6 +313,7 @@ def advance(
         hopping.state,
         search_mask=None if local is None else pack_mask(local.mask),
         failed=() if local is None else tuple(local.failed),
+        batch=LARGEST_BATCH if local is None else local.batch,
     )
     return state, hopping.rows.proposals(evaluator.problem)
 

@@ -1,16 +1,19 @@
-"""Local search by predicted flips: flips that improve a design, until several in succession fail.
+"""Local search by predicted flips, several at once, until single ones fail in succession.
 
-One Newton step predicts the effect of every flip (`SpringEvaluator.predict_flips`). Flips are
-evaluated in the order of their predicted gain; the first that improves the design is accepted,
-and all flips are predicted again. The search also ends when no flip left is predicted to help.
+One Newton step predicts the effect of every flip (`SpringEvaluator.predict_flips`). The flips of
+largest predicted gain that are distant from one another are made together. If they do not gain
+enough, the better half of them is tried, down to a single flip. On large lattices the flips that
+follow in the order of predicted gain are then tried, too, before all flips are predicted again.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from bellcrank.search.hopping.variation import designable_midpoints
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -25,6 +28,16 @@ MIN_GAIN = 1e-6
 MAX_STRAIN = 0.1
 """Strain of an absent beam placed between its displaced nodes, up to which a predicted gain is
 used. Of 38 predicted gains beyond it on the crane none was real, of 79 on the pliers two."""
+LARGEST_BATCH = 64
+"""Largest number of flips made together."""
+LEAST_SHARE = 0.25
+"""Fraction of the sum of their predicted gains from which flips made together are accepted."""
+SEPARATION = 2.0
+"""Least distance of the midpoints of two beams flipped together, in mean beam lengths."""
+BEAMS_PER_GAIN = 1000
+"""Designable beams for each further gain that uses the same prediction."""
+BEAMS_PER_FAILURE = 100
+"""Designable beams for each failed flip that a local search makes at least before it ends."""
 
 
 @dataclass(slots=True, eq=False)
@@ -40,11 +53,13 @@ class LocalSearch:
     efficiency
         Its score: the efficiency less the penalty for violated goals.
     max_failures
-        Consecutive failed flips that end the local search.
+        Consecutive failed single flips that end the local search; more on large lattices.
     max_predicted_loss
         Largest predicted loss, as a fraction of the efficiency, with which a flip is evaluated.
     failed
         Beams whose flips failed since the last gain.
+    batch
+        Largest number of flips made together next.
     """
 
     evaluator: Evaluator
@@ -53,50 +68,104 @@ class LocalSearch:
     max_failures: int
     max_predicted_loss: float
     failed: list[int]
-    _queue: list[int] | None = None
-    """Beams to flip, the most promising last."""
+    batch: int = LARGEST_BATCH
+    _beams: NDArray[np.int64] | None = None
+    """Beams to flip, the most promising first; None if they must be predicted."""
+    _gains: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """Their predicted gains."""
+    _midpoints: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """Their midpoints, in units of `SEPARATION`."""
+    _gains_of_prediction: int = 0
+    """Gains since the last prediction."""
 
-    def next_beam(self) -> int | None:
-        """Return the beam to flip next; None if the local search has ended."""
-        if self._queue is None:
-            self._queue = self._promising_beams()
-        if len(self.failed) >= self.max_failures or not self._queue:
+    def next_flips(self) -> NDArray[np.int64] | None:
+        """Return the beams to flip next, together; None if the local search has ended."""
+        if self._beams is None:
+            self._predict()
+        designable = len(self.evaluator.problem.designable)
+        last = max(self.max_failures, designable // BEAMS_PER_FAILURE)
+        if self._beams is None or not len(self._beams) or len(self.failed) >= last:
             return None
-        return self._queue.pop()
+        return self._beams[self._distant()]
 
-    def _promising_beams(self) -> list[int]:
+    def _predict(self) -> None:
         prediction = self.evaluator.predict_flips(self.mask)
+        self._gains_of_prediction = 0
         if prediction is None:
-            return []
+            return
         reliable = self.mask[prediction.beams] | (np.abs(prediction.strain) <= MAX_STRAIN)
         bound = -self.max_predicted_loss * abs(self.efficiency)
         promising = reliable & (prediction.change != 0.0) & (prediction.change > bound)
         promising &= ~np.isin(prediction.beams, self.failed)
-        order = np.argsort(prediction.change[promising], kind="stable")
-        beams: list[int] = prediction.beams[promising][order].tolist()
-        return beams
+        order = np.flatnonzero(promising)
+        # Of equal gains the last beam comes first.
+        order = order[np.argsort(prediction.change[order], kind="stable")][::-1]
+        problem = self.evaluator.problem
+        unit = SEPARATION * float(np.mean(problem.lattice.rest_length))
+        self._beams, self._gains = prediction.beams[order], prediction.change[order]
+        self._midpoints = designable_midpoints(problem)[order] / unit
 
-    def try_flip(self, beam: int) -> tuple[NDArray[np.bool_], Response, bool]:
-        """Evaluate a flip and accept it if it improves the design.
+    def _distant(self) -> list[int]:
+        """Return the indices of the most promising flips that are distant from one another."""
+        candidates = np.arange(max(1, int(np.count_nonzero(self._gains > 0.0))))
+        chosen: list[int] = []
+        while len(chosen) < self.batch and len(candidates):
+            chosen.append(int(candidates[0]))
+            distance = np.linalg.norm(
+                self._midpoints[candidates] - self._midpoints[chosen[-1]], axis=1
+            )
+            candidates = candidates[distance >= 1.0]
+        return chosen
+
+    def try_flips(self, beams: NDArray[np.int64]) -> tuple[NDArray[np.bool_], Response, bool]:
+        """Evaluate the next flips together and accept them if they improve the design.
+
+        Several flips are accepted if they gain enough of what was predicted.
+
+        Parameters
+        ----------
+        beams : (n,) int64
+            The result of `next_flips`.
 
         Returns
         -------
         mask, response
-            Design with the beam flipped, and its response.
+            Design with the beams flipped, and its response.
         accepted
         """
+        assert self._beams is not None
         mask = self.mask.copy()
-        mask[beam] ^= True
-        required = self.efficiency + MIN_GAIN
+        mask[beams] ^= True
+        tried = np.isin(self._beams, beams)
+        several = len(beams) > 1
+        predicted = LEAST_SHARE * float(self._gains[tried].sum())
+        required = self.efficiency + (predicted if several else MIN_GAIN)
         response = self.evaluator.evaluate(mask, warm_start=True, lower_bound=required)
         accepted = response.is_admissible and response.score > required
         if accepted:
             self.evaluator.set_reference()
             self.mask, self.efficiency = mask, response.score
-            self.failed, self._queue = [], None
+            self.failed = []
+            self.batch = min(2 * len(beams), LARGEST_BATCH)
+        elif several:
+            self.batch = len(beams) // 2
         else:
-            self.failed.append(beam)
+            self.failed.append(int(beams[0]))
+        self._leave_out(tried, accepted=accepted, several=several)
         return mask, response, accepted
+
+    def _leave_out(self, tried: NDArray[np.bool_], *, accepted: bool, several: bool) -> None:
+        """Leave out flips that have been tried; predict all again where predictions are too old."""
+        assert self._beams is not None
+        self._gains_of_prediction += accepted
+        designable = len(self.evaluator.problem.designable)
+        last = 1 + designable // BEAMS_PER_GAIN
+        failed_later = not accepted and self._gains_of_prediction > 0
+        if self._gains_of_prediction >= last or failed_later:
+            self._beams = None
+        elif accepted or not several:
+            self._beams, self._gains = self._beams[~tried], self._gains[~tried]
+            self._midpoints = self._midpoints[~tried]
 
 
 def start_local_search(
@@ -105,6 +174,7 @@ def start_local_search(
     max_failures: int,
     max_predicted_loss: float,
     failed: Iterable[int] = (),
+    batch: int = LARGEST_BATCH,
 ) -> LocalSearch | None:
     """Start or resume a local search; None from a design without a stable response."""
     response = evaluator.evaluate(mask)
@@ -112,5 +182,5 @@ def start_local_search(
         return None
     evaluator.set_reference()
     return LocalSearch(
-        evaluator, mask, response.score, max_failures, max_predicted_loss, list(failed)
+        evaluator, mask, response.score, max_failures, max_predicted_loss, list(failed), batch
     )

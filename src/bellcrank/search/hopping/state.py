@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, NamedTuple, Self
 
+from bellcrank.search.hopping.local_search import LARGEST_BATCH
+
 Stage = Literal["first", "restart", "archive"]
 
 
@@ -51,6 +53,8 @@ class HoppingState:
         The design reached by a local search in progress, in hexadecimal; None if there is none.
     failed
         Beams whose flips failed since the last gain of the local search.
+    batch
+        Largest number of flips that the local search makes together next.
     accepted
         Accepted proposals so far.
     local_searches
@@ -71,6 +75,7 @@ class HoppingState:
     parent: int = 0
     search_mask: str | None = None
     failed: tuple[int, ...] = ()
+    batch: int = LARGEST_BATCH
     accepted: int = 0
     local_searches: int = 0
 
