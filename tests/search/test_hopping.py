@@ -12,6 +12,8 @@ import pytest
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
 from bellcrank.model import Problem, find_problem, unpack_mask
+from bellcrank.model.builtin.scaling import scaling
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import (
     BLOCK,
     HoppingSettings,
@@ -23,12 +25,12 @@ from bellcrank.search import (
 )
 from bellcrank.search.hopping.basin_hopping import BasinHopping
 from bellcrank.search.hopping.local_search import (
-    LARGEST_BATCH,
     MIN_GAIN,
     SEPARATION,
     LocalSearch,
     start_local_search,
 )
+from bellcrank.search.hopping.settings import FRAMES, SPRINGS
 from bellcrank.search.hopping.state import Member
 from bellcrank.search.hopping.variation import perturb, recombine
 from tests.search.snapping import Snapping
@@ -37,8 +39,10 @@ if TYPE_CHECKING:
     from bellcrank.search.evaluator import Evaluator
     from bellcrank.storage import Proposals
 
-EAGER: dict[str, Any] = {"phase_steps": 300, "phase_share": 0.5, "min_stall": 500, "stall": 0.2}
-"""Settings with which short runs of a small problem have Metropolis phases."""
+EAGER: dict[str, Any] = {
+    "phase_steps": 300, "phase_share": 0.5, "min_stall": 500, "stall": 0.2, "restart_after": 0,
+}  # fmt: skip
+"""Settings with which short runs of a small problem have Metropolis phases and no restarts."""
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +61,10 @@ def run_to_the_end(local: LocalSearch) -> list[float]:
 def test_a_long_local_search_ends_where_no_flip_improves(small: Problem) -> None:
     evaluator = SpringEvaluator(small, unloaded_beams="prune_dead_ends")
     local = start_local_search(
-        evaluator, small.initial.copy(), max_failures=10**6, max_predicted_loss=1e6
+        evaluator,
+        small.initial.copy(),
+        SPRINGS._replace(max_failures=10**6),
+        max_predicted_loss=1e6,
     )
     assert local is not None
     efficiencies = run_to_the_end(local)
@@ -74,7 +81,10 @@ def test_a_long_local_search_ends_where_no_flip_improves(small: Problem) -> None
 
 def test_a_local_search_takes_few_responses(small: Problem) -> None:
     local = start_local_search(
-        SpringEvaluator(small, unloaded_beams="prune_dead_ends"), small.initial.copy(), 12, 0.01
+        SpringEvaluator(small, unloaded_beams="prune_dead_ends"),
+        small.initial.copy(),
+        SPRINGS,
+        0.01,
     )
     assert local is not None
     tries = len(run_to_the_end(local))
@@ -84,7 +94,10 @@ def test_a_local_search_takes_few_responses(small: Problem) -> None:
 
 def test_a_local_search_ends_after_the_given_number_of_failures(small: Problem) -> None:
     local = start_local_search(
-        SpringEvaluator(small, unloaded_beams="prune_dead_ends"), small.initial.copy(), 3, 1e6
+        SpringEvaluator(small, unloaded_beams="prune_dead_ends"),
+        small.initial.copy(),
+        SPRINGS._replace(max_failures=3),
+        1e6,
     )
     assert local is not None
     run_to_the_end(local)
@@ -94,7 +107,7 @@ def test_a_local_search_ends_after_the_given_number_of_failures(small: Problem) 
 def test_flips_made_together_are_distant_and_their_number_follows_their_success() -> None:
     crane = find_problem("crane")
     evaluator = SpringEvaluator(crane, unloaded_beams="prune_all")
-    local = start_local_search(evaluator, crane.initial.copy(), 12, 0.01)
+    local = start_local_search(evaluator, crane.initial.copy(), SPRINGS, 0.01)
     assert local is not None
     middle = crane.lattice.positions[crane.lattice.beams].mean(axis=1)
     sizes, outcomes = [], []
@@ -107,7 +120,7 @@ def test_flips_made_together_are_distant_and_their_number_follows_their_success(
         assert np.flatnonzero(mask != before).tolist() == sorted(beams.tolist())
         if accepted:
             assert response.efficiency == local.efficiency > efficiency
-            assert local.batch == min(2 * len(beams), LARGEST_BATCH)
+            assert local.batch == min(2 * len(beams), SPRINGS.largest_batch)
         else:
             assert local.mask is before
             assert local.batch == (len(beams) // 2 or most)
@@ -121,7 +134,7 @@ def test_flips_made_together_are_distant_and_their_number_follows_their_success(
 
 def test_flips_that_failed_together_are_tried_again_alone(small: Problem) -> None:
     evaluator = SpringEvaluator(small, unloaded_beams="prune_all")
-    local = start_local_search(evaluator, small.initial.copy(), 12, 0.01)
+    local = start_local_search(evaluator, small.initial.copy(), SPRINGS, 0.01)
     assert local is not None
     first = local.next_flips()
     assert first is not None
@@ -137,10 +150,22 @@ def test_flips_that_failed_together_are_tried_again_alone(small: Problem) -> Non
     assert local.failed == [first[0]]
 
 
+def test_limits_depend_on_the_model_and_on_the_number_of_beams(small: Problem) -> None:
+    frame = frame_problem(small, PartSpec())
+    large, large_frame = scaling(40), frame_problem(scaling(40), PartSpec())
+    settings = HoppingSettings()
+    assert settings.limits(small) == SPRINGS
+    assert settings.limits(frame) == FRAMES
+    assert settings.limits(large).max_failures == 43
+    assert settings.limits(large_frame).largest_batch == 8
+    given = HoppingSettings(largest_batch=3, restart_after=0).limits(large)
+    assert (given.largest_batch, given.restart_after, given.max_failures) == (3, 0, 43)
+
+
 def test_a_local_search_cannot_start_from_a_mechanism() -> None:
     pliers = find_problem("pliers")
     nothing = np.zeros(pliers.lattice.beam_count, dtype=bool)
-    assert start_local_search(SpringEvaluator(pliers), nothing, 12, 0.01) is None
+    assert start_local_search(SpringEvaluator(pliers), nothing, SPRINGS, 0.01) is None
 
 
 def test_a_perturbation_redraws_a_disc_and_nothing_else(small: Problem) -> None:
@@ -203,7 +228,7 @@ def test_a_phase_continues_from_the_last_one_until_there_is_progress(small: Prob
     evaluator = make_evaluator(small, settings)
     state = replace(start_chain(evaluator, settings, 0), step=1000, local_searches=1)
     rng = np.random.default_rng(1)
-    hopping = BasinHopping(evaluator, settings, settings.patience(small), state, rng, 2000)
+    hopping = BasinHopping(evaluator, settings, settings.limits(small), state, rng, 2000)
     reached = state.mask
     for _ in range(2):
         hopping.leave()
@@ -310,8 +335,8 @@ def test_a_restart_runs_its_chains_from_the_initial_design(small: Problem) -> No
     evaluator = make_evaluator(small, settings)
     first = start_chain(evaluator, settings, 0)
     state = replace(first, step=3000, progress_step=0, local_searches=5)
-    patience = settings.patience(small)
-    hopping = BasinHopping(evaluator, settings, patience, state, np.random.default_rng(1), 4000)
+    limits = settings.limits(small)
+    hopping = BasinHopping(evaluator, settings, limits, state, np.random.default_rng(1), 4000)
     hopping.leave()
     assert hopping.state.stage == "restart"
     assert hopping.state.archive == first.population
@@ -355,8 +380,8 @@ def test_designs_of_the_archive_that_become_equal_count_once(small: Problem) -> 
     first = start_chain(evaluator, settings, 0)
     low, high = first.population[0], Member("00" * len(bytes.fromhex(first.mask)), 9.0)
     state = replace(first, step=3000, stage="archive", population=(low, high, low))
-    patience = settings.patience(small)
-    hopping = BasinHopping(evaluator, settings, patience, state, np.random.default_rng(1), 4000)
+    limits = settings.limits(small)
+    hopping = BasinHopping(evaluator, settings, limits, state, np.random.default_rng(1), 4000)
     hopping.begin_next_stage()
     assert hopping.state.archive == (high, low)
     assert hopping.state.stage == "restart"
@@ -379,7 +404,7 @@ def test_a_recombination_copies_a_disc_of_another_design(small: Problem) -> None
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"restart_after": 0.0}, {"restart_archive": 0}, {"restart_recombination": 1.5}]
+    "wrong", [{"restart_after": -1.0}, {"restart_archive": 0}, {"restart_recombination": 1.5}]
 )
 def test_wrong_settings_of_restarts_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidSettings, match=next(iter(wrong))):

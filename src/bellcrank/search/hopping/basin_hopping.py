@@ -11,7 +11,7 @@ When progress stalls, most steps therefore go to low-temperature Metropolis phas
 starts from the best design, and each later one where the phase before ended, until there is
 progress. A local search from the design that the phase has reached follows each phase.
 
-With `restart_after`, the search restarts when the first stage has made no progress for that long.
+After `restart_after`, the search restarts when the first stage has made no progress for that long.
 A restart runs a few Metropolis chains from the initial design at a low temperature, and a local
 search from the end of each. Local searches then start from perturbations of the designs found and
 from combinations of two of them, until there is no more progress. The best design goes to an
@@ -35,7 +35,7 @@ from bellcrank.search.blocks import (
     steps_in_block,
 )
 from bellcrank.search.constraints.evaluator import without_base_penalty
-from bellcrank.search.hopping.local_search import LARGEST_BATCH, LocalSearch, start_local_search
+from bellcrank.search.hopping.local_search import LocalSearch, start_local_search
 from bellcrank.search.hopping.settings import HoppingSettings
 from bellcrank.search.hopping.state import HoppingState, Member
 from bellcrank.search.hopping.variation import perturb, recombine
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import Response
     from bellcrank.search.evaluator import Evaluator
-    from bellcrank.search.hopping.settings import Patience
+    from bellcrank.search.hopping.settings import Limits
     from bellcrank.storage import Proposals
 
 PROGRESS = 1e-3
@@ -66,13 +66,11 @@ def is_done(state: HoppingState, settings: HoppingSettings) -> bool:
     return state.step >= settings.steps
 
 
-def phase_is_due(state: HoppingState, settings: HoppingSettings, patience: Patience) -> bool:
+def phase_is_due(state: HoppingState, settings: HoppingSettings, limits: Limits) -> bool:
     """Whether a Metropolis phase is due in place of a perturbation."""
     if state.stage != "first" or not settings.phase_steps:
         return False
-    stalled = state.step - state.progress_step > max(
-        patience.min_stall, patience.stall * state.step
-    )
+    stalled = state.step - state.progress_step > max(limits.min_stall, limits.stall * state.step)
     pause = settings.phase_steps * (1.0 - settings.phase_share) / settings.phase_share
     return stalled and state.step - state.phase_end >= pause
 
@@ -91,7 +89,7 @@ class BasinHopping:
 
     evaluator: Evaluator
     settings: HoppingSettings
-    patience: Patience
+    limits: Limits
     state: HoppingState
     rng: np.random.Generator
     last: int
@@ -128,7 +126,7 @@ class BasinHopping:
                 state, phase_steps_left=steps, phase_mask=pack_mask(problem.initial)
             )
             return
-        if phase_is_due(state, self.settings, self.patience):
+        if phase_is_due(state, self.settings, self.limits):
             self.state = replace(
                 state,
                 phase_steps_left=self.settings.phase_steps,
@@ -141,8 +139,8 @@ class BasinHopping:
         if response.is_admissible:
             self.evaluator.set_reference()
             self.local = LocalSearch(
-                self.evaluator, mask, response.score,
-                self.patience.max_failures, self.settings.max_predicted_loss, [],
+                self.evaluator, mask, response.score, self.limits,
+                self.settings.max_predicted_loss, [], self.limits.largest_batch,
             )  # fmt: skip
 
     def next_start(self) -> NDArray[np.bool_]:
@@ -163,9 +161,9 @@ class BasinHopping:
     def stage_is_over(self) -> bool:
         """Whether the stage has made no progress for long enough."""
         state, settings = self.state, self.settings
-        if settings.restart_after is None or state.chains_left:
+        patience = self.limits.restart_after
+        if not patience or state.chains_left:
             return False
-        patience = settings.restart_after
         if state.stage != "first":
             patience = settings.restart_patience * len(state.population)
         stalled = state.step - state.progress_step
@@ -254,12 +252,12 @@ class BasinHopping:
             self.resume_local_search(chain.mask)
 
     def resume_local_search(
-        self, mask: str, failed: tuple[int, ...] = (), batch: int = LARGEST_BATCH
+        self, mask: str, failed: tuple[int, ...] = (), batch: int | None = None
     ) -> None:
         """Start a local search from a packed design, if its response is stable."""
         self.local = start_local_search(
             self.evaluator, self._bits(mask),
-            self.patience.max_failures, self.settings.max_predicted_loss, failed, batch,
+            self.limits, self.settings.max_predicted_loss, failed, batch,
         )  # fmt: skip
 
     def _record(self, mask: NDArray[np.bool_], response: Response, accepted: bool) -> None:
@@ -302,8 +300,8 @@ def advance(
     """Make the steps of one block."""
     rng = random_numbers(settings.seed, chain, state.step // BLOCK)
     last = state.step + steps_in_block(settings, state.step)
-    patience = settings.patience(evaluator.problem)
-    hopping = BasinHopping(evaluator, settings, patience, state, rng, last)
+    limits = settings.limits(evaluator.problem)
+    hopping = BasinHopping(evaluator, settings, limits, state, rng, last)
     if state.search_mask is not None:
         hopping.resume_local_search(state.search_mask, state.failed, state.batch)
     while hopping.state.step < last:
@@ -313,7 +311,7 @@ def advance(
         hopping.state,
         search_mask=None if local is None else pack_mask(local.mask),
         failed=() if local is None else tuple(local.failed),
-        batch=LARGEST_BATCH if local is None else local.batch,
+        batch=None if local is None else local.batch,
     )
     return state, hopping.rows.proposals(evaluator.problem)
 

@@ -22,22 +22,19 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import Response
     from bellcrank.search.evaluator import Evaluator
+    from bellcrank.search.hopping.settings import Limits
 
 MIN_GAIN = 1e-6
 """Smallest gain of efficiency that is accepted; responses are converged to 1e-9."""
 MAX_STRAIN = 0.1
 """Strain of an absent beam placed between its displaced nodes, up to which a predicted gain is
 used. Of 38 predicted gains beyond it on the crane none was real, of 79 on the pliers two."""
-LARGEST_BATCH = 64
-"""Largest number of flips made together."""
 LEAST_SHARE = 0.25
 """Fraction of the sum of their predicted gains from which flips made together are accepted."""
 SEPARATION = 2.0
 """Least distance of the midpoints of two beams flipped together, in mean beam lengths."""
 BEAMS_PER_GAIN = 1000
 """Designable beams for each further gain that uses the same prediction."""
-BEAMS_PER_FAILURE = 100
-"""Designable beams for each failed flip that a local search makes at least before it ends."""
 
 
 @dataclass(slots=True, eq=False)
@@ -52,8 +49,9 @@ class LocalSearch:
         The current design.
     efficiency
         Its score: the efficiency less the penalty for violated goals.
-    max_failures
-        Consecutive failed single flips that end the local search; more on large lattices.
+    limits
+        Consecutive failed single flips that end the local search, and the largest number of flips
+        made together.
     max_predicted_loss
         Largest predicted loss, as a fraction of the efficiency, with which a flip is evaluated.
     failed
@@ -65,10 +63,10 @@ class LocalSearch:
     evaluator: Evaluator
     mask: NDArray[np.bool_]
     efficiency: float
-    max_failures: int
+    limits: Limits
     max_predicted_loss: float
     failed: list[int]
-    batch: int = LARGEST_BATCH
+    batch: int
     _beams: NDArray[np.int64] | None = None
     """Beams to flip, the most promising first; None if they must be predicted."""
     _gains: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
@@ -82,9 +80,8 @@ class LocalSearch:
         """Return the beams to flip next, together; None if the local search has ended."""
         if self._beams is None:
             self._predict()
-        designable = len(self.evaluator.problem.designable)
-        last = max(self.max_failures, designable // BEAMS_PER_FAILURE)
-        if self._beams is None or not len(self._beams) or len(self.failed) >= last:
+        ended = len(self.failed) >= self.limits.max_failures
+        if self._beams is None or not len(self._beams) or ended:
             return None
         return self._beams[self._distant()]
 
@@ -146,7 +143,7 @@ class LocalSearch:
             self.evaluator.set_reference()
             self.mask, self.efficiency = mask, response.score
             self.failed = []
-            self.batch = min(2 * len(beams), LARGEST_BATCH)
+            self.batch = min(2 * len(beams), self.limits.largest_batch)
         elif several:
             self.batch = len(beams) // 2
         else:
@@ -171,10 +168,10 @@ class LocalSearch:
 def start_local_search(
     evaluator: Evaluator,
     mask: NDArray[np.bool_],
-    max_failures: int,
+    limits: Limits,
     max_predicted_loss: float,
     failed: Iterable[int] = (),
-    batch: int = LARGEST_BATCH,
+    batch: int | None = None,
 ) -> LocalSearch | None:
     """Start or resume a local search; None from a design without a stable response."""
     response = evaluator.evaluate(mask)
@@ -182,5 +179,6 @@ def start_local_search(
         return None
     evaluator.set_reference()
     return LocalSearch(
-        evaluator, mask, response.score, max_failures, max_predicted_loss, list(failed), batch
-    )
+        evaluator, mask, response.score, limits, max_predicted_loss, list(failed),
+        batch or limits.largest_batch,
+    )  # fmt: skip

@@ -11,18 +11,25 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
 
 
-class Patience(NamedTuple):
-    """When a local search ends, and when Metropolis phases begin; see `HoppingSettings`."""
+class Limits(NamedTuple):
+    """Settings that depend on the problem; see `HoppingSettings`."""
 
     max_failures: int
     min_stall: int
     stall: float
+    largest_batch: int
+    restart_after: float
 
 
-SPRINGS = Patience(max_failures=12, min_stall=2000, stall=0.4)
-FRAMES = Patience(max_failures=24, min_stall=1000, stall=0.15)
+SPRINGS = Limits(max_failures=12, min_stall=2000, stall=0.4, largest_batch=64, restart_after=15.0)
+FRAMES = Limits(max_failures=24, min_stall=1000, stall=0.15, largest_batch=1, restart_after=0.0)
 """For frames, predictions are less accurate and Metropolis phases gain more: 8 chains of 20,000
-designs of the crane ended at 9.9 in the mean, and with the values for springs at 8.6."""
+designs of the crane ended at 9.9 in the mean, and with the values for springs at 8.6. With batches
+of 64 flips, 6 such chains ended at 7.0 (median), and at 8.6 with single flips."""
+BEAMS_PER_FLIP = 500
+"""Designable beams of a frame for each flip of a batch."""
+BEAMS_PER_FAILURE = 100
+"""Designable beams for each failed flip that a local search makes at least before it ends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,9 +43,12 @@ class HoppingSettings(SearchSettings):
     min_density
         Least value of the probability, drawn anew for each perturbation, with which a beam in the
         disc is present.
+    largest_batch
+        Largest number of flips that a local search makes together. If it is not given, it depends
+        on the model (`SPRINGS`, `FRAMES`), and on the number of beams of a frame.
     max_failures
         Consecutive failed flips that end a local search. If it is not given, it depends on the
-        model (`SPRINGS`, `FRAMES`).
+        model and on the number of beams.
     max_predicted_loss
         Largest predicted loss, as a fraction of the efficiency, with which a flip is evaluated.
     phase_steps
@@ -51,10 +61,10 @@ class HoppingSettings(SearchSettings):
         begins between two local searches.
     min_stall, stall
         Steps without progress after which Metropolis phases begin: at least this number, and at
-        least this fraction of all steps so far. They may depend on the model, too.
+        least this fraction of all steps so far. They depend on the model, too.
     restart_after
-        Steps without progress that end the first stage, for each designable beam; None for no
-        restarts.
+        Steps without progress that end the first stage, for each designable beam; 0 for no
+        restarts. It depends on the model, too.
     restart_patience
         Steps without progress that end any later stage, for each designable beam and design of the
         population.
@@ -79,6 +89,7 @@ class HoppingSettings(SearchSettings):
 
     radius: float = 2.5
     min_density: float = 0.95
+    largest_batch: int | None = None
     max_failures: int | None = None
     max_predicted_loss: float = 0.01
     phase_steps: int = 1000
@@ -97,7 +108,7 @@ class HoppingSettings(SearchSettings):
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
         for name, least in (
-            ("max_failures", 1), ("phase_steps", 0), ("min_stall", 0),
+            ("largest_batch", 1), ("max_failures", 1), ("phase_steps", 0), ("min_stall", 0),
             ("restart_chains", 1), ("restart_archive", 1),
         ):  # fmt: skip
             if getattr(self, name) is not None:
@@ -107,7 +118,7 @@ class HoppingSettings(SearchSettings):
             "restart_patience", "restart_steps", "restart_temperature",
         ):  # fmt: skip
             check_positive(name, getattr(self, name))
-        if self.restart_after is not None:
+        if self.restart_after:
             check_positive("restart_after", self.restart_after)
         for name in (
             "min_density",
@@ -119,8 +130,13 @@ class HoppingSettings(SearchSettings):
             if getattr(self, name) is not None:
                 check_fraction(name, getattr(self, name))
 
-    def patience(self, problem: Problem) -> Patience:
-        """Return the settings that may depend on the model of a problem."""
+    def limits(self, problem: Problem) -> Limits:
+        """Return the settings that depend on the problem."""
+        beams = len(problem.designable)
         default = SPRINGS if problem.section is None else FRAMES
-        given = {name: getattr(self, name) for name in Patience._fields}
+        default = default._replace(
+            max_failures=max(default.max_failures, beams // BEAMS_PER_FAILURE),
+            largest_batch=max(default.largest_batch, beams // BEAMS_PER_FLIP),
+        )
+        given = {name: getattr(self, name) for name in Limits._fields}
         return default._replace(**{key: value for key, value in given.items() if value is not None})

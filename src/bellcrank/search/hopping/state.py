@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, NamedTuple, Self
 
-from bellcrank.search.hopping.local_search import LARGEST_BATCH
-
 Stage = Literal["first", "restart", "archive"]
 
 
@@ -54,7 +52,7 @@ class HoppingState:
     failed
         Beams whose flips failed since the last gain of the local search.
     batch
-        Largest number of flips that the local search makes together next.
+        Largest number of flips that the local search makes together next; None outside of one.
     accepted
         Accepted proposals so far.
     local_searches
@@ -75,7 +73,7 @@ class HoppingState:
     parent: int = 0
     search_mask: str | None = None
     failed: tuple[int, ...] = ()
-    batch: int = LARGEST_BATCH
+    batch: int | None = None
     accepted: int = 0
     local_searches: int = 0
 
