@@ -107,7 +107,8 @@ def test_a_local_search_ends_after_the_given_number_of_failures(small: Problem) 
 def test_flips_made_together_are_distant_and_their_number_follows_their_success() -> None:
     crane = find_problem("crane")
     evaluator = SpringEvaluator(crane, unloaded_beams="prune_all")
-    local = start_local_search(evaluator, crane.initial.copy(), SPRINGS, 0.01)
+    limits = SPRINGS._replace(largest_batch=64)
+    local = start_local_search(evaluator, crane.initial.copy(), limits, 0.01)
     assert local is not None
     middle = crane.lattice.positions[crane.lattice.beams].mean(axis=1)
     sizes, outcomes = [], []
@@ -120,7 +121,7 @@ def test_flips_made_together_are_distant_and_their_number_follows_their_success(
         assert np.flatnonzero(mask != before).tolist() == sorted(beams.tolist())
         if accepted:
             assert response.efficiency == local.efficiency > efficiency
-            assert local.batch == min(2 * len(beams), SPRINGS.largest_batch)
+            assert local.batch == min(2 * len(beams), limits.largest_batch)
         else:
             assert local.mask is before
             assert local.batch == (len(beams) // 2 or most)
@@ -134,7 +135,8 @@ def test_flips_made_together_are_distant_and_their_number_follows_their_success(
 
 def test_flips_that_failed_together_are_tried_again_alone(small: Problem) -> None:
     evaluator = SpringEvaluator(small, unloaded_beams="prune_all")
-    local = start_local_search(evaluator, small.initial.copy(), SPRINGS, 0.01)
+    limits = SPRINGS._replace(largest_batch=64)
+    local = start_local_search(evaluator, small.initial.copy(), limits, 0.01)
     assert local is not None
     first = local.next_flips()
     assert first is not None
@@ -159,6 +161,7 @@ def test_limits_depend_on_the_model_and_on_the_number_of_beams(small: Problem) -
     assert settings.limits(large).max_failures == 43
     assert settings.limits(large_frame).largest_batch == 8
     given = HoppingSettings(largest_batch=3, restart_after=0).limits(large)
+    assert settings.limits(large).largest_batch == 79
     assert (given.largest_batch, given.restart_after, given.max_failures) == (3, 0, 43)
 
 
@@ -260,7 +263,7 @@ def flips(row: np.ndarray, mask: str, problem: Problem) -> int:
 
 
 def resume(evaluator: Evaluator, mask: np.ndarray) -> LocalSearch:
-    local = start_local_search(evaluator, mask.copy(), 12, 0.01)
+    local = start_local_search(evaluator, mask.copy(), SPRINGS, 0.01)
     assert local is not None
     return local
 

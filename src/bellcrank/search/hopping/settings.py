@@ -21,13 +21,16 @@ class Limits(NamedTuple):
     restart_after: float
 
 
-SPRINGS = Limits(max_failures=12, min_stall=2000, stall=0.4, largest_batch=64, restart_after=15.0)
+SPRINGS = Limits(max_failures=12, min_stall=2000, stall=0.4, largest_batch=1, restart_after=15.0)
 FRAMES = Limits(max_failures=24, min_stall=1000, stall=0.15, largest_batch=1, restart_after=0.0)
 """For frames, predictions are less accurate and Metropolis phases gain more: 8 chains of 20,000
 designs of the crane ended at 9.9 in the mean, and with the values for springs at 8.6. With batches
 of 64 flips, 6 such chains ended at 7.0 (median), and at 8.6 with single flips."""
-BEAMS_PER_FLIP = 500
-"""Designable beams of a frame for each flip of a batch."""
+SINGLE_FLIPS = 400
+BEAMS_PER_FLIP = 50
+BEAMS_PER_FLIP_IN_FRAMES = 500
+"""Number of designable beams up to which single flips are made in springs, and of further beams
+for each flip of a batch; in frames all beams count."""
 BEAMS_PER_FAILURE = 100
 """Designable beams for each failed flip that a local search makes at least before it ends."""
 
@@ -45,10 +48,9 @@ class HoppingSettings(SearchSettings):
         disc is present.
     largest_batch
         Largest number of flips that a local search makes together. If it is not given, it depends
-        on the model (`SPRINGS`, `FRAMES`), and on the number of beams of a frame.
+        on the model and on the number of beams.
     max_failures
-        Consecutive failed flips that end a local search. If it is not given, it depends on the
-        model and on the number of beams.
+        Consecutive failed flips that end a local search; depends on them, too.
     max_predicted_loss
         Largest predicted loss, as a fraction of the efficiency, with which a flip is evaluated.
     phase_steps
@@ -133,10 +135,13 @@ class HoppingSettings(SearchSettings):
     def limits(self, problem: Problem) -> Limits:
         """Return the settings that depend on the problem."""
         beams = len(problem.designable)
-        default = SPRINGS if problem.section is None else FRAMES
+        if problem.section is None:
+            default, batch = SPRINGS, (beams - SINGLE_FLIPS) // BEAMS_PER_FLIP
+        else:
+            default, batch = FRAMES, beams // BEAMS_PER_FLIP_IN_FRAMES
         default = default._replace(
             max_failures=max(default.max_failures, beams // BEAMS_PER_FAILURE),
-            largest_batch=max(default.largest_batch, beams // BEAMS_PER_FLIP),
+            largest_batch=max(default.largest_batch, batch),
         )
         given = {name: getattr(self, name) for name in Limits._fields}
         return default._replace(**{key: value for key, value in given.items() if value is not None})
