@@ -2,10 +2,9 @@
 
 Each variant runs on the problems crane, anti-parallel and discs from the same seeds, with the same
 response (`unloaded_beams="prune_all"`). A design counts only if its equilibrium is stable when the
-load is applied in small increments. ``docs/comparison/moves.json`` contains the best efficiency
-and the processor time for each variant, problem and seed. The other records of that folder contain
-the default search and plain Metropolis. The committed record also contains variants that were
-removed from the package, and the commit at which they can be run.
+load is applied in small increments. ``docs/moves.json`` contains the best efficiency and the
+processor time for each variant, problem and seed. The committed record also contains variants that
+were removed from the package, and the commit at which they can be run.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import find_problem
 from bellcrank.search import advance_chain, make_evaluator, read_settings, start_chain
 
-RECORD = Path(__file__).parents[1] / "docs" / "comparison" / "moves.json"
+RECORD = Path(__file__).parents[1] / "docs" / "moves.json"
 PROBLEMS = ("crane", "anti-parallel", "discs")
 TEMPERING = {"search": "tempering", "steps": 10_000}
 VARIANTS = {

@@ -15,8 +15,10 @@ from bellcrank.machines import TwoPort
 from bellcrank.machines.bundled import find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder, kinds
+from benchmarks.competition import best_rows, table_rows
 from benchmarks.inverters import rows_of as inverter_rows
 from benchmarks.refinement import mass_rows, specified_rows
+from benchmarks.size import table as size_rows
 from benchmarks.space import cost_rows, mesh_rows, task_rows
 from benchmarks.tasks import counts, summary
 from tools.draw_tasks import best, identity, identity_in, recorded_runs
@@ -42,24 +44,22 @@ def three(value: float) -> str:
     return f"{rounded:,.0f}" if rounded >= 1000.0 else f"{rounded:g}"
 
 
-def search_comparison() -> Rows:
-    for path in (DOCS / "comparison").glob("*-*.json"):
-        told = json.loads(path.read_text(encoding="utf-8"))
-        unit = " responses" if told["problem"] == "crane" else ""
-        for kind, budget in (
-            ("equal responses", f"{told['responses']:,}{unit}"),
-            ("equal time", f"{told['seconds']:.1f} s"),
-        ):
-            found = told[kind]
-            base, power = f"{found['p']:.0e}".split("e")
-            yield row(
-                told["problem"], budget, f"{found['plain median']:.3f}", f"{found['median']:.3f}",
-                f"{found['ratio']:.2f}", f"{found['tenth percentile']:.3f}", f"{base}e{int(power)}",
-            )  # fmt: skip
+def competition() -> Rows:
+    for cells in table_rows(read("competition")["runs"]):
+        yield row(*cells)
+
+
+def best_designs() -> Rows:
+    for cells in best_rows(read("competition")["runs"]):
+        yield row(*cells)
+
+
+def sizes() -> Rows:
+    yield from size_rows(read("size")["rows"])
 
 
 def move_comparison() -> Rows:
-    results = read("comparison/moves")["results"]
+    results = read("moves")["results"]
     for moves, words in (
         ("flip", "`flip`"),
         ("flip, node", "`flip`, `node`"),
@@ -284,7 +284,8 @@ def space() -> Rows:
 
 
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
-    "searches": (search_comparison, move_comparison),
+    "searches": (competition, sizes, move_comparison),
+    "best": (best_designs,),
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),
