@@ -195,7 +195,7 @@ def table_rows(runs: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
     for budget in BUDGETS:
         for problem in PROBLEMS:
             found = {name: [*chosen(runs, problem, name, budget).values()] for name in METHODS}
-            if not all(found.values()):
+            if not found["default"] or not found["Metropolis"]:
                 continue
             seconds = time_of_default(runs, problem, budget)
             for label, limits in (
@@ -203,14 +203,17 @@ def table_rows(runs: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
             ):  # fmt: skip
                 # The default search uses its time, as the median of its runs does.
                 values = {
-                    name: [best_of(run, *limits) for run in each] for name, each in found.items()
+                    name: [best_of(run, *limits) for run in each]
+                    for name, each in found.items()
+                    if each
                 }
                 medians = {name: median(each) for name, each in values.items()}
                 ratio = medians["default"] / medians["Metropolis"]
                 p = mannwhitneyu(values["default"], values["Metropolis"], alternative="greater")
                 base, power = f"{p.pvalue:.0e}".split("e")
                 yield (
-                    problem, label, *(f"{medians[name]:.3f}" for name in METHODS),
+                    problem, label,
+                    *(f"{medians[name]:.3f}" if name in medians else "" for name in METHODS),
                     f"{ratio:.2f}", f"{base}e{int(power)}",
                 )  # fmt: skip
 

@@ -86,10 +86,13 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     figure, axes = plt.subplots(figsize=(6.0, 4.0), dpi=150)
     for model, colour in zip(MODELS, (style.BEST, style.INPUT), strict=True):
         found = [row for row in rows if row["model"] == model]
-        if found:
+        if len(found) > 1:
             label = f"{model}, exponent {exponent_of(found):.2f}"
             beams, times = [row["beams"] for row in found], [row["ms"] for row in found]
             axes.loglog(beams, times, "o-", color=colour, label=label)
+    ticks = sorted({row["beams"] for row in rows})
+    axes.minorticks_off()
+    axes.set_xticks(ticks, [f"{beams:,}" for beams in ticks])
     axes.set_xlabel("beams", color=style.INK)
     axes.set_ylabel("processor time of a design, ms", color=style.INK)
     axes.legend(frameon=False)
