@@ -32,6 +32,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import builtin, find_problem
 from bellcrank.provenance import provenance
 from bellcrank.search import (
+    DEFAULT_SEARCH,
     SearchSettings,
     Verdict,
     advance_chain,
@@ -48,12 +49,8 @@ PROBLEMS = [
     "crane", "anti-parallel", "scaling-14", "pliers",
     *(name for name in builtin if name.startswith("discs")),
 ]  # fmt: skip
-METHODS: dict[str, dict[str, Any]] = {
-    "default": {"search": "basin-hopping"},
-    "tempering": {"search": "tempering"},
-    "Metropolis": {"search": "paper"},
-}
-"""Settings of each method."""
+METHODS = {"default": DEFAULT_SEARCH, "tempering": "tempering", "Metropolis": "paper"}
+"""Name of the search of each method."""
 UNLIMITED_STEPS = 10**9
 BUDGETS = (10_000, 100_000, 1_000_000)
 SEEDS = 20
@@ -75,8 +72,14 @@ class Run:
     def settings(self) -> SearchSettings:
         """Settings of the search."""
         steps = self.responses if self.method == "default" else UNLIMITED_STEPS
-        common = {"unloaded_beams": "prune_all", "seed": self.seed, "steps": steps}
-        return read_settings({**METHODS[self.method], **common})
+        return read_settings(
+            {
+                "search": METHODS[self.method],
+                "unloaded_beams": "prune_all",
+                "seed": self.seed,
+                "steps": steps,
+            }
+        )
 
 
 class Verifier:
@@ -103,7 +106,8 @@ def warm_up(run: Run) -> None:
 def result_of(run: Run) -> dict[str, Any]:
     """Carry out a run; return its record.
 
-    ``curve`` has responses, processor time and efficiency of each better design.
+    ``curve`` has responses, processor time and efficiency of better designs: of each that exceeds
+    the one before by `MIN_RECORDED_GAIN`, and of the best.
     """
     warm_up(run)
     settings, verifier = run.settings, Verifier(run.problem)
@@ -111,7 +115,7 @@ def result_of(run: Run) -> dict[str, Any]:
     state = start_chain(evaluator, settings, 0)
     current, best, packed = state.efficiency, -np.inf, None
     responses, seconds = 0, 0.0
-    curve: list[list[float]] = []
+    better: list[list[float]] = []
     while state.step < settings.steps and (responses < run.responses or seconds < run.seconds):
         start = time.process_time()
         state, rows = advance_chain(evaluator, settings, 0, state)
@@ -124,20 +128,21 @@ def result_of(run: Run) -> dict[str, Any]:
                 if current > best and verifier.is_stable(rows.mask[index]):
                     best, packed = current, rows.mask[index]
                     reached = seconds + elapsed * (index + 1) / len(rows.status)
-                    point = [responses, float(f"{reached:.4g}"), float(f"{best:.6g}")]
-                    if curve and best - curve[-1][2] < MIN_RECORDED_GAIN * abs(best):
-                        curve[-1][2] = point[2]
-                    else:
-                        curve.append(point)
+                    better.append([responses, float(f"{reached:.4g}"), float(f"{best:.6g}")])
         seconds += elapsed
+    curve = better[:1]
+    for point in better[1:]:
+        if point[2] - curve[-1][2] > MIN_RECORDED_GAIN * abs(point[2]) or point is better[-1]:
+            curve.append(point)
     return {
         "problem": run.problem, "method": run.method, "seed": run.seed, "budget": run.responses,
-        "responses": responses, "seconds": float(f"{seconds:.4g}"), "steps": state.step,
+        "commit": provenance()["commit"], "responses": responses,
+        "seconds": float(f"{seconds:.4g}"), "steps": state.step,
         "curve": curve, "mask": None if packed is None else packed.tobytes().hex(),
     }  # fmt: skip
 
 
-def best_of(run: dict[str, Any], responses: float, seconds: float = np.inf) -> float:
+def best_of(run: dict[str, Any], responses: float = np.inf, seconds: float = np.inf) -> float:
     """Return the best efficiency of a run within a number of responses and a processor time."""
     return max(
         (best for count, at, best in run["curve"] if count <= responses and at <= seconds),
@@ -201,7 +206,6 @@ def table_rows(runs: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
             for label, limits in (
                 (f"{budget:,}", (budget, np.inf)), (f"{seconds:.1f} s", (np.inf, seconds)),
             ):  # fmt: skip
-                # The default search uses its time, as the median of its runs does.
                 values = {
                     name: [best_of(run, *limits) for run in each]
                     for name, each in found.items()
@@ -229,11 +233,11 @@ def best_rows(runs: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
     for problem in PROBLEMS:
         if problem not in by_problem:
             continue
-        run = max(by_problem[problem], key=lambda run: best_of(run, np.inf))
-        best = best_of(run, np.inf)
+        run = max(by_problem[problem], key=best_of)
+        best = best_of(run)
         budgets = {each["budget"] for each in by_problem[problem] if each["method"] == "default"}
         longest = chosen(runs, problem, "default", max(budgets)).values()
-        share = median(best_of(each, np.inf) for each in longest) / best
+        share = median(best_of(each) for each in longest) / best
         yield (
             problem, f"{best:.3f}", run["method"], str(run["seed"]), f"{run['steps']:,}",
             f"`{command_of(run)}`", f"{share:.2f} at {max(budgets):,}",
@@ -242,11 +246,9 @@ def best_rows(runs: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
 
 def command_of(run: dict[str, Any]) -> str:
     """Return the command that repeats a run."""
-    method = dict(METHODS[run["method"]])
-    more = "".join(f" --set {key}={value}" for key, value in method.items() if key != "search")
     return (
-        f"bellcrank design {run['problem']} --model springs --search {method['search']}"
-        f" --unloaded-beams prune_all --chains 1 --steps {run['steps']} --seed {run['seed']}{more}"
+        f"bellcrank design {run['problem']} --model springs --search {METHODS[run['method']]}"
+        f" --unloaded-beams prune_all --chains 1 --steps {run['steps']} --seed {run['seed']}"
     )
 
 
@@ -277,7 +279,7 @@ def main() -> None:
     elif options.quick:
         for method in options.methods:
             found = result_of(Run(options.problems[0], method, 0, 1000))
-            print(f"{method}: {best_of(found, np.inf):.3f} in {found['seconds']:.1f} s")
+            print(f"{method}: {best_of(found):.3f} in {found['seconds']:.1f} s")
     else:
         with ProcessPoolExecutor(2) as pool:
             for problem in options.problems:
@@ -286,15 +288,11 @@ def main() -> None:
                     for done in as_completed([pool.submit(result_of, run) for run in wanted]):
                         runs.append(done.result())
                         write_runs(options.out, runs)
-                print(*next_rows(runs, problem, options.responses), flush=True)
-
-
-def next_rows(runs: list[dict[str, Any]], problem: str, budget: int) -> Iterator[str]:
-    """Yield the medians of all methods on a problem at a budget."""
-    for method in METHODS:
-        values = [best_of(run, budget) for run in chosen(runs, problem, method, budget).values()]
-        if values:
-            yield f"{problem} {method} {median(values):.3f}"
+                    values = [
+                        best_of(run, options.responses)
+                        for run in chosen(runs, problem, method, options.responses).values()
+                    ]
+                    print(f"{problem}, {method}: {median(values):.3f}", flush=True)
 
 
 if __name__ == "__main__":

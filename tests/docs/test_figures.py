@@ -55,7 +55,7 @@ def best_designs() -> Rows:
 
 
 def sizes() -> Rows:
-    yield from size_rows(read("size")["rows"])
+    yield from size_rows(read("size")["runs"].values())
 
 
 def move_comparison() -> Rows:

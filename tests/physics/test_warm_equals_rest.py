@@ -155,3 +155,22 @@ def test_a_design_with_two_equilibria_takes_the_one_reached_from_rest(name: str)
     warm, rest = evaluator.evaluate(mask, warm_start=True), evaluator.evaluate(mask)
     assert warm.status is rest.status
     assert warm.efficiency == pytest.approx(rest.efficiency, abs=SAME)
+
+
+def test_with_a_bound_no_design_is_loaded_from_rest() -> None:
+    """Each design that snaps when it is loaded from rest is refused by a local search."""
+    evaluator = SpringEvaluator(find_problem("pliers"))
+    masks, proposals = run_chain(evaluator, 1500, seed=201)
+    current, refused = evaluator.problem.initial, []
+    for mask, status, accepted in zip(masks, proposals.status, proposals.accepted, strict=True):
+        if status == Status.SNAPPED:
+            evaluator.evaluate(current)
+            evaluator.set_reference()
+            bounded = evaluator.evaluate(mask, warm_start=True, lower_bound=-100.0)
+            refused.append(bounded.status)
+            assert not bounded.is_admissible
+            assert bounded.status in {Status.UNVERIFIED, Status.UNCONVERGED}
+            assert np.isnan(bounded.efficiency) == (bounded.status is Status.UNCONVERGED)
+        current = mask if accepted else current
+    assert len(refused) > 10
+    assert Status.UNVERIFIED in refused

@@ -160,8 +160,8 @@ def test_limits_depend_on_the_model_and_on_the_number_of_beams(small: Problem) -
     assert settings.limits(frame) == FRAMES
     assert settings.limits(large).max_failures == 43
     assert settings.limits(large_frame).largest_batch == 8
-    given = HoppingSettings(largest_batch=3, restart_after=0).limits(large)
     assert settings.limits(large).largest_batch == 79
+    given = HoppingSettings(largest_batch=3, restart_after=0).limits(large)
     assert (given.largest_batch, given.restart_after, given.max_failures) == (3, 0, 43)
 
 

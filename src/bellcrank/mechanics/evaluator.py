@@ -192,7 +192,9 @@ class SpringEvaluator:
             response is the same to within the tolerance, and computed faster.
         lower_bound
             With a warm start: for an equilibrium no more efficient than this, it is not
-            verified that it is the one reached from rest; its status is UNVERIFIED.
+            verified that it is the one reached from rest; its status is UNVERIFIED. With a finite
+            bound no design is loaded from rest: where that would be needed, the status is
+            UNVERIFIED or UNCONVERGED.
 
         Raises
         ------

@@ -51,7 +51,7 @@ class Status(Outcome):
     UNVERIFIED = (
         6,
         (
-            "a stable equilibrium that is no more efficient than the lower bound; it was not "
-            "verified that it is the one reached from rest"
+            "a stable equilibrium; a search did not need to verify that it is the one reached from "
+            "rest, or could not without following the path"
         ),
     )

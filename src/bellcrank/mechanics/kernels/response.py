@@ -152,8 +152,8 @@ def find_response(
     With `warm_start`, start from the reference equilibrium. If no moving beam differs from the
     reference, that is the equilibrium. Another one must be verified to be the one reached from
     rest; otherwise the design is loaded from rest. An equilibrium that is no more efficient than
-    `lower_bound` is not verified, and UNVERIFIED. With a bound, no design is loaded from rest, and
-    one that is not verified is UNVERIFIED too: most such designs snap.
+    `lower_bound` is not verified, and UNVERIFIED. With a bound, no design is loaded from rest: most
+    that would be snap. The status is then UNVERIFIED too, or UNCONVERGED.
     """
     clear(u, len(u))
     status = build_structure(system, mask, core, structure)
@@ -175,6 +175,8 @@ def find_response(
         status = newton(system, structure, 1.0, u, scratch, system.tolerance, LONGEST_STEP)
         if status == CONVERGED and efficiency_of(system, u) <= lower_bound:
             return UNVERIFIED, efficiency_of(system, u)
+        if status != CONVERGED and lower_bound > -math.inf:
+            return status, math.nan
     if status != CONVERGED or not is_reached_from_rest(system, structure, guess, u, scratch):
         if warm_start and lower_bound > -math.inf:
             return UNVERIFIED, efficiency_of(system, u)

@@ -11,11 +11,11 @@ When progress stalls, most steps therefore go to low-temperature Metropolis phas
 starts from the best design, and each later one where the phase before ended, until there is
 progress. A local search from the design that the phase has reached follows each phase.
 
-After `restart_after`, the search restarts when the first stage has made no progress for that long.
-A restart runs a few Metropolis chains from the initial design at a low temperature, and a local
-search from the end of each. Local searches then start from perturbations of the designs found and
-from combinations of two of them, until there is no more progress. The best design goes to an
-archive, whose designs are combined in the same way before the next restart.
+The search restarts when the first stage has made no progress for `restart_after` steps for each
+designable beam. A restart runs a few Metropolis chains from the initial design at a low
+temperature, and a local search from the end of each. Local searches then start from perturbations
+of the designs found and from combinations of two of them, until there is no more progress. The best
+design goes to an archive, whose designs are combined in the same way before the next restart.
 """
 
 from __future__ import annotations

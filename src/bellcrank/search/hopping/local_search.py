@@ -1,9 +1,12 @@
-"""Local search by predicted flips, several at once, until single ones fail in succession.
+"""Local search by predicted flips: flips that improve a design, until several in succession fail.
 
-One Newton step predicts the effect of every flip (`SpringEvaluator.predict_flips`). The flips of
-largest predicted gain that are distant from one another are made together. If they do not gain
-enough, the better half of them is tried, down to a single flip. On large lattices the flips that
-follow in the order of predicted gain are then tried, too, before all flips are predicted again.
+One Newton step predicts the effect of every flip (`SpringEvaluator.predict_flips`). Flips are
+evaluated in the order of their predicted gain; the first that improves the design is accepted,
+and all flips are predicted again. The search also ends when no flip left is predicted to help.
+
+On large lattices the most promising flips that are distant from one another are made together. If
+they do not gain enough, the better half of them is tried, down to a single flip. The next flips in
+the order of predicted gain are then tried, too, before all flips are predicted again.
 """
 
 from __future__ import annotations
@@ -104,6 +107,7 @@ class LocalSearch:
 
     def _distant(self) -> list[int]:
         """Return the indices of the most promising flips that are distant from one another."""
+        # A flip that is not predicted to help is made alone.
         candidates = np.arange(max(1, int(np.count_nonzero(self._gains > 0.0))))
         chosen: list[int] = []
         while len(chosen) < self.batch and len(candidates):
@@ -135,8 +139,8 @@ class LocalSearch:
         mask[beams] ^= True
         tried = np.isin(self._beams, beams)
         several = len(beams) > 1
-        predicted = LEAST_SHARE * float(self._gains[tried].sum())
-        required = self.efficiency + (predicted if several else MIN_GAIN)
+        share = LEAST_SHARE * float(self._gains[tried].sum()) if several else 0.0
+        required = self.efficiency + max(MIN_GAIN, share)
         response = self.evaluator.evaluate(mask, warm_start=True, lower_bound=required)
         accepted = response.is_admissible and response.score > required
         if accepted:
