@@ -39,7 +39,7 @@ SIZES = {
     "frames": (10, 14, 20, 28, 40),
 }
 """Sizes of the lattices with each model."""
-SECONDS = 40.0
+SECONDS = 20.0
 """Processor time of each measurement."""
 LEFT_OUT = 100
 """Designs before the measurement begins, rounded up to a block."""
