@@ -24,7 +24,7 @@ def announce_compilation() -> None:
     from bellcrank.mechanics.kernels._compile import kernels_are_compiled
 
     if not kernels_are_compiled():
-        notes.print("Compiling the kernels for this machine, once; this takes about a minute.")
+        notes.print("Compiling the kernels for this machine, once; this takes half a minute.")
 
 
 def warn_of_another_version(started: Mapping[str, Any], what: str) -> None:

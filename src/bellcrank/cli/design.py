@@ -165,6 +165,7 @@ def design(
     method = "paper" if paper else search or "basin-hopping"
     settings = read_settings({"search": method, **chosen})
     from bellcrank.cli.progress import SearchProgress
+    from bellcrank.mechanics import compile_ahead
     from bellcrank.workflows import complete_design, reopen_design, start_design
 
     with stopping_on_interrupt(resumable=True) as stop:
@@ -174,6 +175,7 @@ def design(
             folder = reopen_design(resume)
             warn_of_another_version(folder.provenance, "run")
         else:
+            compile_ahead(task)
             folder = start_design(task, settings, out or _new_folder(task), part, refine=refine)
             _print_stroke(task, 10.0 if part is None else part.scale)
         command = f"bellcrank design --resume {shlex.quote(str(folder.path))}"

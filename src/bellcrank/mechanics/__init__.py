@@ -29,6 +29,7 @@ from bellcrank.mechanics.evaluator import (
 )
 from bellcrank.mechanics.following import Movable, PathEnd, follow
 from bellcrank.mechanics.frames.case import CaseEvaluator, Channel
+from bellcrank.mechanics.frames.compilation import compile_ahead
 from bellcrank.mechanics.frames.evaluator import FrameEvaluator
 from bellcrank.mechanics.frames.quantities import quantities
 from bellcrank.mechanics.frames.stroke import Quantities
@@ -96,6 +97,7 @@ __all__ = [
     "bent_pieces",
     "channels_of",
     "check_memory",
+    "compile_ahead",
     "efficiency_of",
     "evaluators_that_fit",
     "follow",

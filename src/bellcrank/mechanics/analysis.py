@@ -56,9 +56,13 @@ class Strain:
 class Core:
     """Load-bearing core of designs, without their response.
 
-    As `SpringEvaluator.load_bearing`, ten times faster, and without a change of the response that
-    the evaluator computed last. For an evaluator with ``unloaded_beams="prune_all"``, all unloaded
-    beams are left out.
+    Parameters
+    ----------
+    evaluator
+        Its response computed last does not change.
+    core
+        `PRUNE_DEAD_ENDS`, or `PRUNE_ALL` to leave out all unloaded beams. By default that of the
+        evaluator; dead ends if that keeps them.
 
     Examples
     --------
@@ -69,9 +73,10 @@ class Core:
     352
     """
 
-    def __init__(self, evaluator: ComputedResponse) -> None:
+    def __init__(self, evaluator: ComputedResponse, core: int | None = None) -> None:
         self._system = evaluator.system
-        self._kind = PRUNE_ALL if evaluator.core == PRUNE_ALL else PRUNE_DEAD_ENDS
+        chosen = evaluator.core if core is None else core
+        self._kind = PRUNE_ALL if chosen == PRUNE_ALL else PRUNE_DEAD_ENDS
         self._structure = allocate_structure(evaluator.system)
 
     def of(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

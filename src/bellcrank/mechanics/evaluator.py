@@ -201,21 +201,11 @@ class SpringEvaluator:
         InvalidProblem
             If the mask has the wrong length.
         """
-        return self._load(mask, self.core, largest_increment, warm_start, lower_bound)
-
-    def _load(
-        self,
-        mask: ArrayLike,
-        core: int,
-        largest_increment: float = 1.0,
-        warm_start: bool = False,
-        lower_bound: float = -math.inf,
-    ) -> Response:
         from bellcrank.mechanics.kernels.response import respond
 
         self._factor_is_of_prediction = False
         status, efficiency, energy = respond(
-            self.system, self._checked(mask), core, self.reference, warm_start, lower_bound,
+            self.system, self._checked(mask), self.core, self.reference, warm_start, lower_bound,
             largest_increment, self.structure, self.displacement, self.scratch,
         )  # fmt: skip
         return Response(Status(status), efficiency, energy, self.displacement.copy())
@@ -265,10 +255,7 @@ class SpringEvaluator:
         -------
         (M,) bool
         """
-        self._load(mask, PRUNE_DEAD_ENDS)
-        ends_move = self.structure.active[self.system.beams].astype(bool).any(axis=1)
-        core: NDArray[np.bool_] = (self.structure.present != 0) & ends_move
-        return core
+        return Core(self, PRUNE_DEAD_ENDS).of(self._checked(mask).astype(bool))
 
     def sensitivity(self, mask: ArrayLike) -> NDArray[np.float64]:
         """Return the first-order change of the efficiency by flipping each beam.

@@ -139,7 +139,8 @@ def draw_report(report: DesignReport, folder: RunFolder) -> None:
     else:
         draw_motion(machine, folder.path / "motion.png", overwrite=True)
     if report.human is not None and human is not None:
-        drawn = Motion(report.human, human.displacement, human.efficiency, name="human")
+        of_model = replace(report.human, problem=folder.problem)
+        drawn = Motion(of_model, human.displacement, human.efficiency, name="human")
         draw_comparison(drawn, machine, folder.path / "comparison.png", overwrite=True)
 
 

@@ -189,6 +189,15 @@ def intrinsic(function: F) -> F:
     return _defer(function, None)
 
 
+def compile_for(function: Callable[..., Any], *arguments: object) -> None:
+    """Compile a kernel for the types of its arguments, and store it on disk, without a call."""
+    import numba
+
+    _compile_pending()
+    compiled: Any = function.compiled if isinstance(function, _Deferred) else function
+    compiled.compile(tuple(numba.typeof(each) for each in arguments))
+
+
 def kernels_are_compiled() -> bool:
     """Return whether an earlier process on this machine has compiled the kernels."""
     return any(cache_folder().rglob("*.nbc"))
