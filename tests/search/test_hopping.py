@@ -25,6 +25,7 @@ from bellcrank.search import (
 )
 from bellcrank.search.hopping.basin_hopping import BasinHopping
 from bellcrank.search.hopping.local_search import (
+    LEAST_SHARE,
     MIN_GAIN,
     SEPARATION,
     LocalSearch,
@@ -111,9 +112,10 @@ def test_flips_made_together_are_distant_and_their_number_follows_their_success(
     local = start_local_search(evaluator, crane.initial.copy(), limits, 0.01)
     assert local is not None
     middle = crane.lattice.positions[crane.lattice.beams].mean(axis=1)
-    sizes, outcomes = [], []
+    sizes, outcomes, poor = [], [], 0
     while (beams := local.next_flips()) is not None:
         before, efficiency, most = local.mask, local.efficiency, local.batch
+        predicted = local._gains[np.isin(local._beams, beams)].sum()
         apart = np.linalg.norm(middle[beams][:, None] - middle[beams][None], axis=2)
         assert apart[~np.eye(len(beams), dtype=bool)].min(initial=np.inf) >= SEPARATION
         assert 1 <= len(beams) <= most
@@ -121,16 +123,66 @@ def test_flips_made_together_are_distant_and_their_number_follows_their_success(
         assert np.flatnonzero(mask != before).tolist() == sorted(beams.tolist())
         if accepted:
             assert response.efficiency == local.efficiency > efficiency
-            assert local.batch == min(2 * len(beams), limits.largest_batch)
+            agrees = len(beams) == 1 or response.efficiency - efficiency >= LEAST_SHARE * predicted
+            wanted = 2 * len(beams) if agrees else len(beams) // 2
+            assert local.batch == min(wanted, limits.largest_batch)
+            poor += not agrees
         else:
             assert local.mask is before
-            assert local.batch == (len(beams) // 2 or most)
+            assert local.batch == (most if len(beams) == 1 else max(1, len(beams) // 4))
         sizes.append(len(beams))
         outcomes.append(accepted)
     together = np.array(sizes) > 1
     # Several flips are made together with and without success, and single ones, too.
     assert {*np.array(outcomes)[together].tolist()} == {False, True}
     assert np.array(outcomes)[~together].any()
+    assert poor
+
+
+def test_flips_are_predicted_for_the_current_design() -> None:
+    """On large lattices predictions may follow a failure, after several gains."""
+
+    class Recorder(SpringEvaluator):
+        after_failures = 0
+
+        def evaluate(self, mask, *args, **kwargs):
+            self.last = mask
+            return super().evaluate(mask, *args, **kwargs)
+
+        def predict_flips(self, mask, beams=None):
+            assert np.array_equal(mask, self.last)
+            self.after_failures += failed
+            return super().predict_flips(mask, beams)
+
+    problem = scaling(24)
+    evaluator = Recorder(problem, unloaded_beams="prune_all")
+    limits = HoppingSettings().limits(problem)
+    local = start_local_search(evaluator, problem.initial.copy(), limits, 0.01)
+    assert local is not None
+    failed = False
+    for _ in range(60):
+        beams = local.next_flips()
+        assert beams is not None
+        _, _, accepted = local.try_flips(beams)
+        failed = not accepted
+    assert evaluator.after_failures > 0
+
+
+def test_flips_that_failed_alone_are_left_out_where_flips_are_made_together() -> None:
+    problem = scaling(10)
+    for largest_batch in (1, 4):
+        limits = SPRINGS._replace(largest_batch=largest_batch)
+        evaluator = SpringEvaluator(problem, unloaded_beams="prune_all")
+        local = start_local_search(evaluator, problem.initial.copy(), limits, 0.01)
+        assert local is not None
+        failed: list[int] = []
+        repeated = 0
+        while (beams := local.next_flips()) is not None:
+            repeated += bool(np.isin(beams, failed).any())
+            _, _, accepted = local.try_flips(beams)
+            if not accepted and len(beams) == 1:
+                failed.append(int(beams[0]))
+        assert bool(repeated) == (largest_batch == 1)
 
 
 def test_flips_that_failed_together_are_tried_again_alone(small: Problem) -> None:

@@ -5,8 +5,9 @@ evaluated in the order of their predicted gain; the first that improves the desi
 and all flips are predicted again. The search also ends when no flip left is predicted to help.
 
 On large lattices the most promising flips that are distant from one another are made together. If
-they do not gain enough, the better half of them is tried, down to a single flip. The next flips in
-the order of predicted gain are then tried, too, before all flips are predicted again.
+they gain nothing, the best quarter of them is tried, down to a single flip. If they gain much less
+than was predicted, half as many are made next. Several gains use the same prediction, and flips
+that failed alone are not tried again in the same block of the search.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ MAX_STRAIN = 0.1
 """Strain of an absent beam placed between its displaced nodes, up to which a predicted gain is
 used. Of 38 predicted gains beyond it on the crane none was real, of 79 on the pliers two."""
 LEAST_SHARE = 0.25
-"""Fraction of the sum of their predicted gains from which flips made together are accepted."""
+"""Fraction of the sum of their predicted gains below which fewer flips are made together next."""
+SMALLER_BATCH = 4
+"""Divisor of the number of flips made together after they fail."""
 SEPARATION = 2.0
 """Least distance of the midpoints of two beams flipped together, in mean beam lengths."""
 BEAMS_PER_GAIN = 1000
@@ -58,7 +61,7 @@ class LocalSearch:
     max_predicted_loss
         Largest predicted loss, as a fraction of the efficiency, with which a flip is evaluated.
     failed
-        Beams whose flips failed since the last gain.
+        Beams whose single flips failed since the last gain.
     batch
         Largest number of flips made together next.
     """
@@ -78,6 +81,13 @@ class LocalSearch:
     """Their midpoints, in units of `SEPARATION`."""
     _gains_of_prediction: int = 0
     """Gains since the last prediction."""
+    _left_out: list[int] = field(init=False)
+    """Beams that are not flipped."""
+    _is_evaluated: bool = True
+    """Whether the current design was evaluated last."""
+
+    def __post_init__(self) -> None:
+        self._left_out = list(self.failed)
 
     def next_flips(self) -> NDArray[np.int64] | None:
         """Return the beams to flip next, together; None if the local search has ended."""
@@ -89,6 +99,9 @@ class LocalSearch:
         return self._beams[self._distant()]
 
     def _predict(self) -> None:
+        if not self._is_evaluated:
+            self.evaluator.evaluate(self.mask, warm_start=True)  # the reference
+            self._is_evaluated = True
         prediction = self.evaluator.predict_flips(self.mask)
         self._gains_of_prediction = 0
         if prediction is None:
@@ -96,7 +109,7 @@ class LocalSearch:
         reliable = self.mask[prediction.beams] | (np.abs(prediction.strain) <= MAX_STRAIN)
         bound = -self.max_predicted_loss * abs(self.efficiency)
         promising = reliable & (prediction.change != 0.0) & (prediction.change > bound)
-        promising &= ~np.isin(prediction.beams, self.failed)
+        promising &= ~np.isin(prediction.beams, self._left_out)
         order = np.flatnonzero(promising)
         # Of equal gains the last beam comes first.
         order = order[np.argsort(prediction.change[order], kind="stable")][::-1]
@@ -121,8 +134,6 @@ class LocalSearch:
     def try_flips(self, beams: NDArray[np.int64]) -> tuple[NDArray[np.bool_], Response, bool]:
         """Evaluate the next flips together and accept them if they improve the design.
 
-        Several flips are accepted if they gain enough of what was predicted.
-
         Parameters
         ----------
         beams : (n,) int64
@@ -139,24 +150,29 @@ class LocalSearch:
         mask[beams] ^= True
         tried = np.isin(self._beams, beams)
         several = len(beams) > 1
-        share = LEAST_SHARE * float(self._gains[tried].sum()) if several else 0.0
-        required = self.efficiency + max(MIN_GAIN, share)
+        required = self.efficiency + MIN_GAIN
         response = self.evaluator.evaluate(mask, warm_start=True, lower_bound=required)
         accepted = response.is_admissible and response.score > required
+        self._is_evaluated = accepted
         if accepted:
             self.evaluator.set_reference()
-            self.mask, self.efficiency = mask, response.score
-            self.failed = []
-            self.batch = min(2 * len(beams), self.limits.largest_batch)
+            gain, predicted = response.score - self.efficiency, float(self._gains[tried].sum())
+            self.mask, self.efficiency, self.failed = mask, response.score, []
+            agrees = not several or gain >= LEAST_SHARE * predicted
+            wanted = 2 * len(beams) if agrees else len(beams) // 2
+            self.batch = min(wanted, self.limits.largest_batch)
+            if self.limits.largest_batch == 1:
+                self._left_out = []
         elif several:
-            self.batch = len(beams) // 2
+            self.batch = max(1, len(beams) // SMALLER_BATCH)
         else:
             self.failed.append(int(beams[0]))
-        self._leave_out(tried, accepted=accepted, several=several)
+            self._left_out.append(int(beams[0]))
+        self._drop(tried, accepted=accepted, several=several)
         return mask, response, accepted
 
-    def _leave_out(self, tried: NDArray[np.bool_], *, accepted: bool, several: bool) -> None:
-        """Leave out flips that have been tried; predict all again where predictions are too old."""
+    def _drop(self, tried: NDArray[np.bool_], *, accepted: bool, several: bool) -> None:
+        """Drop flips that have been tried, or all predictions where they are too old."""
         assert self._beams is not None
         self._gains_of_prediction += accepted
         designable = len(self.evaluator.problem.designable)
