@@ -10,7 +10,7 @@ when the load is applied in small increments; the time of this verification is n
 Each run is added to ``docs/competition.json`` as soon as it is done, and runs that are in the
 record are not repeated. ``--responses N`` is the budget, ``--seeds N`` the number of seeds, and
 ``--quick`` a run of each method without a record. The tables of ``docs/searches.md`` and the page
-``docs/best.md`` are printed by ``--table`` and ``--best``.
+``docs/best.md`` are printed by ``--table``, ``--cost`` and ``--best``.
 """
 
 from __future__ import annotations
@@ -167,12 +167,13 @@ def missing(
 ) -> Iterator[Run]:
     """Yield the runs of a method that are not in the record.
 
-    Methods other than the default run for its median time at least.
+    Methods other than the default run for its median time at least; runs that ended earlier are
+    repeated.
     """
     known = chosen(runs, problem, method, budget)
     seconds = 0.0 if method == "default" else time_of_default(runs, problem, budget)
     for seed in seeds:
-        if seed not in known:
+        if seed not in known or known[seed]["seconds"] < seconds:
             yield Run(problem, method, seed, budget, seconds)
 
 
@@ -184,6 +185,11 @@ def chosen(
     return {
         run["seed"]: run for run in runs if (run["problem"], run["method"], run["budget"]) == wanted
     }
+
+
+def key_of(run: dict[str, Any]) -> tuple[Any, ...]:
+    """Return what tells a run from others."""
+    return run["problem"], run["method"], run["budget"], run["seed"]
 
 
 def time_of_default(runs: list[dict[str, Any]], problem: str, budget: int) -> float:
@@ -244,6 +250,21 @@ def best_rows(runs: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
         )  # fmt: skip
 
 
+def step_rows(runs: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yield for each problem and method the processor time of a step in ms.
+
+    The median of all runs with the smallest budget, and that of the slowest as a multiple of it.
+    """
+    for problem in PROBLEMS:
+        row = [problem]
+        for method in METHODS:
+            found = chosen(runs, problem, method, BUDGETS[0]).values()
+            times = [1e3 * run["seconds"] / run["steps"] for run in found]
+            middle = median(times) if times else np.nan
+            row += [f"{middle:.3f}", f"{max(times, default=np.nan) / middle:.1f}"]
+        yield tuple(row)
+
+
 def command_of(run: dict[str, Any]) -> str:
     """Return the command that repeats a run."""
     return (
@@ -269,6 +290,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one short run of each method")
     parser.add_argument("--table", action="store_true")
     parser.add_argument("--best", action="store_true")
+    parser.add_argument("--cost", action="store_true")
     options = parser.parse_args()
     runs = [] if options.quick else read_runs(options.out)
     if options.table:
@@ -276,6 +298,9 @@ def main() -> None:
     elif options.best:
         head = ["problem", "efficiency", "method", "seed", "steps", "command", "default"]
         print(as_table(head, best_rows(runs)))
+    elif options.cost:
+        head = ["problem", *(each for name in METHODS for each in (f"{name}, ms", "slowest"))]
+        print(as_table(head, step_rows(runs)))
     elif options.quick:
         for method in options.methods:
             found = result_of(Run(options.problems[0], method, 0, 1000))
@@ -286,7 +311,9 @@ def main() -> None:
                 for method in options.methods:
                     wanted = missing(runs, problem, method, options.responses, range(options.seeds))
                     for done in as_completed([pool.submit(result_of, run) for run in wanted]):
-                        runs.append(done.result())
+                        run = done.result()
+                        runs = [each for each in runs if key_of(each) != key_of(run)]
+                        runs.append(run)
                         write_runs(options.out, runs)
                     values = [
                         best_of(run, options.responses)
