@@ -43,8 +43,8 @@ from bellcrank.mechanics.frames.case import CHANNELS, CaseEvaluator, Channel
 from bellcrank.mechanics.frames.geometry import BeamSlopes, beam_slopes, geometry_slopes
 from bellcrank.model import Design, Item, gallery_design
 from bellcrank.part import PartSpec, models
-from bellcrank.refine import RefinementSettings, refine_design, specified
-from bellcrank.search import read_settings
+from bellcrank.refine import RefinementSettings, refine_design
+from bellcrank.search import read_settings, specified
 from bellcrank.task import find_task
 from bellcrank.workflows import complete_design, start_design
 from bellcrank.workflows.refinement import BEFORE_REFINEMENT

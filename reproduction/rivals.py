@@ -13,9 +13,9 @@ import numpy as np
 
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.model import Item
-from bellcrank.refine import RefinementSettings, refine_design, specified
+from bellcrank.refine import RefinementSettings, refine_design
 from bellcrank.refine.shape import volume_of
-from bellcrank.search import read_settings, verification_evaluator
+from bellcrank.search import read_settings, specified, verification_evaluator
 from bellcrank.search.choice import FirstWithoutFault
 from bellcrank.search.verification import Verifier
 from bellcrank.workflows import complete_design, start_design

@@ -13,13 +13,15 @@ import pickle
 import signal
 import subprocess
 import sys
+import threading
+from collections import deque
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from bellcrank import errors
 from bellcrank.errors import BellcrankError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
 PROGRAM = """
 import json, sys
@@ -28,6 +30,8 @@ from bellcrank.processes import main
 main(*sys.argv[2:])
 """
 """Program of the process. It does not import the main module of its parent."""
+POLL_INTERVAL = 0.05
+"""Time between two checks whether to stop, s."""
 SINGLE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
@@ -93,6 +97,90 @@ class FunctionProcess:
         """End the process."""
         self._process.kill()
         self._process.wait()
+
+
+class FunctionProcesses:
+    """Functions that are computed in processes, several at a time, each followed by a thread.
+
+    Parameters
+    ----------
+    module, function
+        Names of a module and of a function in it, as in `FunctionProcess`.
+    jobs
+        The arguments of each computation.
+    receive
+        Called with the number of a computation and each value that it sends, from threads.
+
+    Examples
+    --------
+    >>> import threading
+    >>> found = {}
+    >>> jobs = [(["first"],), (["second"],)]
+    >>> own = FunctionProcesses("bellcrank.processes", "send_all", jobs, found.__setitem__)
+    >>> own.run(2, threading.Event())
+    >>> sorted(found.items())
+    [(0, 'first'), (1, 'second')]
+    """
+
+    def __init__(
+        self,
+        module: str,
+        function: str,
+        jobs: Sequence[tuple[object, ...]],
+        receive: Callable[[int, Any], None],
+    ) -> None:
+        self._program = module, function
+        self._jobs, self._receive = jobs, receive
+        self._errors: list[BaseException] = []
+        self._waiting = deque(range(len(jobs)))
+        self._running: list[FunctionProcess] = []
+        self._lock = threading.Lock()
+        self._stopped = False
+
+    def run(self, workers: int, stop: threading.Event) -> None:
+        """Compute all, or until the event is set; raise the first error.
+
+        Parameters
+        ----------
+        workers
+            Number of processes at a time.
+        stop
+            Event that ends all processes.
+        """
+        threads = [threading.Thread(target=self._work, daemon=True) for _ in range(workers)]
+        for thread in threads:
+            thread.start()
+        try:
+            for thread in threads:
+                while thread.is_alive() and not stop.is_set():
+                    thread.join(POLL_INTERVAL)
+        finally:
+            self._stop()
+        if self._errors:
+            raise self._errors[0]
+
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                if self._stopped or not self._waiting:
+                    return
+                number = self._waiting.popleft()
+                process = FunctionProcess(*self._program, *self._jobs[number])
+                self._running.append(process)
+            try:
+                for value in process:
+                    self._receive(number, value)
+            except BaseException as error:  # raised again by `run`
+                if not self._stopped:
+                    self._errors.append(error)
+                self._stop()
+                return
+
+    def _stop(self) -> None:
+        with self._lock:
+            self._stopped = True
+            for process in self._running:
+                process.kill()
 
 
 def send_all(send: Any, values: list[Any]) -> None:

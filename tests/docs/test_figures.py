@@ -21,6 +21,7 @@ from benchmarks.refinement import mass_rows, specified_rows
 from benchmarks.size import table as size_rows
 from benchmarks.space import cost_rows, mesh_rows, task_rows
 from benchmarks.tasks import counts, summary
+from benchmarks.tolerance import table as tolerance_rows
 from tools.draw_tasks import best, identity, identity_in, recorded_runs
 
 ROOT = Path(__file__).parents[2]
@@ -61,6 +62,10 @@ def best_designs() -> Rows:
 
 def sizes() -> Rows:
     yield from size_rows(read("size")["runs"].values())
+
+
+def tolerances() -> Rows:
+    yield from tolerance_rows(read("tolerance")["runs"])
 
 
 def move_comparison() -> Rows:
@@ -291,6 +296,7 @@ def space() -> Rows:
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (competition, cost_of_searches, sizes, move_comparison),
     "best": (best_designs,),
+    "tolerance": (tolerances,),
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),

@@ -48,7 +48,12 @@ def add_struts(ops: Any, part: Part, elements: int, theory: str) -> None:
     """Add nodes and elements within the struts."""
     lattice, section, material = part.design.problem.lattice, part.section, part.material
     tag = element = lattice.node_count + 1
-    for first, last in lattice.beams[part.design.mask].tolist():
+    widths = part.design.problem.widths
+    relative = np.ones(len(lattice.beams))
+    if widths is not None:
+        relative = widths / part.design.problem.section.width
+    struts = lattice.beams[part.design.mask].tolist()
+    for (first, last), wide in zip(struts, relative[part.design.mask].tolist(), strict=True):
         start, end = lattice.positions[[first, last]] * part.scale
         chain = [first + 1, *range(tag, tag + elements - 1), last + 1]
         for inner in range(1, elements):
@@ -59,12 +64,13 @@ def add_struts(ops: Any, part: Part, elements: int, theory: str) -> None:
             if theory == "timoshenko":
                 ops.element(
                     "ElasticTimoshenkoBeam", element, a, b, material.young, material.shear,
-                    section.area, section.inertia, 5.0 / 6.0 * section.area, 1,
+                    wide * section.area, wide**3 * section.inertia,
+                    5.0 / 6.0 * wide * section.area, 1,
                 )  # fmt: skip
             else:
                 ops.element(
                     "elasticBeamColumn", element, a, b,
-                    section.area, material.young, section.inertia, 1,
+                    wide * section.area, material.young, wide**3 * section.inertia, 1,
                 )  # fmt: skip
 
 

@@ -24,11 +24,12 @@ from bellcrank.model import (
     gallery_design,
 )
 from bellcrank.part import PartSpec, frame_problem
-from bellcrank.refine import RefinementSettings, refine_design, refinement, specified
+from bellcrank.refine import RefinementSettings, refine_design, refinement
 from bellcrank.refine.gaps import gaps_of, nearest_points, nearest_to_ends
 from bellcrank.refine.shape import SLENDERNESS, SMALLEST_ANGLE, shape_rows, volume_of
 from bellcrank.refine.steps import linear_step, merit_of
 from bellcrank.refine.variables import variables_of
+from bellcrank.search import specified
 from bellcrank.search.symmetry import beam_images, node_images, operation
 from bellcrank.task import find_task
 from tests.search.test_symmetry import OCTETS, column

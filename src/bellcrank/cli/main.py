@@ -19,6 +19,7 @@ COMMANDS = {
     "characterise": "characterise",
     "validate": "validate",
     "refine": "refine",
+    "tolerance": "tolerance",
     "export": "export",
     "print": "print_part",
     "card": "card",

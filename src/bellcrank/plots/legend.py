@@ -1,4 +1,4 @@
-"""The legend of a drawing."""
+"""The legend and the colour bar of a drawing."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from bellcrank.plots import style
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
+    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 ROW_HEIGHT = 0.24
 """Height of a row of the legend, inches."""
+BAR = 0.12
+"""Height of a colour bar, inches."""
 
 
 def strut_entry(colour: str, width: float = 4.0) -> Line2D:
@@ -53,6 +56,16 @@ def support_entries(problems: list[Problem]) -> list[tuple[str, Any]]:
     if any(len(getattr(p.supports, name)) for p in problems for name in rollers):
         entries.append(("roller", roller_entry()))
     return entries
+
+
+def add_colour_bar(figure: Figure, colours: ScalarMappable, label: str, bottom: float) -> None:
+    """Add a colour bar in the middle, `bottom` inches above the lower edge of the figure."""
+    up = float(figure.get_size_inches()[1])
+    axes = figure.add_axes((0.25, bottom / up, 0.5, BAR / up))
+    bar = figure.colorbar(colours, cax=axes, orientation="horizontal", extend="max")
+    bar.set_label(label, family=style.FONT, size=style.SMALL_SIZE, color=style.INK)
+    bar.outline.set_visible(False)
+    axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT)
 
 
 def _draw_arrow(

@@ -16,7 +16,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.tri import Triangulation
 
 from bellcrank.plots import style
-from bellcrank.plots.legend import ROW_HEIGHT, add_legend
+from bellcrank.plots.legend import BAR, ROW_HEIGHT, add_colour_bar, add_legend
 from bellcrank.plots.marks import Panel, add_arrows, add_panel, add_supports
 from bellcrank.plots.motion import (
     COLUMNS,
@@ -48,9 +48,8 @@ STRESS = LinearSegmentedColormap.from_list(
 """Grey for low, dark for high stress; monotonic in brightness."""
 TOP_QUANTILE = 0.998
 """Quantile of the stress at the end of the colour scale; values above it share one colour."""
-BAR = 0.12
 CURVES = 1.9
-"""Heights of the colour bar and of the curves, inches."""
+"""Height of the curves, inches."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,7 +147,7 @@ def _layout(drawings: list[Drawing], parts: list[StressedPart], labels: StrokeLa
         panel = add_panel(figure, problem, (left, lower), scale, low, high)
         _add_stressed(panel, part, colours, drawing)
         left += scale * float(size[0]) + GAP
-    _add_colour_bar(figure, colours, bar_at, width)
+    add_colour_bar(figure, colours, "von Mises stress, MPa", bar_at)
     _add_curves(figure, drawings, parts, labels, MARGIN + legend + 0.25)
     add_legend(figure, entries, MARGIN, COLUMNS)
     return figure
@@ -183,19 +182,6 @@ def _add_stressed(
         panel.axes.axis(window)
     add_arrows(panel, input_arrows(problem), style.INPUT, bold=True)
     add_arrows(panel, output_arrows(problem, drawing.motion.moved), style.WANTED, bold=True)
-
-
-def _add_colour_bar(figure: Figure, colours: ScalarMappable, bottom: float, width: float) -> None:
-    """Add the colour bar."""
-    across, up = figure.get_size_inches()
-    long = 0.5 * width
-    axes = figure.add_axes((0.5 * (width - long) / across, bottom / up, long / across, BAR / up))
-    bar = figure.colorbar(colours, cax=axes, orientation="horizontal", extend="max")
-    bar.set_label(
-        "von Mises stress, MPa", family=style.FONT, size=style.SMALL_SIZE, color=style.INK
-    )
-    bar.outline.set_visible(False)
-    axes.tick_params(labelsize=style.SMALL_SIZE, colors=style.NOTE, labelfontfamily=style.FONT)
 
 
 def _add_curves(

@@ -16,8 +16,7 @@ programs within a trust region.
 True
 """
 
-from bellcrank.refine.default_specification import specified
 from bellcrank.refine.design import Refinement, refine_design
 from bellcrank.refine.refinement import RefinementSettings
 
-__all__ = ["Refinement", "RefinementSettings", "refine_design", "specified"]
+__all__ = ["Refinement", "RefinementSettings", "refine_design"]

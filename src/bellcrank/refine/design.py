@@ -11,9 +11,9 @@ from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Item
 from bellcrank.refine.by_frames import FrameRefinement
 from bellcrank.refine.by_sheet import SheetRefinement
-from bellcrank.refine.default_specification import specified
 from bellcrank.refine.refinement import RefinementSettings
 from bellcrank.refine.shape import volume_of
+from bellcrank.search.default_specification import specified
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -21,6 +21,7 @@ Examples
 
 from bellcrank.search.blocks import BLOCK
 from bellcrank.search.cleaning import clean, pieces
+from bellcrank.search.default_specification import specified
 from bellcrank.search.evaluator import (
     Evaluator,
     make_evaluator,
@@ -116,6 +117,7 @@ __all__ = [
     "schedules",
     "searches",
     "select",
+    "specified",
     "start_chain",
     "verification_evaluator",
     "with_stable_initial",

@@ -14,6 +14,8 @@ from bellcrank.mechanics.stroke import STATES
 from bellcrank.search.stroke_states import SEARCH_STATES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from bellcrank.mechanics import CaseEvaluator
@@ -45,15 +47,39 @@ def gap_less_overlaps(case: CaseEvaluator, design: NDArray[np.bool_], bound: flo
     bound
         Wanted gap, lattice units.
     """
+    least, worst = float(case.problem.beam_widths.max()) + bound, 0.0
+    for _, _, distance in _near_struts(case, design, least):
+        worst = max(worst, float(np.sum(least - distance)))
+    return bound - worst
+
+
+def gap_of_frame(case: CaseEvaluator, design: NDArray[np.bool_], bound: float) -> float:
+    """Return the smallest gap between bent struts along the stroke; infinite above the bound.
+
+    Faster than `smallest_gap`, at fewer states. Struts that meet in a node do not count. The
+    parameters are those of `gap_less_overlaps`.
+    """
+    widths, ends = case.problem.beam_widths, case.problem.lattice.beams
+    gap = math.inf
+    for first, second, distance in _near_struts(case, design, float(widths.max()) + bound):
+        meet = (ends[first][:, :, None] == ends[second][:, None, :]).any(axis=(1, 2))
+        apart = (distance - 0.5 * (widths[first] + widths[second]))[~meet]
+        gap = min(gap, float(apart.min(initial=math.inf)))
+    return gap if gap < bound else math.inf
+
+
+def _near_struts(
+    case: CaseEvaluator, design: NDArray[np.bool_], distance: float
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]:
+    """Yield pairs of struts whose centre lines are near each other, at states of the stroke."""
     problem = case.problem
     beams = np.flatnonzero(printed_beams(problem, design, case.frame.structure.present != 0))
-    least, worst = float(problem.beam_widths.max()) + bound, 0.0
     for fraction in (np.arange(1, SEARCH_STATES + 1) / SEARCH_STATES).tolist():
         if (found := case.state(fraction)) is not None:
             points, pieces = bent_pieces(problem, beams, found.state.u)
-            _, distance = near_pairs(points, pieces, least)
-            worst = max(worst, float(np.sum(least - distance)))
-    return bound - worst
+            pairs, apart = near_pairs(points, pieces, distance)
+            first, second = beams[pairs.T % len(beams)]
+            yield first, second, apart
 
 
 def smallest_gap(case: CaseEvaluator, design: NDArray[np.bool_], bound: float) -> float:

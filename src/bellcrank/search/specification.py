@@ -32,7 +32,7 @@ from bellcrank.search.symmetry import SymmetryGroups
 from bellcrank.search.verdict import Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -74,6 +74,8 @@ class SpecificationEvaluator:
     reserve
         Part of their size by which all bounds are tightened, so that designs still meet them in a
         better model.
+    gap
+        Function to the clearance of designs that are not verified.
 
     Raises
     ------
@@ -81,7 +83,13 @@ class SpecificationEvaluator:
         If the problem has no specification, or its lattice is not symmetric as demanded.
     """
 
-    def __init__(self, problem: Problem, elements: int | None = None, reserve: float = 0.0) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        elements: int | None = None,
+        reserve: float = 0.0,
+        gap: Callable[[CaseEvaluator, NDArray[np.bool_], float], float] = gap_less_overlaps,
+    ) -> None:
         wanted = problem.specification
         if wanted is None:
             raise InvalidSettings(f"problem {problem.name!r} has no specification")
@@ -93,6 +101,7 @@ class SpecificationEvaluator:
         self.items = tuple(tightened(item, reserve) for item in wanted.items)
         self.objectives = wanted.maximise
         self.elements = elements
+        self._gap = gap
         section = problem.section
         assert section is not None
         self._volume = section.area_of(problem.beam_widths) * problem.lattice.rest_length
@@ -230,7 +239,7 @@ class SpecificationEvaluator:
         wanted = {self.items[k].quantity: self.items[k].at_least or 0.0 for k in case.items}
         given: dict[str, float] = {}
         if (bound := wanted.get("clearance")) is not None:
-            clearance = smallest_gap if verified else gap_less_overlaps
+            clearance = smallest_gap if verified else self._gap
             given["clearance"] = clearance(case.evaluator, design, bound)
         if (bound := wanted.get("stable_stroke")) is not None:
             given["stable_stroke"] = self._stable_stroke(name, design, bound) if verified else bound
@@ -373,6 +382,15 @@ class SpecificationEvaluator:
             self.groups.beams, np.nan_to_num(change, nan=-1e3, neginf=-1e3, posinf=1e3),
             self.groups.largest(strain),
         )  # fmt: skip
+
+    def objective_values(self) -> list[float]:
+        """Return the values of the objectives of the design evaluated last."""
+        found = []
+        for objective in self.objectives:
+            record = self.records[objective.case or next(iter(self.records))]
+            value = quantity_values(record, objective.quantity, objective.output)[..., -1]
+            found.append(float(value))
+        return found
 
     def results(self) -> list[ItemResult]:
         """Return the items with the values of the design evaluated last."""

@@ -25,8 +25,14 @@ from bellcrank.plots import (
     draw_stress,
 )
 from bellcrank.plots.saving import check_target
-from bellcrank.refine import specified
-from bellcrank.search import MetropolisSettings, SearchSettings, Verdict, read_settings, searches
+from bellcrank.search import (
+    MetropolisSettings,
+    SearchSettings,
+    Verdict,
+    read_settings,
+    searches,
+    specified,
+)
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.storage import RunFolder
 from bellcrank.workflows.figures import model_words

@@ -10,8 +10,8 @@ from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.provenance import provenance
-from bellcrank.refine import Refinement, RefinementSettings, refine_design, specified
-from bellcrank.search import HoppingSettings, SpecificationEvaluator
+from bellcrank.refine import Refinement, RefinementSettings, refine_design
+from bellcrank.search import HoppingSettings, SpecificationEvaluator, specified
 from bellcrank.search.choice import nearest
 from bellcrank.search.parallel import default_workers
 from bellcrank.search.selection import Finalist

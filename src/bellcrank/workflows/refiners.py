@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections import deque
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
@@ -15,14 +13,14 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.fem.continuum.mesh import COARSE
 from bellcrank.fem.specification import sheet_records
 from bellcrank.mechanics import VERIFICATION_INCREMENT
-from bellcrank.processes import FunctionProcess
+from bellcrank.processes import FunctionProcesses
 from bellcrank.refine import Refinement, RefinementSettings, refine_design
 from bellcrank.refine.differences import on_same_path
 from bellcrank.search import SpecificationEvaluator
-from bellcrank.search.parallel import POLL_INTERVAL
 from bellcrank.search.verification import ELEMENTS
 
 if TYPE_CHECKING:
+    import threading
     from collections.abc import Callable, Sequence
 
     from bellcrank.model import Design, Problem
@@ -75,7 +73,17 @@ def refine_designs(
     settings = settings or SETTINGS
     workers = min(workers, len(designs))
     if workers > 1:
-        return _Refiners(designs, spec, settings, report).run(workers, stop)
+        refined: dict[int, Refinement] = {}
+
+        def receive(number: int, value: Refinement | Progress) -> None:
+            if isinstance(value, Refinement):
+                refined[number] = value
+            else:
+                report(number, value)
+
+        jobs = [(design, spec, settings) for design in designs]
+        FunctionProcesses(__name__, send_refinement.__name__, jobs, receive).run(workers, stop)
+        return [refined[number] for number in sorted(refined)]
     results: list[Refinement] = []
     for number, design in enumerate(designs):
 
@@ -88,69 +96,6 @@ def refine_designs(
             break
         results.append(found)
     return results
-
-
-class _Refiners:
-    """Refinements in processes, each followed by a thread."""
-
-    def __init__(
-        self,
-        designs: Sequence[Design],
-        spec: PartSpec | None,
-        settings: RefinementSettings,
-        report: Report,
-    ) -> None:
-        self.designs, self.report = designs, report
-        self.options = (spec, settings)
-        self.results: dict[int, Refinement] = {}
-        self.errors: list[BaseException] = []
-        self.waiting = deque(range(len(designs)))
-        self.running: list[FunctionProcess] = []
-        self.lock = threading.Lock()
-        self.stopped = False
-
-    def run(self, workers: int, stop: threading.Event) -> list[Refinement]:
-        """Return the results in the order of the designs; fewer if they were stopped."""
-        threads = [threading.Thread(target=self._work, daemon=True) for _ in range(workers)]
-        for thread in threads:
-            thread.start()
-        try:
-            for thread in threads:
-                while thread.is_alive() and not stop.is_set():
-                    thread.join(POLL_INTERVAL)
-        finally:
-            self._stop()
-        if self.errors:
-            raise self.errors[0]
-        return [self.results[number] for number in sorted(self.results)]
-
-    def _work(self) -> None:
-        while True:
-            with self.lock:
-                if self.stopped or not self.waiting:
-                    return
-                number = self.waiting.popleft()
-                process = FunctionProcess(
-                    __name__, send_refinement.__name__, self.designs[number], *self.options
-                )
-                self.running.append(process)
-            try:
-                for value in process:
-                    if isinstance(value, Refinement):
-                        self.results[number] = value
-                    else:
-                        self.report(number, value)
-            except BaseException as error:  # raised again by `run`
-                if not self.stopped:
-                    self.errors.append(error)
-                self._stop()
-                return
-
-    def _stop(self) -> None:
-        with self.lock:
-            self.stopped = True
-            for process in self.running:
-                process.kill()
 
 
 def send_refinement(

@@ -144,30 +144,31 @@ def item_rows(
     chosen = len(columns) - 1 if decisive is None else list(results).index(decisive)
     for values in zip(*columns, strict=True):
         item, last = values[0].item, values[chosen]
+        is_known = math.isfinite(shown_value(item, last.value))
         after = [" (NO)" if k > chosen and not each.met else "" for k, each in enumerate(values)]
         rows.append(
             [
                 item_label(item, problem),
                 wanted_text(item, units),
                 *(
-                    number_text(item, _shown(each), units) + mark
+                    number_text(item, shown_value(item, each.value), units) + mark
                     for each, mark in zip(values, after, strict=True)
                 ),
-                f"{100.0 * last.margin:+.0f} %" if math.isfinite(_shown(last)) else "-",
+                f"{100.0 * last.margin:+.0f} %" if is_known else "-",
                 "yes" if last.met else "NO",
             ]
         )
     return rows
 
 
-def _shown(result: ItemResult) -> float:
+def shown_value(item: Item, value: float) -> float:
     """Return the value of an item; infinite for more than a wanted payload.
 
     That is extrapolated from the motion under the wanted one, and larger ones may be carried less
     well.
     """
-    least = result.item.at_least if result.item.quantity == "payload" else None
-    return result.value if least is None or result.value <= least else math.inf
+    least = item.at_least if item.quantity == "payload" else None
+    return value if least is None or not value > least else math.inf
 
 
 def item_data(

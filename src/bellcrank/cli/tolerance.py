@@ -1,0 +1,137 @@
+"""`bellcrank tolerance`: what a part does when it is not printed or driven as drawn."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bellcrank.cli.app import app
+from bellcrank.cli.arguments import DesignName, design_named
+from bellcrank.cli.console import (
+    announce_compilation,
+    notes,
+    plain,
+    print_json,
+    results,
+    text_grid,
+)
+from bellcrank.cli.live import Live
+
+if TYPE_CHECKING:
+    from bellcrank.workflows.tolerance import ToleranceReport
+
+SHOWN_STRUTS = 5
+"""Number of struts whose loss is printed."""
+
+
+class ScenarioProgress(Live):
+    """Progress of a computation of scenarios."""
+
+    def __init__(self) -> None:
+        super().__init__("scenarios", None)
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show the number of scenarios that are computed."""
+        self._show(done, total, f"{done} of {total}", f"{done} of {total} scenarios")
+
+
+@app.command()
+def tolerance(
+    design: DesignName,
+    width: Annotated[float, typer.Option(help="Deviation of all widths, mm.")] = 0.1,
+    relative_width: Annotated[
+        float, typer.Option(help="The same as a part of the width; random prints have it too.")
+    ] = 0.1,
+    thin: Annotated[
+        float, typer.Option(help="Part of the width by which all struts may be too thin.")
+    ] = 0.2,
+    each_width: Annotated[
+        float,
+        typer.Option(help="Standard deviation of the width of each strut, as a part of it."),
+    ] = 0.05,
+    node: Annotated[
+        float, typer.Option(help="Largest deviation of each coordinate of a node, mm.")
+    ] = 0.1,
+    angle: Annotated[
+        float, typer.Option(help="Deviation of the direction of the input, degrees.")
+    ] = 5.0,
+    shortest: Annotated[
+        float, typer.Option(help="Shortest stroke, as a part of the nominal one.")
+    ] = 0.5,
+    longest: Annotated[
+        float, typer.Option(help="Longest stroke, as a part of the nominal one.")
+    ] = 1.5,
+    prints: Annotated[int, typer.Option(help="Number of random prints.")] = 200,
+    struts: Annotated[
+        bool, typer.Option("--struts/--no-struts", help="Compute the loss of each strut.")
+    ] = True,
+    seed: Annotated[int, typer.Option(help="Seed of the random prints.")] = 0,
+    workers: Annotated[
+        int | None, typer.Option(help="Number of processes; default: that of the cores.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the map of critical struts (png, svg, pdf)."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Compute what a part does when it is not printed or driven as drawn, or loses a strut."""
+    chosen = design_named(design)
+    from bellcrank.cli.stopping import stopping_on_interrupt
+    from bellcrank.errors import InvalidSettings
+    from bellcrank.model import require_plane
+    from bellcrank.tolerance import Deviations
+    from bellcrank.workflows.pictures import check_targets
+    from bellcrank.workflows.tolerance import compute_tolerance
+
+    if workers is not None and workers < 1:
+        raise InvalidSettings(f"--workers: expected at least 1, got {workers}")
+    deviations = Deviations(
+        width=width, relative_width=relative_width, thin=thin, each_width=each_width, node=node,
+        angle=angle, shortest=shortest, longest=longest, prints=prints, struts=struts, seed=seed,
+    )  # fmt: skip
+    if picture is not None:
+        require_plane(chosen.problem, "--picture")
+        if not struts:
+            raise InvalidSettings("--picture draws the loss of each strut; leave out --no-struts")
+    check_targets(picture, None, overwrite=overwrite)
+    announce_compilation()
+    with stopping_on_interrupt() as stop, ScenarioProgress() as progress:
+        report = compute_tolerance(
+            chosen, deviations, progress=progress, workers=workers, stop=stop
+        )
+    if report is None:
+        stop.exit()
+        return
+    if as_json:
+        print_json(json.dumps(report.to_dict(), indent=1))
+    else:
+        _print(report)
+    if picture is not None:
+        from bellcrank.plots import draw_critical_struts
+
+        losses = report.tolerance.strut_losses()
+        draw_critical_struts(report.design, losses, picture, overwrite=overwrite)
+        notes.print(f"wrote {plain(picture)}")
+
+
+def _print(report: ToleranceReport) -> None:
+    """Print the items, the worst scenarios and the critical struts."""
+    from bellcrank.workflows.tolerance import scenario_rows, strut_lines, tolerance_rows
+
+    count = len(report.tolerance.scenarios)
+    results.print(
+        f"{count} scenarios, by frames with one element in each strut; the worst value of each kind"
+    )
+    results.print(text_grid(tolerance_rows(report)))
+    prints = report.tolerance.of_kind("print")
+    if prints:
+        met = sum(report.tolerance.results[number].met for number in prints)
+        results.print(f"all items are met by {met} of {len(prints)} random prints")
+    results.print(text_grid(scenario_rows(report)))
+    for line in strut_lines(report, SHOWN_STRUTS):
+        results.print(plain(line))

@@ -1,0 +1,129 @@
+"""Evaluation of scenarios by frames."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from bellcrank.errors import InvalidProblem, InvalidSettings
+from bellcrank.search.clearance import gap_of_frame, smallest_gap
+from bellcrank.search.default_specification import specified
+from bellcrank.search.specification import SpecificationEvaluator
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from bellcrank.mechanics import ItemResult
+    from bellcrank.model import Design, Problem
+    from bellcrank.tolerance.scenarios import Scenario
+
+
+class ScenarioResult(NamedTuple):
+    """What a design does in a scenario.
+
+    Parameters
+    ----------
+    status
+        Label of the status of the response.
+    efficiency
+        Of the first load case and its first output; nan without a stable path to full stroke.
+    items
+        Results of the items of the specification; empty without a stable path.
+    objectives
+        Values of the objectives, in the units of the problem; nan without a stable path.
+    """
+
+    status: str
+    efficiency: float
+    items: list[ItemResult]
+    objectives: list[float]
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether a stable path leads to the full stroke."""
+        return math.isfinite(self.efficiency)
+
+    @property
+    def met(self) -> bool:
+        """Whether a stable path leads to the full stroke, and all items are met."""
+        return self.is_stable and all(each.met for each in self.items)
+
+
+class ScenarioEvaluator:
+    """Evaluates scenarios of one design.
+
+    Without a specification, the items are clearance and strain and the objective is the gain
+    (`bellcrank.search.default_specification.specified`).
+
+    Parameters
+    ----------
+    design
+        Design of a frame.
+    strain_limit
+        Largest strain for a design without a specification; nan if it is unknown.
+    elements : int, optional
+        As in `bellcrank.mechanics.FrameEvaluator`.
+
+    Raises
+    ------
+    InvalidSettings
+        If the design has no stable path to its full stroke.
+    """
+
+    def __init__(
+        self, design: Design, strain_limit: float = math.nan, elements: int | None = None
+    ) -> None:
+        problem = specified(design.problem, strain_limit)
+        assert problem.specification is not None
+        # Deviations are not symmetric.
+        wanted = replace(problem.specification, symmetry=())
+        self.problem = replace(problem, specification=wanted)
+        self.mask, self.elements = design.mask, elements
+        self._nominal = self._evaluator(self.problem)
+        response = self._nominal.evaluate(self.mask)
+        if not response.is_admissible:
+            raise InvalidSettings(
+                f"the design has no tolerance to compute: {response.status.message}"
+            )
+        self._nominal.set_reference()
+
+    def _evaluator(self, problem: Problem) -> SpecificationEvaluator:
+        gap = gap_of_frame if self.elements is None else smallest_gap
+        return SpecificationEvaluator(problem, self.elements, gap=gap)
+
+    def evaluate(self, scenario: Scenario) -> ScenarioResult:
+        """Return the outcome of a scenario; its path is followed from rest."""
+        mask, warm = self.mask, scenario.missing is not None
+        if warm:
+            mask = mask.copy()
+            mask[scenario.missing] = False
+            evaluator = self._nominal
+        else:
+            try:
+                evaluator = self._evaluator(scenario.of(self.problem))
+            except InvalidProblem:
+                return self._lost("strut shorter than wide")
+        response = evaluator.evaluate(mask, warm_start=warm)
+        if not response.is_admissible:
+            return self._lost(response.status.label)
+        return ScenarioResult(
+            response.status.label, response.efficiency, evaluator.results(),
+            evaluator.objective_values(),
+        )  # fmt: skip
+
+    def _lost(self, status: str) -> ScenarioResult:
+        """Return the result of a scenario without a stable path."""
+        return ScenarioResult(status, math.nan, [], [math.nan] * len(self._nominal.objectives))
+
+
+def evaluate_scenarios(
+    design: Design,
+    scenarios: Sequence[Scenario],
+    strain_limit: float = math.nan,
+    elements: int | None = None,
+) -> Iterator[ScenarioResult]:
+    """Yield the results of scenarios in their order; for the others see `ScenarioEvaluator`."""
+    evaluator = ScenarioEvaluator(design, strain_limit, elements)
+    for scenario in scenarios:
+        yield evaluator.evaluate(scenario)
