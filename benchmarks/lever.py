@@ -10,6 +10,7 @@ chains on two cores. Designs are verified with small load increments. The result
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import resource
@@ -23,11 +24,12 @@ import numpy as np
 from shapely import Polygon, box, contains, points
 
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
-from bellcrank.model import Design, unpack_mask
+from bellcrank.model import Design, pack_mask, unpack_mask
 from bellcrank.model.builtin.scaling import scaling
 from bellcrank.plots import Motion, draw_comparison
 from bellcrank.provenance import provenance
 from bellcrank.search import HoppingSettings, advance_chain, make_evaluator, start_chain
+from tools.draw_tasks import shrink
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -117,34 +119,50 @@ def search(size: int, chain: int, seconds: float) -> dict[str, Any]:
     }
 
 
-def main() -> None:
-    """Search, compare with the lever, and write the record and the figure."""
-    problem = scaling(SIZE)
-    beams = problem.lattice.beam_count
+def measure(problem: Problem) -> dict[str, Any]:
+    """Search, compare with the best lever, and return the record."""
     with ProcessPoolExecutor(CHAINS) as pool:
         runs = [*pool.map(search, [SIZE] * CHAINS, range(CHAINS), [SECONDS] * CHAINS)]
     drawn, by_hand = best_lever(problem, SIZE)
-    evaluator = SpringEvaluator(problem, unloaded_beams="prune_all")
     for run in runs:
-        mask = unpack_mask(run["mask"], beams)
-        response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
-        run["efficiency"] = float(f"{response.efficiency:.5g}")
-        print({key: value for key, value in run.items() if key != "mask"})
-    best = max(runs, key=lambda run: run["efficiency"])
-    mask = unpack_mask(best["mask"], beams)
-    response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
-    print(f"lever {by_hand.efficiency:.2f}, search {response.efficiency:.2f}")
-    record = {
-        "provenance": provenance(), "beams": beams, "seconds": SECONDS,
-        "lever": float(f"{by_hand.efficiency:.5g}"), "runs": runs,
+        run["efficiency"] = float(f"{verified(problem, run['mask'])[1].efficiency:.5g}")
+    return {
+        "provenance": provenance(), "beams": problem.lattice.beam_count, "seconds": SECONDS,
+        "lever": float(f"{by_hand.efficiency:.5g}"), "lever_mask": pack_mask(drawn), "runs": runs,
     }  # fmt: skip
-    (DOCS / "lever.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    draw_comparison(
-        Motion(Design(problem, drawn), by_hand.displacement, by_hand.efficiency, name="lever"),
-        Motion(Design(problem, mask), response.displacement, response.efficiency, name="search"),
-        DOCS / "images" / "lever.png",
-        overwrite=True,
-    )
+
+
+def verified(problem: Problem, text: str) -> tuple[NDArray[np.bool_], Response]:
+    """Return the beams of a design that carry load, and its response in small increments."""
+    evaluator = SpringEvaluator(problem, unloaded_beams="prune_all")
+    mask = evaluator.load_bearing(unpack_mask(text, problem.lattice.beam_count))
+    return mask, evaluator.evaluate(mask, VERIFICATION_INCREMENT)
+
+
+def draw(problem: Problem, record: dict[str, Any], path: Path) -> None:
+    """Draw the lever and the best design of the searches."""
+    best = max(record["runs"], key=lambda run: run["efficiency"])
+    motions = []
+    for name, text in (("lever", record["lever_mask"]), ("search", best["mask"])):
+        mask, response = verified(problem, text)
+        design = Design(problem, mask)
+        motions.append(Motion(design, response.displacement, response.efficiency, name=name))
+    draw_comparison(motions[0], motions[1], path, overwrite=True)
+    shrink(path, "lever", 1500)
+
+
+def main() -> None:
+    """Search and write the record, or draw the figure of the record alone."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draw", action="store_true", help="draw the figure of the record")
+    problem, path = scaling(SIZE), DOCS / "lever.json"
+    if not parser.parse_args().draw:
+        text = json.dumps(measure(problem), indent=1)
+        path.write_text(text + "\n", encoding="utf-8")
+    record = json.loads(path.read_text(encoding="utf-8"))
+    found = [(run["MB"], run["efficiency"]) for run in record["runs"]]
+    print(f"lever {record['lever']:.2f}; MB and efficiency of each chain: {found}")
+    draw(problem, record, DOCS / "images" / "lever.png")
 
 
 if __name__ == "__main__":
