@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections import deque
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -32,6 +33,8 @@ main(*sys.argv[2:])
 """Program of the process. It does not import the main module of its parent."""
 POLL_INTERVAL = 0.05
 """Time between two checks whether to stop, s."""
+PARENT_INTERVAL = 0.5
+"""Time between two checks whether the parent is alive, s."""
 SINGLE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
@@ -54,7 +57,15 @@ class FunctionProcess:
 
     def __init__(self, module: str, function: str, *arguments: object) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM, json.dumps(sys.path), module, function],
+            [
+                sys.executable,
+                "-c",
+                PROGRAM,
+                json.dumps(sys.path),
+                str(os.getpid()),
+                module,
+                function,
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, **SINGLE_THREAD},
@@ -197,9 +208,13 @@ def _error(name: str, message: str) -> Exception:
     return RuntimeError(f"{name}: {message}")
 
 
-def main(module: str, function: str) -> None:
-    """Compute a function, and write the values that it sends to standard output."""
+def main(parent: str, module: str, function: str) -> None:
+    """Compute a function, and write the values that it sends to standard output.
+
+    The process ends soon after its parent, even if that is killed.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+    threading.Thread(target=_end_with, args=(int(parent),), daemon=True).start()
     stream = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     try:
@@ -211,6 +226,13 @@ def main(module: str, function: str) -> None:
         os._exit(1)  # the parent has ended
     except Exception as error:
         _write(stream, (type(error).__name__, str(error)))
+
+
+def _end_with(parent: int) -> None:
+    """End this process when its parent has ended."""
+    while os.getppid() == parent:
+        time.sleep(PARENT_INTERVAL)
+    os._exit(1)
 
 
 def _write(stream: BinaryIO, message: object) -> None:
