@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import CorruptRun
 from bellcrank.model.storage import write_text
-from bellcrank.search import default_workers
+from bellcrank.processes import default_workers
 from bellcrank.storage.files import make_folder
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ def crane() -> Design:
 
 
 def test_prints_agree_with_opensees(crane: Design) -> None:
-    """Efficiency and off-axis motion of 20 random prints, one with a lost strut each."""
+    """The gain of 20 random prints, with four elements in each strut."""
     pytest.importorskip("openseespy.opensees")
     deviations = Deviations(prints=20, struts=False, seed=7)
     prints = [

@@ -40,7 +40,7 @@ from bellcrank.search.markov import (
     moves,
     schedules,
 )
-from bellcrank.search.parallel import Progress, default_workers, run_chains
+from bellcrank.search.parallel import Progress, run_chains
 from bellcrank.search.registry import (
     DEFAULT_SEARCH,
     Search,
@@ -101,7 +101,6 @@ __all__ = [
     "clean",
     "confirmed",
     "costs",
-    "default_workers",
     "is_done",
     "make_evaluator",
     "most_efficient",

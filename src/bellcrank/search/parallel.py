@@ -7,7 +7,6 @@ results do not depend on their number.
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections import deque
@@ -18,7 +17,7 @@ import numpy as np
 
 from bellcrank.errors import BellcrankError
 from bellcrank.mechanics import evaluators_that_fit
-from bellcrank.processes import FunctionProcess
+from bellcrank.processes import POLL_INTERVAL, FunctionProcess, default_workers
 from bellcrank.search.chain_process import chain_steps, received_steps, send_steps
 from bellcrank.search.registry import State, is_done, read_state
 from bellcrank.storage import Proposals, RunFolder
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
 
 SEGMENT_STEPS = 4000
 """Steps after which the proposals of a chain are written to disk."""
-POLL_INTERVAL = 0.05
-"""Seconds between two checks for a request to stop."""
 STOP_TIMEOUT = 0.5
 """Seconds in which a chain can end its block after a request to stop."""
 
@@ -57,13 +54,6 @@ class Progress:
     temperature: float
     steps: int
     accepted: int
-
-
-def default_workers() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class ChainRunner:

@@ -1,4 +1,4 @@
-"""Tolerance: what a part does when it is not printed, held or driven as it was drawn.
+"""Tolerance: what a part does when it is not printed or driven as it was drawn, or loses a strut.
 
 `scenarios_of` lists deviations of widths, nodes and input, and losses of single struts;
 `evaluate_scenarios` computes the specification in each of them, and `Tolerance` sums up.

@@ -53,15 +53,12 @@ class ScenarioResult(NamedTuple):
 class ScenarioEvaluator:
     """Evaluates scenarios of one design.
 
-    Without a specification, the items are clearance and strain and the objective is the gain
-    (`bellcrank.search.default_specification.specified`).
+    A design without a specification gets that of `bellcrank.search.specified`.
 
     Parameters
     ----------
     design
         Design of a frame.
-    strain_limit
-        Largest strain for a design without a specification; nan if it is unknown.
     elements : int, optional
         As in `bellcrank.mechanics.FrameEvaluator`.
 
@@ -71,10 +68,8 @@ class ScenarioEvaluator:
         If the design has no stable path to its full stroke.
     """
 
-    def __init__(
-        self, design: Design, strain_limit: float = math.nan, elements: int | None = None
-    ) -> None:
-        problem = specified(design.problem, strain_limit)
+    def __init__(self, design: Design, elements: int | None = None) -> None:
+        problem = specified(design.problem)
         assert problem.specification is not None
         # Deviations are not symmetric.
         wanted = replace(problem.specification, symmetry=())
@@ -93,7 +88,11 @@ class ScenarioEvaluator:
         return SpecificationEvaluator(problem, self.elements, gap=gap)
 
     def evaluate(self, scenario: Scenario) -> ScenarioResult:
-        """Return the outcome of a scenario; its path is followed from rest."""
+        """Return the result of a scenario.
+
+        Without a strut, the path is compared with that of the design, and followed from rest where
+        both are not next to each other; else it is followed from rest.
+        """
         mask, warm = self.mask, scenario.missing is not None
         if warm:
             mask = mask.copy()
@@ -117,13 +116,8 @@ class ScenarioEvaluator:
         return ScenarioResult(status, math.nan, [], [math.nan] * len(self._nominal.objectives))
 
 
-def evaluate_scenarios(
-    design: Design,
-    scenarios: Sequence[Scenario],
-    strain_limit: float = math.nan,
-    elements: int | None = None,
-) -> Iterator[ScenarioResult]:
-    """Yield the results of scenarios in their order; for the others see `ScenarioEvaluator`."""
-    evaluator = ScenarioEvaluator(design, strain_limit, elements)
+def evaluate_scenarios(design: Design, scenarios: Sequence[Scenario]) -> Iterator[ScenarioResult]:
+    """Yield the results of scenarios in their order, with one element in each strut."""
+    evaluator = ScenarioEvaluator(design)
     for scenario in scenarios:
         yield evaluator.evaluate(scenario)

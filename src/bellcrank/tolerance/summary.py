@@ -41,7 +41,7 @@ class Row:
     worst
         Its worst value among the scenarios of each kind.
     percentile
-        The value that 95 % of the random prints reach or exceed; nan if more lose their path.
+        The value than which 5 % of the random prints are worse; nan if more lose their path.
     share
         Fraction of the random prints that meet the item; nan for an objective.
     """

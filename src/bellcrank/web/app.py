@@ -17,7 +17,7 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from bellcrank import __version__
 from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName, first_line
-from bellcrank.search import default_workers
+from bellcrank.processes import default_workers
 from bellcrank.web import design_routes, run_routes, task_routes
 from bellcrank.web.gallery import BundledDesigns, Gallery, RunDesigns, SavedDesigns
 from bellcrank.web.jobs import Jobs

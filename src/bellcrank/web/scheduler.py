@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.search import default_workers
+from bellcrank.processes import default_workers
 from bellcrank.web.jobs import UNFINISHED
 from bellcrank.web.limits import WAITING
 from bellcrank.web.search_process import run_search

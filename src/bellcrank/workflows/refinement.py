@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.mechanics.frames.joints import with_joints
+from bellcrank.processes import default_workers
 from bellcrank.provenance import provenance
 from bellcrank.refine import Refinement, RefinementSettings, refine_design
 from bellcrank.search import HoppingSettings, SpecificationEvaluator, specified
 from bellcrank.search.choice import nearest
-from bellcrank.search.parallel import default_workers
 from bellcrank.search.selection import Finalist
 from bellcrank.search.verification import Verifier
 from bellcrank.workflows.refiners import (

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics import ItemResult
     from bellcrank.model import Item, Problem
+    from bellcrank.model.specification import Dimension
     from bellcrank.part import PartSpec
     from bellcrank.task import ProblemUnits
 
@@ -69,8 +70,7 @@ def number_text(item: Item, value: float, units: ProblemUnits) -> str:
         return "-"
     unit = _unit(item)
     number = 100.0 * value if unit == "%" else value
-    if item.of != "spread":
-        number = units.in_part(QUANTITIES[item.quantity].dimension, number)
+    number = units.in_part(dimension_of(item), number)
     if abs(number) < ROUNDING:
         number = 0.0
     return f"{number:.3g} {unit}".rstrip()
@@ -108,6 +108,11 @@ def wanted_text(item: Item, units: ProblemUnits) -> str:
     if item.start == 0.0:
         return f"{text}, up to {stop} % of the stroke"
     return f"{text}, from {start} to {stop} % of the stroke"
+
+
+def dimension_of(item: Item) -> Dimension:
+    """Return the dimension of the values of an item."""
+    return "ratio" if item.of == "spread" else QUANTITIES[item.quantity].dimension
 
 
 def _unit(item: Item) -> str:
@@ -185,7 +190,7 @@ def item_data(
     rows = []
     for values in zip(*results.values(), strict=True):
         item = values[0].item
-        dimension = "ratio" if item.of == "spread" else QUANTITIES[item.quantity].dimension
+        dimension = dimension_of(item)
         data = item.to_dict()
         data.pop("path", None)
         for key in ("at_least", "at_most"):

@@ -10,16 +10,20 @@ import numpy as np
 
 from bellcrank.fem.results import finite
 from bellcrank.model import Item
-from bellcrank.model.specification import QUANTITIES
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.part.pieces import check_supported
-from bellcrank.processes import FunctionProcesses
+from bellcrank.processes import FunctionProcesses, default_workers
 from bellcrank.provenance import provenance
 from bellcrank.search import specified
-from bellcrank.search.parallel import default_workers
 from bellcrank.task import NAMES, units_of
 from bellcrank.tolerance import Deviations, Tolerance, evaluate_scenarios, scenarios_of
-from bellcrank.workflows.specification import item_label, number_text, shown_value, wanted_text
+from bellcrank.workflows.specification import (
+    dimension_of,
+    item_label,
+    number_text,
+    shown_value,
+    wanted_text,
+)
 from bellcrank.workflows.validation import problem_identity, spec_for
 
 if TYPE_CHECKING:
@@ -32,7 +36,7 @@ SCHEMA = "bellcrank/tolerance/1"
 IN_ONE_PROCESS = 50
 """Number of scenarios up to which one process computes all."""
 CHUNK = 25
-"""Number of scenarios that a process computes before it begins the next ones."""
+"""Number of results that a process sends at a time."""
 HEADINGS = {
     "widths": "widths", "input": "direction", "stroke": "stroke", "print": "prints",
 }  # fmt: skip
@@ -85,7 +89,7 @@ class ToleranceReport:
 
     def _row_data(self, row: Row) -> dict[str, Any]:
         item = as_item(row.quantity)
-        dimension = "ratio" if item.of == "spread" else QUANTITIES[item.quantity].dimension
+        dimension = dimension_of(item)
         units = units_of(self.design.problem, self.spec)
 
         def number(value: float) -> float | None:
@@ -193,12 +197,12 @@ def _results(
             results[number] = result
             progress(len(results), len(scenarios))
         return results
-    share = [range(first, len(scenarios), workers) for first in range(workers)]
-    jobs = [(design, [scenarios[number] for number in numbers]) for numbers in share]
+    jobs = [(design, scenarios[first::workers]) for first in range(workers)]
+    waiting = [iter(range(first, len(scenarios), workers)) for first in range(workers)]
 
     def receive(job: int, value: list[ScenarioResult]) -> None:
-        done = sum(number in results for number in share[job])
-        results.update(zip(share[job][done:], value, strict=False))
+        for result in value:
+            results[next(waiting[job])] = result
         progress(len(results), len(scenarios))
 
     own = FunctionProcesses(__name__, send_results.__name__, jobs, receive)
@@ -270,5 +274,5 @@ def strut_lines(report: ToleranceReport, count: int) -> list[str]:
     others = [(beam, loss) for beam, loss in losses if np.isfinite(loss)][:count]
     if others:
         cost = ", ".join(f"{beam} ({100.0 * loss:.0f} %)" for beam, loss in others)
-        lines.append(f"struts whose loss costs most of the efficiency otherwise: {cost}")
+        lines.append(f"parts of the efficiency that the loss of other struts costs: {cost}")
     return lines

@@ -159,7 +159,7 @@ class ProcessEngine:
 @contextmanager
 def processes(store: Store, options: EngineOptions) -> Iterator[Engine]:
     """Compute in processes of this machine."""
-    from bellcrank.search import default_workers
+    from bellcrank.processes import default_workers
 
     engine = ProcessEngine(str(store.path), options.workers or default_workers())
     try:

@@ -8,7 +8,6 @@ which the second process takes over the path from rest and then what a search ne
 from __future__ import annotations
 
 import atexit
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from bellcrank.mechanics.frames.flips import FlipPredictor
 from bellcrank.mechanics.frames.geometry import beam_slopes, geometry_slopes
 from bellcrank.mechanics.frames.quantities import quantities
 from bellcrank.mechanics.kernels._compile import compile_for, kernels_are_compiled
-from bellcrank.processes import FunctionProcess
+from bellcrank.processes import FunctionProcess, default_workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +31,7 @@ def compile_ahead(problem: Problem) -> None:
 
     The process ends with this one.
     """
-    if problem.section is not None and not kernels_are_compiled() and (os.cpu_count() or 1) > 1:
+    if problem.section is not None and not kernels_are_compiled() and default_workers() > 1:
         module = compile_kernels.__module__
         atexit.register(FunctionProcess(module, compile_kernels.__name__, problem).kill)
 
