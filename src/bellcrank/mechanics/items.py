@@ -38,6 +38,7 @@ CHANNELS_OF: dict[str, tuple[str, ...]] = {
     "strain": ("strain",),
     "clearance": (),
     "stable_stroke": (),
+    "strut_loss": (),
     "mass": (),
 }
 """Channels from which a quantity follows. The others are given (`StrokeRecord.given`)."""
@@ -70,7 +71,8 @@ class StrokeRecord:
     channels
         (..., F, ...) values of channels.
     given
-        Values of quantities that do not follow from channels: clearance, stable stroke, mass.
+        Values of quantities that do not follow from channels: clearance, stable stroke, strut loss,
+        mass.
     payloads
         Forces under which the loaded motion of outputs was measured.
     kinks

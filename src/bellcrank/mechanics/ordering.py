@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,9 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
     from bellcrank.mechanics.kernels.arrays import Ints
+
+KEPT = 32
+"""Number of lattices whose order and size are kept."""
 
 
 def one_beam_apart(beams: Ints, count: int) -> csc_matrix:
@@ -73,9 +77,23 @@ def elimination_order(beams: Ints, held: NDArray[np.bool_], *, springs: bool = T
     (N,) int64
         Elimination index of each free node, -1 for held nodes.
     """
+    return _elimination_order(*_bytes_of(beams, held), springs=springs).copy()
+
+
+def _bytes_of(beams: Ints, of_nodes: NDArray[Any]) -> tuple[bytes, bytes, str]:
+    """Return arrays as bytes, by which results are stored: geometries of one design share them."""
+    beams = np.ascontiguousarray(beams, dtype=np.int64)
+    return beams.tobytes(), of_nodes.tobytes(), of_nodes.dtype.str
+
+
+@lru_cache(maxsize=KEPT)
+def _elimination_order(of_beams: bytes, of_held: bytes, kind: str, *, springs: bool) -> Ints:
+    """Compute the order of the free nodes."""
     from scipy.sparse import csc_matrix, identity
     from scipy.sparse.linalg import splu
 
+    beams = np.frombuffer(of_beams, dtype=np.int64).reshape(-1, 2)
+    held = np.frombuffer(of_held, dtype=kind)
     block = np.full(len(held), -1)
     pattern = coupled_nodes(beams, held, springs=springs)
     count = pattern.shape[0]
@@ -116,6 +134,14 @@ def factor_size(beams: Ints, block: Ints, *, springs: bool = True) -> FactorSize
     springs
         Whether there are angular springs.
     """
+    return _factor_size(*_bytes_of(beams, block), springs=springs)
+
+
+@lru_cache(maxsize=KEPT)
+def _factor_size(of_beams: bytes, of_block: bytes, kind: str, *, springs: bool) -> FactorSize:
+    """Compute the size of the factor."""
+    beams = np.frombuffer(of_beams, dtype=np.int64).reshape(-1, 2)
+    block = np.frombuffer(of_block, dtype=kind)
     pattern = coupled_nodes(beams, block < 0, springs=springs)
     order = block[block >= 0]
     node_at = np.argsort(order)

@@ -53,6 +53,7 @@ from bellcrank.model.specification import (
     QuantityType,
     Specification,
 )
+from bellcrank.model.tolerances import Tolerances
 
 __all__ = [
     "IN_SPACE",
@@ -74,6 +75,7 @@ __all__ = [
     "Specification",
     "Stiffness",
     "Supports",
+    "Tolerances",
     "builtin",
     "design_from_dict",
     "design_to_dict",

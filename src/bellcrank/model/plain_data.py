@@ -67,6 +67,8 @@ def specification_data(specification: Specification, dimension: int) -> dict[str
         data["symmetry"] = list(specification.symmetry)
     if specification.domain:
         data["domain"] = [ring.tolist() for ring in specification.domain]
+    if specification.tolerances is not None:
+        data["tolerances"] = specification.tolerances.to_dict()
     return data
 
 

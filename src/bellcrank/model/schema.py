@@ -75,6 +75,7 @@ from bellcrank.model.regions import regions
 from bellcrank.model.section import Elasticity, Section, Shape
 from bellcrank.model.specification import Case, Item, ObjectiveTerm, Specification
 from bellcrank.model.tables import ProblemTable
+from bellcrank.model.tolerances import Tolerances
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -239,6 +240,9 @@ def _specification(lattice: Lattice, table: SpecificationTable | None) -> Specif
         weight=table.weight,  # type: ignore[arg-type]  # cast there
         symmetry=tuple(table.symmetry),
         domain=tuple(table.domain),  # type: ignore[arg-type]  # cast there
+        tolerances=None
+        if table.tolerances is None
+        else Tolerances(**table.tolerances.model_dump()),
     )
 
 

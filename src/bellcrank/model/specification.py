@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model.conditions import Input, Output, Supports
+    from bellcrank.model.tolerances import Tolerances
 
 Dimension = Literal["ratio", "length", "angle", "force", "stiffness", "volume"]
 Scope = Literal["output", "case", "design"]
@@ -81,6 +82,11 @@ QUANTITIES: dict[str, QuantityType] = {
     ),
     "stable_stroke": QuantityType(
         "ratio", "case", False, "part of the stroke up to which the equilibrium is stable"
+    ),
+    "strut_loss": QuantityType(
+        "ratio", "design", False,
+        "largest part of the efficiency of the first output that the loss of a single strut costs; "
+        "2 at most, and where the full stroke is not reached",
     ),
     "mass": QuantityType("volume", "design", False, "volume of all struts"),
 }  # fmt: skip
@@ -284,6 +290,8 @@ class Specification:
         Closed rings around the region of the plane in which struts must lie, lattice units; in
         space triangles of closed surfaces. A point is inside if a ray from it crosses them an odd
         number of times. None by default.
+    tolerances
+        Deviations over which the items are to be met; None if only as drawn.
 
     Raises
     ------
@@ -309,6 +317,7 @@ class Specification:
     weight: NDArray[np.float64] | None = None
     symmetry: tuple[str, ...] = ()
     domain: tuple[NDArray[np.float64], ...] = ()
+    tolerances: Tolerances | None = None
 
     def __post_init__(self) -> None:
         for name in ("cases", "items", "maximise", "symmetry"):

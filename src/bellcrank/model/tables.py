@@ -101,6 +101,16 @@ class ObjectiveTable(Table):
     scale: float = 1.0
 
 
+class TolerancesTable(Table):
+    """``[specification.tolerances]``."""
+
+    width: float = 0.1
+    each_width: float = 0.05
+    node: float = 0.01
+    angle: float = 5.0
+    least_yield: float = 0.95
+
+
 class SpecificationTable(Table):
     """``[specification]``."""
 
@@ -113,6 +123,7 @@ class SpecificationTable(Table):
     weight: list[float] | None = None
     symmetry: list[str] = Field(default_factory=list)
     domain: list[list[Any]] = Field(default_factory=list)
+    tolerances: TolerancesTable | None = None
 
 
 class SectionTable(Table):

@@ -8,21 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import VERIFICATION_INCREMENT, tightened
+from bellcrank.refine.choice import ScenarioChoice
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
+from bellcrank.refine.scenarios import ScenarioRows
 from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from bellcrank.model import Design, Item
     from bellcrank.refine.differences import Difference, Records
     from bellcrank.refine.refinement import Progress
+    from bellcrank.tolerance import Scenario
 
     Values = NDArray[np.float64]
     Models = tuple[Difference, ...]
@@ -46,6 +49,8 @@ Larger margins by frames are lost in the sheet, since geometries with large marg
 large differences."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
+SCENARIO_ROUNDS = 6
+"""Number of further times, each with further scenarios."""
 
 
 def stricter(stable: float) -> float:
@@ -68,6 +73,8 @@ class FrameRefinement:
         Bound of the lowest stiffness, over its reference, with which it was found.
     payload
         Factor of the payload that one element in each strut has to carry.
+    missed
+        Scenarios in which the geometry that was judged last misses items.
     goes_on
         Whether the refinement has not been stopped.
     """
@@ -86,8 +93,10 @@ class FrameRefinement:
         width = problem.section.width
         bounds = (settings.narrowest * width, settings.widest * width)
         self.variables = variables_of(design, settings.largest_move, bounds)
-        self.before = self.best = state_of(problem, design.mask)
+        self.choice = ScenarioChoice(design)
         self.chosen = np.zeros(self.variables.count)
+        self.missed: list[Scenario] = []
+        self.before = self.best = self.state_at(self.chosen)
         self.path = self.tried = [self.chosen]
         self.stable = STABLE
         self.payload = 1.0
@@ -100,19 +109,26 @@ class FrameRefinement:
         vector, stable = self.chosen, STABLE
         path: list[Values] = []
         models: Models = (NO_DIFFERENCE,)
-        for _ in range(ROUNDS):
+        rounds = wider = 0
+        while rounds < ROUNDS and wider < SCENARIO_ROUNDS:
             least = self.settings.evaluations // 4
             found = self.refined(vector, models, stable, self.settings.steps, least)
             if found is None:
                 return
             state, vector, is_last = found
+            goes_wider = state.is_stable and self.choice.add(self._design_at(vector), self.missed)
+            rounds, wider = rounds + (not goes_wider), wider + goes_wider
             path = [*path, *self.tried]
             if is_better(state, self.best):
                 self.best, self.chosen = state, vector
                 self.path, self.stable = path, stable
-            is_last = is_last or self.evaluations >= self.settings.evaluations
-            is_edge = self.reason == UNSTABLE and self.evaluations < self.settings.evaluations
-            if not state.items or not self.goes_on or (state.met and is_last and not is_edge):
+            is_spent = self.evaluations >= self.settings.evaluations
+            is_edge = self.reason == UNSTABLE and not is_spent
+            if not state.items or not self.goes_on or (goes_wider and is_spent):
+                return
+            if goes_wider and state.met:
+                continue
+            if state.met and (is_last or is_spent) and not is_edge:
                 return
             if state.is_stable and not state.met:
                 self.payload, models = 1.0, self.models(vector, state.records)
@@ -142,13 +158,15 @@ class FrameRefinement:
             State and vector of the last geometry that meets all with eight elements, and whether
             it is the last one of all. None if the response is not stable.
         """
-        items = [self._tightened(item) for item in self.items]
-        rows = RowEvaluator(self.variables, self.design.mask, items, stable, models)
-        left = replace(
-            self.settings,
-            steps=steps,
-            evaluations=max(least, self.settings.evaluations - self.evaluations),
-        )
+        items = [self._tightened(each) for each in self.items if each.quantity != "strut_loss"]
+        evaluator = self._rows(items, stable, models)
+        if not self.choice.is_empty:
+            evaluator, vector = self._stable_start(evaluator, vector)
+        evaluations = max(least, self.settings.evaluations - self.evaluations)
+        if not self.choice.is_empty:
+            # Prints that miss items follow in later rounds.
+            evaluations = min(evaluations, max(least, self.settings.evaluations // 3))
+        left = replace(self.settings, steps=steps, evaluations=evaluations)
         if near:
             # Differences of models hold near the geometry that they were computed for.
             left = replace(
@@ -157,7 +175,7 @@ class FrameRefinement:
                 largest_region=REPAIR_REGION * left.largest_region,
             )
         path = []
-        for progress in refine_rows(rows, left, vector):
+        for progress in refine_rows(evaluator, left, vector):
             path.append(progress)
             self.goes_on = self.report(progress)
             is_met = progress.rows.violation < MET
@@ -171,7 +189,47 @@ class FrameRefinement:
         vectors = [each.vector for each in path]
         state, number = latest_met(self.variables, self.design.mask, vectors)
         self.tried = vectors[: number + 1]
+        state = self._judged(state, vectors[number])
         return state, vectors[number], number == len(vectors) - 1
+
+    def _rows(self, items: Sequence[Item], stable: float, models: Models) -> ScenarioRows:
+        """Return the rows as drawn, and in the chosen scenarios."""
+        drawn, *others = [
+            RowEvaluator(self.variables, self.design.mask, items, stable, models, scenario)
+            for scenario in (None, *self.choice.chosen)
+        ]
+        return ScenarioRows(drawn, [*others, *self.choice.loss_rows(self.variables, self.design)])
+
+    def _stable_start(self, evaluator: ScenarioRows, vector: Values) -> tuple[ScenarioRows, Values]:
+        """Return a geometry that is stable in all scenarios: the given one, or one before it.
+
+        If there is none among a few, the scenarios in which the given one is not stable are left
+        out; those that miss items after the round are added again.
+        """
+        earlier, start, back = [*self.path, vector], vector, 1
+        while evaluator.evaluate(start) is None:
+            if back > len(earlier):
+                return evaluator.stable_at(vector), vector
+            start, back = earlier[-back], 2 * back
+        return evaluator, start
+
+    def state_at(self, vector: Values) -> State:
+        """Return the state of a geometry."""
+        state = state_of(self.variables.problem_at(vector), self.design.mask)
+        return self._judged(state, vector)
+
+    def _judged(self, state: State, vector: Values) -> State:
+        """Return a state over all scenarios; `missed` are those in which it misses items."""
+        if self.choice.tolerances is None or not state.is_stable:
+            self.missed = []
+            return state
+        found = self.choice.judge(self._design_at(vector))
+        self.missed = found.missed
+        return replace(state, share=found.share, objective=found.objective)
+
+    def _design_at(self, vector: Values) -> Design:
+        """Return the design with the geometry of a vector."""
+        return replace(self.design, problem=self.variables.problem_at(vector))
 
     def _tightened(self, item: Item) -> Item:
         """Return an item as the model of the refinement has to meet it."""

@@ -11,7 +11,7 @@ import numpy as np
 from bellcrank.mechanics import item_results
 from bellcrank.refine.by_frames import LOST_PAYLOAD, stricter
 from bellcrank.refine.differences import NO_DIFFERENCE
-from bellcrank.refine.state import State, loses_payload, state_of, total_violation
+from bellcrank.refine.state import State, loses_payload, total_violation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -128,7 +128,7 @@ class SheetRefinement:
             middle = (low + high) // 2
             if not job.goes_on or middle == low:
                 break
-            found = state_of(job.variables.problem_at(job.path[middle]), job.design.mask)
+            found = job.state_at(job.path[middle])
             if not found.met:
                 low = middle
                 continue

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.refine.rows import RowEvaluator, Rows
+    from bellcrank.refine.scenarios import ScenarioRows
 
     Values = NDArray[np.float64]
 
@@ -98,7 +99,9 @@ class Progress:
 
 
 def refine_rows(
-    evaluator: RowEvaluator, settings: RefinementSettings, start: Values | None = None
+    evaluator: RowEvaluator | ScenarioRows,
+    settings: RefinementSettings,
+    start: Values | None = None,
 ) -> Iterator[Progress]:
     """Improve a geometry step by step; yield the initial state and each accepted one.
 
@@ -131,7 +134,10 @@ class _Search:
     """The state of a refinement."""
 
     def __init__(
-        self, evaluator: RowEvaluator, settings: RefinementSettings, start: Values | None
+        self,
+        evaluator: RowEvaluator | ScenarioRows,
+        settings: RefinementSettings,
+        start: Values | None,
     ) -> None:
         self.evaluator, self.settings = evaluator, settings
         self.variables = evaluator.variables

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from bellcrank.refine.differences import Difference
     from bellcrank.refine.gaps import Gaps
     from bellcrank.refine.variables import Variables
+    from bellcrank.tolerance import Scenario
 
     Values = NDArray[np.float64]
     Gradients = dict[tuple[Channel, int], Values]
@@ -129,6 +130,11 @@ class RowEvaluator:
     models
         Models in which the items must be met, as differences from one element in each strut. The
         last one counts for the objectives.
+    scenario
+        Deviation with which the responses are computed; None for none. The shape at rest is no
+        constraint then.
+    objectives_only
+        Whether there are no constraints besides those of `items`.
     """
 
     def __init__(
@@ -138,9 +144,14 @@ class RowEvaluator:
         items: Sequence[Item],
         stable: float = STABLE,
         models: Sequence[Difference] = (NO_DIFFERENCE,),
+        scenario: Scenario | None = None,
+        *,
+        objectives_only: bool = False,
     ) -> None:
         self.variables = variables
         self.mask = mask
+        self.scenario = scenario
+        self.objectives_only = objectives_only
         self.models = tuple(models)
         self.items = tuple(items)
         self.stable = stable
@@ -173,24 +184,35 @@ class RowEvaluator:
             return None
         parts = []
         for name in here.evaluator.cases:
-            found = self._channel_rows(here, name, slopes=slopes)
-            gaps = self._gap_rows(here, name, slopes=slopes)
-            stable = self._stability_rows(here, name, slopes=slopes)
-            if found is None or gaps is None or stable is None:
-                return None
-            parts += [found, gaps, stable]
-        return self._joined([*parts, self._shape_rows(here.problem, slopes=slopes)])
+            kinds = [self._channel_rows]
+            if not self.objectives_only:
+                kinds += [self._gap_rows, self._stability_rows]
+            for rows_of in kinds:
+                rows = rows_of(here, name, slopes=slopes)
+                if rows is None:
+                    return None
+                parts.append(rows)
+        if self.scenario is None and not self.objectives_only:
+            parts.append(self._shape_rows(here.problem, slopes=slopes))
+        return joined(parts)
 
     def _responses(self, vector: Values) -> _Geometry | None:
         """Compute the responses of a geometry; None if one is not stable, or a strut too short."""
         try:
             problem = self.variables.problem_at(vector)
+            if self.scenario is not None:
+                problem = self.scenario.of(problem)
         except InvalidProblem:
             return None
         wanted = problem.specification
         assert wanted is not None
-        # Payloads are those of the items of this refinement.
-        asked = replace(problem, specification=replace(wanted, items=self.items))
+        # Payloads are those of the items of this refinement. Deviations are not symmetric.
+        asked = replace(
+            problem,
+            specification=replace(
+                wanted, items=self.items, symmetry=() if self.scenario else wanted.symmetry
+            ),
+        )
         evaluator = SpecificationEvaluator(asked)
         for name, case in evaluator.cases.items():
             response = case.evaluator.respond(self.mask, LARGEST_INCREMENT)
@@ -201,15 +223,11 @@ class RowEvaluator:
                 return None
         return _Geometry(vector.copy(), problem, evaluator)
 
-    def _joined(self, parts: list[Rows]) -> Rows:
-        return Rows(
-            np.concatenate([part.objectives for part in parts]),
-            np.concatenate([part.constraints for part in parts]),
-            tuple(name for part in parts for name in part.names),
-            tuple((k, *key) for k, part in enumerate(parts) for key in part.keys),
-            np.concatenate([part.objective_slopes for part in parts]),
-            np.concatenate([part.constraint_slopes for part in parts]),
-        )
+    def _gradient(self, positions: Values, widths: Values) -> Values:
+        """Return (k, n) derivatives by the variables from those by positions and widths."""
+        if self.scenario is not None and self.scenario.widths is not None:
+            widths = widths * self.scenario.widths
+        return self.variables.gradient(positions, widths)
 
     def _channel_rows(self, here: _Geometry, name: str, *, slopes: bool) -> Rows | None:
         """Return the rows of a load case that follow from its channels."""
@@ -263,7 +281,7 @@ class RowEvaluator:
             for each, (quantity, measures), slope in zip(
                 point.channels, point.measured, found, strict=True
             ):
-                by_measure = self.variables.gradient(slope.positions, slope.widths)
+                by_measure = self._gradient(slope.positions, slope.widths)
                 if quantity.combine is not vector:
                     by_measure = quantity.gradient(measures.value)[None] @ by_measure
                 out[each] = by_measure
@@ -303,7 +321,7 @@ class RowEvaluator:
             if moved is None:
                 return None
             positions = moved[0].positions + found.fields[..., : problem.lattice.dimension]
-            by_vector = self.variables.gradient(positions, moved[0].widths + found.widths)
+            by_vector = self._gradient(positions, moved[0].widths + found.widths)
             gradients.append(-by_vector / width)
         constraints = np.concatenate(values)
         names = ("clearance",) * len(constraints)
@@ -356,7 +374,7 @@ class RowEvaluator:
                 slope = geometry_slopes(equilibrium, [(LOWEST_STIFFNESS, measures)], of_beams)
                 if slope is None:
                     return None
-                rates[fraction] = self.variables.gradient(*slope[0])[0]
+                rates[fraction] = self._gradient(*slope[0])[0]
             for (each, peak, factor), ratio, size in zip(
                 near, ratios.tolist(), least.tolist(), strict=True
             ):
@@ -372,6 +390,18 @@ class RowEvaluator:
         none = np.zeros((0, self.variables.count))
         by_vector = self.variables.gradient(found.positions, found.widths) if slopes else none
         return Rows(np.zeros(0), found.values, found.names, found.keys, none, by_vector)
+
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """Return several rows as one."""
+    return Rows(
+        np.concatenate([part.objectives for part in parts]),
+        np.concatenate([part.constraints for part in parts]),
+        tuple(name for part in parts for name in part.names),
+        tuple((k, *key) for k, part in enumerate(parts) for key in part.keys),
+        np.concatenate([part.objective_slopes for part in parts]),
+        np.concatenate([part.constraint_slopes for part in parts]),
+    )
 
 
 def _quantity_of(fields: Values) -> Quantity:

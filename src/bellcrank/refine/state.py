@@ -42,6 +42,8 @@ class State:
         Whether all of them are met, and the geometry prints.
     records
         Channels along the stroke by load case.
+    share
+        Part of random prints that meet all items, up to the wanted one; 1 without tolerances.
     sheet
         Items in the sheet; empty if they were not computed, or it is not stable.
     sheet_records
@@ -52,8 +54,14 @@ class State:
     items: tuple[ItemResult, ...]
     met: bool
     records: Records = field(default_factory=dict)
+    share: float = 1.0
     sheet: tuple[ItemResult, ...] = ()
     sheet_records: Records = field(default_factory=dict)
+
+    @property
+    def rank(self) -> tuple[bool, float, float]:
+        """How good it is by frames; larger is better."""
+        return self.met, self.share, self.objective
 
     @property
     def is_stable(self) -> bool:
@@ -76,9 +84,9 @@ class State:
         return total_violation(self.sheet) if self.is_on_path_of_sheet else math.inf
 
     @property
-    def rank_in_sheet(self) -> tuple[float, float]:
-        """How far the sheet is from meeting all items; smaller is better."""
-        return self.missed_in_sheet, total_violation(self.sheet)
+    def rank_in_sheet(self) -> tuple[float, float, float]:
+        """How far the sheet is from meeting all items, then the yield; smaller is better."""
+        return self.missed_in_sheet, total_violation(self.sheet), -self.share
 
     @property
     def is_near_sheet(self) -> bool:
@@ -152,4 +160,4 @@ def latest_met(
 
 def is_better(new: State, old: State) -> bool:
     """Whether a state meets more, or has the larger objective."""
-    return bool(new.items) and (new.met, new.objective) > (old.met, old.objective)
+    return bool(new.items) and new.rank > old.rank

@@ -58,6 +58,31 @@ def corrected(rows: Rows, after: Rows, change: Values) -> Rows:
     return replace(rows, objectives=objectives, constraints=constraints)
 
 
+def _that_matter(rows: Rows, low: Values, high: Values) -> Rows:
+    """Return the rows without those that no step within its bounds makes matter.
+
+    Those are constraints that are met after all steps, and objectives that are never the smallest.
+    """
+    _, most = _range(rows.constraint_slopes, low, high)
+    kept = rows.constraints + most > 0.0
+    least, most = _range(rows.objective_slopes, low, high)
+    smallest = (rows.objectives + most).min(initial=np.inf)
+    used = rows.objectives + least <= smallest
+    return replace(
+        rows,
+        objectives=rows.objectives[used],
+        constraints=rows.constraints[kept],
+        objective_slopes=rows.objective_slopes[used],
+        constraint_slopes=rows.constraint_slopes[kept],
+    )
+
+
+def _range(slopes: Values, low: Values, high: Values) -> tuple[Values, Values]:
+    """Return the smallest and largest change (r,) of rows within the bounds of a step."""
+    rising, falling = np.maximum(slopes, 0.0), np.minimum(slopes, 0.0)
+    return rising @ low + falling @ high, rising @ high + falling @ low
+
+
 def linear_step(rows: Rows, low: Values, high: Values, size: float) -> Step | None:
     """Return the step that is best for the linear model; None if HiGHS finds none.
 
@@ -72,6 +97,7 @@ def linear_step(rows: Rows, low: Values, high: Values, size: float) -> Step | No
     """
     from scipy.optimize import linprog
 
+    rows = _that_matter(rows, low, high)
     count, objectives, constraints = len(low), len(rows.objectives), len(rows.constraints)
     cost = np.concatenate(
         [np.zeros(count), [-1.0 if objectives else 0.0], np.full(constraints, PENALTY)]

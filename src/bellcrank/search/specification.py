@@ -13,7 +13,6 @@ from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     CaseEvaluator,
     FlipPrediction,
-    FrameEvaluator,
     ItemResult,
     Status,
     StrokeRecord,
@@ -25,8 +24,9 @@ from bellcrank.mechanics import (
     violation,
 )
 from bellcrank.mechanics.items import TOLERANCE, reduced, relative_distance
-from bellcrank.search.clearance import gap_less_overlaps, smallest_gap
+from bellcrank.search.clearance import gap_less_overlaps
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
+from bellcrank.search.given import GivenQuantities
 from bellcrank.search.stroke_states import fractions_of
 from bellcrank.search.symmetry import SymmetryGroups
 from bellcrank.search.verdict import Verdict
@@ -101,7 +101,6 @@ class SpecificationEvaluator:
         self.items = tuple(tightened(item, reserve) for item in wanted.items)
         self.objectives = wanted.maximise
         self.elements = elements
-        self._gap = gap
         section = problem.section
         assert section is not None
         self._volume = section.area_of(problem.beam_widths) * problem.lattice.rest_length
@@ -127,7 +126,8 @@ class SpecificationEvaluator:
             self.cases[name] = _Case(evaluator, chosen, channels, cheap, fractions)
         self.records: dict[str, StrokeRecord] = {}
         self.violations = np.ones(len(self.items))
-        self._extended: dict[str, FrameEvaluator] = {}
+        evaluators = {name: case.evaluator for name, case in self.cases.items()}
+        self._given = GivenQuantities(self.problem, self.items, evaluators, elements, gap)
 
     def evaluate(
         self,
@@ -208,9 +208,13 @@ class SpecificationEvaluator:
             records[name] = replace(now, channels={**now.channels, **found})
         yield records
         for name in self.cases:
-            given = self._given(name, design, verified=verified)
+            given = self._given.of_case(name, design, verified=verified)
             records[name] = replace(records[name], given={**structural, **given})
         yield records
+        if given := self._given.of_design(design, verified=verified):
+            for name, record in records.items():
+                records[name] = replace(record, given={**record.given, **given})
+            yield records
 
     def _bound(
         self, design: NDArray[np.bool_], structural: dict[str, float], lower_bound: float
@@ -232,29 +236,6 @@ class SpecificationEvaluator:
             return None
         assert first is not None
         return replace(first, status=Status.UNVERIFIED, penalty=first.efficiency - score)
-
-    def _given(self, name: str, design: NDArray[np.bool_], *, verified: bool) -> dict[str, float]:
-        """Return the quantities of a case that do not follow from channels."""
-        case = self.cases[name]
-        wanted = {self.items[k].quantity: self.items[k].at_least or 0.0 for k in case.items}
-        given: dict[str, float] = {}
-        if (bound := wanted.get("clearance")) is not None:
-            clearance = smallest_gap if verified else self._gap
-            given["clearance"] = clearance(case.evaluator, design, bound)
-        if (bound := wanted.get("stable_stroke")) is not None:
-            given["stable_stroke"] = self._stable_stroke(name, design, bound) if verified else bound
-        return given
-
-    def _stable_stroke(self, name: str, design: NDArray[np.bool_], bound: float) -> float:
-        """Return the part of the stroke up to which a design is stable, at most a bound."""
-        if name not in self._extended:
-            problem = self.cases[name].evaluator.problem
-            given = replace(problem.input, amount=bound * problem.input.amount)
-            self._extended[name] = FrameEvaluator(
-                replace(problem, input=given), "displacement", self.elements
-            )
-        response = self._extended[name].evaluate(design, VERIFICATION_INCREMENT)
-        return bound * response.reached if response.status is not Status.MECHANISM else 0.0
 
     def _extremes(
         self, records: dict[str, StrokeRecord], earlier: Extremes | None = None

@@ -21,6 +21,7 @@ from bellcrank.model import (
     Lattice,
     Problem,
     Specification,
+    Tolerances,
     builtin,
     lattices,
 )
@@ -169,6 +170,7 @@ class _Builder:
                 weight=weight,
                 symmetry=_symmetry_names(table.limits.symmetry, self.lattice.dimension),
                 domain=self.domain,
+                tolerances=self._tolerances(),
             ),
         )
         return Task(self._with_designable(problem), self.part, self.units, table.description)
@@ -239,9 +241,27 @@ class _Builder:
                     )
                 least = limits.stable_stroke
                 items.append(Item(quantity="stable_stroke", case=name, at_least=least))
+        if limits.strut_loss is not None:
+            if not 0.0 < limits.strut_loss < 1.0:
+                raise InvalidProblem(
+                    "limits.strut_loss: expected a part of the efficiency between 0 and 1, such as "
+                    f"'30%', got {limits.strut_loss:g}"
+                )
+            items.append(Item(quantity="strut_loss", at_most=limits.strut_loss))
         if limits.mass is not None:
             items.append(self._mass(limits.mass))
         return items
+
+    def _tolerances(self) -> Tolerances | None:
+        """Return the tolerances, in lattice units."""
+        given = self.table.tolerance
+        if given is None:
+            return None
+        data = given.model_dump()
+        try:
+            return Tolerances(**{**data, "node": data["node"] / self.part.scale})
+        except InvalidProblem as error:
+            raise InvalidProblem(str(error).replace("tolerances: ", "tolerance.", 1)) from None
 
     def _mass(self, mass: float) -> Item:
         """Return the item of the mass."""

@@ -360,6 +360,8 @@ class LimitsSection(Table):
     """Smallest gap between struts along the stroke; by default they must not touch."""
     stable_stroke: Ratio | None = None
     """Part of the stroke up to which the part is stable, such as 1.2."""
+    strut_loss: Ratio | None = None
+    """Largest part of the efficiency that the loss of a single strut may cost, such as '30%'."""
     mass: Mass | None = None
     """Largest mass of the struts."""
     symmetry: (
@@ -369,6 +371,21 @@ class LimitsSection(Table):
     """Mirror symmetry along axes, or in space rotational symmetry about the vertical axis."""
     upright: Direction = "down"
     """Direction of the own weight for `sag`."""
+
+
+class ToleranceSection(Table):
+    """``[tolerance]``: deviations of print and drive over which all items are to be met."""
+
+    width: Ratio = 0.1
+    """Largest deviation of all widths together, as a part of the width."""
+    each_width: Ratio = 0.05
+    """Standard deviation of the width of each strut, as a part of it."""
+    node: Length = 0.1
+    """Largest deviation of each coordinate of a node."""
+    angle: Angle = 5.0
+    """Largest deviation of the direction of the input."""
+    least_yield: Ratio = 0.95
+    """Part of random prints that are to meet all items."""
 
 
 class TaskTable(Table):
@@ -382,3 +399,4 @@ class TaskTable(Table):
     supports: list[SupportSection] = Field(default_factory=list)
     cases: list[CaseSection]
     limits: LimitsSection = LimitsSection()
+    tolerance: ToleranceSection | None = None

@@ -126,10 +126,13 @@ def _is_enough(results: Sequence[Refinement]) -> bool:
     return any(not each.sheets or each.after.met_in_sheet for each in met)
 
 
-def _rank(refinement: Refinement) -> tuple[bool, bool, float]:
-    """Return how good a refined design is: items met by frames, and in the sheet; the objective."""
+def _rank(refinement: Refinement) -> tuple[bool, bool, float, float]:
+    """Return how good a refined design is.
+
+    Items met by frames, and in the sheet; the part of random prints that meets them; the objective.
+    """
     after = refinement.after
-    return after.met, bool(after.met_in_sheet), after.objective
+    return after.met, bool(after.met_in_sheet), after.share, after.objective
 
 
 def _joined(first: Refinement, second: Refinement) -> Refinement:

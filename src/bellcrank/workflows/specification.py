@@ -30,6 +30,7 @@ ROUNDING = 1e-9
 LABELS = {
     "off_axis": "off-axis motion", "path_error": "path error", "blocked_force": "blocked force",
     "input_force": "input force", "stable_stroke": "stable stroke",
+    "strut_loss": "strut loss",
 }  # fmt: skip
 """Names of quantities whose words differ from their keys."""
 

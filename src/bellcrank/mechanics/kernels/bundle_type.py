@@ -6,6 +6,7 @@ Imports numba; imported when the first kernel is compiled or called.
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from numba.np import numpy_support
 from numba.np.arrayobj import make_array, populate_array
 
 if TYPE_CHECKING:
+    from collections.abc import Hashable
+
     from llvmlite.ir import IRBuilder, Value
 
 WORD = ir.IntType(64)
@@ -59,8 +62,33 @@ class BundleType(Type):
 
 def type_of(bundle: Any) -> BundleType:
     """Return the type of a `bellcrank.mechanics.kernels.bundle.Bundle`."""
-    members = tuple((field.name, _kind(getattr(bundle, field.name))) for field in fields(bundle))
-    return BundleType(type(bundle).__name__, members)
+    names = _names_of(type(bundle))
+    key = type(bundle), *(_key(getattr(bundle, name)) for name in names)
+    if key not in _known:
+        members = tuple((name, _kind(getattr(bundle, name))) for name in names)
+        _known[key] = BundleType(type(bundle).__name__, members)
+    return _known[key]
+
+
+_known: dict[tuple[Any, ...], BundleType] = {}
+"""Types that were made, by what determines them; numba takes long to compare types."""
+
+
+@cache
+def _names_of(kind: Hashable) -> tuple[str, ...]:
+    """Return the names of the fields of a class."""
+    return tuple(field.name for field in fields(kind))  # type: ignore[arg-type]
+
+
+def _key(value: Any) -> Any:
+    """Return what determines the type of the value of a field."""
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.ndim
+    if hasattr(value, "_numba_type_"):
+        return id(value._numba_type_)
+    if isinstance(value, tuple):
+        return type(value), *(_key(each) for each in value)
+    return type(value)
 
 
 def _kind(value: Any) -> Any:

@@ -1,0 +1,60 @@
+"""Deviations of print and drive over which the specification of a problem is to be met."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+from bellcrank.errors import InvalidProblem
+
+LARGEST = {"width": 0.9, "each_width": 0.3, "node": math.inf, "angle": 90.0, "least_yield": 1.0}
+"""Largest value of each tolerance; the smallest one is 0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """Deviations over which the items of a specification are to be met.
+
+    Parameters
+    ----------
+    width
+        Largest deviation of all widths together, as a part of the width.
+    each_width
+        Standard deviation of the width of each strut, as a part of it.
+    node
+        Largest deviation of each coordinate of a node, lattice units.
+    angle
+        Largest deviation of the direction of the input, degrees.
+    least_yield
+        Part of random prints with these deviations that are to meet all items.
+
+    Raises
+    ------
+    InvalidProblem
+        If a number is out of its range.
+
+    Examples
+    --------
+    >>> Tolerances(width=0.2).to_dict()["width"]
+    0.2
+    """
+
+    width: float = 0.1
+    each_width: float = 0.05
+    node: float = 0.01
+    angle: float = 5.0
+    least_yield: float = 0.95
+
+    def __post_init__(self) -> None:
+        for name, most in LARGEST.items():
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0.0 <= value <= most):
+                limit = "at least 0" if most == math.inf else f"from 0 to {most:g}"
+                raise InvalidProblem(
+                    f"tolerances: {name}: expected a number {limit}, got {value!r}"
+                )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}

@@ -1,0 +1,160 @@
+"""The scenarios of a refinement: which are constraints, and what a geometry does in all."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from bellcrank.errors import InvalidSettings
+from bellcrank.refine.scenarios import LossRows
+from bellcrank.search.strut_loss import StrutLosses
+from bellcrank.tolerance import Deviations, ScenarioEvaluator, scenarios_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bellcrank.model import Design, Specification, Tolerances
+    from bellcrank.refine.variables import Variables
+    from bellcrank.tolerance import Scenario, ScenarioResult
+
+PRINTS = 60
+"""Number of random prints by which a geometry is judged. They are not those of `bellcrank
+tolerance`."""
+SEED = 1
+"""Their seed."""
+ADDED = 3
+"""Largest number of scenarios, and of lost struts, that become constraints after each round."""
+NEAR_LOSS = 0.7
+"""Loss of a strut, over the largest one, from which it is a constraint."""
+LOST_STRUTS = 8
+"""Number of struts whose losses are constraints from the beginning."""
+
+
+class Judgement(NamedTuple):
+    """A geometry over all scenarios.
+
+    Parameters
+    ----------
+    share
+        Part of them that meets all items, at most the wanted yield.
+    objective
+        The smallest objective that the wanted yield of them keeps; without objectives, the smallest
+        margin.
+    missed
+        Scenarios that miss an item, worst first.
+    """
+
+    share: float
+    objective: float
+    missed: list[Scenario]
+
+
+class ScenarioChoice:
+    """The scenarios of a refinement.
+
+    Those in which all widths or the direction of the input deviate as far as is tolerated are
+    constraints from the beginning. Random prints that miss items become constraints round by round,
+    worst first. So do struts whose loss costs much.
+
+    Parameters
+    ----------
+    design
+        The design to refine, with a specification.
+    """
+
+    def __init__(self, design: Design) -> None:
+        wanted = design.problem.specification
+        assert wanted is not None
+        self.tolerances = wanted.tolerances
+        self.all = [] if self.tolerances is None else _scenarios(design, self.tolerances)
+        self.chosen = [each for each in self.all if each.kind != "print"]
+        self.largest_loss = _largest_loss(wanted)
+        self.lost: list[int] = []
+        if self.largest_loss is not None:
+            self.lost = self._near_losses(design)[:LOST_STRUTS]
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether only the design as drawn counts."""
+        return self.tolerances is None and self.largest_loss is None
+
+    def loss_rows(self, variables: Variables, design: Design) -> list[LossRows]:
+        """Return the constraints on lost struts."""
+        if self.largest_loss is None:
+            return []
+        return [LossRows(variables, design.mask, beam, self.largest_loss) for beam in self.lost]
+
+    def _near_losses(self, design: Design) -> list[int]:
+        """Return the struts whose loss costs about as much as it may, or more, worst first."""
+        assert self.largest_loss is not None
+        least = NEAR_LOSS * self.largest_loss
+        losses = StrutLosses(design.problem).by_strut(design.mask)
+        return sorted((b for b in losses if losses[b] > least), key=lambda beam: -losses[beam])
+
+    def judge(self, design: Design) -> Judgement:
+        """Return what a geometry does over all scenarios, for a specification with tolerances."""
+        assert self.tolerances is not None
+        try:
+            evaluator = ScenarioEvaluator(design)
+        except InvalidSettings:
+            return Judgement(0.0, -math.inf, [])
+        wanted = design.problem.specification
+        assert wanted is not None
+        results = [evaluator.evaluate(each) for each in self.all]
+        scales = [each.scale for each in wanted.maximise]
+        values = sorted(_objective(result, scales) for result in results)
+        index = math.floor((1.0 - self.tolerances.least_yield) * len(values) + 1e-9)
+        order = sorted(range(len(results)), key=lambda k: _margin(results[k]))
+        missed = [self.all[k] for k in order if not results[k].met]
+        share = 1.0 - len(missed) / len(results)
+        return Judgement(min(share, self.tolerances.least_yield), values[index], missed)
+
+    def add(self, design: Design, missed: Sequence[Scenario]) -> bool:
+        """Make the worst of some scenarios and of the lost struts constraints; whether any is new.
+
+        Parameters
+        ----------
+        design
+            The geometry.
+        missed
+            Scenarios in which it misses items, worst first.
+        """
+        new = [each for each in missed if not any(each is other for other in self.chosen)][:ADDED]
+        self.chosen += new
+        if self.largest_loss is None:
+            return bool(new)
+        lost = [beam for beam in self._near_losses(design) if beam not in self.lost][:ADDED]
+        self.lost += lost
+        return bool(new or lost)
+
+
+def _scenarios(design: Design, tolerances: Tolerances) -> list[Scenario]:
+    """Return the scenarios of tolerances, without the nominal one."""
+    deviations = Deviations(
+        width=0.0, relative_width=tolerances.width, thin=0.0, each_width=tolerances.each_width,
+        node=tolerances.node, angle=tolerances.angle, shortest=1.0, longest=1.0, prints=PRINTS,
+        struts=False, seed=SEED,
+    )  # fmt: skip
+    return scenarios_of(design.problem, design.mask, 1.0, deviations)[1:]
+
+
+def _largest_loss(wanted: Specification) -> float | None:
+    """Return the largest part of the efficiency that the loss of a strut may cost."""
+    bounds = [item.at_most for item in wanted.items if item.quantity == "strut_loss"]
+    return min((bound for bound in bounds if bound is not None), default=None)
+
+
+def _margin(result: ScenarioResult) -> float:
+    """Return the smallest margin of the items; minus infinity without a stable path."""
+    if not result.is_stable:
+        return -math.inf
+    return min((each.margin for each in result.items), default=math.inf)
+
+
+def _objective(result: ScenarioResult, scales: Sequence[float]) -> float:
+    """Return the smallest objective, or margin without any; minus infinity if the path is lost."""
+    if not result.is_stable:
+        return -math.inf
+    if not scales:
+        return _margin(result)
+    return min(value / scale for value, scale in zip(result.objectives, scales, strict=True))
