@@ -227,6 +227,8 @@ def _specification(lattice: Lattice, table: SpecificationTable | None) -> Specif
         )
         for k, each in enumerate(table.cases)
     ]
+    deviations = table.tolerances
+    tolerances = None if deviations is None else Tolerances(**deviations.model_dump())
     return Specification(
         case=table.case,
         output=table.output,
@@ -240,9 +242,7 @@ def _specification(lattice: Lattice, table: SpecificationTable | None) -> Specif
         weight=table.weight,  # type: ignore[arg-type]  # cast there
         symmetry=tuple(table.symmetry),
         domain=tuple(table.domain),  # type: ignore[arg-type]  # cast there
-        tolerances=None
-        if table.tolerances is None
-        else Tolerances(**table.tolerances.model_dump()),
+        tolerances=tolerances,
     )
 
 

@@ -12,7 +12,7 @@ from bellcrank.refine.choice import ScenarioChoice
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
 from bellcrank.refine.rows import STABLE, RowEvaluator
-from bellcrank.refine.scenarios import ScenarioRows
+from bellcrank.refine.scenarios import nearest_rows
 from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from bellcrank.model import Design, Item
     from bellcrank.refine.differences import Difference, Records
     from bellcrank.refine.refinement import Progress
+    from bellcrank.refine.scenarios import ScenarioRows
     from bellcrank.tolerance import Scenario
 
     Values = NDArray[np.float64]
@@ -43,13 +44,16 @@ REPAIR_REGION = 0.25
 """Trust regions of refinements that are corrected by the sheet, over those of others."""
 MET = 1e-3
 """Sum of violations at which they are."""
+REDUCED_STEPS = 8
+"""Number of steps towards scenarios that the geometry is not near meeting, before they are chosen
+again."""
 AMPLE = 0.25
 """Margin at which a specification without objectives is met: a part of the size of each bound.
 Larger margins by frames are lost in the sheet, since geometries with large margins by frames have
 large differences."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
-SCENARIO_ROUNDS = 6
+SCENARIO_ROUNDS = 20
 """Number of further times, each with further scenarios."""
 
 
@@ -96,6 +100,7 @@ class FrameRefinement:
         self.choice = ScenarioChoice(design)
         self.chosen = np.zeros(self.variables.count)
         self.missed: list[Scenario] = []
+        self.is_reduced = False
         self.before = self.best = self.state_at(self.chosen)
         self.path = self.tried = [self.chosen]
         self.stable = STABLE
@@ -116,7 +121,9 @@ class FrameRefinement:
             if found is None:
                 return
             state, vector, is_last = found
-            goes_wider = state.is_stable and self.choice.add(self._design_at(vector), self.missed)
+            goes_wider = self.is_reduced and len(self.tried) > 1
+            if not self.is_reduced and state.is_stable:
+                goes_wider = self.choice.add(self._design_at(vector), self.missed)
             rounds, wider = rounds + (not goes_wider), wider + goes_wider
             path = [*path, *self.tried]
             if is_better(state, self.best):
@@ -159,13 +166,13 @@ class FrameRefinement:
             it is the last one of all. None if the response is not stable.
         """
         items = [self._tightened(each) for each in self.items if each.quantity != "strut_loss"]
-        evaluator = self._rows(items, stable, models)
-        if not self.choice.is_empty:
-            evaluator, vector = self._stable_start(evaluator, vector)
+        evaluator, vector = self._start(items, stable, models, vector)
         evaluations = max(least, self.settings.evaluations - self.evaluations)
         if not self.choice.is_empty:
             # Prints that miss items follow in later rounds.
-            evaluations = min(evaluations, max(least, self.settings.evaluations // 3))
+            evaluations = min(evaluations, max(least, self.settings.evaluations // 5))
+        if self.is_reduced:
+            steps = min(steps, REDUCED_STEPS)
         left = replace(self.settings, steps=steps, evaluations=evaluations)
         if near:
             # Differences of models hold near the geometry that they were computed for.
@@ -192,26 +199,30 @@ class FrameRefinement:
         state = self._judged(state, vectors[number])
         return state, vectors[number], number == len(vectors) - 1
 
-    def _rows(self, items: Sequence[Item], stable: float, models: Models) -> ScenarioRows:
-        """Return the rows as drawn, and in the chosen scenarios."""
-        drawn, *others = [
-            RowEvaluator(self.variables, self.design.mask, items, stable, models, scenario)
-            for scenario in (None, *self.choice.chosen)
-        ]
-        return ScenarioRows(drawn, [*others, *self.choice.loss_rows(self.variables, self.design)])
+    def _start(
+        self, items: Sequence[Item], stable: float, models: Models, vector: Values
+    ) -> tuple[ScenarioRows, Values]:
+        """Return rows as drawn and in the chosen scenarios, and the geometry to begin with.
 
-    def _stable_start(self, evaluator: ScenarioRows, vector: Values) -> tuple[ScenarioRows, Values]:
-        """Return a geometry that is stable in all scenarios: the given one, or one before it.
-
-        If there is none among a few, the scenarios in which the given one is not stable are left
-        out; those that miss items after the round are added again.
+        It is the last one that is near meeting all scenarios, or the one that is nearest to it
+        among a few; there scenarios are reduced to what it is near meeting.
         """
-        earlier, start, back = [*self.path, vector], vector, 1
-        while evaluator.evaluate(start) is None:
-            if back > len(earlier):
-                return evaluator.stable_at(vector), vector
-            start, back = earlier[-back], 2 * back
-        return evaluator, start
+
+        def rows_of(scenario: Scenario | None) -> RowEvaluator:
+            return RowEvaluator(self.variables, self.design.mask, items, stable, models, scenario)
+
+        losses = self.choice.loss_rows(self.variables, self.design)
+        path, back, best = [*self.path, *self.tried], 0, None
+        while best is None or (best.parts < len(self.choice.chosen) and back < len(path)):
+            here = path[-back] if back else vector
+            found = nearest_rows(rows_of, self.choice.chosen, losses, here)
+            if best is None or found.parts > best.parts:
+                best, start = found, here
+            back = max(1, 2 * back)
+        self.is_reduced = best.parts < len(self.choice.chosen)
+        if self.is_reduced:
+            best.rows.maximise_margins()
+        return best.rows, start
 
     def state_at(self, vector: Values) -> State:
         """Return the state of a geometry."""

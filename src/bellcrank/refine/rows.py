@@ -152,6 +152,7 @@ class RowEvaluator:
         self.mask = mask
         self.scenario = scenario
         self.objectives_only = objectives_only
+        self.has_objectives = True
         self.models = tuple(models)
         self.items = tuple(items)
         self.stable = stable
@@ -164,6 +165,10 @@ class RowEvaluator:
     def soft_states(self) -> int:
         """Number of states that were soft or unstable in any geometry, and are constraints."""
         return sum(map(len, self.soft.values()))
+
+    def maximise_margins(self) -> None:
+        """Make the smallest margin the objective, as without objectives."""
+        self.has_objectives, self._last = False, None
 
     def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
         """Return the rows of a geometry; None if a response is not stable, or a strut too short.
@@ -210,7 +215,10 @@ class RowEvaluator:
         asked = replace(
             problem,
             specification=replace(
-                wanted, items=self.items, symmetry=() if self.scenario else wanted.symmetry
+                wanted,
+                items=self.items,
+                symmetry=() if self.scenario else wanted.symmetry,
+                maximise=wanted.maximise if self.has_objectives else (),
             ),
         )
         evaluator = SpecificationEvaluator(asked)

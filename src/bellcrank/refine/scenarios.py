@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,13 +11,14 @@ from bellcrank.model import ObjectiveTerm
 from bellcrank.refine.rows import RowEvaluator, Rows, joined
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from typing import Protocol
 
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
     from bellcrank.refine.variables import Variables
+    from bellcrank.tolerance import Scenario
 
     Values = NDArray[np.float64]
 
@@ -30,6 +31,12 @@ if TYPE_CHECKING:
 
         def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
             """As `RowEvaluator.evaluate`."""
+
+
+PARTS = (1.0, 0.85, 0.7, 0.5, 0.3, 0.15)
+"""Parts of a deviation, the largest first."""
+NEAR = 0.5
+"""Largest sum of violations of a scenario that is near to being met."""
 
 
 class ScenarioRows:
@@ -53,6 +60,12 @@ class ScenarioRows:
         """Number of states that were soft or unstable in any geometry, and are constraints."""
         return self.drawn.soft_states + sum(each.soft_states for each in self.others)
 
+    def maximise_margins(self) -> None:
+        """Make the smallest margin the objective."""
+        for each in (self.drawn, *self.others):
+            if isinstance(each, RowEvaluator):
+                each.maximise_margins()
+
     def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
         """Return the rows of a geometry; None if a response is not stable, or a strut too short."""
         found: dict[int, Rows] = {}
@@ -66,10 +79,58 @@ class ScenarioRows:
             found[id(part)] = rows
         return joined([found[id(part)] for part in (self.drawn, *self.others)])
 
-    def stable_at(self, vector: Values) -> ScenarioRows:
-        """Return the rows without the scenarios in which a geometry is not stable."""
-        stable = [each for each in self.others if each.evaluate(vector) is not None]
-        return ScenarioRows(self.drawn, stable)
+
+class NearRows(NamedTuple):
+    """Rows of the scenarios that a geometry is near meeting.
+
+    Parameters
+    ----------
+    rows
+        Their rows.
+    parts
+        Sum of the parts of the deviations that they have; 0 if the geometry is not near meeting all
+        as drawn.
+    """
+
+    rows: ScenarioRows
+    parts: float
+
+
+def nearest_rows(
+    rows_of: Callable[[Scenario | None], RowEvaluator],
+    scenarios: Sequence[Scenario],
+    losses: Sequence[LossRows],
+    vector: Values,
+) -> NearRows:
+    """Return the rows of scenarios, each reduced to the largest part that is near to being met.
+
+    Parameters
+    ----------
+    rows_of
+        Function to the rows of a scenario, and to those as drawn for None.
+    scenarios
+        Scenarios.
+    losses
+        Constraints on lost struts; those where the path is lost are left out.
+    vector : (n,)
+        The geometry.
+    """
+    drawn = rows_of(None)
+    now = drawn.evaluate(vector)
+    if now is None or now.violation > NEAR:
+        return NearRows(ScenarioRows(drawn, []), 0.0)
+    parts = 0.0
+    others: list[Part] = []
+    for scenario in scenarios:
+        for part in PARTS:
+            reduced = rows_of(scenario.reduced(part))
+            found = reduced.evaluate(vector)
+            if found is not None and found.violation <= NEAR:
+                others.append(reduced)
+                parts += part
+                break
+    others += [each for each in losses if each.evaluate(vector) is not None]
+    return NearRows(ScenarioRows(drawn, others), parts)
 
 
 class LossRows:

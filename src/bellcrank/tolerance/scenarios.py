@@ -120,6 +120,18 @@ class Scenario:
     stroke: float = 1.0
     missing: int | None = None
 
+    def reduced(self, part: float) -> Scenario:
+        """Return the scenario with a part of its deviations."""
+        if part == 1.0:
+            return self
+        return replace(
+            self,
+            widths=None if self.widths is None else 1.0 + part * (self.widths - 1.0),
+            moves=None if self.moves is None else part * self.moves,
+            angle=part * self.angle,
+            stroke=1.0 + part * (self.stroke - 1.0),
+        )
+
     def of(self, problem: Problem) -> Problem:
         """Return the problem of a frame with this deviation; the missing beam is still in it.
 

@@ -5,8 +5,6 @@ Imports numba; imported when the first kernel is compiled or called.
 
 from __future__ import annotations
 
-from dataclasses import fields
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,8 +19,6 @@ from numba.np import numpy_support
 from numba.np.arrayobj import make_array, populate_array
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
-
     from llvmlite.ir import IRBuilder, Value
 
 WORD = ir.IntType(64)
@@ -62,7 +58,7 @@ class BundleType(Type):
 
 def type_of(bundle: Any) -> BundleType:
     """Return the type of a `bellcrank.mechanics.kernels.bundle.Bundle`."""
-    names = _names_of(type(bundle))
+    names = type(bundle).__match_args__
     key = type(bundle), *(_key(getattr(bundle, name)) for name in names)
     if key not in _known:
         members = tuple((name, _kind(getattr(bundle, name))) for name in names)
@@ -72,12 +68,6 @@ def type_of(bundle: Any) -> BundleType:
 
 _known: dict[tuple[Any, ...], BundleType] = {}
 """Types that were made, by what determines them; numba takes long to compare types."""
-
-
-@cache
-def _names_of(kind: Hashable) -> tuple[str, ...]:
-    """Return the names of the fields of a class."""
-    return tuple(field.name for field in fields(kind))  # type: ignore[arg-type]
 
 
 def _key(value: Any) -> Any:
