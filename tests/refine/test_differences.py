@@ -13,7 +13,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, Channel, StrokeRecord
 from bellcrank.model import gallery_design
 from bellcrank.refine import RefinementSettings, refine_design
 from bellcrank.refine.differences import NO_DIFFERENCE, Difference, difference, on_same_path
-from bellcrank.refine.rows import RowEvaluator
+from bellcrank.refine.row_evaluator import RowEvaluator
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
 

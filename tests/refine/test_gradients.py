@@ -13,7 +13,7 @@ from bellcrank.mechanics.frames.geometry import beam_slopes, geometry_slopes
 from bellcrank.mechanics.frames.joints import joint_lengths, joint_slopes, with_joints
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 from bellcrank.model import Item, ObjectiveTerm, Specification
-from bellcrank.refine.rows import RowEvaluator
+from bellcrank.refine.row_evaluator import RowEvaluator
 from bellcrank.refine.shape import shape_rows
 from bellcrank.refine.variables import variables_of
 
@@ -178,7 +178,7 @@ def compared_rows(rows: RowEvaluator, start: np.ndarray, way: np.ndarray) -> set
 def test_constraints_have_the_derivatives_of_differences(
     widest: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bellcrank.refine.rows.GAP_REACH", 3.0)
+    monkeypatch.setattr("bellcrank.refine.row_evaluator.GAP_REACH", 3.0)
     design = straight_crane()
     width = design.problem.section.width
     variables = variables_of(design, 0.4, (width, widest * width))
@@ -196,7 +196,7 @@ def test_constraints_have_the_derivatives_of_differences(
 def test_constraints_in_space_have_the_derivatives_of_differences(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("bellcrank.refine.rows.GAP_REACH", 3.0)
+    monkeypatch.setattr("bellcrank.refine.row_evaluator.GAP_REACH", 3.0)
     design = random_block(0)
     case, output = "case", "output"
     items = (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bellcrank.refine import stability
-from bellcrank.refine.rows import RowEvaluator
+from bellcrank.refine.row_evaluator import RowEvaluator
 from bellcrank.refine.stability import DECLINE, references
 from bellcrank.refine.variables import variables_of
 

@@ -29,7 +29,7 @@ def test_prints_agree_with_opensees(crane: Design) -> None:
     deviations = Deviations(prints=20, struts=False, seed=7)
     prints = [
         each
-        for each in scenarios_of(crane.problem, crane.mask, 10.0, deviations)
+        for each in scenarios_of(crane.problem, crane.mask, deviations, 10.0)
         if each.kind == "print"
     ]
     evaluator = ScenarioEvaluator(crane, elements=4)
@@ -61,7 +61,7 @@ def test_lost_struts_are_as_from_rest(crane: Design) -> None:
 
 
 def test_results_do_not_depend_on_the_scenarios_before(crane: Design) -> None:
-    scenarios = scenarios_of(crane.problem, crane.mask, 10.0, Deviations(prints=5))
+    scenarios = scenarios_of(crane.problem, crane.mask, Deviations(prints=5), 10.0)
     chosen = [scenarios[k] for k in (0, 3, 8, 12, 30, 60)]
     evaluator = ScenarioEvaluator(crane)
     together = [evaluator.evaluate(each) for each in chosen]

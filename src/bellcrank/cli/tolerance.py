@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -43,21 +44,26 @@ def tolerance(
     design: DesignName,
     width: Annotated[float, typer.Option(help="Deviation of all widths, mm.")] = 0.1,
     relative_width: Annotated[
-        float, typer.Option(help="The same as a part of the width; random prints have it too.")
-    ] = 0.1,
+        float | None,
+        typer.Option(
+            help="The same as a part of the width; random prints have it too. Default, as for "
+            "--each-width, --node and --angle: that of the task, or 0.1."
+        ),
+    ] = None,
     thin: Annotated[
         float, typer.Option(help="Part of the width by which all struts may be too thin.")
     ] = 0.2,
     each_width: Annotated[
-        float,
-        typer.Option(help="Standard deviation of the width of each strut, as a part of it."),
-    ] = 0.05,
+        float | None,
+        typer.Option(help="Standard deviation of the width of each strut, as a part of it: 0.05."),
+    ] = None,
     node: Annotated[
-        float, typer.Option(help="Largest deviation of each coordinate of a node, mm.")
-    ] = 0.1,
+        float | None,
+        typer.Option(help="Largest deviation of each coordinate of a node, mm: 0.1."),
+    ] = None,
     angle: Annotated[
-        float, typer.Option(help="Deviation of the direction of the input, degrees.")
-    ] = 5.0,
+        float | None, typer.Option(help="Deviation of the direction of the input, degrees: 5.")
+    ] = None,
     shortest: Annotated[
         float, typer.Option(help="Shortest stroke, as a part of the nominal one.")
     ] = 0.5,
@@ -86,13 +92,20 @@ def tolerance(
     from bellcrank.model import require_plane
     from bellcrank.tolerance import Deviations
     from bellcrank.workflows.pictures import check_targets
-    from bellcrank.workflows.tolerance import compute_tolerance
+    from bellcrank.workflows.tolerance import compute_tolerance, tolerances_of
+    from bellcrank.workflows.validation import spec_for
 
     if workers is not None and workers < 1:
         raise InvalidSettings(f"--workers: expected at least 1, got {workers}")
+    spec = spec_for(chosen)
+    given = {
+        "width": relative_width, "each_width": each_width, "angle": angle,
+        "node": None if node is None else node / spec.scale,
+    }  # fmt: skip
+    changes = {name: value for name, value in given.items() if value is not None}
     deviations = Deviations(
-        width=width, relative_width=relative_width, thin=thin, each_width=each_width, node=node,
-        angle=angle, shortest=shortest, longest=longest, prints=prints, struts=struts, seed=seed,
+        tolerances=replace(tolerances_of(chosen, spec), **changes), width=width / spec.scale,
+        thin=thin, shortest=shortest, longest=longest, prints=prints, struts=struts, seed=seed,
     )  # fmt: skip
     if picture is not None:
         require_plane(chosen.problem, "--picture")

@@ -11,7 +11,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, tightened
 from bellcrank.refine.choice import ScenarioChoice
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
-from bellcrank.refine.rows import STABLE, RowEvaluator
+from bellcrank.refine.row_evaluator import STABLE, RowEvaluator
 from bellcrank.refine.scenarios import nearest_rows
 from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
 from bellcrank.refine.variables import variables_of
@@ -111,7 +111,7 @@ class FrameRefinement:
 
     def run(self) -> None:
         """Refine until all items are met with eight elements."""
-        vector, stable = self.chosen, STABLE
+        vector, stable = self.chosen, STABLE if self.choice.is_empty else stricter(STABLE)
         path: list[Values] = []
         models: Models = (NO_DIFFERENCE,)
         rounds = wider = 0

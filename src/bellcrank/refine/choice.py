@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from bellcrank.refine.variables import Variables
     from bellcrank.tolerance import Scenario, ScenarioResult
 
-PRINTS = 60
+PRINTS = 100
 """Number of random prints by which a geometry is judged. They are not those of `bellcrank
 tolerance`."""
 SEED = 1
 """Their seed."""
-ADDED = 3
+ADDED = 4
 """Largest number of scenarios, and of lost struts, that become constraints after each round."""
 NEAR_LOSS = 0.7
 """Loss of a strut, over the largest one, from which it is a constraint."""
@@ -131,11 +131,10 @@ class ScenarioChoice:
 def _scenarios(design: Design, tolerances: Tolerances) -> list[Scenario]:
     """Return the scenarios of tolerances, without the nominal one."""
     deviations = Deviations(
-        width=0.0, relative_width=tolerances.width, thin=0.0, each_width=tolerances.each_width,
-        node=tolerances.node, angle=tolerances.angle, shortest=1.0, longest=1.0, prints=PRINTS,
+        tolerances=tolerances, width=0.0, thin=0.0, shortest=1.0, longest=1.0, prints=PRINTS,
         struts=False, seed=SEED,
     )  # fmt: skip
-    return scenarios_of(design.problem, design.mask, 1.0, deviations)[1:]
+    return scenarios_of(design.problem, design.mask, deviations)[1:]
 
 
 def _largest_loss(wanted: Specification) -> float | None:

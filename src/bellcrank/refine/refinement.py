@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.refine.rows import RowEvaluator, Rows
+    from bellcrank.refine.row_evaluator import RowEvaluator
+    from bellcrank.refine.rows import Rows
     from bellcrank.refine.scenarios import ScenarioRows
 
     Values = NDArray[np.float64]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bellcrank.model import ObjectiveTerm
-from bellcrank.refine.rows import RowEvaluator, Rows, joined
+from bellcrank.refine.row_evaluator import RowEvaluator
+from bellcrank.refine.rows import Rows, joined
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

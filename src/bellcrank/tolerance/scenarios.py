@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.model import Tolerances
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,28 +26,27 @@ NARROWEST = 0.05
 """Least width of a strut, as a part of its nominal width."""
 
 
+USUAL = Tolerances()
+"""Tolerances of parts whose task names none."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deviations:
     """Sizes of deviations, and the number of random prints.
 
     Parameters
     ----------
+    tolerances
+        Deviations of random prints; those of all widths and of the direction are computed alone
+        too.
     width
-        Deviation of all widths, mm, in both directions.
-    relative_width
-        The same as a part of the width.
+        Further deviation of all widths, in both directions, lattice units.
     thin
         Part of the width by which all struts may be too thin: a printer's thin walls.
-    each_width
-        Standard deviation of the width of each strut, as a part of it.
-    node
-        Largest deviation of each coordinate of a node, mm.
-    angle
-        Deviation of the direction of the input, degrees.
     shortest, longest
         Strokes, as parts of the nominal one.
     prints
-        Number of random prints: common and own deviations of widths, nodes and direction together.
+        Number of random prints.
     struts
         Whether the loss of each strut is computed.
     seed
@@ -58,12 +58,9 @@ class Deviations:
         If a number is out of its range.
     """
 
-    width: float = 0.1
-    relative_width: float = 0.1
+    tolerances: Tolerances = USUAL
+    width: float = 0.01
     thin: float = 0.2
-    each_width: float = 0.05
-    node: float = 0.1
-    angle: float = 5.0
     shortest: float = 0.5
     longest: float = 1.5
     prints: int = 200
@@ -72,8 +69,7 @@ class Deviations:
 
     def __post_init__(self) -> None:
         for name, most in (
-            ("width", math.inf), ("relative_width", 0.9), ("thin", 0.9), ("each_width", 0.3),
-            ("node", math.inf), ("angle", 90.0), ("shortest", 1.0), ("longest", 3.0),
+            ("width", math.inf), ("thin", 0.9), ("shortest", 1.0), ("longest", 3.0),
         ):  # fmt: skip
             value = getattr(self, name)
             if not (math.isfinite(value) and 0.0 <= value <= most):
@@ -81,10 +77,6 @@ class Deviations:
                 raise InvalidSettings(f"{name}: expected a number {limit}, got {value!r}")
         if self.prints < 0:
             raise InvalidSettings(f"prints: expected at least 0, got {self.prints}")
-
-    def to_dict(self) -> dict[str, float | int | bool]:
-        """Return plain data."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -168,7 +160,7 @@ class Scenario:
 
 
 def scenarios_of(
-    problem: Problem, mask: NDArray[np.bool_], length: float, deviations: Deviations
+    problem: Problem, mask: NDArray[np.bool_], deviations: Deviations, length: float = 1.0
 ) -> list[Scenario]:
     """Return the scenarios of a design, the nominal one first.
 
@@ -178,10 +170,10 @@ def scenarios_of(
         Problem of a frame.
     mask : (M,) bool
         The design.
-    length
-        Length of a lattice unit, mm.
     deviations
         Their sizes.
+    length
+        Length of a lattice unit in mm, for the names of scenarios.
 
     Examples
     --------
@@ -190,21 +182,21 @@ def scenarios_of(
     >>> design = human_design("crane")
     >>> problem = frame_problem(design.problem, PartSpec())
     >>> few = Deviations(prints=2, struts=False)
-    >>> [scenario.name for scenario in scenarios_of(problem, design.mask, 10.0, few)][:4]
+    >>> [scenario.name for scenario in scenarios_of(problem, design.mask, few, 10.0)][:4]
     ['nominal', 'widths +0.1 mm', 'widths -0.1 mm', 'widths +10 %']
     """
     found = [Scenario(name="nominal", kind="nominal")]
-    found += _widths(problem, length, deviations)
-    planes = _planes(problem)
-    for plane in planes if deviations.angle else ():
-        for angle in (deviations.angle, -deviations.angle):
+    found += _widths(problem, deviations, length)
+    planes, largest = _planes(problem), deviations.tolerances.angle
+    for plane in planes if largest else ():
+        for angle in (largest, -largest):
             about = "" if len(planes) == 1 else f" in the plane {'xyz'[plane[0]]}{'xyz'[plane[1]]}"
             name = f"input turned by {angle:+g} degrees{about}"
             found.append(Scenario(name=name, kind="input", angle=angle, plane=plane))
     for stroke in (deviations.shortest, deviations.longest):
         if stroke not in {0.0, 1.0}:
             found.append(Scenario(name=f"stroke {stroke:.0%}", kind="stroke", stroke=stroke))
-    found += _prints(problem, length, deviations)
+    found += _prints(problem, deviations)
     if deviations.struts:
         held = np.isin(problem.lattice.beams, problem.supports.fixed).all(axis=1)
         found += [
@@ -214,15 +206,16 @@ def scenarios_of(
     return found
 
 
-def _widths(problem: Problem, length: float, deviations: Deviations) -> Iterator[Scenario]:
+def _widths(problem: Problem, deviations: Deviations, length: float) -> Iterator[Scenario]:
     """Yield scenarios in which all widths deviate alike."""
     nominal = problem.beam_widths
     for sign in (1.0, -1.0):
         if deviations.width:
-            widths = np.maximum(1.0 + sign * deviations.width / (length * nominal), NARROWEST)
-            name = f"widths {sign * deviations.width:+g} mm"
+            widths = np.maximum(1.0 + sign * deviations.width / nominal, NARROWEST)
+            name = f"widths {sign * length * deviations.width:+g} mm"
             yield Scenario(name=name, kind="widths", widths=widths)
-    parts = [deviations.relative_width, -deviations.relative_width, -deviations.thin]
+    relative = deviations.tolerances.width
+    parts = [relative, -relative, -deviations.thin]
     for part in dict.fromkeys(part for part in parts if part):
         widths = np.full(len(nominal), 1.0 + part)
         yield Scenario(name=f"widths {100.0 * part:+g} %", kind="widths", widths=widths)
@@ -236,17 +229,17 @@ def _planes(problem: Problem) -> list[tuple[int, int]]:
     return [(along, axis) for axis in range(3) if axis != along]
 
 
-def _prints(problem: Problem, length: float, deviations: Deviations) -> Iterator[Scenario]:
+def _prints(problem: Problem, deviations: Deviations) -> Iterator[Scenario]:
     """Yield random prints; each is determined by the seed and its number."""
-    planes = _planes(problem)
+    planes, sizes = _planes(problem), deviations.tolerances
     nominal = problem.beam_widths
     for number in range(deviations.prints):
         rng = np.random.default_rng([deviations.seed, number])
-        common = 1.0 + deviations.relative_width * rng.uniform(-1.0, 1.0)
-        widths = common * (1.0 + deviations.each_width * rng.standard_normal(len(nominal)))
-        moves = deviations.node / length * rng.uniform(-1.0, 1.0, problem.lattice.positions.shape)
+        common = 1.0 + sizes.width * rng.uniform(-1.0, 1.0)
+        widths = common * (1.0 + sizes.each_width * rng.standard_normal(len(nominal)))
+        moves = sizes.node * rng.uniform(-1.0, 1.0, problem.lattice.positions.shape)
         yield Scenario(
             name=f"print {number + 1}", kind="print", widths=np.maximum(widths, NARROWEST),
-            moves=moves, angle=deviations.angle * rng.uniform(-1.0, 1.0),
+            moves=moves, angle=sizes.angle * rng.uniform(-1.0, 1.0),
             plane=planes[int(rng.integers(len(planes)))],
         )  # fmt: skip

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bellcrank.fem.results import finite
-from bellcrank.model import Item
+from bellcrank.model import Item, Tolerances
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.part.pieces import check_supported
 from bellcrank.processes import FunctionProcesses, default_workers
@@ -41,6 +41,8 @@ HEADINGS = {
     "widths": "widths", "input": "direction", "stroke": "stroke", "print": "prints",
 }  # fmt: skip
 """Headings of the worst values by kind of scenario. Lost struts are reported apart."""
+WIDTH, NODE = 0.1, 0.1
+"""Usual deviations of widths and of coordinates of nodes, mm."""
 LOST = "lost"
 """Text for a value in a scenario without a stable path to the full stroke."""
 
@@ -75,7 +77,7 @@ class ToleranceReport:
             "mask": self.design.mask_hex,
             "model": "frames",
             "elements": 1,
-            "deviations": self.deviations.to_dict(),
+            "deviations": _deviation_data(self.deviations, self.spec),
             "scenarios": len(self.tolerance.scenarios),
             "yield": finite(self.tolerance.print_yield),
             "items": [self._row_data(row) for row in self.tolerance.rows()],
@@ -123,9 +125,39 @@ def worst_struts(tolerance: Tolerance) -> list[tuple[int, float]]:
     return sorted(tolerance.strut_losses().items(), key=lambda pair: -pair[1])
 
 
+def tolerances_of(design: Design, spec: PartSpec) -> Tolerances:
+    """Return the tolerances of the specification of a design; the usual ones if it has none."""
+    wanted = design.problem.specification
+    if wanted is not None and wanted.tolerances is not None:
+        return wanted.tolerances
+    return Tolerances(node=NODE / spec.scale)
+
+
+def deviations_of(design: Design, spec: PartSpec, **changes: Any) -> Deviations:
+    """Return the usual deviations of a design as a part, with its own tolerances.
+
+    Parameters
+    ----------
+    **changes
+        Fields of `bellcrank.tolerance.Deviations` with other values.
+    """
+    usual: dict[str, Any] = {
+        "tolerances": tolerances_of(design, spec), "width": WIDTH / spec.scale
+    }  # fmt: skip
+    return Deviations(**{**usual, **changes})
+
+
+def _deviation_data(deviations: Deviations, spec: PartSpec) -> dict[str, Any]:
+    """Return deviations as plain data, lengths in mm."""
+    data = asdict(deviations)
+    sizes = data.pop("tolerances")
+    sizes = {**sizes, "relative_width": sizes.pop("width"), "node": spec.scale * sizes["node"]}
+    return {**sizes, **data, "width": spec.scale * deviations.width}
+
+
 def compute_tolerance(
     design: Design,
-    deviations: Deviations,
+    deviations: Deviations | None = None,
     spec: PartSpec | None = None,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
     workers: int | None = None,
@@ -138,7 +170,7 @@ def compute_tolerance(
     design
         Design of a frame or of springs; with springs, its beams become the struts of the part.
     deviations
-        Sizes of the deviations.
+        Sizes of the deviations; `deviations_of` by default.
     spec
         Size and material of the part; that for which it was searched by default.
     progress
@@ -161,17 +193,19 @@ def compute_tolerance(
     Examples
     --------
     >>> from bellcrank.model import human_design
+    >>> from bellcrank.tolerance import Deviations
     >>> few = Deviations(prints=4, struts=False)
     >>> report = compute_tolerance(human_design("crane"), few, workers=1)
     >>> report.tolerance.print_yield
     1.0
     """
     spec = spec or spec_for(design)
+    deviations = deviations or deviations_of(design, spec)
     check_supported(design)
     limit = spec.registered_material.strain_limit
     problem = specified(frame_problem(design.problem, spec), limit)
     design = replace(design, problem=problem)
-    scenarios = scenarios_of(problem, design.mask, spec.scale, deviations)
+    scenarios = scenarios_of(problem, design.mask, deviations, spec.scale)
     results = _results(design, scenarios, progress, workers or default_workers(), stop)
     if len(results) < len(scenarios):
         return None
