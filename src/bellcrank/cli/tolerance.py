@@ -134,17 +134,15 @@ def tolerance(
 
 def _print(report: ToleranceReport) -> None:
     """Print the items, the worst scenarios and the critical struts."""
-    from bellcrank.workflows.tolerance import scenario_rows, strut_lines, tolerance_rows
-
-    count = len(report.tolerance.scenarios)
-    results.print(
-        f"{count} scenarios, by frames with one element in each strut; the worst value of each kind"
+    from bellcrank.workflows.tolerance import (
+        scenario_rows,
+        strut_lines,
+        tolerance_rows,
+        tolerance_sentence,
     )
+
+    results.print(tolerance_sentence(report))
     results.print(text_grid(tolerance_rows(report)))
-    prints = report.tolerance.of_kind("print")
-    if prints:
-        met = sum(report.tolerance.results[number].met for number in prints)
-        results.print(f"all items are met by {met} of {len(prints)} random prints")
     results.print(text_grid(scenario_rows(report)))
     for line in strut_lines(report, SHOWN_STRUTS):
         results.print(plain(line))

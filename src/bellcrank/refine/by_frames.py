@@ -10,7 +10,7 @@ import numpy as np
 from bellcrank.mechanics import VERIFICATION_INCREMENT, tightened
 from bellcrank.refine.choice import ScenarioChoice
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
-from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
+from bellcrank.refine.refinement import GEOMETRIES, UNSTABLE, RefinementSettings, refine_rows
 from bellcrank.refine.row_evaluator import STABLE, RowEvaluator
 from bellcrank.refine.scenarios import nearest_rows
 from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
@@ -97,7 +97,7 @@ class FrameRefinement:
         width = problem.section.width
         bounds = (settings.narrowest * width, settings.widest * width)
         self.variables = variables_of(design, settings.largest_move, bounds)
-        self.choice = ScenarioChoice(design)
+        self.choice = ScenarioChoice(design, settings.prints)
         self.chosen = np.zeros(self.variables.count)
         self.missed: list[Scenario] = []
         self.is_reduced = False
@@ -131,9 +131,10 @@ class FrameRefinement:
                 self.path, self.stable = path, stable
             is_spent = self.evaluations >= self.settings.evaluations
             is_edge = self.reason == UNSTABLE and not is_spent
+            is_cut = not (self.choice.is_empty or is_spent) and self.reason.endswith(GEOMETRIES)
             if not state.items or not self.goes_on or (goes_wider and is_spent):
                 return
-            if goes_wider and state.met:
+            if state.met and (goes_wider or is_cut):
                 continue
             if state.met and (is_last or is_spent) and not is_edge:
                 return

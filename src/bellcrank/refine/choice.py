@@ -17,11 +17,9 @@ if TYPE_CHECKING:
     from bellcrank.refine.variables import Variables
     from bellcrank.tolerance import Scenario, ScenarioResult
 
-PRINTS = 100
-"""Number of random prints by which a geometry is judged. They are not those of `bellcrank
-tolerance`."""
 SEED = 1
-"""Their seed."""
+"""Seed of the random prints by which geometries are judged; they are not those of `bellcrank
+tolerance`."""
 ADDED = 4
 """Largest number of scenarios, and of lost struts, that become constraints after each round."""
 NEAR_LOSS = 0.7
@@ -60,13 +58,17 @@ class ScenarioChoice:
     ----------
     design
         The design to refine, with a specification.
+    prints
+        Number of random prints.
     """
 
-    def __init__(self, design: Design) -> None:
+    def __init__(self, design: Design, prints: int) -> None:
         wanted = design.problem.specification
         assert wanted is not None
         self.tolerances = wanted.tolerances
-        self.all = [] if self.tolerances is None else _scenarios(design, self.tolerances)
+        self.all = [] if self.tolerances is None else _scenarios(design, self.tolerances, prints)
+        if not self.all:
+            self.tolerances = None
         self.chosen = [each for each in self.all if each.kind != "print"]
         self.largest_loss = _largest_loss(wanted)
         self.lost: list[int] = []
@@ -128,10 +130,10 @@ class ScenarioChoice:
         return bool(new or lost)
 
 
-def _scenarios(design: Design, tolerances: Tolerances) -> list[Scenario]:
+def _scenarios(design: Design, tolerances: Tolerances, prints: int) -> list[Scenario]:
     """Return the scenarios of tolerances, without the nominal one."""
     deviations = Deviations(
-        tolerances=tolerances, width=0.0, thin=0.0, shortest=1.0, longest=1.0, prints=PRINTS,
+        tolerances=tolerances, width=0.0, thin=0.0, shortest=1.0, longest=1.0, prints=prints,
         struts=False, seed=SEED,
     )  # fmt: skip
     return scenarios_of(design.problem, design.mask, deviations)[1:]

@@ -52,6 +52,8 @@ class RefinementSettings:
         Growth below which a refinement ends.
     same_mass
         Whether the mass may not grow.
+    prints
+        Number of random prints by which a geometry is judged, if the specification has tolerances.
     """
 
     steps: int = 400
@@ -65,8 +67,11 @@ class RefinementSettings:
     patience: int = 25
     least_gain: float = 2e-3
     same_mass: bool = False
+    prints: int = 100
 
 
+GEOMETRIES = "geometries"
+"""Last word of the reason of a refinement that ends after its number of geometries."""
 UNSTABLE = "no step improves the design, and some lose the stability of a path"
 """Reason for which a refinement ends at the edge of a stable region."""
 
@@ -162,7 +167,7 @@ class _Search:
         ends = {
             "no node may move and no width may change": not self.variables.count,
             f"{settings.steps} steps": self.step >= settings.steps,
-            f"{settings.evaluations} geometries": self.evaluations >= settings.evaluations,
+            f"{settings.evaluations} {GEOMETRIES}": self.evaluations >= settings.evaluations,
             UNSTABLE: self.region < settings.smallest_region and self.refused > 0,
             "no step improves the design": self.region < settings.smallest_region,
             f"less than {settings.least_gain:g} gained in {past} steps": stalled,

@@ -53,7 +53,8 @@ class ScenarioResult(NamedTuple):
 class ScenarioEvaluator:
     """Evaluates scenarios of one design.
 
-    A design without a specification gets that of `bellcrank.search.specified`.
+    A design without a specification gets that of `bellcrank.search.specified`. What the loss of a
+    strut costs is an item of the design as drawn only.
 
     Parameters
     ----------
@@ -71,8 +72,9 @@ class ScenarioEvaluator:
     def __init__(self, design: Design, elements: int | None = None) -> None:
         problem = specified(design.problem)
         assert problem.specification is not None
+        items = [item for item in problem.specification.items if item.quantity != "strut_loss"]
         # Deviations are not symmetric.
-        wanted = replace(problem.specification, symmetry=())
+        wanted = replace(problem.specification, items=tuple(items), symmetry=())
         self.problem = replace(problem, specification=wanted)
         self.mask, self.elements = design.mask, elements
         self._nominal = self._evaluator(self.problem)

@@ -46,6 +46,7 @@ from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.refinement import refine_selection, refinement_data
 from bellcrank.workflows.report import RESULTS, DesignReport
 from bellcrank.workflows.report_tables import write_report
+from bellcrank.workflows.tolerance import compute_tolerance, deviations_of
 from bellcrank.workflows.validation import Validation, replace_record, validate
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bellcrank.refine.refinement import Progress as RefinementProgress
+    from bellcrank.workflows.tolerance import ToleranceReport
 
 
 def prepare(problem: Problem, settings: SearchSettings) -> None:
@@ -272,6 +274,9 @@ def conclude(
     human_response = None
     if human is not None:
         human_response = all_beams.evaluate(human.mask, VERIFICATION_INCREMENT)
+    tolerance = _tolerance(selection.design, spec, workers, stop)
+    if stop is not None and stop.is_set():
+        return None
     report = DesignReport(
         folder=folder.path,
         settings=settings,
@@ -289,6 +294,7 @@ def conclude(
         part_figures=(
             [] if spec is None or problem.section is None else part_figures(selection.design, spec)
         ),
+        tolerance=tolerance,
     )
     part = {} if spec is None else {"part": spec.to_dict()}
     design = replace(
@@ -315,6 +321,20 @@ def _figures(selection: Selection) -> list[dict[str, Any]]:
         response = evaluator.evaluate(selection.design.mask, VERIFICATION_INCREMENT)
         rows.append({**model_record(problem, elements), **figures_of(evaluator, response)})
     return rows
+
+
+def _tolerance(
+    design: Design, spec: PartSpec | None, workers: int | None, stop: threading.Event | None
+) -> ToleranceReport | None:
+    """Return a part over the tolerances of its task; None without, or if it is not stable."""
+    wanted = design.problem.specification
+    if spec is None or wanted is None or wanted.tolerances is None:
+        return None
+    try:
+        deviations = deviations_of(design, spec, struts=False)
+        return compute_tolerance(design, deviations, spec, workers=workers, stop=stop)
+    except InvalidSettings:
+        return None
 
 
 def _validated(design: Design, spec: PartSpec | None) -> Validation | None:

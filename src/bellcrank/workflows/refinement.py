@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 BEFORE_REFINEMENT = {"steps": 8_000}
 """Settings of a search whose design is refined: a longer search gains less than the refinement."""
-FIRST = RefinementSettings(evaluations=FIRST_EVALUATIONS)
-"""Settings of the first refinement of each design, without the sheet."""
+FIRST = RefinementSettings(evaluations=FIRST_EVALUATIONS, prints=0)
+"""Settings of the first refinement of each design, without the sheet and random prints."""
 
 BATCHES = 2
 """Largest number of times as many designs as there are chains are refined further."""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from bellcrank.part import PartSpec
     from bellcrank.refine import Refinement
     from bellcrank.search import SearchSettings, Selection
+    from bellcrank.workflows.tolerance import ToleranceReport
     from bellcrank.workflows.validation import Validation
 
 
@@ -68,6 +69,8 @@ class DesignReport:
         How the design was refined after the search, if it was.
     validation
         Frame analysis of that part, if it is in the plane and all its pieces are supported.
+    tolerance
+        The part over the tolerances of its task, if it has any.
     part_figures
         Figures of the part for each output of each load case (`bellcrank.workflows.part_figures`).
     """
@@ -86,6 +89,7 @@ class DesignReport:
     refinement: Refinement | None = None
     validation: Validation | None = None
     part_figures: list[dict[str, Any]] = field(default_factory=list)
+    tolerance: ToleranceReport | None = None
 
     @property
     def items(self) -> dict[str, Sequence[ItemResult]]:
@@ -109,6 +113,17 @@ class DesignReport:
     def missed(self) -> list[ItemResult]:
         """Items that the design misses in the best model, the binding one first."""
         return binding(list(self.items.values())[-1]) if self.items else []
+
+    @property
+    def low_yield(self) -> str:
+        """By how many random prints the wanted yield is missed, in words; empty if it is not."""
+        if self.tolerance is None:
+            return ""
+        found = self.tolerance.tolerance.print_yield
+        wanted = self.tolerance.deviations.tolerances.least_yield
+        if found >= wanted:
+            return ""
+        return f"{found:.1%} of random prints meet all items, fewer than the {wanted:.1%} asked for"
 
     @property
     def failures(self) -> list[str]:
@@ -172,6 +187,7 @@ def summary_data(report: DesignReport) -> dict[str, Any]:
         **_specification(report),
         "refinement": None if report.refinement is None else refinement_data(report.refinement),
         "part_figures": report.part_figures,
+        "tolerance": None if report.tolerance is None else report.tolerance.to_dict(),
         "as_part": _as_part(report),
         "found": {
             "chain": selection.found.chain,
@@ -190,7 +206,7 @@ def _specification(report: DesignReport) -> dict[str, Any]:
         return {}
     problem, part = report.selection.design.problem, report.part
     data: dict[str, Any] = {
-        "met": not report.missed,
+        "met": not report.missed and not report.low_yield,
         "binding": report.missed[0].item.name if report.missed else None,
         "items": item_data(problem, part, report.all_items),
     }

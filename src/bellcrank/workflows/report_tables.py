@@ -11,6 +11,7 @@ from bellcrank.model.storage import write_text
 from bellcrank.workflows.figures import figure_text, model_words
 from bellcrank.workflows.report import summary_data
 from bellcrank.workflows.specification import item_rows
+from bellcrank.workflows.tolerance import tolerance_rows, tolerance_sentence
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -153,7 +154,8 @@ def summary_text(report: DesignReport) -> str:
     )
     return f"""# {selection.design.problem.name}
 
-{_markdown(item_table(report))}{_markdown(nearest_table(report))}{figures_table}
+{_markdown(item_table(report))}{_markdown(nearest_table(report))}{_tolerance_text(report)}\
+{figures_table}
 
 {_markdown(part_figure_table(report))}
 | | |
@@ -169,6 +171,15 @@ in a real part, so the efficiency after cleaning is the one to expect.
 
 ![efficiency along the chains](efficiency.png)
 """
+
+
+def _tolerance_text(report: DesignReport) -> str:
+    """Return the items over the tolerances as a Markdown table with its heading."""
+    if report.tolerance is None:
+        return ""
+    return f"{tolerance_sentence(report.tolerance)}:\n\n" + _markdown(
+        tolerance_rows(report.tolerance)
+    )
 
 
 def _markdown(rows: list[list[str]]) -> str:

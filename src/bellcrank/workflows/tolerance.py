@@ -281,6 +281,17 @@ def tolerance_rows(report: ToleranceReport) -> list[list[str]]:
     return rows
 
 
+def tolerance_sentence(report: ToleranceReport) -> str:
+    """Return how many random prints meet all items, and with which model."""
+    tolerance = report.tolerance
+    prints = tolerance.of_kind("print")
+    met = sum(tolerance.results[number].met for number in prints)
+    return (
+        f"all items are met by {met} of {len(prints)} random prints; {len(tolerance.scenarios)} "
+        "scenarios, by frames with one element in each strut, and the worst value of each kind"
+    )
+
+
 def scenario_rows(report: ToleranceReport) -> list[list[str]]:
     """Return the scenarios that are worst for the first objective, or else the first item."""
     rows = report.tolerance.rows()

@@ -1,0 +1,170 @@
+"""Refinement over deviations of print and drive, and over losses of struts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bellcrank.model import Design, Item, Tolerances
+from bellcrank.refine import RefinementSettings, refine_design
+from bellcrank.refine.choice import ScenarioChoice
+from bellcrank.refine.row_evaluator import RowEvaluator
+from bellcrank.refine.scenarios import LossRows, ScenarioRows, nearest_rows
+from bellcrank.refine.variables import variables_of
+from bellcrank.search import SpecificationEvaluator
+from bellcrank.search.strut_loss import StrutLosses
+from bellcrank.tolerance import Deviations, Scenario, ScenarioEvaluator, scenarios_of
+
+from .designs import straight_crane
+from .test_gradients import compared_rows
+
+TOLERANCES = Tolerances(width=0.15, angle=4.0, node=0.01)
+
+
+def tolerant_crane(*items: Item, tolerances: Tolerances | None = TOLERANCES) -> Design:
+    design = straight_crane()
+    wanted = design.problem.specification
+    assert wanted is not None
+    wanted = replace(wanted, items=(*wanted.items, *items), tolerances=tolerances)
+    return replace(design, problem=replace(design.problem, specification=wanted))
+
+
+def a_print(design: Design) -> Scenario:
+    deviations = Deviations(tolerances=TOLERANCES, prints=1, struts=False)
+    return scenarios_of(design.problem, design.mask, deviations)[-1]
+
+
+def test_rows_in_a_scenario_have_the_derivatives_of_differences() -> None:
+    design = tolerant_crane()
+    wanted = design.problem.specification
+    assert wanted is not None
+    variables = variables_of(design, 0.4, (0.2, 0.4))
+    rows = RowEvaluator(variables, design.mask, wanted.items, scenario=a_print(design))
+    rng = np.random.default_rng(2)
+    start = np.where(variables.moves, 0.02, 0.01) * rng.normal(size=variables.count)
+    compared = compared_rows(rows, start, rng.normal(size=variables.count))
+    assert {"case.output.off_axis", "case.output.payload"} <= compared
+    assert not {"length of struts", "holes between struts"} & compared  # of the drawn part alone
+
+
+def test_the_loss_of_a_strut_has_the_derivative_of_differences() -> None:
+    design = tolerant_crane()
+    losses = StrutLosses(design.problem).by_strut(design.mask)
+    beam = max((each for each in losses if losses[each] < 0.6), key=losses.__getitem__)
+    variables = variables_of(design, 0.4, (0.2, 0.4))
+    rows = LossRows(variables, design.mask, beam, 0.3)
+    found = rows.evaluate(np.zeros(variables.count), slopes=True)
+    assert found is not None
+    # The efficiency is the mean motion over that of the input, as the gain is.
+    assert found.constraints[0] == pytest.approx(losses[beam] / 0.3 - 1.0, abs=1e-6)
+    way, step = np.random.default_rng(0).normal(size=variables.count), 1e-6
+    ahead, behind = (rows.evaluate(sign * step * way) for sign in (1.0, -1.0))
+    assert ahead is not None
+    assert behind is not None
+    expected = (ahead.constraints[0] - behind.constraints[0]) / (2.0 * step)
+    assert found.constraint_slopes[0] @ way == pytest.approx(expected, rel=1e-4)
+
+
+def test_rows_of_scenarios_follow_those_of_the_drawn_part() -> None:
+    design = tolerant_crane()
+    wanted = design.problem.specification
+    assert wanted is not None
+    variables = variables_of(design, 0.4, (0.2, 0.4))
+    drawn = RowEvaluator(variables, design.mask, wanted.items)
+    turned = RowEvaluator(
+        variables, design.mask, wanted.items, scenario=Scenario(name="", kind="input", angle=5.0)
+    )
+    start = np.zeros(variables.count)
+    one, other = drawn.evaluate(start), turned.evaluate(start)
+    both = ScenarioRows(drawn, [turned]).evaluate(start)
+    assert one is not None
+    assert other is not None
+    assert both is not None
+    assert np.array_equal(both.objectives, [*one.objectives, *other.objectives])
+    assert both.names == one.names + other.names
+    assert len(set(zip(both.names, both.keys, strict=True))) == len(both.names)
+
+
+def test_a_scenario_that_is_far_from_being_met_is_reduced() -> None:
+    design = tolerant_crane()
+    wanted = design.problem.specification
+    assert wanted is not None
+    variables = variables_of(design, 0.4, (0.2, 0.4))
+    given = next(item for item in wanted.items if item.quantity == "sag")
+    evaluator = SpecificationEvaluator(design.problem)
+    evaluator.evaluate(design.mask)
+    value = next(each.value for each in evaluator.results() if each.item.name == given.name)
+    items = [replace(given, at_most=2.0 * value)]
+    thin = Scenario(name="thin", kind="widths", widths=np.full(len(design.mask), 0.3))
+
+    def rows_of(scenario: Scenario | None) -> RowEvaluator:
+        return RowEvaluator(variables, design.mask, items, scenario=scenario)
+
+    start = np.zeros(variables.count)
+    found = nearest_rows(rows_of, [thin, a_print(design)], [], start)
+    assert 1.0 < found.parts < 2.0
+    reduced = found.rows.others[0]
+    assert isinstance(reduced, RowEvaluator)
+    assert reduced.scenario is not None
+    assert reduced.scenario.widths is not None
+    part = found.parts - 1.0
+    assert reduced.scenario.widths == pytest.approx(np.full(len(design.mask), 1.0 - 0.7 * part))
+
+
+def test_the_scenarios_are_extreme_widths_and_directions_then_prints() -> None:
+    design = tolerant_crane(Item(quantity="strut_loss", at_most=0.3))
+    choice = ScenarioChoice(design, 12)
+    assert [each.name for each in choice.chosen] == [
+        "widths +15 %", "widths -15 %",
+        "input turned by +4 degrees", "input turned by -4 degrees",
+    ]  # fmt: skip
+    assert len(choice.all) == 4 + 12
+    losses = StrutLosses(design.problem).by_strut(design.mask)
+    assert choice.lost == sorted(losses, key=lambda beam: -losses[beam])[: len(choice.lost)]
+    found = choice.judge(design)
+    assert 0.0 <= found.share <= 0.95
+    results = ScenarioEvaluator(design)
+    met = [results.evaluate(each).met for each in choice.all]
+    assert min(np.mean(met), 0.95) == pytest.approx(found.share)
+    prints = [each for each in found.missed if each.kind == "print"]
+    choice.lost += [beam for beam in losses if beam not in choice.lost]
+    assert choice.add(design, prints) == bool(prints)
+    assert not choice.add(design, prints[:1])
+
+
+def test_without_deviations_only_the_drawn_part_counts() -> None:
+    none = Tolerances(width=0.0, each_width=0.0, node=0.0, angle=0.0)
+    assert ScenarioChoice(tolerant_crane(tolerances=none), 0).is_empty
+    assert ScenarioChoice(tolerant_crane(tolerances=None), 100).is_empty
+
+
+@pytest.mark.slow
+def test_refinement_over_tolerances_increases_the_yield() -> None:
+    """By prints that the refinement does not know."""
+    design = tolerant_crane()
+    deviations = Deviations(tolerances=TOLERANCES, prints=40, struts=False)
+    prints = scenarios_of(design.problem, design.mask, deviations)[-40:]
+
+    def met(each: Design) -> int:
+        evaluator = ScenarioEvaluator(each)
+        return sum(evaluator.evaluate(scenario).met for scenario in prints)
+
+    found = refine_design(design, RefinementSettings(evaluations=120, prints=30))
+    assert found.after.met
+    assert found.after.share > found.before.share
+    assert met(design) == 0
+    assert met(found.design) > 30
+
+
+@pytest.mark.slow
+def test_refinement_reduces_the_loss_of_struts() -> None:
+    limit = Item(quantity="strut_loss", at_most=0.5)
+    design = tolerant_crane(limit, tolerances=None)
+    before = StrutLosses(design.problem).by_strut(design.mask)
+    found = refine_design(design, RefinementSettings(evaluations=80))
+    after = StrutLosses(found.design.problem).by_strut(found.design.mask)
+    # Struts without which the path is lost, or all motion, remain.
+    few = sum(loss > 0.55 for loss in after.values())
+    assert few < sum(loss > 0.55 for loss in before.values())
