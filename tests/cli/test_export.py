@@ -62,9 +62,20 @@ def test_the_part_is_as_wide_and_thick_as_said(here: Path) -> None:
     assert trimesh.load(here / "b.stl").extents[2] == pytest.approx(3.0)
 
 
+def test_struts_are_drawn_wider_where_the_printer_makes_them_thin(here: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    call("export", "crane", "a.stl", "--width", "2mm", "--printed-width", "80%")
+    call("export", "crane", "b.stl", "--width", "2.5mm")
+    call("export", "crane", "c.stl", "--width", "2mm")
+    thin, wide, drawn = (trimesh.load(here / f"{name}.stl").volume for name in "abc")
+    assert thin == pytest.approx(wide)
+    assert thin > 1.1 * drawn
+
+
 @pytest.mark.parametrize(
     ("words", "word"),
     [
+        (("crane", "part.stl", "--printed-width", "20%"), "printed_width: expected the printed"),
         (("crane", "part.foo"), "unknown export format '.foo'; known suffixes: .stl, .3mf"),
         (("crane", "part.stl", "--width", "6mm"), "width: struts 6 mm wide would close"),
         (("crane", "part.stl", "--fillet", "3mm"), "fillet: a radius of 3 mm would close"),

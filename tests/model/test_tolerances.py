@@ -47,7 +47,7 @@ def test_an_empty_table_has_the_defaults() -> None:
 
 
 def test_an_error_names_the_key_of_the_task() -> None:
-    with pytest.raises(InvalidProblem, match=r"^tolerance.width: expected a number"):
+    with pytest.raises(InvalidProblem, match=r"tolerance\.width: expected a number"):
         task_from_dict(task(width="120%"))
 
 

@@ -34,6 +34,21 @@ Screws = Annotated[int, typer.Option(help="Number of screw holes in the plate.")
 ScrewDiameter = Annotated[str, typer.Option(help="Diameter of the screw holes.")]
 Pad = Annotated[bool, typer.Option("--pad", help="Fill the input to a pad for pushing.")]
 Pointer = Annotated[str, typer.Option(help="Length of a pointer at the output.")]
+PrintedWidth = Annotated[
+    str | None,
+    typer.Option(
+        metavar="RATIO",
+        help="Width of a printed strut over the drawn one, measured on the printer, such as 88%: "
+        "struts are drawn wider by its inverse. \\[100%]",
+    ),
+]
+
+
+def printed_width_of(text: str | None) -> float | None:
+    """Return the ratio of printed to drawn widths of the option."""
+    from bellcrank.part.units import read_quantity
+
+    return None if text is None else read_quantity("printed width", text, "ratio")
 
 
 def grips_of(plate: bool, screws: int, screw_diameter: str, pad: bool, pointer: str) -> Grips:
@@ -71,6 +86,7 @@ def export(
     screw_diameter: ScrewDiameter = "3.4mm",
     pad: Pad = False,
     pointer: Pointer = "0",
+    printed_width: PrintedWidth = None,
     moved: Annotated[bool, typer.Option("--moved", help="Include the motion (vtu).")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
@@ -92,7 +108,11 @@ def export(
     if moved:
         announce_compilation()
     whole = out.suffix.lower() in (*PRINTED, *CUT)
-    bundle = bundle_of(chosen, spec, grips, layer=height or None, moved=moved, whole=whole)
+    ratio = printed_width_of(printed_width)
+    bundle = bundle_of(
+        chosen, spec, grips, layer=height or None, moved=moved, whole=whole,
+        printed_width=1.0 if ratio is None else ratio,
+    )  # fmt: skip
     write(bundle, out, overwrite=overwrite)
     size = "high" if bundle.part.dimension == 3 else "thick"
     notes.print(f"wrote {plain(out)}, {bundle.thickness:.4g} mm {size}")

@@ -22,7 +22,16 @@ from bellcrank.cli.arguments import (
     part_of,
 )
 from bellcrank.cli.console import announce_compilation, notes, plain, results
-from bellcrank.cli.export import Pad, Plate, Pointer, ScrewDiameter, Screws, grips_of
+from bellcrank.cli.export import (
+    Pad,
+    Plate,
+    Pointer,
+    PrintedWidth,
+    ScrewDiameter,
+    Screws,
+    grips_of,
+    printed_width_of,
+)
 
 if TYPE_CHECKING:
     from bellcrank.workflows.fabricate import PrintJob
@@ -52,6 +61,7 @@ def print_(
     screw_diameter: ScrewDiameter = "3.4mm",
     pad: Pad = False,
     pointer: Pointer = "0",
+    printed_width: PrintedWidth = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Slice a design for a printer and report material and time."""
@@ -69,9 +79,12 @@ def print_(
     spec = part_of(spec_for(chosen), part, lengths, material)
     given = {"nozzle": nozzle, "layer": layer, "bead_width": bead_width}
     figures = {key: None if text is None else read_length(key, text) for key, text in given.items()}
-    printer = profile_for(profile, spec, **figures)
+    ratio = printed_width_of(printed_width)
+    printer = profile_for(profile, spec, **figures, printed_width=ratio)
     grips = grips_of(plate, screws, screw_diameter, pad, pointer)
-    bundle = bundle_of(chosen, spec, grips, layer=printer.layer)
+    bundle = bundle_of(
+        chosen, spec, grips, layer=printer.layer, printed_width=printer.printed_width
+    )
     target = out or Path(f"{chosen.problem.name}.gcode")
     job = print_design(bundle, printer, target, slicer=slicer, overwrite=overwrite)
     _print(job)

@@ -32,6 +32,9 @@ class Material:
         Density, g/cm^3; nan if unknown.
     strain_limit
         Largest strain without permanent damage (0.65 for 65 %); nan if unknown.
+    fatigue_strain
+        Largest amplitude of the strain that a printed part endures over the cycles of its use; nan
+        if unknown, as it is for all bundled materials.
     sources
         Source of each value.
 
@@ -51,6 +54,7 @@ class Material:
     poisson: float
     density: float = math.nan
     strain_limit: float = math.nan
+    fatigue_strain: float = math.nan
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -60,7 +64,7 @@ class Material:
             raise InvalidSettings(
                 f"poisson: expected a ratio from 0 to {LARGEST_POISSON}, got {self.poisson!r}"
             )
-        for name in ("density", "strain_limit"):
+        for name in ("density", "strain_limit", "fatigue_strain"):
             value = getattr(self, name)
             if not (math.isnan(value) or 0.0 < value < math.inf):
                 raise InvalidSettings(f"{name}: expected a number above 0, got {value!r}")

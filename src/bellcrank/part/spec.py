@@ -174,6 +174,7 @@ class MaterialTable(Table):
     poisson: float
     density: float | None = None
     strain_limit: float | None = None
+    fatigue_strain: float | None = None
 
 
 class PartTable(Table):

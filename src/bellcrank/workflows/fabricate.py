@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.export import Export, check_print, exporters
-from bellcrank.export.profiles import profiles
+from bellcrank.export.profiles import check_printed_width, profiles
 from bellcrank.export.slicer import find_slicer, slice_solid
 from bellcrank.fem.contact import centre_lines, find_contacts
 from bellcrank.mechanics import StrokeEvaluator, model_evaluator
@@ -118,6 +118,7 @@ def bundle_of(
     layer: float | None,
     moved: bool = False,
     whole: bool = True,
+    printed_width: float = 1.0,
 ) -> Export:
     """Return the export of a design.
 
@@ -135,13 +136,17 @@ def bundle_of(
         Whether to compute the motion.
     whole
         Whether to refuse designs with unsupported pieces, which cannot be printed or cut.
+    printed_width
+        Width of a printed strut over that of the drawn one. Struts are drawn wider by its inverse,
+        so that the printed part has the widths of the design.
 
     Raises
     ------
     InvalidSettings, UnknownName
         If the part is not valid.
     """
-    part = spec.of(design)
+    check_printed_width(printed_width)
+    part = replace(spec, width=spec.width / printed_width, joint=None).of(design)
     if whole:
         check_supported(design)
     positions = None

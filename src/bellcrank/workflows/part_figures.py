@@ -14,6 +14,7 @@ from bellcrank.mechanics import (
     Channel,
     Status,
 )
+from bellcrank.mechanics.frames.analysis import strain_amplitude
 from bellcrank.mechanics.frames.case import with_output, with_payload
 from bellcrank.task import units_of
 
@@ -116,6 +117,7 @@ def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[
         "input_force_N": finite(units.in_part("force", force[-1])),
         "largest_input_force_N": finite(units.in_part("force", force.max())),
         "strain": finite(found[Channel("strain")].max()),
+        "strain_amplitude": finite(_amplitude(evaluator, fractions)),
         "output_stiffness_N_per_mm": finite(
             units.in_part("stiffness", found[Channel("stiffness", output)][0])
         ),
@@ -126,6 +128,13 @@ def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[
         "limit_points": limit_points(fractions, force),
         "path_mm": np.vstack([np.zeros(path.shape[1]), path]).round(4).tolist(),
     }
+
+
+def _amplitude(evaluator: CaseEvaluator, fractions: Values) -> float:
+    """Return the amplitude of the strain in a cycle of the stroke; nan if a state is unknown."""
+    states = [evaluator.state(fraction) for fraction in fractions.tolist()]
+    known = [state for state in states if state is not None]
+    return strain_amplitude(known) if len(known) == len(states) else math.nan
 
 
 def limit_points(fractions: Values, force: Values) -> list[float]:

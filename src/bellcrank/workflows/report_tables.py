@@ -102,7 +102,19 @@ def part_figure_table(report: DesignReport) -> list[list[str]]:
     rows += [[label, *(texts[label] for texts in texts_of)] for label, *_ in FIGURES]
     points = [row.get("limit_points") or [] for row in found]
     texts = [", ".join(f"{point:.0%}" for point in each) or "none" for each in points]
-    return [*rows, ["limit points of the force", *texts]]
+    cycles = [_cycle_text(report, row.get("strain_amplitude")) for row in found]
+    return [
+        *rows, ["limit points of the force", *texts], ["strain amplitude in cycles", *cycles]
+    ]  # fmt: skip
+
+
+def _cycle_text(report: DesignReport, amplitude: float | None) -> str:
+    """Return the amplitude of the strain beside what the material endures."""
+    if amplitude is None or report.part is None:
+        return "-"
+    limit = report.part.registered_material.fatigue_strain
+    endured = "fatigue limit unknown" if math.isnan(limit) else f"{limit:.1%} endured"
+    return f"{amplitude:.1%}, {endured}"
 
 
 def _force(report: DesignReport, force: list[float] | None) -> str:

@@ -10,10 +10,16 @@ import numpy as np
 from bellcrank.mechanics.analysis import Strain
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.mechanics.frames.kernels.arrays import Frame, Memory, State, Structure
     from bellcrank.mechanics.kernels.arrays import Floats, Ints
     from bellcrank.model import Problem
+
+
+FIBRES = 16
+"""Number of fibres around a round section."""
 
 
 class ComputedFrame(Protocol):
@@ -159,27 +165,70 @@ def _fibre_strains(
     frame: Frame, problem: Problem, beams: Ints, resultants: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return (m,) the axial strain, the largest bending strain and the largest shear strain."""
+    axial, one, other = _end_strains(frame, problem, beams, resultants)
+    bending = np.hypot(one, other).max(axis=1, initial=0.0)
+    shear = np.zeros(len(beams))
+    if resultants.shape[1] == 6:
+        bent = frame.rest_length[beams] - frame.rigid[beams].sum(axis=1)
+        torsional = frame.section[beams, 1] * bent
+        shear = np.abs(resultants[:, 1]) * 0.5 * frame.width[beams] / torsional
+    return axial, bending, shear
+
+
+def normal_strains(frame: Frame, problem: Problem, beams: Ints, resultants: Floats) -> Floats:
+    """Return (m, 2, k) the normal strain of outer fibres at both ends of beams.
+
+    In the plane the fibres are those of both sides, in space `FIBRES` around the section.
+    Parameters are those of `fibre_strain`.
+    """
+    axial, one, other = _end_strains(frame, problem, beams, resultants)
+    angles = 2.0 * np.pi * np.arange(FIBRES) / FIBRES
+    if resultants.shape[1] == 3:
+        angles = np.array([0.0, np.pi])
+    bending = one[..., None] * np.cos(angles) + other[..., None] * np.sin(angles)
+    strain: Floats = axial[:, None, None] + bending
+    return strain
+
+
+def _end_strains(
+    frame: Frame, problem: Problem, beams: Ints, resultants: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return (m,) the axial strain, and (m, 2) the bending strains about two axes at both ends."""
     section = problem.section
     assert section is not None
-    radius = 0.5 * frame.width[beams]
     length, rigid = frame.rest_length[beams], frame.rigid[beams]
     # From the stiffness of each beam, which may be a part of that of its section.
     extensional = frame.section[beams, 0] * length
-    axial = resultants[:, 0] / extensional
-    shear = np.zeros(len(beams))
+    gyration = section.inertia / section.area * (frame.width[beams] / section.width) ** 2
+    by_moment = (0.5 * frame.width[beams] / (extensional * gyration))[:, None]
     # Moments vary linearly along a beam.
     share = rigid / length[:, None]
     if resultants.shape[1] == 3:
-        moment = np.abs(without_ends(resultants[:, 1:], share))
+        one = without_ends(resultants[:, 1:], share)
+        other = np.zeros_like(one)
     else:
-        parts = [without_ends(resultants[:, [k, k + 2]], share) for k in (2, 3)]
-        moment = np.hypot(*parts)
-        torsional = frame.section[beams, 1] * (length - rigid.sum(axis=1))
-        shear = np.abs(resultants[:, 1]) * radius / torsional
-    gyration = section.inertia / section.area * (frame.width[beams] / section.width) ** 2
-    flexural = extensional * gyration
-    bending = moment.max(axis=1, initial=0.0) * radius / flexural
-    return axial, bending, shear
+        one, other = (without_ends(resultants[:, [k, k + 2]], share) for k in (2, 3))
+    return resultants[:, 0] / extensional, one * by_moment, other * by_moment
+
+
+def strain_amplitude(states: Iterable[Equilibrium]) -> float:
+    """Return the largest amplitude of a normal strain in a cycle from rest through states and back.
+
+    It is half the difference of the largest and the smallest strain of an outer fibre.
+
+    Parameters
+    ----------
+    states
+        Equilibria along the stroke.
+    """
+    low: Floats | float = 0.0
+    high: Floats | float = 0.0
+    for state in states:
+        frame, beams = state.frame, np.flatnonzero(state.structure.present)
+        strained = stress_resultants(frame, beams, deformations(frame, beams, *state.ends(beams)))
+        strain = normal_strains(frame, state.problem, beams, strained)
+        low, high = np.minimum(low, strain), np.maximum(high, strain)
+    return 0.5 * float(np.max(high - low, initial=0.0))
 
 
 def without_ends(moments: Floats, share: Floats) -> Floats:
