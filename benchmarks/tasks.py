@@ -5,7 +5,8 @@ cores. The chosen design is evaluated by frames with eight elements in each stru
 Each run is added to ``docs/tasks/runs.json`` (or ``--out FILE``) as soon as it is done; runs that
 are in the record are not repeated unless ``--again`` is given. ``selector:A`` after ``--only``
 designs a load case of a task alone; ``straight-crane:free`` asks for the largest gain within the
-strain limit and without contact. ``--first N`` is the first seed. A table of medians is printed;
+strain limit and without contact, ``:tolerant`` for all items over widths that are 20 % off, and
+``:redundant`` for a loss of any strut that costs at most 30 %. ``--first N`` is the first seed. A table of medians is printed;
 times include the sheet of the refinement, not the compilation.
 """
 
@@ -25,20 +26,28 @@ import numpy as np
 
 from bellcrank.errors import InvalidSettings, NoDesignFound
 from bellcrank.fem.continuum.mesh import COARSE
+from bellcrank.fem.results import finite
 from bellcrank.fem.specification import sheet_items
 from bellcrank.mechanics.frames.joints import with_joints
-from bellcrank.model import Design, unpack_mask
+from bellcrank.model import Design, Item, Tolerances, unpack_mask
 from bellcrank.provenance import provenance
 from bellcrank.search import read_settings
 from bellcrank.task import Task, bundled_tasks, find_task
 from bellcrank.workflows import complete_design, start_design
 from bellcrank.workflows.refinement import BEFORE_REFINEMENT, refinement_data
 from bellcrank.workflows.specification import binding, item_data
+from bellcrank.workflows.tolerance import (
+    as_item,
+    compute_tolerance,
+    deviations_of,
+    tolerances_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bellcrank.mechanics import ItemResult
+    from bellcrank.part import PartSpec
     from bellcrank.workflows import DesignReport
 
 RECORD = Path(__file__).parents[1] / "docs" / "tasks" / "runs.json"
@@ -49,6 +58,10 @@ LIMIT = 180.0
 """Time in s within which a task is to be designed."""
 FREE = {"strain", "clearance"}
 """Quantities of the items of ``TASK:free``."""
+WIDTH, NODE = 0.2, 0.1
+"""Deviations of all widths, and of coordinates of nodes in mm, of ``TASK:tolerant``."""
+STRUT_LOSS = 0.3
+"""Largest part of the efficiency that the loss of a strut costs in ``TASK:redundant``."""
 
 
 def tasks_in(dimension: int) -> list[str]:
@@ -62,7 +75,7 @@ def tasks_in(dimension: int) -> list[str]:
 
 
 def task_named(name: str) -> Task:
-    """Return a task, ``TASK:CASE``, one of its load cases alone, or ``TASK:free``."""
+    """Return a task, ``TASK:CASE``, one of its load cases alone, or ``TASK:VARIANT``."""
     base, _, case = name.partition(":")
     task = find_task(base)
     assert task is not None
@@ -73,6 +86,11 @@ def task_named(name: str) -> Task:
     if case == "free":
         items = tuple(item for item in wanted.items if item.quantity in FREE)
         asked = replace(wanted, items=items)
+    elif case == "tolerant":
+        asked = replace(wanted, tolerances=Tolerances(width=WIDTH, node=NODE / task.part.scale))
+    elif case == "redundant":
+        item = Item(quantity="strut_loss", at_most=STRUT_LOSS)
+        asked = replace(wanted, items=(*wanted.items, item))
     else:
         problem = problem.cases[case]
         own = problem.specification
@@ -136,9 +154,41 @@ def run(name: str, seed: int) -> dict[str, Any]:
     row["widths"] = design.problem.beam_widths.round(5).tolist()
     if report.refinement is not None:
         row["refinement"] = refinement_data(report.refinement)
+    if report.tolerance is not None:
+        row["tolerance"] = {
+            name: over_tolerances(design, task.part, **changes)
+            for name, changes in (("", {}), ("without_own_widths", {"each_width": 0.0}))
+        }
     row["proposals"] = report.proposals
     row["items"] = item_data(design.problem, task.part, models)
     return row
+
+
+def over_tolerances(design: Design, part: PartSpec, **changes: float) -> dict[str, Any]:
+    """Return yield and objectives of a design over its tolerances, some of them changed."""
+    sizes = replace(tolerances_of(design, part), **changes)
+    deviations = deviations_of(
+        design, part, tolerances=sizes, width=0.0, thin=0.0, shortest=1.0, longest=1.0,
+        struts=False,
+    )  # fmt: skip
+    report = compute_tolerance(design, deviations, part)
+    assert report is not None
+    found, rows = report.tolerance, report.tolerance.rows()
+    objectives = [row for row in rows if not isinstance(row.quantity, Item)]
+    return {
+        "scenarios": len(found.scenarios),
+        "yield": found.print_yield,
+        "met": sum(result.met for result in found.results),
+        "objectives": [
+            {
+                "name": as_item(row.quantity).name,
+                "nominal": finite(row.nominal),
+                "worst": {kind: finite(worst.value) for kind, worst in row.worst.items()},
+                "percentile_5": finite(row.percentile),
+            }
+            for row in objectives
+        ],
+    }
 
 
 def recorded_design(task: Task, row: dict[str, Any]) -> Design:
