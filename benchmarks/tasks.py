@@ -6,8 +6,8 @@ Each run is added to ``docs/tasks/runs.json`` (or ``--out FILE``) as soon as it 
 are in the record are not repeated unless ``--again`` is given. ``selector:A`` after ``--only``
 designs a load case of a task alone; ``straight-crane:free`` asks for the largest gain within the
 strain limit and without contact, ``:tolerant`` for all items over widths that are 20 % off, and
-``:redundant`` for a loss of any strut that costs at most 30 %. ``--first N`` is the first seed. A table of medians is printed;
-times include the sheet of the refinement, not the compilation.
+``:redundant`` for a loss of any strut that costs at most 30 %. ``--first N`` is the first seed. A
+table of medians is printed; times include the sheet of the refinement, not the compilation.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from bellcrank.model import Item
 from bellcrank.provenance import provenance
 from bellcrank.refine import RefinementSettings, refine_design
 from bellcrank.task import find_task
-from bellcrank.workflows.tolerance import as_item, compute_tolerance, deviations_of, tolerances_of
+from bellcrank.workflows.tolerance import as_item, compute_tolerance, deviations_of, with_tolerances
 from benchmarks.record import add_runs
 from benchmarks.tasks import recorded_design
 from tools.draw_tasks import best, identity, recorded_runs
@@ -47,11 +47,7 @@ def measure_refined(name: str, run: dict[str, Any]) -> dict[str, Any]:
     """Return the tolerance of the design of a run after a refinement over the usual tolerances."""
     task = find_task(name)
     assert task is not None
-    design = recorded_design(task, run)
-    problem = design.problem
-    assert problem.specification is not None
-    wanted = replace(problem.specification, tolerances=tolerances_of(design, task.part))
-    design = replace(design, problem=replace(problem, specification=wanted))
+    design = with_tolerances(recorded_design(task, run), task.part)
     start = time.perf_counter()
     found = refine_design(design, RefinementSettings(evaluations=EVALUATIONS))
     seconds = time.perf_counter() - start
@@ -122,8 +118,8 @@ def _cells(row: dict[str, Any]) -> list[str]:
     value = "-"
     if objective is not None:
         least = objective["percentile_5"]
-        kept = "lost" if least is None else f"{least * objective['nominal']:.3g}"
-        value = f"{objective['nominal']:.3g}, {kept}"
+        of_95 = "lost" if least is None else f"{least * objective['nominal']:.3g}"
+        value = f"{objective['nominal']:.3g}, {of_95}"
     return [f"{row['yield']:.0%}", which, value]
 
 

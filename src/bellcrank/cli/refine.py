@@ -35,6 +35,14 @@ def refine(
         typer.Option(help="Largest width of a strut over that of the section; 1 for no change."),
     ] = 1.8,
     same_mass: Annotated[bool, typer.Option("--same-mass", help="The mass may not grow.")] = False,
+    tolerance: Annotated[
+        bool,
+        typer.Option(
+            "--tolerance",
+            help="Meet all items over deviations of print and drive too: those of the task, or the "
+            "usual ones.",
+        ),
+    ] = False,
     picture: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Draw the motion before and after (png, svg, pdf)."),
@@ -59,8 +67,11 @@ def refine(
     from bellcrank.refine import RefinementSettings
     from bellcrank.workflows.pictures import check_targets, draw_before_and_after
     from bellcrank.workflows.refinement import motion_rows, refine_file, refinement_rows
+    from bellcrank.workflows.tolerance import with_tolerances
     from bellcrank.workflows.validation import spec_for
 
+    if tolerance:
+        chosen = with_tolerances(chosen, spec_for(chosen))
     check_targets(picture, None, overwrite=overwrite)
     settings = RefinementSettings(
         evaluations=evaluations, largest_move=largest_move, widest=widest, same_mass=same_mass

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics.kernels.arrays import Ints
 
-KEPT = 32
-"""Number of lattices whose order and size are kept."""
+STORED = 32
+"""Number of lattices whose order and size are stored."""
 
 
 def one_beam_apart(beams: Ints, count: int) -> csc_matrix:
@@ -86,7 +86,7 @@ def _bytes_of(beams: Ints, of_nodes: NDArray[Any]) -> tuple[bytes, bytes, str]:
     return beams.tobytes(), of_nodes.tobytes(), of_nodes.dtype.str
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=STORED)
 def _elimination_order(of_beams: bytes, of_held: bytes, kind: str, *, springs: bool) -> Ints:
     """Compute the order of the free nodes."""
     from scipy.sparse import csc_matrix, identity
@@ -137,7 +137,7 @@ def factor_size(beams: Ints, block: Ints, *, springs: bool = True) -> FactorSize
     return _factor_size(*_bytes_of(beams, block), springs=springs)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=STORED)
 def _factor_size(of_beams: bytes, of_block: bytes, kind: str, *, springs: bool) -> FactorSize:
     """Compute the size of the factor."""
     beams = np.frombuffer(of_beams, dtype=np.int64).reshape(-1, 2)

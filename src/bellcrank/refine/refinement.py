@@ -71,7 +71,7 @@ class RefinementSettings:
 
 
 GEOMETRIES = "geometries"
-"""Last word of the reason of a refinement that ends after its number of geometries."""
+"""End of the reason of a refinement that ends after its number of geometries."""
 UNSTABLE = "no step improves the design, and some lose the stability of a path"
 """Reason for which a refinement ends at the edge of a stable region."""
 

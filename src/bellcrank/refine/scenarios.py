@@ -170,11 +170,11 @@ class LossRows:
         drawn, without = found
         if drawn is None or without is None:
             return None
-        kept = without.objectives / drawn.objectives
-        by_vector = without.objective_slopes - kept[:, None] * drawn.objective_slopes
+        ratio = without.objectives / drawn.objectives
+        by_vector = without.objective_slopes - ratio[:, None] * drawn.objective_slopes
         return Rows(
             np.zeros(0),
-            (1.0 - kept) / self.largest - 1.0,
+            (1.0 - ratio) / self.largest - 1.0,
             ("strut_loss",),
             ((self.beam,),),
             np.zeros((0, drawn.objective_slopes.shape[1])),

@@ -64,16 +64,16 @@ def _that_matter(rows: Rows, low: Values, high: Values) -> Rows:
     Those are constraints that are met after all steps, and objectives that are never the smallest.
     """
     _, most = _range(rows.constraint_slopes, low, high)
-    kept = rows.constraints + most > 0.0
+    reached = rows.constraints + most > 0.0
     least, most = _range(rows.objective_slopes, low, high)
     smallest = (rows.objectives + most).min(initial=np.inf)
     used = rows.objectives + least <= smallest
     return replace(
         rows,
         objectives=rows.objectives[used],
-        constraints=rows.constraints[kept],
+        constraints=rows.constraints[reached],
         objective_slopes=rows.objective_slopes[used],
-        constraint_slopes=rows.constraint_slopes[kept],
+        constraint_slopes=rows.constraint_slopes[reached],
     )
 
 

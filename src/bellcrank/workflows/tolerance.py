@@ -133,6 +133,14 @@ def tolerances_of(design: Design, spec: PartSpec) -> Tolerances:
     return Tolerances(node=NODE / spec.scale)
 
 
+def with_tolerances(design: Design, spec: PartSpec) -> Design:
+    """Return a design of a frame whose specification has tolerances, the usual ones by default."""
+    problem = specified(design.problem, spec.registered_material.strain_limit)
+    assert problem.specification is not None
+    wanted = replace(problem.specification, tolerances=tolerances_of(design, spec))
+    return replace(design, problem=replace(problem, specification=wanted))
+
+
 def deviations_of(design: Design, spec: PartSpec, **changes: Any) -> Deviations:
     """Return the usual deviations of a design as a part, with its own tolerances.
 
