@@ -22,6 +22,7 @@ from bellcrank.mechanics.frames.case import with_output, with_payload
 from bellcrank.mechanics.frames.stroke import with_held_output
 from bellcrank.mechanics.output import best_fit_rotation, motion_weights
 from bellcrank.mechanics.splines import stroke_spline
+from bellcrank.search.strut_loss import StrutLosses
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -97,6 +98,8 @@ def sheet_records(
 ) -> dict[str, StrokeRecord] | None:
     """Return the channels of the items and objectives of a part in the sheet, by load case.
 
+    The loss of struts is that by frames.
+
     Parameters
     ----------
     part
@@ -135,6 +138,11 @@ def sheet_records(
         if record is None:
             return None
         records[name] = record
+    if any(item.quantity == "strut_loss" for item in wanted.items):
+        # By frames: a mesh without each strut would take hours.
+        loss = StrutLosses(part.design.problem).largest(part.design.mask)
+        for name, record in records.items():
+            records[name] = replace(record, given={**record.given, "strut_loss": loss})
     return records
 
 
