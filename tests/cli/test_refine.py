@@ -79,6 +79,22 @@ def test_a_design_in_a_file_is_refined(here: Path, runs: dict[str, tuple[Path, s
     assert "better.json exists" in message
 
 
+@pytest.mark.slow
+def test_a_refinement_over_tolerances_increases_the_yield(here: Path) -> None:
+    """Also of a design without a specification, whose file then names the tolerances."""
+    shares = []
+    for name in ("machine:anti-parallel", "wide.json"):
+        words = ("--prints", 60, "--no-struts", "--json")
+        shares.append(json.loads(call("tolerance", name, *words).out)["yield"])
+        if name != "wide.json":
+            outcome = call("refine", name, "wide.json", "--tolerance", "--evaluations", 100)
+            assert outcome.code == 0, outcome.err
+    assert shares[1] > shares[0]
+    wanted = read_design(here / "wide.json").problem.specification
+    assert wanted is not None
+    assert wanted.tolerances is not None
+
+
 def test_the_gain_of_a_free_design_grows(here: Path) -> None:
     outcome = call(
         "refine", "machine:discs", "discs.json", "--evaluations", 80, "--picture", "both.png"
@@ -97,6 +113,7 @@ def test_the_gain_of_a_free_design_grows(here: Path) -> None:
     ("words", "message"),
     [
         (("crane",), "expected a frame; designs of springs are not refined"),
+        (("crane", "--tolerance"), "expected a frame; designs of springs are not refined"),
         (("machine:crane", "--evaluations", "0"), "--evaluations: expected at least 1, got 0"),
         (("machine:crane", "--largest-move", "2.5"), "--largest-move: expected above 0"),
         (("machine:crane", "--picture", "both.pic"), "both.pic"),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bellcrank.model import read_design
+from bellcrank.task import bundled_tasks
 
 from .helpers import call, refusal
 
@@ -52,6 +53,24 @@ def missed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
     outcome = call("design", task, "--steps", 500, "--no-refine", "--out", folder / "run")
     assert outcome.code == 3, outcome.err
     return folder / "run", outcome.out, outcome.err
+
+
+def test_the_yield_over_tolerances_is_reported_and_counts(tmp_path: Path) -> None:
+    task = tmp_path / "tolerant.toml"
+    text = bundled_tasks()["inverter"].read_text(encoding="utf-8")
+    task.write_text(f"{text}\n[tolerance]\nwidth = '30%'\nleast_yield = '99%'\n", encoding="utf-8")
+    folder = tmp_path / "run"
+    outcome = call("design", task, *SETTINGS, "--out", folder)
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    found = summary["tolerance"]
+    assert found["deviations"]["relative_width"] == 0.3
+    assert found["deviations"]["prints"] == 200
+    assert found["yield"] < 0.99
+    assert "of 200 random prints" in outcome.out
+    assert "fewer than the 99.0% asked for" in outcome.err
+    assert outcome.code == 3
+    assert not summary["specification"]["met"]
+    assert "of 200 random prints" in (folder / "summary.md").read_text(encoding="utf-8")
 
 
 def test_every_item_is_reported_with_what_is_wanted_reached_and_met(met: tuple[Path, str]) -> None:

@@ -134,7 +134,12 @@ def tolerances_of(design: Design, spec: PartSpec) -> Tolerances:
 
 
 def with_tolerances(design: Design, spec: PartSpec) -> Design:
-    """Return a design of a frame whose specification has tolerances, the usual ones by default."""
+    """Return a design whose specification has tolerances, the usual ones by default.
+
+    One of springs is returned as it is.
+    """
+    if design.problem.section is None:
+        return design
     problem = specified(design.problem, spec.registered_material.strain_limit)
     assert problem.specification is not None
     wanted = replace(problem.specification, tolerances=tolerances_of(design, spec))
@@ -290,14 +295,16 @@ def tolerance_rows(report: ToleranceReport) -> list[list[str]]:
 
 
 def tolerance_sentence(report: ToleranceReport) -> str:
-    """Return how many random prints meet all items, and with which model."""
+    """Return the number of scenarios, the model, and how many random prints meet all items."""
     tolerance = report.tolerance
-    prints = tolerance.of_kind("print")
-    met = sum(tolerance.results[number].met for number in prints)
-    return (
-        f"all items are met by {met} of {len(prints)} random prints; {len(tolerance.scenarios)} "
-        "scenarios, by frames with one element in each strut, and the worst value of each kind"
+    sentence = (
+        f"{len(tolerance.scenarios)} scenarios, by frames with one element in each strut; the worst "
+        "value of each kind"
     )
+    if prints := tolerance.of_kind("print"):
+        met = sum(tolerance.results[number].met for number in prints)
+        sentence += f"; all items are met by {met} of {len(prints)} random prints"
+    return sentence
 
 
 def scenario_rows(report: ToleranceReport) -> list[list[str]]:
