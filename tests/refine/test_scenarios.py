@@ -168,3 +168,10 @@ def test_refinement_reduces_the_loss_of_struts() -> None:
     # Struts without which the path is lost, or all motion, remain.
     few = sum(loss > 0.55 for loss in after.values())
     assert few < sum(loss > 0.55 for loss in before.values())
+
+
+def test_the_mass_of_the_widest_print_is_limited() -> None:
+    """The mass is that of the drawn part in the refinement, and of each print in its result."""
+    choice = ScenarioChoice(tolerant_crane(), 0)
+    assert choice.largest_area == pytest.approx(1.15)
+    assert ScenarioChoice(tolerant_crane(tolerances=None), 0).largest_area == 1.0

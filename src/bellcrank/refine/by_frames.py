@@ -121,6 +121,7 @@ class FrameRefinement:
             if found is None:
                 return
             state, vector, is_last = found
+            # Further rounds follow towards scenarios that are reduced, or with further ones.
             goes_wider = self.is_reduced and len(self.tried) > 1
             if not self.is_reduced and state.is_stable:
                 goes_wider = self.choice.add(self._design_at(vector), self.missed)
@@ -131,6 +132,7 @@ class FrameRefinement:
                 self.path, self.stable = path, stable
             is_spent = self.evaluations >= self.settings.evaluations
             is_edge = self.reason == UNSTABLE and not is_spent
+            # Over scenarios, a round has a part of the geometries.
             is_cut = not (self.choice.is_empty or is_spent) and self.reason.endswith(GEOMETRIES)
             if not state.items or not self.goes_on or (goes_wider and is_spent):
                 return
@@ -246,6 +248,9 @@ class FrameRefinement:
     def _tightened(self, item: Item) -> Item:
         """Return an item as the model of the refinement has to meet it."""
         tight = tightened(item, RESERVES.get(item.quantity, RESERVE))
+        if item.quantity == "mass" and tight.at_most is not None:
+            # The shape is that of the part as drawn alone; wider struts are heavier.
+            return replace(tight, at_most=tight.at_most / self.choice.largest_area)
         if item.quantity != "payload" or tight.at_least is None:
             return tight
         return replace(tight, at_least=self.payload * tight.at_least)

@@ -65,6 +65,8 @@ class ScenarioChoice:
     def __init__(self, design: Design, prints: int) -> None:
         wanted = design.problem.specification
         assert wanted is not None
+        section = design.problem.section
+        self._power = 2 if section is not None and section.shape == "round" else 1
         self.tolerances = wanted.tolerances
         self.all = [] if self.tolerances is None else _scenarios(design, self.tolerances, prints)
         if not self.all:
@@ -79,6 +81,13 @@ class ScenarioChoice:
     def is_empty(self) -> bool:
         """Whether only the design as drawn counts."""
         return self.tolerances is None and self.largest_loss is None
+
+    @property
+    def largest_area(self) -> float:
+        """Largest area of the section of a strut over that as drawn, of all struts together."""
+        if self.tolerances is None:
+            return 1.0
+        return float((1.0 + self.tolerances.width) ** self._power)
 
     def loss_rows(self, variables: Variables, design: Design) -> list[LossRows]:
         """Return the constraints on lost struts."""
