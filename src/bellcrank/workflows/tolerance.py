@@ -298,8 +298,8 @@ def tolerance_sentence(report: ToleranceReport) -> str:
     """Return the number of scenarios, the model, and how many random prints meet all items."""
     tolerance = report.tolerance
     sentence = (
-        f"{len(tolerance.scenarios)} scenarios, by frames with one element in each strut; the worst "
-        "value of each kind"
+        f"{len(tolerance.scenarios)} scenarios, by frames with one element in each strut; the "
+        "worst value of each kind"
     )
     if prints := tolerance.of_kind("print"):
         met = sum(tolerance.results[number].met for number in prints)
