@@ -80,7 +80,11 @@ def draw_critical_struts(
     lost = [beam for beam, loss in losses.items() if math.isinf(loss)]
     known = np.array([beam for beam in losses if beam not in lost], dtype=np.int64)
     motion = Motion(design, np.zeros(problem.lattice.positions.shape))
-    note = f"{len(lost)} of {len(losses)} struts are needed to reach the full stroke"
+    half = sum(0.5 < loss < math.inf for loss in losses.values())
+    note = (
+        f"{len(lost)} of {len(losses)} struts are needed to reach the full stroke; without one of "
+        f"{half} others more than half of the efficiency is lost"
+    )
     drawing = Drawing(f"{problem.name}: without one strut", note, motion, displaced=False)
     ((low, high),) = drawing_frames([drawing])
     across, up = (high - low).tolist()

@@ -118,11 +118,11 @@ def nearest_rows(
     """
     drawn = rows_of(None)
     now = drawn.evaluate(vector)
-    if now is None or now.violation > NEAR:
+    if now is None:
         return NearRows(ScenarioRows(drawn, []), 0.0)
     parts = 0.0
-    others: list[Part] = []
-    for scenario in scenarios:
+    others: list[Part] = [each for each in losses if each.evaluate(vector) is not None]
+    for scenario in scenarios if now.violation <= NEAR else ():
         for part in PARTS:
             reduced = rows_of(scenario.reduced(part))
             found = reduced.evaluate(vector)
@@ -130,7 +130,6 @@ def nearest_rows(
                 others.append(reduced)
                 parts += part
                 break
-    others += [each for each in losses if each.evaluate(vector) is not None]
     return NearRows(ScenarioRows(drawn, others), parts)
 
 
