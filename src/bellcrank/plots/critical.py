@@ -82,8 +82,8 @@ def draw_critical_struts(
     motion = Motion(design, np.zeros(problem.lattice.positions.shape))
     half = sum(0.5 < loss < math.inf for loss in losses.values())
     note = (
-        f"{len(lost)} of {len(losses)} struts are needed to reach the full stroke; without one of "
-        f"{half} others more than half of the efficiency is lost"
+        f"of {len(losses)} struts, {len(lost)} are needed for the full stroke, {half} others for "
+        "half of the efficiency"
     )
     drawing = Drawing(f"{problem.name}: without one strut", note, motion, displaced=False)
     ((low, high),) = drawing_frames([drawing])
