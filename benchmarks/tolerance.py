@@ -123,6 +123,32 @@ def _cells(row: dict[str, Any]) -> list[str]:
     return [f"{row['yield']:.0%}", which, value]
 
 
+def robust_table(runs: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield the rows of the table of ``TASK:tolerant`` (`benchmarks.tasks`) in Markdown.
+
+    The smallest objective as drawn, at worst over widths, directions and random prints, and over
+    prints whose struts do not deviate each by itself; the part of the prints that meets all items;
+    whether the sheet does; and the time of the design.
+    """
+    for run in runs:
+        if "tolerance" not in run:
+            continue
+        whole, common = run["tolerance"][""], run["tolerance"]["without_own_widths"]
+
+        def least(found: dict[str, Any], kind: str) -> str:
+            values = [each["worst"][kind] for each in found["objectives"]]
+            return "lost" if None in values else f"{min(values):.3g}"
+
+        nominal = min(each["nominal"] for each in whole["objectives"])
+        cells = [
+            f"`{run['task'].partition(':')[0]}`", f"{nominal:.3g}",
+            *(least(whole, kind) for kind in ("widths", "input", "print")),
+            f"{whole['yield']:.1%}", least(common, "print"), f"{common['yield']:.1%}",
+            "yes" if run["met_in_sheet"] else "no", f"{run['seconds']:.0f} s",
+        ]  # fmt: skip
+        yield f"| {' | '.join(cells)} |"
+
+
 def chosen_runs() -> dict[str, dict[str, Any]]:
     """Return the run that the documentation shows, by task."""
     runs = recorded_runs()

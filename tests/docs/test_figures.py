@@ -21,6 +21,7 @@ from benchmarks.refinement import mass_rows, specified_rows
 from benchmarks.size import table as size_rows
 from benchmarks.space import cost_rows, mesh_rows, task_rows
 from benchmarks.tasks import counts, summary
+from benchmarks.tolerance import robust_table
 from benchmarks.tolerance import table as tolerance_rows
 from tools.draw_tasks import best, identity, identity_in, recorded_runs
 
@@ -66,6 +67,7 @@ def sizes() -> Rows:
 
 def tolerances() -> Rows:
     yield from tolerance_rows(read("tolerance")["runs"])
+    yield from robust_table(read("tasks/robust")["runs"])
 
 
 def move_comparison() -> Rows:
