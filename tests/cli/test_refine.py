@@ -80,16 +80,17 @@ def test_a_design_in_a_file_is_refined(here: Path, runs: dict[str, tuple[Path, s
 
 
 @pytest.mark.slow
-def test_a_refinement_over_tolerances_increases_the_yield(here: Path) -> None:
+def test_a_refinement_over_tolerances_increases_the_worst_gain(here: Path) -> None:
     """Also of a design without a specification, whose file then names the tolerances."""
-    shares = []
-    for name in ("machine:anti-parallel", "wide.json"):
-        words = ("--prints", 60, "--no-struts", "--json")
-        shares.append(json.loads(call("tolerance", name, *words).out)["yield"])
-        if name != "wide.json":
-            outcome = call("refine", name, "wide.json", "--tolerance", "--evaluations", 100)
-            assert outcome.code == 0, outcome.err
-    assert shares[1] > shares[0]
+    outcome = call("refine", "machine:crane", "wide.json", "--tolerance", "--evaluations", 60)
+    assert outcome.code == 0, outcome.err
+    before, after = (
+        json.loads(call("tolerance", name, "--prints", 60, "--no-struts", "--json").out)
+        for name in ("machine:crane", "wide.json")
+    )
+    assert after["yield"] >= before["yield"]
+    gains = [found["items"][-1]["percentile_5"] for found in (before, after)]
+    assert gains[1] > 1.1 * gains[0]
     wanted = read_design(here / "wide.json").problem.specification
     assert wanted is not None
     assert wanted.tolerances is not None

@@ -56,7 +56,8 @@ class SheetRefinement:
     def run(self) -> None:
         """Refine until all items are met in the sheet too; keeps the best in the sheet.
 
-        If no refined geometry is near the sheet, the given design is kept if it is.
+        If no refined geometry is near the sheet, or those that are have a lower yield, the given
+        design is kept if it is near the sheet.
         """
         job = self.job
         if not job.best.met:
@@ -65,12 +66,14 @@ class SheetRefinement:
         if not job.best.is_near_sheet:
             job.chosen, job.best = self._earlier(job.chosen, job.best)
         self._repair()
-        if job.goes_on and job.before.met and not job.best.is_near_sheet and job.chosen.any():
+        is_worse = not job.best.is_near_sheet or job.best.share < job.before.share
+        if job.goes_on and job.before.met and is_worse and job.chosen.any():
             start = np.zeros_like(job.chosen)
             given = self._in_sheet(start, job.before)
             if given.is_near_sheet:
+                others = "have a lower yield" if job.best.is_near_sheet else "are on other paths"
                 job.best, job.chosen = given, start
-                job.reason = "in the sheet, all better geometries are on other paths"
+                job.reason = f"in the sheet, all better geometries {others}"
 
     def _repair(self) -> None:
         """Refine with the differences from the sheet until all items are met in it."""
