@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
+MANY = 2000
+"""Number of constraints, as over scenarios, from which those that no step reaches are left out."""
 PENALTY = 20.0
 """Weight of a violation against the objective over its size."""
 
@@ -97,7 +99,8 @@ def linear_step(rows: Rows, low: Values, high: Values, size: float) -> Step | No
     """
     from scipy.optimize import linprog
 
-    rows = _that_matter(rows, low, high)
+    if len(rows.constraints) > MANY:
+        rows = _that_matter(rows, low, high)
     count, objectives, constraints = len(low), len(rows.objectives), len(rows.constraints)
     cost = np.concatenate(
         [np.zeros(count), [-1.0 if objectives else 0.0], np.full(constraints, PENALTY)]
