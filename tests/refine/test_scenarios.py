@@ -123,7 +123,7 @@ def test_the_scenarios_are_extreme_widths_and_directions_then_prints() -> None:
     assert len(choice.all) == 4 + 12
     losses = StrutLosses(design.problem).by_strut(design.mask)
     assert choice.lost == sorted(losses, key=lambda beam: -losses[beam])[: len(choice.lost)]
-    found = choice.judge(design)
+    found = choice.robustness(design)
     assert 0.0 <= found.share <= 0.95
     results = ScenarioEvaluator(design)
     met = [results.evaluate(each).met for each in choice.all]

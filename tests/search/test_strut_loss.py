@@ -54,17 +54,21 @@ def test_a_design_without_a_path_loses_all(crane: Design) -> None:
     assert losses.largest(single) == PATH_LOST
 
 
-def test_an_item_limits_the_loss(crane: Design) -> None:
+@pytest.mark.parametrize("is_full", [False, True])
+def test_an_item_limits_the_loss(crane: Design, *, is_full: bool) -> None:
+    """The human design needs some of its struts, the full lattice none."""
+    mask = crane.problem.initial if is_full else crane.mask
     wanted = crane.problem.specification
     assert wanted is not None
-    worst = StrutLosses(crane.problem).largest(crane.mask)
-    for limit, met in ((0.3, False), (1.9, worst <= 1.9)):
+    worst = StrutLosses(crane.problem).largest(mask)
+    assert (worst < 1.0) == is_full
+    for limit in (0.5 * worst, min(1.01 * worst, PATH_LOST)):
         item = Item(quantity="strut_loss", at_most=limit)
         limited = replace(wanted, items=(*wanted.items, item))
         evaluator = SpecificationEvaluator(replace(crane.problem, specification=limited))
         for increment in (1.0, 1.0 / 32.0):
-            evaluator.evaluate(crane.mask, increment)
+            evaluator.evaluate(mask, increment)
             result = evaluator.results()[-1]
             assert result.item.quantity == "strut_loss"
-            assert result.met == met
+            assert result.met == (limit >= worst)
         assert result.value == pytest.approx(worst)

@@ -104,11 +104,11 @@ class ObjectiveTable(Table):
 class TolerancesTable(Table):
     """``[specification.tolerances]``."""
 
-    width: float = 0.1
-    each_width: float = 0.05
-    node: float = 0.01
-    angle: float = 5.0
-    least_yield: float = 0.95
+    width: float
+    each_width: float
+    node: float
+    angle: float
+    least_yield: float
 
 
 class SpecificationTable(Table):

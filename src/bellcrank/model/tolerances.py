@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidProblem
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 LARGEST = {"width": 0.9, "each_width": 0.3, "node": math.inf, "angle": 90.0, "least_yield": 1.0}
 """Largest value of each tolerance; the smallest one is 0."""
+
+
+def out_of_range(given: object, largest: Mapping[str, float]) -> str:
+    """Return which attribute is not a number from 0 to its largest value; empty if none is."""
+    for name, most in largest.items():
+        value = getattr(given, name)
+        if not (math.isfinite(value) and 0.0 <= value <= most):
+            limit = "at least 0" if most == math.inf else f"from 0 to {most:g}"
+            return f"{name}: expected a number {limit}, got {value!r}"
+    return ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,14 +60,13 @@ class Tolerances:
     least_yield: float = 0.95
 
     def __post_init__(self) -> None:
-        for name, most in LARGEST.items():
-            value = getattr(self, name)
-            if not (math.isfinite(value) and 0.0 <= value <= most):
-                limit = "at least 0" if most == math.inf else f"from 0 to {most:g}"
-                raise InvalidProblem(
-                    f"tolerances: {name}: expected a number {limit}, got {value!r}"
-                )
+        if fault := out_of_range(self, LARGEST):
+            raise InvalidProblem(f"tolerances: {fault}")
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+USUAL = Tolerances()
+"""Tolerances of parts whose task names none, at 10 mm for each lattice unit."""

@@ -78,7 +78,7 @@ class FrameRefinement:
     payload
         Factor of the payload that one element in each strut has to carry.
     missed
-        Scenarios in which the geometry that was judged last misses items.
+        Scenarios in which the geometry that was evaluated last misses items.
     goes_on
         Whether the refinement has not been stopped.
     """
@@ -114,18 +114,19 @@ class FrameRefinement:
         vector, stable = self.chosen, STABLE if self.choice.is_empty else stricter(STABLE)
         path: list[Values] = []
         models: Models = (NO_DIFFERENCE,)
-        rounds = wider = 0
-        while rounds < ROUNDS and wider < SCENARIO_ROUNDS:
+        rounds = scenario_rounds = 0
+        while rounds < ROUNDS and scenario_rounds < SCENARIO_ROUNDS:
             least = self.settings.evaluations // 4
             found = self.refined(vector, models, stable, self.settings.steps, least)
             if found is None:
                 return
             state, vector, is_last = found
-            # Further rounds follow towards scenarios that are reduced, or with further ones.
-            goes_wider = self.is_reduced and len(self.tried) > 1
+            # Reduced scenarios get nearer to their full deviations, or others are added.
+            has_changed = self.is_reduced and len(self.tried) > 1
             if not self.is_reduced and state.is_stable:
-                goes_wider = self.choice.add(self._design_at(vector), self.missed)
-            rounds, wider = rounds + (not goes_wider), wider + goes_wider
+                has_changed = self.choice.add(self._design_at(vector), self.missed)
+            scenario_rounds += has_changed
+            rounds += not has_changed
             path = [*path, *self.tried]
             if is_better(state, self.best):
                 self.best, self.chosen = state, vector
@@ -134,9 +135,9 @@ class FrameRefinement:
             is_edge = self.reason == UNSTABLE and not is_spent
             # Over scenarios, a round has a part of the geometries.
             is_cut = not (self.choice.is_empty or is_spent) and self.reason.endswith(GEOMETRIES)
-            if not state.items or not self.goes_on or (goes_wider and is_spent):
+            if not state.items or not self.goes_on or (has_changed and is_spent):
                 return
-            if state.met and (goes_wider or is_cut):
+            if state.met and (has_changed or is_cut):
                 continue
             if state.met and (is_last or is_spent) and not is_edge:
                 return
@@ -199,7 +200,7 @@ class FrameRefinement:
         vectors = [each.vector for each in path]
         state, number = latest_met(self.variables, self.design.mask, vectors)
         self.tried = vectors[: number + 1]
-        state = self._judged(state, vectors[number])
+        state = self._with_robustness(state, vectors[number])
         return state, vectors[number], number == len(vectors) - 1
 
     def _start(
@@ -230,14 +231,14 @@ class FrameRefinement:
     def state_at(self, vector: Values) -> State:
         """Return the state of a geometry."""
         state = state_of(self.variables.problem_at(vector), self.design.mask)
-        return self._judged(state, vector)
+        return self._with_robustness(state, vector)
 
-    def _judged(self, state: State, vector: Values) -> State:
-        """Return a state over all scenarios; `missed` are those in which it misses items."""
+    def _with_robustness(self, state: State, vector: Values) -> State:
+        """Return a state with its robustness; `missed` are scenarios that miss items."""
         if self.choice.tolerances is None or not state.is_stable:
             self.missed = []
             return state
-        found = self.choice.judge(self._design_at(vector))
+        found = self.choice.robustness(self._design_at(vector))
         self.missed = found.missed
         return replace(state, share=found.share, objective=found.objective)
 

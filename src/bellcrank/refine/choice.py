@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from bellcrank.tolerance import Scenario, ScenarioResult
 
 SEED = 1
-"""Seed of the random prints by which geometries are judged; they are not those of `bellcrank
-tolerance`."""
+"""Seed of the random prints with which the robustness of geometries is computed; they are not those
+of `bellcrank tolerance`."""
 ADDED = 4
 """Largest number of scenarios, and of lost struts, that become constraints after each round."""
 NEAR_LOSS = 0.7
@@ -28,8 +28,8 @@ LOST_STRUTS = 8
 """Number of struts whose losses are constraints from the beginning."""
 
 
-class Judgement(NamedTuple):
-    """A geometry over all scenarios.
+class Robustness(NamedTuple):
+    """What a geometry does over all scenarios.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ class ScenarioChoice:
         losses = StrutLosses(design.problem).by_strut(design.mask)
         return sorted((b for b in losses if losses[b] > least), key=lambda beam: -losses[beam])
 
-    def judge(self, design: Design) -> Judgement:
+    def robustness(self, design: Design) -> Robustness:
         """Return what a geometry does over all scenarios, for a specification with tolerances."""
         assert self.tolerances is not None
         try:
             evaluator = ScenarioEvaluator(design)
         except InvalidSettings:
-            return Judgement(0.0, -math.inf, [])
+            return Robustness(0.0, -math.inf, [])
         wanted = design.problem.specification
         assert wanted is not None
         results = [evaluator.evaluate(each) for each in self.all]
@@ -118,7 +118,7 @@ class ScenarioChoice:
         order = sorted(range(len(results)), key=lambda k: _margin(results[k]))
         missed = [self.all[k] for k in order if not results[k].met]
         share = 1.0 - len(missed) / len(results)
-        return Judgement(min(share, self.tolerances.least_yield), values[index], missed)
+        return Robustness(min(share, self.tolerances.least_yield), values[index], missed)
 
     def add(self, design: Design, missed: Sequence[Scenario]) -> bool:
         """Make the worst of some scenarios and of the lost struts constraints; whether any is new.

@@ -53,7 +53,8 @@ class RefinementSettings:
     same_mass
         Whether the mass may not grow.
     prints
-        Number of random prints by which a geometry is judged, if the specification has tolerances.
+        Number of random prints with which the robustness of a geometry is computed, if the
+        specification has tolerances.
     """
 
     steps: int = 400

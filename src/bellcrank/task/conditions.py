@@ -11,8 +11,8 @@ import numpy as np
 from bellcrank.errors import InvalidProblem
 from bellcrank.model import Case, Input, Loads, NodeForce, NodeSpring, Output, Supports
 from bellcrank.model.stroke_ranges import WHOLE, check_cover, stroke_range
-from bellcrank.task.schema import unit_vector
 from bellcrank.task.shapes import nodes_at
+from bellcrank.task.values import unit_vector
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

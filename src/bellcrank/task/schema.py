@@ -1,167 +1,40 @@
 """Tables of a task file, which are also the classes of a task in Python.
 
-Numbers may carry a unit (`bellcrank.part.units`); bare ones are in mm, N, g, degrees and N/mm.
+Numbers may carry a unit (`bellcrank.task.values`); bare ones are in mm, N, g, degrees and N/mm.
 """
 
 from __future__ import annotations
 
-import math
-from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
 
-from bellcrank.errors import InvalidProblem, InvalidSettings
 from bellcrank.model.parsing import Table
-from bellcrank.part.units import UNITS, read_quantity
-
-if TYPE_CHECKING:
-    from bellcrank.part.units import Quantity
+from bellcrank.model.tolerances import USUAL
+from bellcrank.task.values import (
+    Angle,
+    Box,
+    Direction,
+    Force,
+    Length,
+    Mass,
+    Pair,
+    Point,
+    Ratio,
+    Stiffness,
+    as_list,
+    as_range,
+    as_tuple,
+    reader,
+    switch,
+)
 
 SCHEMA = "bellcrank/task/1"
-DIRECTIONS: dict[int, dict[str, tuple[float, ...]]] = {
-    2: {"right": (1.0, 0.0), "left": (-1.0, 0.0), "up": (0.0, 1.0), "down": (0.0, -1.0)},
-    3: {
-        "right": (1.0, 0.0, 0.0), "left": (-1.0, 0.0, 0.0),
-        "back": (0.0, 1.0, 0.0), "front": (0.0, -1.0, 0.0),
-        "up": (0.0, 0.0, 1.0), "down": (0.0, 0.0, -1.0),
-    },
-}  # fmt: skip
-"""Directions by name, in the plane and in space."""
-
-
-def _reader(quantity: Quantity) -> BeforeValidator:
-    """Return a validator that reads a number with a unit."""
-
-    def read(value: Any) -> float:
-        try:
-            return read_quantity("", value, quantity)
-        except InvalidSettings:
-            raise PydanticCustomError("unit", UNITS[quantity].wanted) from None
-
-    return BeforeValidator(read)
-
-
-Length = Annotated[float, _reader("length")]
-Force = Annotated[float, _reader("force")]
-Mass = Annotated[float, _reader("mass")]
-Angle = Annotated[float, _reader("angle")]
-Ratio = Annotated[float, _reader("ratio")]
-Stiffness = Annotated[float, _reader("stiffness")]
-
-
-def _as_point(value: Any) -> Any:
-    if isinstance(value, list | tuple) and len(value) in {2, 3}:
-        return tuple(value)
-    raise PydanticCustomError("point", "two lengths, or three in space")
-
-
-def _as_box(value: Any) -> Any:
-    if isinstance(value, list | tuple) and len(value) in {4, 6}:
-        return tuple(value)
-    raise PydanticCustomError("box", "four lengths, or six in space")
-
-
-Point = Annotated[tuple[Length, ...], BeforeValidator(_as_point)]
-"""A point [x, y], in space [x, y, z], mm."""
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _as_range(value: Any) -> Any:
-    if value is None or (isinstance(value, list | tuple) and len(value) == 2):
-        return _as_tuple(value)
-    raise PydanticCustomError("range", "two fractions of the stroke like ['0%', '50%']")
-
-
-def _as_list(value: Any) -> Any:
-    return value if isinstance(value, list) else [value]
 
 
 def _as_bounds(value: Any) -> Any:
     """Return a list of tables for a table or a single value."""
-    return [
-        each if isinstance(each, dict | Bounds) else {"value": each} for each in _as_list(value)
-    ]
-
-
-def read_direction(value: Any) -> tuple[float, ...] | str:
-    """Return a name as it is, and the unit vector of an angle from the x axis or of a vector.
-
-    Examples
-    --------
-    >>> read_direction("left"), read_direction([0, 2]), read_direction([0, 0, 2])
-    ('left', (0.0, 1.0), (0.0, 0.0, 1.0))
-    """
-    if isinstance(value, str) and value in DIRECTIONS[3]:
-        return value
-    if isinstance(value, str) and not value.strip().isdigit():
-        with suppress(InvalidSettings):
-            angle = math.radians(read_quantity("", value, "angle"))
-            return math.cos(angle), math.sin(angle)
-    if isinstance(value, list | tuple) and len(value) in DIRECTIONS:
-        with suppress(TypeError, ValueError, ZeroDivisionError):
-            parts = [float(each) for each in value]
-            size = math.hypot(*parts)
-            if math.isfinite(size):
-                return tuple(each / size for each in parts)
-    raise PydanticCustomError(
-        "direction",
-        "left, right, up, down, an angle like '30deg', or a vector [x, y]; in space also front, "
-        "back and [x, y, z]",
-    )
-
-
-def unit_vector(direction: tuple[float, ...] | str, dimension: int, key: str) -> tuple[float, ...]:
-    """Return the unit vector (d,) of a direction that `read_direction` has read.
-
-    Raises
-    ------
-    InvalidProblem
-        If it is one of the plane in space, or the other way round.
-
-    Examples
-    --------
-    >>> unit_vector("up", 2, "direction"), unit_vector("up", 3, "direction")
-    ((0.0, 1.0), (0.0, 0.0, 1.0))
-    """
-    names = DIRECTIONS[dimension]
-    if isinstance(direction, str):
-        if direction not in names:
-            raise InvalidProblem(
-                f"{key}: expected {', '.join(names)} or a vector in the plane, got {direction!r}"
-            )
-        return names[direction]
-    if len(direction) != dimension:
-        form = f"[{', '.join('xyz'[:dimension])}]"
-        raise InvalidProblem(
-            f"{key}: expected {', '.join(names)} or a vector {form}, got {list(direction)}"
-        )
-    return direction
-
-
-def _switch(quantity: Quantity) -> BeforeValidator:
-    """Return a validator that reads a number with a unit, true or false."""
-
-    def read(value: Any) -> float | bool:
-        if isinstance(value, bool):
-            return value
-        try:
-            return read_quantity("", value, quantity)
-        except InvalidSettings:
-            message = f"{UNITS[quantity].wanted}, true or false"
-            raise PydanticCustomError("unit", message) from None
-
-    return BeforeValidator(read)
-
-
-Pair = Annotated[tuple[Length, Length], BeforeValidator(_as_tuple)]
-Box = Annotated[tuple[Length, ...], BeforeValidator(_as_box)]
-Direction = Annotated[tuple[float, ...] | str, BeforeValidator(read_direction)]
-"""left, right, up, down, in space also front and back, an angle from the x axis, or a vector."""
+    return [each if isinstance(each, dict | Bounds) else {"value": each} for each in as_list(value)]
 
 
 class PartSection(Table):
@@ -239,7 +112,7 @@ class DomainSection(Table):
     """Regions in which all beams are present."""
 
 
-NodeRegions = Annotated[list[NodeRegion], BeforeValidator(_as_list)]
+NodeRegions = Annotated[list[NodeRegion], BeforeValidator(as_list)]
 """A region, or several."""
 
 
@@ -260,7 +133,7 @@ class InputSection(Table):
     """Displacement of each node."""
     force: Force | None = None
     """Total force."""
-    during: Annotated[tuple[Ratio, Ratio] | None, BeforeValidator(_as_range)] = None
+    during: Annotated[tuple[Ratio, Ratio] | None, BeforeValidator(as_range)] = None
     """Fractions of the stroke between which it moves from rest to its full displacement."""
 
 
@@ -269,7 +142,7 @@ class LoadSection(Table):
 
     at: NodeRegions
     direction: Direction
-    force: Annotated[float, _reader("load")] | None = None
+    force: Annotated[float, reader("load")] | None = None
     """Total force, or the mass whose weight acts; it grows with the input."""
     spring: Stiffness | None = None
     """Total stiffness."""
@@ -310,7 +183,7 @@ class PathSection(Table):
 
     points: list[Point] | None = None
     """Corners, from the rest position of the output, which is [0, 0]."""
-    arc: Annotated[tuple[Length, Angle], BeforeValidator(_as_tuple)] | None = None
+    arc: Annotated[tuple[Length, Angle], BeforeValidator(as_tuple)] | None = None
     """Radius and angle of an arc that begins along the direction of the output; a positive angle
     turns left."""
     error: Ratio = 0.01
@@ -354,9 +227,9 @@ class CaseSection(Table):
 class LimitsSection(Table):
     """``[limits]``: what holds in every case."""
 
-    strain: Annotated[Any, _switch("ratio")] = True
+    strain: Annotated[Any, switch("ratio")] = True
     """Largest principal strain; by default that of the material. false for no limit."""
-    clearance: Annotated[Any, _switch("length")] = True
+    clearance: Annotated[Any, switch("length")] = True
     """Smallest gap between struts along the stroke; by default they must not touch."""
     stable_stroke: Ratio | None = None
     """Part of the stroke up to which the part is stable, such as 1.2."""
@@ -376,15 +249,15 @@ class LimitsSection(Table):
 class ToleranceSection(Table):
     """``[tolerance]``: deviations of print and drive over which all items are to be met."""
 
-    width: Ratio = 0.1
+    width: Ratio = USUAL.width
     """Largest deviation of all widths together, as a part of the width."""
-    each_width: Ratio = 0.05
+    each_width: Ratio = USUAL.each_width
     """Standard deviation of the width of each strut, as a part of it."""
     node: Length = 0.1
     """Largest deviation of each coordinate of a node."""
-    angle: Angle = 5.0
+    angle: Angle = USUAL.angle
     """Largest deviation of the direction of the input."""
-    least_yield: Ratio = 0.95
+    least_yield: Ratio = USUAL.least_yield
     """Part of random prints that are to meet all items."""
 
 

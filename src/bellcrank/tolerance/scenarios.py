@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.model import Tolerances
+from bellcrank.model.tolerances import USUAL, Tolerances, out_of_range
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,12 +22,10 @@ if TYPE_CHECKING:
 
 Kind = Literal["nominal", "widths", "input", "stroke", "print", "strut"]
 """Kinds of scenarios. Those of the kind ``"print"`` are random, all others are not."""
+LARGEST = {"width": math.inf, "thin": 0.9, "shortest": 1.0, "longest": 3.0}
+"""Largest values of deviations; the smallest one is 0."""
 NARROWEST = 0.05
 """Least width of a strut, as a part of its nominal width."""
-
-
-USUAL = Tolerances()
-"""Tolerances of parts whose task names none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,13 +66,8 @@ class Deviations:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, most in (
-            ("width", math.inf), ("thin", 0.9), ("shortest", 1.0), ("longest", 3.0),
-        ):  # fmt: skip
-            value = getattr(self, name)
-            if not (math.isfinite(value) and 0.0 <= value <= most):
-                limit = "at least 0" if most == math.inf else f"from 0 to {most:g}"
-                raise InvalidSettings(f"{name}: expected a number {limit}, got {value!r}")
+        if fault := out_of_range(self, LARGEST):
+            raise InvalidSettings(fault)
         if self.prints < 0:
             raise InvalidSettings(f"prints: expected at least 0, got {self.prints}")
 
