@@ -60,6 +60,8 @@ FREE = {"strain", "clearance"}
 """Quantities of the items of ``TASK:free``."""
 WIDTH, NODE = 0.2, 0.1
 """Deviations of all widths, and of coordinates of nodes in mm, of ``TASK:tolerant``."""
+LEAST_YIELD = 0.99
+"""Part of the prints that meets all items of ``TASK:tolerant``."""
 STRUT_LOSS = 0.3
 """Largest part of the efficiency that the loss of a strut costs in ``TASK:redundant``."""
 
@@ -87,7 +89,8 @@ def task_named(name: str) -> Task:
         items = tuple(item for item in wanted.items if item.quantity in FREE)
         asked = replace(wanted, items=items)
     elif case == "tolerant":
-        asked = replace(wanted, tolerances=Tolerances(width=WIDTH, node=NODE / task.part.scale))
+        sizes = Tolerances(width=WIDTH, node=NODE / task.part.scale, least_yield=LEAST_YIELD)
+        asked = replace(wanted, tolerances=sizes)
     elif case == "redundant":
         item = Item(quantity="strut_loss", at_most=STRUT_LOSS)
         asked = replace(wanted, items=(*wanted.items, item))

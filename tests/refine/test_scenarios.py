@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Design, Item, Tolerances
 from bellcrank.refine import RefinementSettings, refine_design
-from bellcrank.refine.choice import ScenarioChoice
+from bellcrank.refine.choice import LARGER, ScenarioChoice
 from bellcrank.refine.row_evaluator import RowEvaluator
-from bellcrank.refine.scenarios import LossRows, ScenarioRows, nearest_rows
+from bellcrank.refine.scenarios import NEAR, PARTS, LossRows, ScenarioRows, reduced_rows
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.search.strut_loss import StrutLosses
@@ -19,6 +21,9 @@ from bellcrank.tolerance import Deviations, Scenario, ScenarioEvaluator, scenari
 
 from .designs import straight_crane
 from .test_gradients import compared_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 TOLERANCES = Tolerances(width=0.15, angle=4.0, node=0.01)
 
@@ -36,8 +41,13 @@ def a_print(design: Design) -> Scenario:
     return scenarios_of(design.problem, design.mask, deviations)[-1]
 
 
-def test_rows_in_a_scenario_have_the_derivatives_of_differences() -> None:
+@pytest.mark.parametrize("with_own_joints", [False, True])
+def test_rows_in_a_scenario_have_the_derivatives_of_differences(*, with_own_joints: bool) -> None:
+    """With joints whose lengths follow the drawn part, and are printed wider or thinner."""
     design = tolerant_crane()
+    if with_own_joints:
+        design = replace(design, problem=with_joints(design.problem, design.mask))
+        assert design.problem.joints is not None
     wanted = design.problem.specification
     assert wanted is not None
     variables = variables_of(design, 0.4, (0.2, 0.4))
@@ -87,8 +97,10 @@ def test_rows_of_scenarios_follow_those_of_the_drawn_part() -> None:
     assert len(set(zip(both.names, both.keys, strict=True))) == len(both.names)
 
 
-def test_a_scenario_that_is_far_from_being_met_is_reduced() -> None:
-    design = tolerant_crane()
+def rows_with_little_sag(
+    design: Design, factor: float
+) -> Callable[[Scenario | None], RowEvaluator]:
+    """Return a function to rows whose only item is a largest sag, a multiple of that of a design."""
     wanted = design.problem.specification
     assert wanted is not None
     variables = variables_of(design, 0.4, (0.2, 0.4))
@@ -96,21 +108,25 @@ def test_a_scenario_that_is_far_from_being_met_is_reduced() -> None:
     evaluator = SpecificationEvaluator(design.problem)
     evaluator.evaluate(design.mask)
     value = next(each.value for each in evaluator.results() if each.item.name == given.name)
-    items = [replace(given, at_most=2.0 * value)]
+    items = [replace(given, at_most=factor * value)]
+    return lambda scenario: RowEvaluator(variables, design.mask, items, scenario=scenario)
+
+
+def test_a_scenario_that_is_far_from_being_met_is_reduced() -> None:
+    design = tolerant_crane()
+    rows_of = rows_with_little_sag(design, 2.0)
+    start = np.zeros(rows_of(None).variables.count)
     thin = Scenario(name="thin", kind="widths", widths=np.full(len(design.mask), 0.3))
-
-    def rows_of(scenario: Scenario | None) -> RowEvaluator:
-        return RowEvaluator(variables, design.mask, items, scenario=scenario)
-
-    start = np.zeros(variables.count)
-    found = nearest_rows(rows_of, [thin, a_print(design)], [], start)
-    assert 1.0 < found.parts < 2.0
-    reduced = found.rows.others[0]
-    assert isinstance(reduced, RowEvaluator)
+    reduced = reduced_rows(rows_of, thin, start)
+    assert reduced is not None
     assert reduced.scenario is not None
     assert reduced.scenario.widths is not None
-    part = found.parts - 1.0
-    assert reduced.scenario.widths == pytest.approx(np.full(len(design.mask), 1.0 - 0.7 * part))
+    width = float(reduced.scenario.widths[0])
+    assert any(1.0 - width == pytest.approx(0.7 * part) for part in PARTS)
+    found = reduced.evaluate(start)
+    assert found is not None
+    assert found.violation <= NEAR
+    assert reduced_rows(rows_with_little_sag(design, 0.01), thin, start) is None
 
 
 def test_the_scenarios_are_extreme_widths_and_directions_then_prints() -> None:
@@ -120,7 +136,11 @@ def test_the_scenarios_are_extreme_widths_and_directions_then_prints() -> None:
         "widths +15 %", "widths -15 %",
         "input turned by +4 degrees", "input turned by -4 degrees",
     ]  # fmt: skip
-    assert len(choice.all) == 4 + 12
+    assert len(choice.all) == len(choice.watched) == 4 + 12
+    larger, given = choice.watched[-1].widths, choice.all[-1].widths
+    assert larger is not None
+    assert given is not None
+    assert larger - 1.0 == pytest.approx(LARGER * (given - 1.0))
     losses = StrutLosses(design.problem).by_strut(design.mask)
     assert choice.lost == sorted(losses, key=lambda beam: -losses[beam])[: len(choice.lost)]
     found = choice.robustness(design)
@@ -128,10 +148,10 @@ def test_the_scenarios_are_extreme_widths_and_directions_then_prints() -> None:
     results = ScenarioEvaluator(design)
     met = [results.evaluate(each).met for each in choice.all]
     assert min(np.mean(met), 0.95) == pytest.approx(found.share)
-    prints = [each for each in found.missed if each.kind == "print"]
-    choice.lost += [beam for beam in losses if beam not in choice.lost]
-    assert choice.add(design, prints) == bool(prints)
-    assert not choice.add(design, prints[:1])
+    judged = choice.judged(design, choice.watched)
+    assert choice.add(judged[-2:])
+    assert [each.name for each in choice.chosen[4:]] == [each.scenario.name for each in judged[-2:]]
+    assert not choice.add(judged[-2:])
 
 
 def test_without_deviations_only_the_drawn_part_counts() -> None:

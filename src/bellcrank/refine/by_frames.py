@@ -10,11 +10,12 @@ import numpy as np
 from bellcrank.mechanics import VERIFICATION_INCREMENT, tightened
 from bellcrank.refine.choice import ScenarioChoice
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
-from bellcrank.refine.refinement import GEOMETRIES, UNSTABLE, RefinementSettings, refine_rows
+from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
 from bellcrank.refine.row_evaluator import STABLE, RowEvaluator
-from bellcrank.refine.scenarios import nearest_rows
+from bellcrank.refine.scenarios import LossRows, ScenarioRows
 from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
 from bellcrank.refine.variables import variables_of
+from bellcrank.refine.watched import WatchedRows
 from bellcrank.search import SpecificationEvaluator
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from bellcrank.model import Design, Item
     from bellcrank.refine.differences import Difference, Records
     from bellcrank.refine.refinement import Progress
-    from bellcrank.refine.scenarios import ScenarioRows
     from bellcrank.tolerance import Scenario
 
     Values = NDArray[np.float64]
@@ -51,10 +51,14 @@ AMPLE = 0.25
 """Margin at which a specification without objectives is met: a part of the size of each bound.
 Larger margins by frames are lost in the sheet, since geometries with large margins by frames have
 large differences."""
+LEAST = -1e9
+"""An objective that all geometries exceed."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
 SCENARIO_ROUNDS = 20
 """Number of further times, each with further scenarios."""
+GROWTH = 0.01
+"""Part by which the objective has to grow in a time for another one."""
 
 
 def stricter(stable: float) -> float:
@@ -77,8 +81,6 @@ class FrameRefinement:
         Bound of the lowest stiffness, over its reference, with which it was found.
     payload
         Factor of the payload that one element in each strut has to carry.
-    missed
-        Scenarios in which the geometry that was evaluated last misses items.
     goes_on
         Whether the refinement has not been stopped.
     """
@@ -99,7 +101,6 @@ class FrameRefinement:
         self.variables = variables_of(design, settings.largest_move, bounds)
         self.choice = ScenarioChoice(design, settings.prints)
         self.chosen = np.zeros(self.variables.count)
-        self.missed: list[Scenario] = []
         self.is_reduced = False
         self.before = self.best = self.state_at(self.chosen)
         self.path = self.tried = [self.chosen]
@@ -115,6 +116,7 @@ class FrameRefinement:
         path: list[Values] = []
         models: Models = (NO_DIFFERENCE,)
         rounds = scenario_rounds = 0
+        reached = LEAST
         while rounds < ROUNDS and scenario_rounds < SCENARIO_ROUNDS:
             least = self.settings.evaluations // 4
             found = self.refined(vector, models, stable, self.settings.steps, least)
@@ -124,7 +126,11 @@ class FrameRefinement:
             # Reduced scenarios get nearer to their full deviations, or others are added.
             has_changed = self.is_reduced and len(self.tried) > 1
             if not self.is_reduced and state.is_stable:
-                has_changed = self.choice.add(self._design_at(vector), self.missed)
+                has_changed = self._is_short(state) and len(self.tried) > 1
+                # Steps end at kinks between scenarios; larger ones lead on.
+                least_objective = reached + GROWTH * max(abs(reached), 0.1)
+                has_changed |= not self.choice.is_empty and state.objective > least_objective
+            reached = state.objective if state.met and not self.is_reduced else LEAST
             scenario_rounds += has_changed
             rounds += not has_changed
             path = [*path, *self.tried]
@@ -133,11 +139,9 @@ class FrameRefinement:
                 self.path, self.stable = path, stable
             is_spent = self.evaluations >= self.settings.evaluations
             is_edge = self.reason == UNSTABLE and not is_spent
-            # Over scenarios, a round has a part of the geometries.
-            is_cut = not (self.choice.is_empty or is_spent) and self.reason.endswith(GEOMETRIES)
             if not state.items or not self.goes_on or (has_changed and is_spent):
                 return
-            if state.met and (has_changed or is_cut):
+            if state.met and has_changed:
                 continue
             if state.met and (is_last or is_spent) and not is_edge:
                 return
@@ -170,11 +174,8 @@ class FrameRefinement:
             it is the last one of all. None if the response is not stable.
         """
         items = [self._tightened(each) for each in self.items if each.quantity != "strut_loss"]
-        evaluator, vector = self._start(items, stable, models, vector)
+        evaluator = self._start(items, stable, models, vector)
         evaluations = max(least, self.settings.evaluations - self.evaluations)
-        if not self.choice.is_empty:
-            # Prints that miss items follow in later rounds.
-            evaluations = min(evaluations, max(least, self.settings.evaluations // 5))
         if self.is_reduced:
             steps = min(steps, REDUCED_STEPS)
         left = replace(self.settings, steps=steps, evaluations=evaluations)
@@ -205,28 +206,33 @@ class FrameRefinement:
 
     def _start(
         self, items: Sequence[Item], stable: float, models: Models, vector: Values
-    ) -> tuple[ScenarioRows, Values]:
-        """Return rows as drawn and in the chosen scenarios, and the geometry to begin with.
+    ) -> ScenarioRows:
+        """Return rows as drawn and in the chosen scenarios.
 
-        It is the last one that is near meeting all scenarios, or the one that is nearest to it
-        among a few; there scenarios are reduced to what it is near meeting.
+        Where the geometry is not near meeting these, they are reduced to what it is near meeting.
         """
+        # A path that is stable under a larger payload may not be so under the given one.
+        payloads = {each.name: each for each in self.items if each.quantity == "payload"}
+        in_scenarios = [payloads.get(each.name, each) for each in items]
 
         def rows_of(scenario: Scenario | None) -> RowEvaluator:
-            return RowEvaluator(self.variables, self.design.mask, items, stable, models, scenario)
+            own = items if scenario is None else in_scenarios
+            return RowEvaluator(self.variables, self.design.mask, own, stable, models, scenario)
 
-        losses = self.choice.loss_rows(self.variables, self.design)
-        path, back, best = [*self.path, *self.tried], 0, None
-        while best is None or (best.parts < len(self.choice.chosen) and back < len(path)):
-            here = path[-back] if back else vector
-            found = nearest_rows(rows_of, self.choice.chosen, losses, here)
-            if best is None or found.parts > best.parts:
-                best, start = found, here
-            back = max(1, 2 * back)
-        self.is_reduced = best.parts < len(self.choice.chosen)
-        if self.is_reduced:
-            best.rows.maximise_margins()
-        return best.rows, start
+        def loss_rows_of(beam: int) -> LossRows:
+            assert self.choice.largest_loss is not None
+            return LossRows(self.variables, self.design.mask, beam, self.choice.largest_loss)
+
+        if self.choice.is_empty:
+            return ScenarioRows(rows_of(None), [])
+        rows = WatchedRows(self.choice, rows_of, loss_rows_of, self._design_at, vector)
+        self.is_reduced = rows.is_reduced
+        return rows
+
+    def _is_short(self, state: State) -> bool:
+        """Whether less than the wanted yield of prints meets all items."""
+        tolerances = self.choice.tolerances
+        return tolerances is not None and state.share < tolerances.least_yield
 
     def state_at(self, vector: Values) -> State:
         """Return the state of a geometry."""
@@ -234,12 +240,10 @@ class FrameRefinement:
         return self._with_robustness(state, vector)
 
     def _with_robustness(self, state: State, vector: Values) -> State:
-        """Return a state with its robustness; `missed` are scenarios that miss items."""
+        """Return a state with its robustness."""
         if self.choice.tolerances is None or not state.is_stable:
-            self.missed = []
             return state
         found = self.choice.robustness(self._design_at(vector))
-        self.missed = found.missed
         return replace(state, share=found.share, objective=found.objective)
 
     def _design_at(self, vector: Values) -> Design:

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.refine.scenarios import LossRows
 from bellcrank.search.strut_loss import StrutLosses
 from bellcrank.tolerance import Deviations, ScenarioEvaluator, scenarios_of
 
@@ -14,18 +13,41 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bellcrank.model import Design, Specification, Tolerances
-    from bellcrank.refine.variables import Variables
     from bellcrank.tolerance import Scenario, ScenarioResult
 
 SEED = 1
 """Seed of the random prints with which the robustness of geometries is computed; they are not those
 of `bellcrank tolerance`."""
+LARGER = 1.15
+"""Factor of the deviations of prints as constraints, so that other prints meet all items too."""
 ADDED = 4
-"""Largest number of scenarios, and of lost struts, that become constraints after each round."""
+"""Largest number of scenarios, and of lost struts, that become constraints at a time."""
 NEAR_LOSS = 0.7
 """Loss of a strut, over the largest one, from which it is a constraint."""
 LOST_STRUTS = 8
 """Number of struts whose losses are constraints from the beginning."""
+
+
+class Judged(NamedTuple):
+    """What a geometry does in a scenario, by frames with one element in each strut.
+
+    Parameters
+    ----------
+    scenario
+        The scenario.
+    margin
+        The smallest margin of its items; minus infinity without a stable path.
+    objective
+        The smallest objective, the smallest margin without any; minus infinity without a stable
+        path.
+    met
+        Whether all items are met.
+    """
+
+    scenario: Scenario
+    margin: float
+    objective: float
+    met: bool
 
 
 class Robustness(NamedTuple):
@@ -38,21 +60,17 @@ class Robustness(NamedTuple):
     objective
         The smallest objective that the wanted yield of them keeps; without objectives, the smallest
         margin.
-    missed
-        Scenarios that miss an item, worst first.
     """
 
     share: float
     objective: float
-    missed: list[Scenario]
 
 
 class ScenarioChoice:
-    """The scenarios of a refinement.
+    """The scenarios of a refinement, and which of them are constraints.
 
     Those in which all widths or the direction of the input deviate as far as is tolerated are
-    constraints from the beginning. Random prints that miss items become constraints round by round,
-    worst first. So do struts whose loss costs much.
+    constraints from the beginning. So are struts whose loss costs much.
 
     Parameters
     ----------
@@ -60,6 +78,15 @@ class ScenarioChoice:
         The design to refine, with a specification.
     prints
         Number of random prints.
+
+    Attributes
+    ----------
+    all
+        All scenarios besides the drawn part.
+    watched
+        The same with larger deviations of the prints; from them constraints are chosen.
+    chosen, lost
+        Scenarios, and lost struts, that are constraints.
     """
 
     def __init__(self, design: Design, prints: int) -> None:
@@ -71,7 +98,8 @@ class ScenarioChoice:
         self.all = [] if self.tolerances is None else _scenarios(design, self.tolerances, prints)
         if not self.all:
             self.tolerances = None
-        self.chosen = [each for each in self.all if each.kind != "print"]
+        self.watched = [each.reduced(LARGER) if each.kind == "print" else each for each in self.all]
+        self.chosen = [each for each in self.watched if each.kind != "print"]
         self.largest_loss = _largest_loss(wanted)
         self.lost: list[int] = []
         if self.largest_loss is not None:
@@ -83,17 +111,18 @@ class ScenarioChoice:
         return self.tolerances is None and self.largest_loss is None
 
     @property
+    def allowed(self) -> int:
+        """Number of scenarios that may be far from being met: other prints miss items too."""
+        if self.tolerances is None:
+            return 0
+        return int(0.5 * (1.0 - self.tolerances.least_yield) * len(self.all))
+
+    @property
     def largest_area(self) -> float:
         """Largest area of the section of a strut over that as drawn, of all struts together."""
         if self.tolerances is None:
             return 1.0
         return float((1.0 + self.tolerances.width) ** self._power)
-
-    def loss_rows(self, variables: Variables, design: Design) -> list[LossRows]:
-        """Return the constraints on lost struts."""
-        if self.largest_loss is None:
-            return []
-        return [LossRows(variables, design.mask, beam, self.largest_loss) for beam in self.lost]
 
     def _near_losses(self, design: Design) -> list[int]:
         """Return the struts whose loss costs about as much as it may, or more, worst first."""
@@ -102,41 +131,44 @@ class ScenarioChoice:
         losses = StrutLosses(design.problem).by_strut(design.mask)
         return sorted((b for b in losses if losses[b] > least), key=lambda beam: -losses[beam])
 
-    def robustness(self, design: Design) -> Robustness:
-        """Return what a geometry does over all scenarios, for a specification with tolerances."""
-        assert self.tolerances is not None
+    def judged(self, design: Design, scenarios: Sequence[Scenario]) -> list[Judged]:
+        """Return what a geometry does in scenarios."""
         try:
             evaluator = ScenarioEvaluator(design)
         except InvalidSettings:
-            return Robustness(0.0, -math.inf, [])
+            return [Judged(each, -math.inf, -math.inf, met=False) for each in scenarios]
         wanted = design.problem.specification
         assert wanted is not None
-        results = [evaluator.evaluate(each) for each in self.all]
         scales = [each.scale for each in wanted.maximise]
-        values = sorted(_objective(result, scales) for result in results)
+        results = ((each, evaluator.evaluate(each)) for each in scenarios)
+        return [
+            Judged(each, _margin(result), _objective(result, scales), result.met)
+            for each, result in results
+        ]
+
+    def robustness(self, design: Design) -> Robustness:
+        """Return what a geometry does over all scenarios, for a specification with tolerances."""
+        assert self.tolerances is not None
+        found = self.judged(design, self.all)
+        values = sorted(each.objective for each in found)
         index = math.floor((1.0 - self.tolerances.least_yield) * len(values) + 1e-9)
-        order = sorted(range(len(results)), key=lambda k: _margin(results[k]))
-        missed = [self.all[k] for k in order if not results[k].met]
-        share = 1.0 - len(missed) / len(results)
-        return Robustness(min(share, self.tolerances.least_yield), values[index], missed)
+        share = sum(each.met for each in found) / len(found)
+        return Robustness(min(share, self.tolerances.least_yield), values[index])
 
-    def add(self, design: Design, missed: Sequence[Scenario]) -> bool:
-        """Make the worst of some scenarios and of the lost struts constraints; whether any is new.
-
-        Parameters
-        ----------
-        design
-            The geometry.
-        missed
-            Scenarios in which it misses items, worst first.
-        """
-        new = [each for each in missed if not any(each is other for other in self.chosen)][:ADDED]
+    def add(self, judged: Sequence[Judged]) -> bool:
+        """Make the first of some scenarios constraints; whether any is new."""
+        known = {id(each) for each in self.chosen}
+        new = [each.scenario for each in judged if id(each.scenario) not in known][:ADDED]
         self.chosen += new
+        return bool(new)
+
+    def add_losses(self, design: Design) -> bool:
+        """Make the struts whose loss costs most constraints; whether any is new."""
         if self.largest_loss is None:
-            return bool(new)
-        lost = [beam for beam in self._near_losses(design) if beam not in self.lost][:ADDED]
-        self.lost += lost
-        return bool(new or lost)
+            return False
+        new = [beam for beam in self._near_losses(design) if beam not in self.lost][:ADDED]
+        self.lost += new
+        return bool(new)
 
 
 def _scenarios(design: Design, tolerances: Tolerances, prints: int) -> list[Scenario]:

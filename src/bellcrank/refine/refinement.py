@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.refine.row_evaluator import RowEvaluator
     from bellcrank.refine.rows import Rows
     from bellcrank.refine.scenarios import ScenarioRows
 
@@ -26,6 +25,8 @@ SHARE = 0.5
 """Part of the variables that change in a step after one that lost stability."""
 SMALLEST_GAIN = 1e-9
 """Predicted improvement below which a step is not tried."""
+CHECKED = 5
+"""Number of steps after which all scenarios are computed."""
 GOOD = 0.5
 """Part of the predicted improvement from which the trust region grows."""
 
@@ -106,7 +107,7 @@ class Progress:
 
 
 def refine_rows(
-    evaluator: RowEvaluator | ScenarioRows,
+    evaluator: ScenarioRows,
     settings: RefinementSettings,
     start: Values | None = None,
 ) -> Iterator[Progress]:
@@ -142,7 +143,7 @@ class _Search:
 
     def __init__(
         self,
-        evaluator: RowEvaluator | ScenarioRows,
+        evaluator: ScenarioRows,
         settings: RefinementSettings,
         start: Values | None,
     ) -> None:
@@ -153,6 +154,7 @@ class _Search:
         self.step, self.evaluations, self.region = 0, 1, settings.first_region
         self.merits = [] if self.rows is None else [merit_of(self.rows, _size(self.rows))]
         self.rng, self.refused = np.random.default_rng(0), 0
+        self.known_merits = len(self.merits)
 
     def progress(self, reason: str = "") -> Progress:
         """Return the present state."""
@@ -220,7 +222,23 @@ class _Search:
         self.vector, self.rows = self.vector + change, after
         self.step, self.refused = self.step + 1, 0
         self.merits.append(self.merits[-1] + gained)
+        if self.step % CHECKED == 0:
+            self._choose_scenarios()
         return True
+
+    def _choose_scenarios(self) -> None:
+        """Choose the scenarios again; go back where others than before are far from being met."""
+        found = self.evaluator.update(self.vector)
+        if found.back is not None:
+            self.vector = found.back
+            del self.merits[self.known_merits :]
+            self._refuse(unstable=True)
+        else:
+            self.known_merits = len(self.merits)
+        if found.is_changed and found.back is None:
+            self.region = max(self.region, 0.5 * self.settings.first_region)
+        if found.is_changed or found.back is not None:
+            self.rows = self._evaluate(np.zeros_like(self.vector), slopes=True) or self.rows
 
     def _evaluate(self, change: Values, *, slopes: bool = False) -> Rows | None:
         self.evaluations += 1

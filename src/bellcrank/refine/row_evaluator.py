@@ -11,6 +11,7 @@ import numpy as np
 from bellcrank.errors import InvalidProblem
 from bellcrank.mechanics import Channel, Status, StrokeRecord, channels_of, quantity_values
 from bellcrank.mechanics.frames.geometry import BeamSlopes, beam_slopes, geometry_slopes
+from bellcrank.mechanics.frames.joints import joint_slopes
 from bellcrank.mechanics.frames.quantities.definition import Measures, Quantity, Slopes, vector
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
 from bellcrank.mechanics.stroke import STATES
@@ -58,19 +59,13 @@ class _Geometry:
     """Responses of one geometry, and what was computed from them by load case."""
 
     vector: Values
+    drawn: Problem
     problem: Problem
     evaluator: SpecificationEvaluator
     channels: dict[str, dict[Channel, Values]] = field(default_factory=dict)
     softest: dict[tuple[str, int], States] = field(default_factory=dict)
     gaps: dict[tuple[str, int], Gaps] = field(default_factory=dict)
     beams: BeamSlopes | None = None
-
-    def beam_slopes(self, mask: NDArray[np.bool_]) -> BeamSlopes:
-        """Return the derivatives of the properties of beams, which are those of all load cases."""
-        if self.beams is None:
-            case = next(iter(self.evaluator.cases.values()))
-            self.beams = beam_slopes(case.evaluator.frame, mask)
-        return self.beams
 
 
 class RowEvaluator:
@@ -164,9 +159,9 @@ class RowEvaluator:
     def _responses(self, vector: Values) -> _Geometry | None:
         """Compute the responses of a geometry; None if one is not stable, or a strut too short."""
         try:
-            problem = self.variables.problem_at(vector)
+            drawn = problem = self.variables.problem_at(vector)
             if self.scenario is not None:
-                problem = self.scenario.of(problem)
+                problem = self.scenario.of(drawn)
         except InvalidProblem:
             return None
         wanted = problem.specification
@@ -189,7 +184,20 @@ class RowEvaluator:
                     lost = math.ceil(response.reached * FRACTIONS) / FRACTIONS
                     self.soft.setdefault((name, 0), set()).add(min(lost, 1.0))
                 return None
-        return _Geometry(vector.copy(), problem, evaluator)
+        return _Geometry(vector.copy(), drawn, problem, evaluator)
+
+    def _beam_slopes(self, here: _Geometry) -> BeamSlopes:
+        """Return the derivatives of the properties of beams, which are those of all load cases."""
+        if here.beams is None:
+            case = next(iter(here.evaluator.cases.values()))
+            joints = None
+            if here.drawn.joints is not None:
+                # Those of the whole drawn part, without deviations and with lost struts.
+                joints = joint_slopes(here.drawn, self.variables.mask)
+                if self.scenario is not None:
+                    joints = self.scenario.joint_slopes(joints)
+            here.beams = beam_slopes(case.evaluator.frame, self.mask, joints)
+        return here.beams
 
     def _gradient(self, positions: Values, widths: Values) -> Values:
         """Return (k, n) derivatives by the variables from those by positions and widths."""
@@ -241,7 +249,7 @@ class RowEvaluator:
     def _channel_gradients(self, here: _Geometry, name: str) -> Gradients | None:
         """Return (c, n) the derivatives of each channel at each of its states."""
         out: Gradients = {}
-        of_beams = here.beam_slopes(self.mask)
+        of_beams = self._beam_slopes(here)
         for point in here.evaluator.cases[name].evaluator.merged_points():
             found = geometry_slopes(point.equilibrium, point.measured, of_beams)
             if found is None:
@@ -270,7 +278,7 @@ class RowEvaluator:
         printed = printed_beams(problem, self.mask, case.frame.structure.present != 0)
         values, gradients = [np.zeros(0)], [np.zeros((0, self.variables.count))]
         keys: list[tuple[int, ...]] = []
-        of_beams = here.beam_slopes(self.mask) if slopes else None
+        of_beams = self._beam_slopes(here) if slopes else None
         for k in range(1, STATES + 1):
             state = case.state(k / STATES)
             if state is None:
@@ -336,7 +344,7 @@ class RowEvaluator:
             keys += [(index, *(round(1e6 * each) for each in row)) for row in near]
             if not slopes or not near:
                 continue
-            rates, of_beams = {}, here.beam_slopes(self.mask)
+            rates, of_beams = {}, self._beam_slopes(here)
             for fraction in {state for each, peak, _ in near for state in (each, peak)}:
                 equilibrium, measures = found[fraction]
                 slope = geometry_slopes(equilibrium, [(LOWEST_STIFFNESS, measures)], of_beams)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
             """As `RowEvaluator.evaluate`."""
 
 
-PARTS = (1.0, 0.85, 0.7, 0.5, 0.3, 0.15)
+PARTS = (0.85, 0.7, 0.5, 0.3, 0.15)
 """Parts of a deviation, the largest first."""
 NEAR = 0.5
 """Largest sum of violations of a scenario that is near to being met."""
@@ -61,12 +61,6 @@ class ScenarioRows:
         """Number of states that were soft or unstable in any geometry, and are constraints."""
         return self.drawn.soft_states + sum(each.soft_states for each in self.others)
 
-    def maximise_margins(self) -> None:
-        """Make the smallest margin the objective."""
-        for each in (self.drawn, *self.others):
-            if isinstance(each, RowEvaluator):
-                each.maximise_margins()
-
     def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
         """Return the rows of a geometry; None if a response is not stable, or a strut too short."""
         found: dict[int, Rows] = {}
@@ -80,57 +74,53 @@ class ScenarioRows:
             found[id(part)] = rows
         return joined([found[id(part)] for part in (self.drawn, *self.others)])
 
+    def update(self, _vector: Values) -> Update:
+        """Return whether the scenarios have changed: never."""
+        return Update()
 
-class NearRows(NamedTuple):
-    """Rows of the scenarios that a geometry is near meeting.
+    def replace_others(self, others: Sequence[Part]) -> None:
+        """Take other scenarios."""
+        self.others = tuple(others)
+        self._order = [self.drawn, *others]
+
+
+class Update(NamedTuple):
+    """What has changed since scenarios were chosen last.
 
     Parameters
     ----------
-    rows
-        Their rows.
-    parts
-        Sum of the parts of the deviations that they have; 0 if the geometry is not near meeting all
-        as drawn.
+    is_changed
+        Whether there are other scenarios.
+    back : (n,) or None
+        The geometry to go back to, if the present one is far from meeting others than before.
     """
 
-    rows: ScenarioRows
-    parts: float
+    is_changed: bool = False
+    back: Values | None = None
 
 
-def nearest_rows(
-    rows_of: Callable[[Scenario | None], RowEvaluator],
-    scenarios: Sequence[Scenario],
-    losses: Sequence[LossRows],
-    vector: Values,
-) -> NearRows:
-    """Return the rows of scenarios, each reduced to the largest part that is near to being met.
+def reduced_rows(
+    rows_of: Callable[[Scenario], RowEvaluator], scenario: Scenario, vector: Values
+) -> RowEvaluator | None:
+    """Return the rows of the largest part of a scenario that a geometry is near meeting.
+
+    None if it is not near meeting even a small part.
 
     Parameters
     ----------
     rows_of
-        Function to the rows of a scenario, and to those as drawn for None.
-    scenarios
-        Scenarios.
-    losses
-        Constraints on lost struts; those where the path is lost are left out.
+        Function to the rows of a scenario.
+    scenario
+        The scenario.
     vector : (n,)
         The geometry.
     """
-    drawn = rows_of(None)
-    now = drawn.evaluate(vector)
-    if now is None:
-        return NearRows(ScenarioRows(drawn, []), 0.0)
-    parts = 0.0
-    others: list[Part] = [each for each in losses if each.evaluate(vector) is not None]
-    for scenario in scenarios if now.violation <= NEAR else ():
-        for part in PARTS:
-            reduced = rows_of(scenario.reduced(part))
-            found = reduced.evaluate(vector)
-            if found is not None and found.violation <= NEAR:
-                others.append(reduced)
-                parts += part
-                break
-    return NearRows(ScenarioRows(drawn, others), parts)
+    for part in PARTS:
+        reduced = rows_of(scenario.reduced(part))
+        found = reduced.evaluate(vector)
+        if found is not None and found.violation <= NEAR:
+            return reduced
+    return None
 
 
 class LossRows:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
+    from scipy.sparse import csr_matrix
 
     from bellcrank.model import Input, Problem
 
@@ -139,6 +140,24 @@ class Scenario:
             problem, lattice=lattice, widths=widths, joints=joints,
             input=self._of_input(problem.input), specification=wanted,
         )  # fmt: skip
+
+    def joint_slopes(self, drawn: csr_matrix) -> csr_matrix:
+        """Return the derivatives of the joints of a print by its positions and widths.
+
+        Parameters
+        ----------
+        drawn : (2 M, N d + M) sparse
+            Those of the drawn part, by the positions and widths drawn.
+        """
+        from scipy.sparse import diags
+
+        if self.widths is None:
+            return drawn
+        by_joint = np.repeat(self.widths, 2)
+        by_column = np.ones(drawn.shape[1])
+        by_column[-len(self.widths) :] = 1.0 / self.widths
+        printed: csr_matrix = diags(by_joint) @ drawn @ diags(by_column)
+        return printed
 
     def _of_input(self, given: Input) -> Input:
         """Return an input with another direction and stroke."""

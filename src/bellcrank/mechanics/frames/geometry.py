@@ -56,11 +56,21 @@ class BeamSlopes(NamedTuple):
     """(N d + M, 2 M) of the lengths of joints by positions and widths."""
 
 
-def beam_slopes(evaluator: FrameEvaluator, mask: NDArray[np.bool_]) -> BeamSlopes:
+def beam_slopes(
+    evaluator: FrameEvaluator, mask: NDArray[np.bool_], joints: csr_matrix | None = None
+) -> BeamSlopes:
     """Return the derivatives of the properties of all beams, by complex steps.
 
-    Joints follow the geometry of the design `mask` (M,) if the problem has joints of its own; else
-    they are in proportion to the width.
+    Parameters
+    ----------
+    evaluator
+        Evaluator of the frame.
+    mask : (M,) bool
+        The design.
+    joints : (2 M, N d + M) sparse, optional
+        Derivatives of the lengths of joints, as `joint_slopes` returns them. By default joints
+        follow the geometry of the design if the problem has joints of its own; else they are in
+        proportion to the width.
     """
     from scipy.sparse import csr_matrix
 
@@ -80,9 +90,9 @@ def beam_slopes(evaluator: FrameEvaluator, mask: NDArray[np.bool_]) -> BeamSlope
         section.append(stiffness.imag / COMPLEX_STEP)
         coefficients = bow_coefficients(frame.rest_length + length, rigid)
         bow.append(coefficients.imag / COMPLEX_STEP * bowed)
-    if problem.joints is not None:
+    if joints is None and problem.joints is not None:
         joints = joint_slopes(problem, mask)
-    else:
+    elif joints is None:
         beams = problem.lattice.beam_count
         columns = problem.lattice.positions.size + np.repeat(np.arange(beams), 2)
         joints = csr_matrix(
