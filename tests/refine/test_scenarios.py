@@ -100,7 +100,7 @@ def test_rows_of_scenarios_follow_those_of_the_drawn_part() -> None:
 def rows_with_little_sag(
     design: Design, factor: float
 ) -> Callable[[Scenario | None], RowEvaluator]:
-    """Return a function to rows whose only item is a largest sag, a multiple of that of a design."""
+    """Return a function to rows whose only item is a largest sag: a multiple of the present one."""
     wanted = design.problem.specification
     assert wanted is not None
     variables = variables_of(design, 0.4, (0.2, 0.4))

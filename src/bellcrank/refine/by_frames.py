@@ -51,14 +51,12 @@ AMPLE = 0.25
 """Margin at which a specification without objectives is met: a part of the size of each bound.
 Larger margins by frames are lost in the sheet, since geometries with large margins by frames have
 large differences."""
-LEAST = -1e9
-"""An objective that all geometries exceed."""
 ROUNDS = 3
 """Number of times a design is refined, each corrected by the result of the one before."""
 SCENARIO_ROUNDS = 20
-"""Number of further times, each with further scenarios."""
+"""Number of further times over scenarios."""
 GROWTH = 0.01
-"""Part by which the objective has to grow in a time for another one."""
+"""Part of the objective by which it has to grow in one of these times for the next."""
 
 
 def stricter(stable: float) -> float:
@@ -116,32 +114,24 @@ class FrameRefinement:
         path: list[Values] = []
         models: Models = (NO_DIFFERENCE,)
         rounds = scenario_rounds = 0
-        reached = LEAST
         while rounds < ROUNDS and scenario_rounds < SCENARIO_ROUNDS:
             least = self.settings.evaluations // 4
             found = self.refined(vector, models, stable, self.settings.steps, least)
             if found is None:
                 return
             state, vector, is_last = found
-            # Reduced scenarios get nearer to their full deviations, or others are added.
-            has_changed = self.is_reduced and len(self.tried) > 1
-            if not self.is_reduced and state.is_stable:
-                has_changed = self._is_short(state) and len(self.tried) > 1
-                # Steps end at kinks between scenarios; larger ones lead on.
-                least_objective = reached + GROWTH * max(abs(reached), 0.1)
-                has_changed |= not self.choice.is_empty and state.objective > least_objective
-            reached = state.objective if state.met and not self.is_reduced else LEAST
-            scenario_rounds += has_changed
-            rounds += not has_changed
+            leads_on = self._leads_on(state)
+            scenario_rounds += leads_on
+            rounds += not leads_on
             path = [*path, *self.tried]
             if is_better(state, self.best):
                 self.best, self.chosen = state, vector
                 self.path, self.stable = path, stable
             is_spent = self.evaluations >= self.settings.evaluations
             is_edge = self.reason == UNSTABLE and not is_spent
-            if not state.items or not self.goes_on or (has_changed and is_spent):
+            if not state.items or not self.goes_on or (leads_on and is_spent):
                 return
-            if state.met and has_changed:
+            if state.met and leads_on:
                 continue
             if state.met and (is_last or is_spent) and not is_edge:
                 return
@@ -229,10 +219,16 @@ class FrameRefinement:
         self.is_reduced = rows.is_reduced
         return rows
 
-    def _is_short(self, state: State) -> bool:
-        """Whether less than the wanted yield of prints meets all items."""
+    def _leads_on(self, state: State) -> bool:
+        """Whether, over scenarios, the design is to be refined again from a state."""
+        if self.choice.is_empty:
+            return False
         tolerances = self.choice.tolerances
-        return tolerances is not None and state.share < tolerances.least_yield
+        is_short = tolerances is not None and state.share < tolerances.least_yield
+        if self.is_reduced or is_short:
+            return len(self.tried) > 1
+        # Steps end at kinks between scenarios; larger ones lead on.
+        return state.objective - self.best.objective > GROWTH * abs(state.objective)
 
     def state_at(self, vector: Values) -> State:
         """Return the state of a geometry."""
