@@ -245,6 +245,8 @@ def counts(rows: list[dict[str, Any]]) -> list[str]:
     Those within the limit without the straight tasks, which have more seeds.
     """
     whole = [row for row in rows if ":" not in row["task"]]
+    if not whole:
+        return []
     plain = [row for row in whole if not row["task"].startswith("straight-")]
     quick = [row for row in plain if row["seconds"] <= LIMIT]
     seconds = median(row["seconds"] for row in whole)
