@@ -11,6 +11,7 @@ import pytest
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.model import Design, Item, Tolerances
 from bellcrank.refine import RefinementSettings, refine_design
+from bellcrank.refine.active import FAR, ROOM, ActiveRows
 from bellcrank.refine.choice import LARGER, ScenarioChoice
 from bellcrank.refine.row_evaluator import RowEvaluator
 from bellcrank.refine.scenarios import NEAR, PARTS, LossRows, ScenarioRows, reduced_rows
@@ -59,8 +60,12 @@ def test_rows_in_a_scenario_have_the_derivatives_of_differences(*, with_own_join
     assert not {"length of struts", "holes between struts"} & compared  # of the drawn part alone
 
 
-def test_the_loss_of_a_strut_has_the_derivative_of_differences() -> None:
+@pytest.mark.parametrize("with_own_joints", [False, True])
+def test_the_loss_of_a_strut_has_the_derivative_of_differences(*, with_own_joints: bool) -> None:
+    """The joints remain those of the whole drawn part."""
     design = tolerant_crane()
+    if with_own_joints:
+        design = replace(design, problem=with_joints(design.problem, design.mask))
     losses = StrutLosses(design.problem).by_strut(design.mask)
     beam = max((each for each in losses if losses[each] < 0.6), key=losses.__getitem__)
     variables = variables_of(design, 0.4, (0.2, 0.4))
@@ -97,27 +102,44 @@ def test_rows_of_scenarios_follow_those_of_the_drawn_part() -> None:
     assert len(set(zip(both.names, both.keys, strict=True))) == len(both.names)
 
 
-def rows_with_little_sag(
-    design: Design, factor: float
-) -> Callable[[Scenario | None], RowEvaluator]:
-    """Return a function to rows whose only item is a largest sag: a multiple of the present one."""
+def with_little_sag(factor: float) -> Design:
+    """Return a design whose only item is a largest sag: a multiple of the present one."""
+    design = tolerant_crane()
     wanted = design.problem.specification
     assert wanted is not None
-    variables = variables_of(design, 0.4, (0.2, 0.4))
     given = next(item for item in wanted.items if item.quantity == "sag")
     evaluator = SpecificationEvaluator(design.problem)
     evaluator.evaluate(design.mask)
     value = next(each.value for each in evaluator.results() if each.item.name == given.name)
-    items = [replace(given, at_most=factor * value)]
-    return lambda scenario: RowEvaluator(variables, design.mask, items, scenario=scenario)
+    wanted = replace(wanted, items=(replace(given, at_most=factor * value),))
+    return replace(design, problem=replace(design.problem, specification=wanted))
+
+
+def rows_of(design: Design) -> Callable[[Scenario | None], RowEvaluator]:
+    """Return the function from a scenario to its rows."""
+    variables, wanted = variables_of(design, 0.4, (0.2, 0.4)), design.problem.specification
+    assert wanted is not None
+    return lambda scenario: RowEvaluator(variables, design.mask, wanted.items, scenario=scenario)
+
+
+def active_rows(design: Design, choice: ScenarioChoice) -> ActiveRows:
+    """Return the rows of active scenarios of a design that is not moved yet."""
+    variables = rows_of(design)(None).variables
+
+    def loss_rows_of(beam: int) -> LossRows:
+        return LossRows(variables, design.mask, beam, 0.3)
+
+    def design_at(vector: np.ndarray) -> Design:
+        return replace(design, problem=variables.problem_at(vector))
+
+    return ActiveRows(choice, rows_of(design), loss_rows_of, design_at, np.zeros(variables.count))
 
 
 def test_a_scenario_that_is_far_from_being_met_is_reduced() -> None:
-    design = tolerant_crane()
-    rows_of = rows_with_little_sag(design, 2.0)
-    start = np.zeros(rows_of(None).variables.count)
+    design = with_little_sag(2.0)
+    start = np.zeros(rows_of(design)(None).variables.count)
     thin = Scenario(name="thin", kind="widths", widths=np.full(len(design.mask), 0.3))
-    reduced = reduced_rows(rows_of, thin, start)
+    reduced = reduced_rows(rows_of(design), thin, start)
     assert reduced is not None
     assert reduced.scenario is not None
     assert reduced.scenario.widths is not None
@@ -126,7 +148,53 @@ def test_a_scenario_that_is_far_from_being_met_is_reduced() -> None:
     found = reduced.evaluate(start)
     assert found is not None
     assert found.violation <= NEAR
-    assert reduced_rows(rows_with_little_sag(design, 0.01), thin, start) is None
+    assert reduced_rows(rows_of(with_little_sag(0.01)), thin, start) is None
+
+
+def test_scenarios_that_a_geometry_misses_are_active_and_those_with_room_are_not() -> None:
+    design = with_little_sag(1.2)
+    choice = ScenarioChoice(design, 8)
+    outcomes = choice.outcomes(design, choice.candidates)
+    assert any(-FAR < each.margin < 0.0 for each in outcomes)
+    rows = active_rows(design, choice)
+    assert not rows.is_reduced
+    active = {each.name for each in choice.chosen}
+    assert {each.scenario.name for each in outcomes if each.margin < 0.0} <= active
+    assert len(rows.others) == len(active) < len(choice.candidates)
+    assert rows.evaluate(np.zeros(rows.variables.count)) is not None
+    wider = np.where(rows.variables.moves, 0.0, 0.1)
+    assert rows.update(wider) == (True, None)
+    # The sag is met with room in all scenarios; those that remain bound the objective.
+    moved = replace(design, problem=rows.variables.problem_at(wider))
+    objectives = {}
+    for each in choice.outcomes(moved, choice.candidates):
+        assert each.margin > ROOM
+        objectives[id(each.scenario)] = each.objective
+    chosen = [objectives[id(each)] for each in choice.chosen]
+    assert min(chosen) == min(objectives.values())
+    assert len(chosen) < len(objectives)
+
+
+def test_a_geometry_that_is_far_from_meeting_a_scenario_is_left() -> None:
+    design = with_little_sag(1.5)
+    rows = active_rows(design, ScenarioChoice(design, 8))
+    start = np.zeros(rows.variables.count)
+    assert rows.update(start).back is None
+    assert rows.update(np.where(rows.variables.moves, 0.0, -0.05)).back is start
+    # A design that is far from meeting all scenarios has no way back.
+    design = with_little_sag(0.5)
+    choice = ScenarioChoice(design, 8)
+    rows = active_rows(design, choice)
+    assert rows.is_reduced
+    assert not choice.chosen
+    assert rows.update(start).back is None
+
+
+def test_scaled_deviations_leave_some_width() -> None:
+    thin = Scenario(name="thin", kind="widths", widths=np.array([0.1, 0.9]), angle=2.0)
+    scaled = thin.scaled(1.15)
+    assert scaled.widths == pytest.approx([0.05, 0.885])
+    assert scaled.angle == pytest.approx(2.3)
 
 
 def test_the_scenarios_are_extreme_widths_and_directions_then_prints() -> None:
@@ -136,8 +204,8 @@ def test_the_scenarios_are_extreme_widths_and_directions_then_prints() -> None:
         "widths +15 %", "widths -15 %",
         "input turned by +4 degrees", "input turned by -4 degrees",
     ]  # fmt: skip
-    assert len(choice.all) == len(choice.watched) == 4 + 12
-    larger, given = choice.watched[-1].widths, choice.all[-1].widths
+    assert len(choice.all) == len(choice.candidates) == 4 + 12
+    larger, given = choice.candidates[-1].widths, choice.all[-1].widths
     assert larger is not None
     assert given is not None
     assert larger - 1.0 == pytest.approx(LARGER * (given - 1.0))
@@ -148,10 +216,10 @@ def test_the_scenarios_are_extreme_widths_and_directions_then_prints() -> None:
     results = ScenarioEvaluator(design)
     met = [results.evaluate(each).met for each in choice.all]
     assert min(np.mean(met), 0.95) == pytest.approx(found.share)
-    judged = choice.judged(design, choice.watched)
-    assert choice.add(judged[-2:])
-    assert [each.name for each in choice.chosen[4:]] == [each.scenario.name for each in judged[-2:]]
-    assert not choice.add(judged[-2:])
+    outcomes = choice.outcomes(design, choice.candidates)[-2:]
+    choice.add(outcomes)
+    choice.add(outcomes)
+    assert [each.name for each in choice.chosen[4:]] == [each.scenario.name for each in outcomes]
 
 
 def test_without_deviations_only_the_drawn_part_counts() -> None:

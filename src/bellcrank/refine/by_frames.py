@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import VERIFICATION_INCREMENT, tightened
+from bellcrank.refine.active import ActiveRows
 from bellcrank.refine.choice import ScenarioChoice
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
@@ -15,7 +16,6 @@ from bellcrank.refine.row_evaluator import STABLE, RowEvaluator
 from bellcrank.refine.scenarios import LossRows, ScenarioRows
 from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
 from bellcrank.refine.variables import variables_of
-from bellcrank.refine.watched import WatchedRows
 from bellcrank.search import SpecificationEvaluator
 
 if TYPE_CHECKING:
@@ -120,18 +120,18 @@ class FrameRefinement:
             if found is None:
                 return
             state, vector, is_last = found
-            leads_on = self._leads_on(state)
-            scenario_rounds += leads_on
-            rounds += not leads_on
+            is_repeated = self._is_repeated(state)
+            scenario_rounds += is_repeated
+            rounds += not is_repeated
             path = [*path, *self.tried]
             if is_better(state, self.best):
                 self.best, self.chosen = state, vector
                 self.path, self.stable = path, stable
             is_spent = self.evaluations >= self.settings.evaluations
             is_edge = self.reason == UNSTABLE and not is_spent
-            if not state.items or not self.goes_on or (leads_on and is_spent):
+            if not state.items or not self.goes_on or (is_repeated and is_spent):
                 return
-            if state.met and leads_on:
+            if state.met and is_repeated:
                 continue
             if state.met and (is_last or is_spent) and not is_edge:
                 return
@@ -199,7 +199,7 @@ class FrameRefinement:
     ) -> ScenarioRows:
         """Return rows as drawn and in the chosen scenarios.
 
-        Where the geometry is not near meeting these, they are reduced to what it is near meeting.
+        Scenarios that the geometry is far from meeting have a part of their deviations.
         """
         # A path that is stable under a larger payload may not be so under the given one.
         payloads = {each.name: each for each in self.items if each.quantity == "payload"}
@@ -215,11 +215,11 @@ class FrameRefinement:
 
         if self.choice.is_empty:
             return ScenarioRows(rows_of(None), [])
-        rows = WatchedRows(self.choice, rows_of, loss_rows_of, self._design_at, vector)
+        rows = ActiveRows(self.choice, rows_of, loss_rows_of, self._design_at, vector)
         self.is_reduced = rows.is_reduced
         return rows
 
-    def _leads_on(self, state: State) -> bool:
+    def _is_repeated(self, state: State) -> bool:
         """Whether, over scenarios, the design is to be refined again from a state."""
         if self.choice.is_empty:
             return False
@@ -227,7 +227,7 @@ class FrameRefinement:
         is_short = tolerances is not None and state.share < tolerances.least_yield
         if self.is_reduced or is_short:
             return len(self.tried) > 1
-        # Steps end at kinks between scenarios; larger ones lead on.
+        # Steps get too small at kinks between scenarios; another time begins with large ones.
         return state.objective - self.best.objective > GROWTH * abs(state.objective)
 
     def state_at(self, vector: Values) -> State:

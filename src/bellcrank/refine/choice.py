@@ -28,7 +28,7 @@ LOST_STRUTS = 8
 """Number of struts whose losses are constraints from the beginning."""
 
 
-class Judged(NamedTuple):
+class Outcome(NamedTuple):
     """What a geometry does in a scenario, by frames with one element in each strut.
 
     Parameters
@@ -83,7 +83,7 @@ class ScenarioChoice:
     ----------
     all
         All scenarios besides the drawn part.
-    watched
+    candidates
         The same with larger deviations of the prints; from them constraints are chosen.
     chosen, lost
         Scenarios, and lost struts, that are constraints.
@@ -98,8 +98,10 @@ class ScenarioChoice:
         self.all = [] if self.tolerances is None else _scenarios(design, self.tolerances, prints)
         if not self.all:
             self.tolerances = None
-        self.watched = [each.reduced(LARGER) if each.kind == "print" else each for each in self.all]
-        self.chosen = [each for each in self.watched if each.kind != "print"]
+        self.candidates = [
+            each.scaled(LARGER) if each.kind == "print" else each for each in self.all
+        ]
+        self.chosen = [each for each in self.candidates if each.kind != "print"]
         self.largest_loss = _largest_loss(wanted)
         self.lost: list[int] = []
         if self.largest_loss is not None:
@@ -131,44 +133,42 @@ class ScenarioChoice:
         losses = StrutLosses(design.problem).by_strut(design.mask)
         return sorted((b for b in losses if losses[b] > least), key=lambda beam: -losses[beam])
 
-    def judged(self, design: Design, scenarios: Sequence[Scenario]) -> list[Judged]:
+    def outcomes(self, design: Design, scenarios: Sequence[Scenario]) -> list[Outcome]:
         """Return what a geometry does in scenarios."""
         try:
             evaluator = ScenarioEvaluator(design)
         except InvalidSettings:
-            return [Judged(each, -math.inf, -math.inf, met=False) for each in scenarios]
+            return [Outcome(each, -math.inf, -math.inf, met=False) for each in scenarios]
         wanted = design.problem.specification
         assert wanted is not None
         scales = [each.scale for each in wanted.maximise]
         results = ((each, evaluator.evaluate(each)) for each in scenarios)
         return [
-            Judged(each, _margin(result), _objective(result, scales), result.met)
+            Outcome(each, _margin(result), _objective(result, scales), result.met)
             for each, result in results
         ]
 
     def robustness(self, design: Design) -> Robustness:
         """Return what a geometry does over all scenarios, for a specification with tolerances."""
         assert self.tolerances is not None
-        found = self.judged(design, self.all)
+        found = self.outcomes(design, self.all)
         values = sorted(each.objective for each in found)
         index = math.floor((1.0 - self.tolerances.least_yield) * len(values) + 1e-9)
         share = sum(each.met for each in found) / len(found)
         return Robustness(min(share, self.tolerances.least_yield), values[index])
 
-    def add(self, judged: Sequence[Judged]) -> bool:
-        """Make the first of some scenarios constraints; whether any is new."""
+    def add(self, outcomes: Sequence[Outcome]) -> None:
+        """Make the first scenarios of some outcomes constraints."""
         known = {id(each) for each in self.chosen}
-        new = [each.scenario for each in judged if id(each.scenario) not in known][:ADDED]
-        self.chosen += new
-        return bool(new)
+        self.chosen += [each.scenario for each in outcomes if id(each.scenario) not in known][
+            :ADDED
+        ]
 
-    def add_losses(self, design: Design) -> bool:
-        """Make the struts whose loss costs most constraints; whether any is new."""
-        if self.largest_loss is None:
-            return False
-        new = [beam for beam in self._near_losses(design) if beam not in self.lost][:ADDED]
-        self.lost += new
-        return bool(new)
+    def add_losses(self, design: Design) -> None:
+        """Make the struts whose loss costs most constraints."""
+        if self.largest_loss is not None:
+            near = self._near_losses(design)
+            self.lost += [beam for beam in near if beam not in self.lost][:ADDED]
 
 
 def _scenarios(design: Design, tolerances: Tolerances, prints: int) -> list[Scenario]:

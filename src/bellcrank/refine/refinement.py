@@ -72,8 +72,6 @@ class RefinementSettings:
     prints: int = 100
 
 
-GEOMETRIES = "geometries"
-"""End of the reason of a refinement that ends after its number of geometries."""
 UNSTABLE = "no step improves the design, and some lose the stability of a path"
 """Reason for which a refinement ends at the edge of a stable region."""
 
@@ -170,7 +168,7 @@ class _Search:
         ends = {
             "no node may move and no width may change": not self.variables.count,
             f"{settings.steps} steps": self.step >= settings.steps,
-            f"{settings.evaluations} {GEOMETRIES}": self.evaluations >= settings.evaluations,
+            f"{settings.evaluations} geometries": self.evaluations >= settings.evaluations,
             UNSTABLE: self.region < settings.smallest_region and self.refused > 0,
             "no step improves the design": self.region < settings.smallest_region,
             f"less than {settings.least_gain:g} gained in {past} steps": stalled,

@@ -52,9 +52,8 @@ class ScenarioRows:
     """
 
     def __init__(self, drawn: RowEvaluator, others: Sequence[Part]) -> None:
-        self.drawn, self.others = drawn, tuple(others)
-        self.variables = drawn.variables
-        self._order: list[Part] = [drawn, *others]
+        self.drawn, self.variables = drawn, drawn.variables
+        self.replace_others(others)
 
     @property
     def soft_states(self) -> int:
@@ -81,7 +80,7 @@ class ScenarioRows:
     def replace_others(self, others: Sequence[Part]) -> None:
         """Take other scenarios."""
         self.others = tuple(others)
-        self._order = [self.drawn, *others]
+        self._order: list[Part] = [self.drawn, *others]
 
 
 class Update(NamedTuple):
@@ -116,7 +115,7 @@ def reduced_rows(
         The geometry.
     """
     for part in PARTS:
-        reduced = rows_of(scenario.reduced(part))
+        reduced = rows_of(scenario.scaled(part))
         found = reduced.evaluate(vector)
         if found is not None and found.violation <= NEAR:
             return reduced

@@ -106,16 +106,17 @@ class Scenario:
     stroke: float = 1.0
     missing: int | None = None
 
-    def reduced(self, part: float) -> Scenario:
-        """Return the scenario with a part of its deviations."""
-        if part == 1.0:
-            return self
+    def scaled(self, factor: float) -> Scenario:
+        """Return the scenario with all deviations multiplied by a factor; no width is too small."""
+        widths = self.widths
+        if widths is not None:
+            widths = np.maximum(1.0 + factor * (widths - 1.0), NARROWEST)
         return replace(
             self,
-            widths=None if self.widths is None else 1.0 + part * (self.widths - 1.0),
-            moves=None if self.moves is None else part * self.moves,
-            angle=part * self.angle,
-            stroke=1.0 + part * (self.stroke - 1.0),
+            widths=widths,
+            moves=None if self.moves is None else factor * self.moves,
+            angle=factor * self.angle,
+            stroke=1.0 + factor * (self.stroke - 1.0),
         )
 
     def of(self, problem: Problem) -> Problem:

@@ -1,4 +1,4 @@
-"""Rows of the scenarios that a geometry is near missing, chosen again as it changes."""
+"""Rows of the active scenarios: those that a geometry is near missing, chosen as it changes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Design
-    from bellcrank.refine.choice import Judged, ScenarioChoice
+    from bellcrank.refine.choice import Outcome, ScenarioChoice
     from bellcrank.refine.row_evaluator import RowEvaluator
     from bellcrank.refine.scenarios import LossRows
     from bellcrank.tolerance import Scenario
@@ -33,7 +33,7 @@ REDUCED = 6
 """Largest number of random prints that are constraints with parts of their deviations."""
 
 
-class WatchedRows(ScenarioRows):
+class ActiveRows(ScenarioRows):
     """Rows as drawn and in those scenarios, of many, that a geometry is near missing.
 
     Scenarios that the first geometry is far from meeting have a part of their deviations. If there
@@ -65,20 +65,19 @@ class WatchedRows(ScenarioRows):
         self._rows_of, self._loss_rows_of = rows_of, loss_rows_of
         self._scenarios: dict[int, RowEvaluator] = {}
         self._losses: dict[int, LossRows] = {}
-        self._near = vector
-        judged = self._judged(vector)
-        judged = sorted(judged, key=lambda each: each.margin)
-        far = [each.scenario for each in judged if each.margin < -FAR]
+        self._accepted = vector
+        outcomes = sorted(self._outcomes(vector), key=lambda each: each.margin)
+        far = [each.scenario for each in outcomes if each.margin < -FAR]
         self._far = {id(each) for each in far}
         extreme = [each for each in far if each.kind != "print"]
         self.is_reduced = bool(extreme) or len(far) > choice.allowed
-        drawn = self._made(None)
+        drawn = self._new_rows(None)
         super().__init__(drawn, [])
         self._reduced: list[RowEvaluator] = []
         now = drawn.evaluate(vector)
         if self.is_reduced and now is not None and now.violation <= NEAR:
             prints = [each for each in far if each.kind == "print"][:REDUCED]
-            found = [reduced_rows(self._made, each, vector) for each in (*extreme, *prints)]
+            found = [reduced_rows(self._new_rows, each, vector) for each in (*extreme, *prints)]
             self._reduced = [each for each in found if each is not None]
         choice.chosen = [
             each
@@ -88,7 +87,7 @@ class WatchedRows(ScenarioRows):
         choice.lost = [
             beam for beam in choice.lost if self._loss_rows(beam).evaluate(vector) is not None
         ]
-        self._choose_near(judged, vector)
+        self._choose_near(outcomes, vector)
 
     def update(self, vector: Values) -> Update:
         """Choose the scenarios again: those that the geometry misses, and those that bound it.
@@ -96,29 +95,29 @@ class WatchedRows(ScenarioRows):
         Where it is far from meeting one that was near at the last call, the geometry of that call
         is `Update.back`.
         """
-        judged = self._judged(vector)
-        far = {id(each.scenario) for each in judged if each.margin < -FAR}
+        outcomes = self._outcomes(vector)
+        far = {id(each.scenario) for each in outcomes if each.margin < -FAR}
         is_back = not far <= self._far and len(far) > self.choice.allowed
         if not is_back:
-            self._far, self._near = far, vector
-        is_changed = self._choose_near(judged, vector)
-        return Update(is_changed=is_changed, back=self._near if is_back else None)
+            self._far, self._accepted = far, vector
+        is_changed = self._choose_near(outcomes, vector)
+        return Update(is_changed=is_changed, back=self._accepted if is_back else None)
 
-    def _judged(self, vector: Values) -> list[Judged]:
-        """Return what a geometry does in each scenario that is watched."""
-        return self.choice.judged(self.design_at(vector), self.choice.watched)
+    def _outcomes(self, vector: Values) -> list[Outcome]:
+        """Return what a geometry does in each candidate."""
+        return self.choice.outcomes(self.design_at(vector), self.choice.candidates)
 
-    def _choose_near(self, judged: Sequence[Judged], vector: Values) -> bool:
+    def _choose_near(self, outcomes: Sequence[Outcome], vector: Values) -> bool:
         """Choose the scenarios that are near, and lost struts; whether others than before."""
         choice = self.choice
         before = [*choice.chosen], [*choice.lost]
         choice.chosen = self._without_room(vector)
         chosen = {id(each) for each in choice.chosen}
-        bounds = [each.objective for each in judged if id(each.scenario) in chosen]
+        bounds = [each.objective for each in outcomes if id(each.scenario) in chosen]
         smallest = min(bounds, default=math.inf)
-        room = {id(each): _room(each, smallest) for each in judged}
+        room = {id(each): _room(each, smallest) for each in outcomes}
         near = [
-            each for each in judged if id(each.scenario) not in self._far and room[id(each)] < 0.0
+            each for each in outcomes if id(each.scenario) not in self._far and room[id(each)] < 0.0
         ]
         choice.add(sorted(near, key=lambda each: room[id(each)]))
         choice.add_losses(self.design_at(vector))
@@ -126,12 +125,12 @@ class WatchedRows(ScenarioRows):
         choice.chosen = [
             each
             for each in choice.chosen
-            if id(each) in chosen or self._rows_in(each).evaluate(self._near) is not None
+            if id(each) in chosen or self._rows_in(each).evaluate(self._accepted) is not None
         ]
         choice.lost = [
             beam
             for beam in choice.lost
-            if beam in before[1] or self._loss_rows(beam).evaluate(self._near) is not None
+            if beam in before[1] or self._loss_rows(beam).evaluate(self._accepted) is not None
         ]
         self.replace_others(
             [
@@ -158,7 +157,7 @@ class WatchedRows(ScenarioRows):
             or found.objective < bound
         ]
 
-    def _made(self, scenario: Scenario | None) -> RowEvaluator:
+    def _new_rows(self, scenario: Scenario | None) -> RowEvaluator:
         """Return new rows of a scenario."""
         rows = self._rows_of(scenario)
         if self.is_reduced:
@@ -168,7 +167,7 @@ class WatchedRows(ScenarioRows):
     def _rows_in(self, scenario: Scenario) -> RowEvaluator:
         """Return the rows of a scenario."""
         if id(scenario) not in self._scenarios:
-            self._scenarios[id(scenario)] = self._made(scenario)
+            self._scenarios[id(scenario)] = self._new_rows(scenario)
         return self._scenarios[id(scenario)]
 
     def _loss_rows(self, beam: int) -> LossRows:
@@ -178,7 +177,7 @@ class WatchedRows(ScenarioRows):
         return self._losses[beam]
 
 
-def _room(judged: Judged, smallest: float) -> float:
+def _room(outcome: Outcome, smallest: float) -> float:
     """Return the margin of a scenario, or how far its objective is above the smallest one."""
-    above = (judged.objective - smallest) / max(abs(smallest), 0.1) + NEARLY
-    return min(judged.margin, above if math.isfinite(smallest) else math.inf)
+    above = (outcome.objective - smallest) / max(abs(smallest), 0.1) + NEARLY
+    return min(outcome.margin, above if math.isfinite(smallest) else math.inf)
