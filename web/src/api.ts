@@ -18,19 +18,64 @@ export interface Problem {
   /** Cross-section and material of the beams of a frame, in lattice units; without them a problem is one of the spring model. */
   section?: { shape: string; width?: number; thickness?: number; diameter?: number } | null;
   material?: { young: number; poisson: number } | null;
+  /** Names of the first load case and its output, other outputs and load cases, and what is wanted of them. */
+  specification?: Specification | null;
+}
+
+export interface Specification {
+  case: string;
+  output: string;
+  outputs?: Record<string, Problem["output"]>;
+  cases?: { name: string; input: Problem["input"]; outputs: Record<string, Problem["output"]> }[];
+  items: unknown[];
+  maximise: unknown[];
 }
 
 /** The mechanical model of a problem in words. */
 export function modelOf(problem: Problem): string { return problem.section ? "frames" : "spring model"; }
+
+/** An item of a specification: what is wanted, and what a design reaches in one model. */
+export interface ItemState { name: string; label: string; wanted: string; reached: string; margin: number | null; met: boolean }
+
+/** Figures of an output in one load case; none if the path is not stable. */
+export interface PartFigures {
+  case: string;
+  output: string;
+  status: string;
+  efficiency?: number | null;
+  travel_mm?: number | null;
+  off_axis?: number | null;
+  rotation_deg?: number | null;
+  payload_N?: number | null;
+  sag_mm?: number | null;
+  largest_input_force_N?: number | null;
+  strain?: number | null;
+  path_mm?: Point[];
+}
+
+export interface PartReport {
+  specified: boolean;
+  items: { search: ItemState[] | null; frames: ItemState[] | null };
+  figures: PartFigures[];
+}
 
 export interface Response {
   status: string;
   message: string;
   efficiency: number | null;
   displacement: number[] | null;
+  items: ItemState[] | null;
 }
 
 export interface Motion {
+  /** Names of all load cases. */
+  cases: string[];
+  /** Nodes of the load case of this motion. */
+  input: number[];
+  outputs: Record<string, number[]>;
+  supports: number[];
+  /** Displacement of the input in lattice units; none for a force. */
+  stroke: number | null;
   part: number[];
   displacement: number[][];
   energy: number[][];
@@ -63,6 +108,8 @@ export interface RunDetails extends Run {
   mask: string | null;
   provenance: Record<string, unknown>;
   comparison: Comparison | null;
+  /** Table of the task, as in a task file, if the search was started from one. */
+  task: Record<string, unknown> | null;
 }
 
 export type TracePoint = [number, number | null, number | null, number];
@@ -75,7 +122,8 @@ export interface RunUpdate {
   speed: number | null;
   left: number | null;
   tried: [number, number] | null;
-  moved: { mask: string; efficiency: number | null; displacement: number[] | null } | null;
+  refined: { designs: number; geometries: number; objective: number | null } | null;
+  moved: { mask: string; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null } | null;
   error?: { message: string };
 }
 

@@ -22,6 +22,9 @@ export class Player {
   private readonly slider = h("input", { type: "range", min: 0, max: 1000, value: "1000", "aria-label": "Fraction of the stroke" });
   private readonly playButton = h("button", { type: "button", class: "round", onclick: () => this.toggle() });
   private readonly stress = s("g", { class: "stress" });
+  private readonly path = s("path", { class: "output-path", "aria-hidden": "true" });
+  private readonly cases = h("div", { class: "cases" });
+  private loadCase = "";
   private motion: Motion | null = null;
   private beams: number[] = [];
   private part = 1;
@@ -41,7 +44,7 @@ export class Player {
 
   constructor(private readonly problem: Problem, private readonly mask: string, private readonly scale: number) {
     this.drawing.setLattice(problem.positions, problem.beams);
-    this.drawing.overlay.append(this.stress);
+    this.drawing.overlay.append(this.stress, this.path);
     const bits = bitsOf(mask, problem.beams.length);
     this.beams = where(bits);
     this.drawing.ghost("rest", this.beams);
@@ -51,7 +54,7 @@ export class Player {
     times.addEventListener("input", () => { this.times = Number(times.value); size.textContent = `× ${this.times}`; this.show(); });
     this.controls.append(this.playButton, this.slider,
       h("span", { class: "amplify" }, field("Amplify", times), size));
-    this.element.append(h("div", { class: "paper" }, this.readout, this.drawing.svg), this.controls,
+    this.element.append(this.cases, h("div", { class: "paper" }, this.readout, this.drawing.svg), this.controls,
       h("div", { class: "row between colour" }, this.colours(), this.legend));
     this.setPlaying(false);
     this.drawing.svg.addEventListener("pointermove", (event) => this.point(event));
@@ -85,8 +88,10 @@ export class Player {
 
   private async load(): Promise<void> {
     try {
-      this.motion = await post<Motion>("/motion", { problem: this.problem, mask: this.mask });
+      this.motion = await post<Motion>("/motion", { problem: this.problem, mask: this.mask, case: this.loadCase });
       this.drawing.makeRoom(this.beams, this.motion.displacement.at(-1)!);
+      this.showCases(this.motion);
+      this.drawPaths(this.motion);
       this.show();
       this.element.dataset.ready = "yes";
       this.onMotion(this.motion);
@@ -94,6 +99,28 @@ export class Player {
     } catch (error) {
       this.onError(sentence((error as Error).message));
     }
+  }
+
+  /** Offer the load cases of a task that has several. */
+  private showCases({ cases }: Motion): void {
+    if (cases.length < 2) return;
+    clear(this.cases, choice("Load case", cases.map((name): [string, string] => [name, name]), this.loadCase || cases[0]!, (picked) => {
+      this.loadCase = picked;
+      this.stop();
+      void this.load();
+    }));
+  }
+
+  /** Draw the path of each output, from rest to the full stroke. */
+  private drawPaths({ displacement, outputs }: Motion): void {
+    const { rest } = this.drawing;
+    const mean = (nodes: number[], at: (index: number) => number, axis: number): number =>
+      nodes.reduce((sum, node) => sum + at(2 * node + axis), 0) / nodes.length;
+    const d = Object.values(outputs).flatMap((nodes) => displacement.map((moved, k) => {
+      const [x, y] = [0, 1].map((axis) => mean(nodes, (index) => rest[index]! + moved[index]!, axis)) as [number, number];
+      return `${k ? "L" : "M"}${x.toFixed(3)} ${(-y).toFixed(3)}`;
+    })).join("");
+    this.path.setAttribute("d", d);
   }
 
   private async loadSensitivity(): Promise<void> {
@@ -163,16 +190,19 @@ export class Player {
     else if (this.colour === "energy" && energy) drawing.draw(binned(this.beams, energy));
     else drawing.draw([{ name: "plain", beams: this.beams }]);
     if (stressed) for (const name of ["support", "input", "output"]) drawing.mark(name, []);
-    else drawing.markRegions(this.problem);
+    else if (motion) {
+      drawing.mark("support", motion.supports);
+      drawing.mark("input", motion.input);
+      drawing.mark("output", Object.values(motion.outputs).flat());
+    } else drawing.markRegions(this.problem);
     if (!calm) this.showLegend();
   }
 
   private showReadout(motion: Motion, k: number, t: number): void {
     const near = t > 0.5 ? k + 1 : k;
-    const { input } = this.problem;
-    const stroke = input.drive === "displacement" ? `${figure(this.part * input.amount * this.scale, 2)} mm in` : `${figure(100 * this.part, 0)} % of the force`;
+    const stroke = motion.stroke === null ? `${figure(100 * this.part, 0)} % of the force` : `${figure(this.part * motion.stroke * this.scale, 2)} mm in`;
     const efficiency = motion.efficiency[near] ?? null;
-    const out = efficiency === null || input.drive !== "displacement" ? "" : `${figure(this.part * input.amount * this.scale * efficiency, 2)} mm out`;
+    const out = efficiency === null || motion.stroke === null ? "" : `${figure(this.part * motion.stroke * this.scale * efficiency, 2)} mm out`;
     const lines = [figure(efficiency, 3), modelOf(this.problem), stroke, out, motion.snapped[near] ? "after a snap-through" : ""];
     if (this.readout.childElementCount !== 5) {
       clear(this.readout, h("strong"), h("span"), h("span"), h("span"), h("span", { class: "alarm" }));

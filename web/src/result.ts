@@ -1,10 +1,11 @@
-// The panel beside a design: efficiency, part, files and next steps.
+// The panel beside a design: its specification, figures, part, files and next steps.
 
-import { fetchBlob, fetchFile, fetchRegistries, get, modelOf, post, type Comparison, type Part, type Problem, type Registries, type ServerError } from "./api";
+import { fetchBlob, fetchFile, fetchRegistries, get, post, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError } from "./api";
 import { bitsOf, hexOf } from "./api";
 import { TASK_KEY } from "./begin";
 import { button, clear, download, field, figure, h, number, select } from "./dom";
 import { Player, type Picture } from "./player";
+import { figureTable, itemTable, verdictOf, type Column } from "./specification";
 import { taskOf } from "./task";
 import { fileName, REMEDIES, sentence } from "./text";
 
@@ -20,15 +21,19 @@ export interface Subject {
   history: string | null;
   /** Name of the plan, if it is a bundled machine. */
   plan: string | null;
+  /** Table of the task that it was searched for, if there is one. */
+  task: Record<string, unknown> | null;
 }
 
-interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null }
+interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null }
 interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[] }
 
 export class Result {
   readonly player: Player;
   readonly element = h("aside", { class: "panel", "aria-label": "Result" });
   private readonly headline = h("p", { class: "headline" });
+  private readonly verdict = h("p", { class: "verdict", role: "status" });
+  private readonly reportBox = h("div", { class: "report" });
   private readonly warnings = h("ul", { class: "warnings", role: "alert" });
   private readonly advice = h("div", { class: "advice" });
   private readonly table = h("table", { class: "figures" });
@@ -36,6 +41,8 @@ export class Result {
   private readonly partBox = h("div", { class: "content" });
   private readonly filesBox = h("div", { class: "content" });
   private part: Part;
+  private report: PartReport | string | null = null;
+  private reports = 0;
   private fems: Record<string, Fem | "running" | string> = {};
   private registries: Registries | null = null;
   private remarks: Remarks | null = null;
@@ -46,12 +53,8 @@ export class Result {
     this.player = new Player(subject.problem, subject.mask, this.part.scale);
     this.player.onError = (text) => { this.trouble.textContent = text; };
     this.player.onStressRequested = () => void this.validate("frame");
-    this.player.onMotion = ({ efficiency }) => {
-      this.subject.efficiency ??= efficiency.at(-1) ?? null;
-      this.showTable();
-    };
     this.element.append(
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Efficiency"), this.headline, this.warnings, this.advice, this.table, this.trouble),
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Result"), this.headline, this.verdict, this.warnings, this.advice, this.reportBox, this.table, this.trouble),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Part"), this.partBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Download"), this.filesBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Next steps"), this.nextSteps()));
@@ -59,6 +62,7 @@ export class Result {
     this.showPart();
     this.showFiles();
     void this.describe();
+    void this.loadReport();
     if (this.isPart) void this.validate("frame", false);
     void fetchRegistries().then((found) => {
       this.registries = found;
@@ -73,33 +77,59 @@ export class Result {
 
   close(): void { this.player.close(); }
 
-  /** Show the efficiency of the most detailed model that has been computed, with its name and the warnings. */
-  private showHeadline(): void {
-    const { problem } = this.subject;
-    const known = this.fems["frame"];
-    const frame = typeof known === "object" ? known : null;
-    const useFrame = frame !== null && frame.efficiency !== null;
-    const quantity = problem.input.drive === "displacement" && (problem.objective ?? "displacement") === "displacement" ? "Output displacement / input displacement"
-      : `Objective: ${problem.objective ?? "output / input"}`;
-    clear(this.headline, h("strong", {}, figure(useFrame ? frame.efficiency : this.subject.efficiency, 2)),
-      h("span", {}, h("b", { class: "model" }, useFrame ? `frame of ${this.part.width} mm struts` : modelOf(problem)), h("br"), quantity));
-    const warnings = frame ? [...frame.warnings, ...frame.doubts] : [];
-    clear(this.warnings, ...warnings.map((text) => h("li", {}, sentence(text))));
+  private async loadReport(): Promise<void> {
+    const asked = ++this.reports;
+    this.report = null;
+    this.showTable();
+    const { problem, mask } = this.subject;
+    let found: PartReport | string;
+    try {
+      found = await post<PartReport>("/report", { problem, mask, part: this.part });
+    } catch (error) {
+      found = sentence((error as ServerError).message);
+    }
+    if (asked !== this.reports) return;
+    this.report = found;
+    this.showTable();
   }
 
-  /** Suggestions for a design that does not move as required. */
-  private showAdvice(): void {
-    const { efficiency, comparison } = this.subject;
-    if (efficiency === null) return;
-    const better = comparison?.efficiency ?? null;
-    const defect = efficiency <= 0 ? "The output does not move in its direction."
-      : better !== null && better > efficiency ? "The design drawn by hand has a higher efficiency." : "";
+  /** Show the figures of the part, and whether it meets its specification. */
+  private showReport(): void {
+    const { report } = this;
+    const frame = this.fems["frame"];
+    const warnings = typeof frame === "object" ? [...frame.warnings, ...frame.doubts] : [];
+    clear(this.warnings, ...warnings.map((text) => h("li", {}, sentence(text))));
+    if (report === null || typeof report === "string") {
+      clear(this.headline, h("strong", {}, "–"), h("span", {}, report ?? h("span", {}, h("span", { class: "working" }), "computing the part …")));
+      clear(this.verdict);
+      clear(this.reportBox);
+      return;
+    }
+    const first = report.figures[0];
+    clear(this.headline, h("strong", {}, figure(first?.efficiency, 2)),
+      h("span", {}, h("b", { class: "model" }, "frames, 8 elements in each strut"), h("br"),
+        `Output / input motion of the part with ${this.part.width} mm struts`));
+    const columns: Column[] = [];
+    if (report.items.search) columns.push({ title: "search", items: report.items.search });
+    if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
+    const sheet = this.fems["plane"];
+    if (typeof sheet === "object" && sheet.items) columns.push({ title: "sheet", items: sheet.items });
+    const last = columns.at(-1)?.items ?? null;
+    const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
+    const isMet = last !== null && last.every(({ met }) => met) && !unstable;
+    this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? "met" : "missed"}`;
+    clear(this.verdict, unstable ? "The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."
+      : last ? `${verdictOf(last)} (${columns.at(-1)!.title === "sheet" ? "in the sheet" : "by frames"}).` : "No specification: the task says nothing about straightness, rotation or load.");
+    clear(this.reportBox, columns.length > 0 && itemTable(columns), figureTable(report.figures));
+    const better = this.subject.comparison?.efficiency ?? null;
+    const defect = unstable || (first.efficiency ?? 0) <= 0 ? "The output does not move in its direction along a stable path."
+      : last && !isMet ? "The specification is not met."
+      : better !== null && this.subject.efficiency !== null && better > this.subject.efficiency ? "The design drawn by hand has a higher efficiency." : "";
     clear(this.advice, defect && h("p", {}, defect), defect && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
   }
 
   private showTable(): void {
-    this.showHeadline();
-    this.showAdvice();
+    this.showReport();
     const { efficiency, comparison, mask } = this.subject;
     const beams = bitsOf(mask, this.subject.problem.beams.length).reduce((a, b) => a + b, 0);
     const rows: (HTMLElement | null)[] = [
@@ -146,8 +176,8 @@ export class Result {
     const change = (changes: Partial<Part>): void => {
       this.part = { ...this.part, ...changes };
       this.fems = {};
-      this.showTable();
       void this.describe();
+      void this.loadReport();
     };
     const size = (key: "width" | "thickness" | "scale", label: string): HTMLElement =>
       field(label, number(this.part[key], { min: 0.1, step: "any" }, (value) => change({ [key]: value })), "mm");
@@ -236,5 +266,5 @@ function partOf(subject: Subject): Partial<Part> {
 /** Load a design of the gallery. */
 export async function designSubject(source: string, key: string): Promise<Subject> {
   const whole = await get<{ title: string; problem: Problem; note: string; mask: string; efficiency: number | null; provenance: Record<string, unknown> }>(`/gallery/${source}/${key}`);
-  return { ...whole, comparison: null, part: null, history: null, plan: source === "machines" ? key : null };
+  return { ...whole, comparison: null, part: null, history: null, plan: source === "machines" ? key : null, task: null };
 }

@@ -6,6 +6,7 @@ import { Chart } from "./chart";
 import { Drawing, where } from "./drawing";
 import { announce, button, choice, clear, count, duration, figure, h } from "./dom";
 import { Result } from "./result";
+import { itemTable, verdictOf } from "./specification";
 import { runMessage, REMEDIES, sentence } from "./text";
 
 export class RunPage {
@@ -14,6 +15,7 @@ export class RunPage {
   private readonly chart = new Chart();
   private readonly head = h("div", { class: "intro" });
   private readonly live = h("div", { class: "live" });
+  private readonly items = h("div", { class: "report" });
   private readonly stage = h("section", { class: "stage", "aria-label": "Design" });
   private readonly controls = h("div", { class: "buttons" });
   private readonly trouble = h("p", { class: "fault", role: "alert" });
@@ -41,7 +43,7 @@ export class RunPage {
       h("h2", {}, "Efficiency along the search"), this.chart.svg,
       this.curveNote);
     this.watch = h("aside", { class: "panel", "aria-label": "Search" },
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.controls, this.trouble));
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.items, this.controls, this.trouble));
     this.side.append(this.watch);
     this.element.append(this.head, h("div", { class: "main" }, this.stage, card), this.side);
     this.show(run);
@@ -120,7 +122,7 @@ export class RunPage {
     this.result?.element.remove();
     this.result = new Result({
       title: whole.title, problem: whole.problem, mask: whole.mask, efficiency: whole.efficiency, provenance: whole.provenance,
-      comparison: whole.comparison, part: whole.part, history: whole.id, plan: null,
+      comparison: whole.comparison, part: whole.part, history: whole.id, plan: null, task: whole.task,
     });
     clear(this.stage, this.result.player.element);
     this.side.prepend(this.result.element);
@@ -142,10 +144,13 @@ export class RunPage {
     const done = run.status === "finished" ? run.total : Math.max(run.done, made);
     const share = Math.min(1, done / run.total);
     const running = run.status === "running";
+    const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
-    const last: [string, string] = tried ? ["candidates verified", `${tried[0]} of at most ${tried[1]}`] : ["time left", duration(this.update?.left)];
+    const refined = this.update?.refined;
+    const last: [string, string] = refined ? ["refinement", `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.objective === null ? "" : `, best ${figure(refined.objective, 2)}`}`]
+      : tried ? ["candidates verified", `${tried[0]} of at most ${tried[1]}`] : ["time left", duration(this.update?.left)];
     const rows: [string, string][] = [
-      ["best so far", figure(run.efficiency ?? this.chart.best, 3)],
+      [specified ? "largest objective" : "best so far", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
       ...(running ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], last] as [string, string][] : []),
       ["method", `${this.method?.title ?? run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
@@ -158,12 +163,20 @@ export class RunPage {
     }
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
+    const reached = this.update?.moved?.items;
+    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the best design so far, before refinement.`),
+      !this.result && reached && itemTable([{ title: "search", items: reached }]));
     if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {
       const moved = this.update?.moved;
       const value = moved?.efficiency ?? run.efficiency ?? this.chart.best;
       clear(this.readout, value !== null && h("strong", {}, figure(value, 3)), h("span", {}, this.stateText(run, value !== null, done)));
     }
+  }
+
+  private bestText(run: Run): string {
+    const best = run.efficiency ?? this.chart.best;
+    return best === null && this.run.problem.specification && this.chart.curves.size ? "no design meets all items yet" : figure(best, 3);
   }
 
   /** Show why a search has no design, and suggestions. */

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Any, NamedTuple
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from fastapi.responses import Response
@@ -21,6 +21,7 @@ from bellcrank.web.requests import (
     FemBody,
     FileBody,
     FileSuffix,
+    MotionBody,
     PartBody,
     PlanBody,
     SaveDesignBody,
@@ -32,10 +33,10 @@ router = APIRouter(prefix="/api", tags=["designs"])
 
 
 @router.post("/motion")
-async def get_motion(body: DesignBody, state: State) -> dict[str, Any]:
+async def get_motion(body: MotionBody, state: State) -> dict[str, Any]:
     """Return the states of a design along its path, from rest to the full stroke."""
     text = json.dumps(body.problem)
-    return await state.pools.thorough.call(quick_calls.motion, text, body.mask)
+    return await state.pools.thorough.call(quick_calls.motion, text, body.mask, body.case)
 
 
 @router.post("/sensitivity")
@@ -50,6 +51,13 @@ async def describe_part(body: PartBody, state: State) -> dict[str, Any]:
     """Return size, mass and printability remarks of the part of a design."""
     text = json.dumps(body.problem)
     return await state.pools.thorough.call(slow_calls.part_summary, text, body.mask, body.part)
+
+
+@router.post("/report")
+async def report_part(body: PartBody, state: State) -> dict[str, Any]:
+    """Return the items of the specification of a design, and its figures as a part."""
+    text = json.dumps(body.problem)
+    return await state.pools.thorough.call(quick_calls.part_report, text, body.mask, body.part)
 
 
 @router.post("/validation")
@@ -120,11 +128,11 @@ async def build_machine(body: PlanBody, state: State) -> dict[str, Any]:
 async def edit(socket: WebSocket, state: State) -> None:
     """Return the response of each design that a client sends.
 
-    A message is ``{"id": number, "problem": ..., "mask": hex}``; without ``problem``, the problem
-    of the previous message is used.
+    A message is ``{"id": number, "problem": ..., "part": ..., "mask": hex, "verified": bool}``;
+    without ``problem``, the problem and the part of the previous message are used.
     """
     await socket.accept()
-    text = ""
+    text, part = "", {}
     while True:
         try:
             raw = await socket.receive_text()
@@ -132,18 +140,31 @@ async def edit(socket: WebSocket, state: State) -> None:
             return
         number: Any = None
         try:
-            number, problem, mask = _read_edit(raw)
-            if problem is not None:
-                text = json.dumps(problem)
+            message = _read_edit(raw)
+            number = message.number
+            if message.problem is not None:
+                text, part = json.dumps(message.problem), message.part
             if not text:
                 raise InvalidFile("problem: is missing")
-            result = await state.pools.quick.call(quick_calls.evaluate, text, mask)
+            result = await state.pools.quick.call(
+                quick_calls.evaluate, text, message.mask, part, verified=message.verified
+            )
         except BellcrankError as error:
             result = {"error": plain_error(error)}
         await socket.send_text(json.dumps({"id": number, **result}, separators=(",", ":")))
 
 
-def _read_edit(raw: str) -> tuple[Any, dict[str, Any] | None, str]:
+class _Edit(NamedTuple):
+    """A message of the editor."""
+
+    number: int | None
+    problem: dict[str, Any] | None
+    part: dict[str, Any]
+    mask: str
+    verified: bool
+
+
+def _read_edit(raw: str) -> _Edit:
     """Read a message of the editor.
 
     Raises
@@ -162,5 +183,14 @@ def _read_edit(raw: str) -> tuple[Any, dict[str, Any] | None, str]:
     problem = data.get("problem")
     if problem is not None and not isinstance(problem, dict):
         raise InvalidFile("problem: expected a table")
+    part = data.get("part", {})
+    if not isinstance(part, dict):
+        raise InvalidFile("part: expected a table")
     number = data.get("id")
-    return (number if isinstance(number, int) else None), problem, mask
+    return _Edit(
+        number if isinstance(number, int) else None,
+        problem,
+        part,
+        mask,
+        data.get("verified") is not False,
+    )

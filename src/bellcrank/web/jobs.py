@@ -45,6 +45,8 @@ class Record:
         Settings of the search, as plain data.
     part
         Dimensions and material of the part, if given.
+    task
+        Table of the task, if it was started from one.
     reference
         Mask of a design drawn by hand, for comparison.
     created
@@ -63,6 +65,7 @@ class Record:
     session: str
     settings: dict[str, Any]
     part: dict[str, Any] | None = None
+    task: dict[str, Any] | None = None
     reference: str | None = None
     created: float = 0.0
     status: str = "queued"
@@ -108,9 +111,10 @@ class Job:
         self.changed += 1
 
     def best(self) -> float | None:
-        """Return the best efficiency that the process has reported."""
+        """Return the best efficiency that any process of the job has reported so far."""
         reported = [each["best"] for each in self.progress.get("chains", {}).values()]
-        return max((value for value in reported if value is not None), default=None)
+        known = [value for value in (*reported, self.record.efficiency) if value is not None]
+        return max(known, default=None)
 
     def summary(self) -> dict[str, Any]:
         """Return the entry of a job in the list of jobs."""

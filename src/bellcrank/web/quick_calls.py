@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,11 +18,26 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, ModelEvaluator, Status, model_evaluator
 from bellcrank.model import Design, human_design, unpack_mask
 from bellcrank.part import PartSpec, frame_problem
+from bellcrank.search import SpecificationEvaluator
+from bellcrank.search.verdict import Verdict
+from bellcrank.search.verification import ELEMENTS
+from bellcrank.task import units_of
 from bellcrank.web.task_files import problem_of
+from bellcrank.workflows.part_figures import part_figures
+from bellcrank.workflows.specification import (
+    item_label,
+    number_text,
+    results_for,
+    shown_value,
+    wanted_text,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from bellcrank.mechanics import ItemResult
     from bellcrank.model import Problem
 
 CACHED = 24
@@ -34,10 +49,11 @@ DIGITS = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedProblem:
-    """A problem with its evaluator."""
+    """A problem with its evaluator, and that of its specification if it has one."""
 
     problem: Problem
     evaluator: ModelEvaluator
+    specification: SpecificationEvaluator | None
 
 
 _cache: OrderedDict[str, CachedProblem] = OrderedDict()
@@ -49,10 +65,19 @@ def cached(text: str) -> CachedProblem:
         _cache.move_to_end(text)
         return _cache[text]
     problem = problem_of(json.loads(text))
-    _cache[text] = CachedProblem(problem, model_evaluator(problem))
+    _cache[text] = CachedProblem(problem, model_evaluator(problem), specification_of(problem))
     while len(_cache) > CACHED:
         _cache.popitem(last=False)
     return _cache[text]
+
+
+def specification_of(problem: Problem) -> SpecificationEvaluator | None:
+    """Return the evaluator of the specification of a problem; None without one."""
+    if problem.specification is None:
+        return None
+    # The design itself counts, not the symmetric one that a search would make of it.
+    own = replace(problem.specification, symmetry=())
+    return SpecificationEvaluator(replace(problem, specification=own))
 
 
 def design_of(text: str, mask: str) -> Design:
@@ -72,21 +97,79 @@ def load_kernels() -> bool:
     return True
 
 
-def evaluate(text: str, mask: str) -> dict[str, Any]:
-    """Return the response of a design, followed from rest to the full stroke in small steps."""
+def evaluate(
+    text: str, mask: str, part: dict[str, Any] | None = None, *, verified: bool = True
+) -> dict[str, Any]:
+    """Return the response of a design, followed from rest to the full stroke.
+
+    Parameters
+    ----------
+    part
+        Size and material, for the items of a specification.
+    verified
+        Follow the path in small steps, and check contact and stability along the whole stroke.
+    """
     entry = cached(text)
-    response = entry.evaluator.evaluate(
-        unpack_mask(mask, entry.problem.lattice.beam_count), VERIFICATION_INCREMENT
-    )
+    bits = unpack_mask(mask, entry.problem.lattice.beam_count)
+    evaluator = entry.specification or entry.evaluator
+    response = evaluator.evaluate(bits, VERIFICATION_INCREMENT if verified else 1.0)
     result: dict[str, Any] = {
         "status": response.status.label,
         "message": response.status.message,
         "efficiency": finite(response.efficiency),
         "displacement": None,
+        "items": None,
     }
-    if response.status in {Status.CONVERGED, Status.SNAPPED}:
+    if response.status in {Status.CONVERGED, Status.SNAPPED, Verdict.UNMET}:
         result["displacement"] = flat(response.displacement)
+    if entry.specification is not None and response.is_admissible:
+        spec = PartSpec.from_dict(part or {}, "part")
+        result["items"] = item_states(entry.problem, spec, entry.specification.results())
     return result
+
+
+def item_states(
+    problem: Problem, spec: PartSpec, results: Sequence[ItemResult]
+) -> list[dict[str, Any]]:
+    """Return the items that a design reaches in one model, as the page shows them."""
+    units = units_of(problem, spec)
+    states = []
+    for each in results:
+        value = shown_value(each.item, each.value)
+        states.append(
+            {
+                "name": each.item.name,
+                "label": item_label(each.item, problem),
+                "wanted": wanted_text(each.item, units),
+                "reached": number_text(each.item, value, units),
+                "margin": finite(each.margin) if math.isfinite(value) else None,
+                "met": bool(each.met),
+            }
+        )
+    return states
+
+
+def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
+    """Return what a design does as a part: the items of its specification, and its figures.
+
+    The figures are those of frames with eight elements in each strut, for each output of each load
+    case. Items are given in the model of the search and by eight elements; None for a path that is
+    not stable.
+    """
+    spec = PartSpec.from_dict(part, "part")
+    design = design_of(text, mask)
+    if design.problem.section is None:
+        design = replace(design, problem=frame_problem(design.problem, spec))
+    problem = design.problem
+    items = {}
+    for model, elements in (("search", None), ("frames", ELEMENTS)):
+        results = results_for(problem, design.mask, elements)
+        items[model] = None if results is None else item_states(problem, spec, results)
+    return {
+        "specified": problem.is_specified,
+        "items": items,
+        "figures": part_figures(design, spec, ELEMENTS),
+    }
 
 
 def check(text: str, goals: tuple[str, ...]) -> dict[str, Any]:
@@ -107,13 +190,30 @@ def check(text: str, goals: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def motion(text: str, mask: str) -> dict[str, Any]:
-    """Return the states of a design along its loading path, each computed from rest."""
+def motion(text: str, mask: str, case: str = "") -> dict[str, Any]:
+    """Return the states of a design along its path in a load case, each computed from rest.
+
+    Parameters
+    ----------
+    case
+        Name of the load case; the first one by default.
+    """
     from bellcrank.workflows.loading import loading_path
 
-    path = loading_path(design_of(text, mask), np.linspace(0.0, 1.0, STATES))
+    design = design_of(text, mask)
+    cases = design.problem.cases
+    if case and case not in cases:
+        raise InvalidSettings(f"case: expected one of {', '.join(cases)}, got {case!r}")
+    problem = cases[case or next(iter(cases))]
+    path = loading_path(replace(design, problem=problem), np.linspace(0.0, 1.0, STATES))
     peak = float(path.energy.max(initial=0.0)) or 1.0
+    supports = problem.supports
     return {
+        "cases": list(cases),
+        "input": problem.input.nodes.tolist(),
+        "outputs": {name: each.nodes.tolist() for name, each in problem.outputs.items()},
+        "supports": np.concatenate([supports.fixed, supports.fixed_x, supports.fixed_y]).tolist(),
+        "stroke": problem.input.amount if problem.input.drive == "displacement" else None,
         "part": path.fraction.round(DIGITS).tolist(),
         "displacement": [flat(each) for each in path.displacement],
         "energy": [(each / peak).round(4).tolist() for each in path.energy],

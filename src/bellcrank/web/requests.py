@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from bellcrank.errors import UnknownName, first_line
 from bellcrank.fem import levels
@@ -76,6 +76,12 @@ class TaskBody(Body):
     part: dict[str, Any] | None = None
 
 
+class TableBody(Body):
+    """A task as a table, as in task files."""
+
+    task: dict[str, Any]
+
+
 class SaveBody(Body):
     """A task to be written as a file."""
 
@@ -89,6 +95,12 @@ class DesignBody(Body):
 
     problem: dict[str, Any]
     mask: Mask
+
+
+class MotionBody(DesignBody):
+    """A design that moves in one of its load cases, the first one by default."""
+
+    case: str = Field(default="", max_length=120)
 
 
 class PartBody(DesignBody):
@@ -118,11 +130,12 @@ class SaveDesignBody(DesignBody):
 
 
 class RunBody(Body):
-    """A search to be started."""
+    """A search to be started, for a task with a specification or for a problem."""
 
     title: str = Field(min_length=1, max_length=120)
     session: Session
-    problem: dict[str, Any]
+    task: dict[str, Any] | None = None
+    problem: dict[str, Any] | None = None
     method: Method = DEFAULT_SEARCH
     steps: int = Field(default=25_000, ge=1, le=STEPS)
     chains: int = Field(default=2, ge=1, le=CHAINS)
@@ -130,6 +143,14 @@ class RunBody(Body):
     goals: Goals = ()
     part: dict[str, Any] | None = None
     reference: Mask | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.task is None) == (self.problem is None):
+            raise ValueError("expected either a task or a problem")
+        if self.task is not None and self.part is not None:
+            raise ValueError("the part is that of the task")
+        return self
 
 
 class PlanBody(Body):

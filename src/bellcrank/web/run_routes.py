@@ -24,6 +24,7 @@ from bellcrank.web.pools import plain_error
 from bellcrank.web.requests import RunBody
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of
+from bellcrank.web.task_tables import task_of
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
@@ -59,7 +60,8 @@ def _validated(body: RunBody) -> tuple[Problem, Record]:
     from bellcrank.search import read_settings
     from bellcrank.search.constraints import parse_goal
 
-    problem = problem_of(body.problem)
+    task = None if body.task is None else task_of(body.task)
+    problem = problem_of(body.problem or {}) if task is None else task.problem
     settings = read_settings(
         {
             "search": body.method,
@@ -71,19 +73,20 @@ def _validated(body: RunBody) -> tuple[Problem, Record]:
     )
     for goal in body.goals:
         parse_goal(goal).constraint(problem)
-    part = None
+    spec = None if task is None else task.part
     if body.part is not None:
         spec = PartSpec.from_dict(body.part)
         problem = frame_problem(problem, spec)
+    if spec is not None:
         spec.of(problem.full_design())
-        part = spec.to_dict()
     if body.reference is not None:
         unpack_mask(body.reference, problem.lattice.beam_count)
     record = Record(
         title=body.title,
         session=body.session,
         settings=json.loads(json.dumps(settings.to_dict())),
-        part=part,
+        part=None if spec is None else spec.to_dict(),
+        task=body.task,
         reference=body.reference,
     )
     return problem, record
@@ -100,6 +103,7 @@ async def get_run(name: RunName, state: State) -> dict[str, Any]:
         "place": state.scheduler.position(job),
         "problem": problem_to_dict(problem),
         "mask": None if design is None else design.mask_hex,
+        "task": job.record.task,
         "provenance": {} if design is None else json.loads(json.dumps(dict(design.provenance))),
         "comparison": await _comparison(state, job, problem, text),
     }
@@ -247,5 +251,6 @@ def _live_state(
         "speed": progress.get("speed"),
         "left": progress.get("left"),
         "tried": progress.get("tried"),
+        "refined": progress.get("refined"),
         "moved": job.moved,
     }

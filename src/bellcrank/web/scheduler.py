@@ -199,7 +199,9 @@ class Scheduler:
 
     def _receive(self, each: Running, message: dict[str, Any]) -> None:
         each.job.receive(message)
-        if self.queue and time.monotonic() - each.since > SLICE and not each.request:
+        # A refinement begins anew each time, so that it is not suspended.
+        is_search = message["refined"] is None
+        if is_search and self.queue and time.monotonic() - each.since > SLICE and not each.request:
             each.send("yield")
 
     def _ended(self, each: Running, last: dict[str, Any]) -> None:

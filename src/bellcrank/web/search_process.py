@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import signal
+import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -22,6 +25,7 @@ from bellcrank.storage.locking import locked
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
+    from bellcrank.refine.refinement import Progress as RefinementProgress
     from bellcrank.search import Progress, SearchSettings
     from bellcrank.storage import RunFolder
     from bellcrank.web.curves import Point
@@ -32,6 +36,8 @@ INTERVAL = 0.1
 MOVED_INTERVAL = 0.4
 """Seconds between two evaluations of the displayed design."""
 NICENESS = 5
+MET = 1e-3
+"""Sum of violations up to which a refined geometry meets all items."""
 
 
 class CommandListener:
@@ -67,10 +73,14 @@ class ProgressReporter:
 
     def __init__(self, pipe: Connection, folder: RunFolder, settings: SearchSettings) -> None:
         from bellcrank.mechanics import model_evaluator
+        from bellcrank.part import PartSpec
+        from bellcrank.web.quick_calls import specification_of
 
         self._pipe = pipe
         self._problem = folder.problem
-        self._evaluator = model_evaluator(folder.problem)
+        self._specification = specification_of(folder.problem)
+        self._evaluator = self._specification or model_evaluator(folder.problem)
+        self._part = PartSpec.from_dict(folder.provenance.get("part") or {}, "part")
         self._total = settings.chains * settings.steps
         self._lock = threading.Lock()
         self._chains: dict[int, dict[str, Any]] = {}
@@ -79,6 +89,7 @@ class ProgressReporter:
         self._start = time.monotonic()
         self._moved_at, self._moved_mask = 0.0, ""
         self._tried: tuple[int, int] | None = None
+        self._refined: dict[int, tuple[int, float, float]] = {}
         self._done = {chain: folder.progress(chain)[0] for chain in range(settings.chains)}
         self._points.update(self._first_points(settings))
         self._end = threading.Event()
@@ -103,10 +114,8 @@ class ProgressReporter:
 
     def __call__(self, progress: Progress) -> None:
         """Record the progress of one chain."""
-        from bellcrank.web.curves import rounded
-
         state = progress.state
-        now, best = rounded(state.efficiency), rounded(state.best)
+        now, best = _met_score(state.efficiency), _met_score(state.best)
         with self._lock:
             self._made += progress.steps
             self._done[progress.chain] = state.step
@@ -114,6 +123,7 @@ class ProgressReporter:
                 "step": state.step,
                 "efficiency": now,
                 "best": best,
+                "score": state.best if math.isfinite(state.best) else -sys.float_info.max,
                 "temperature": progress.temperature,
                 "accepted": state.accepted,
                 "mask": _current_mask(state),
@@ -126,6 +136,12 @@ class ProgressReporter:
         """Record how many candidates have been verified, and the largest number."""
         with self._lock:
             self._tried = done, total
+
+    def refining(self, number: int, progress: RefinementProgress) -> None:
+        """Record the progress of the refinement of a design."""
+        rows = progress.rows
+        with self._lock:
+            self._refined[number] = progress.evaluations, rows.objective, rows.violation
 
     def _send_regularly(self) -> None:
         while not self._end.wait(INTERVAL):
@@ -141,6 +157,7 @@ class ProgressReporter:
             points, self._points = self._points, {}
             chains = {chain: dict(state) for chain, state in self._chains.items()}
             done, made, tried = sum(self._done.values()), self._made, self._tried
+            refined = dict(self._refined)
         speed = made / max(time.monotonic() - self._start, 1e-9)
         message: dict[str, Any] = {
             "kind": "progress",
@@ -151,8 +168,9 @@ class ProgressReporter:
             "total": self._total,
             "left": round((self._total - done) / max(speed, 1e-9), 1),
             "tried": tried,
+            "refined": _refinement_of(refined),
         }
-        best = max(chains.values(), key=lambda each: _number(each["best"]))
+        best = max(chains.values(), key=lambda each: each["score"])
         if time.monotonic() - self._moved_at > MOVED_INTERVAL and best["kept"] != self._moved_mask:
             message["moved"] = self._move(best["kept"])
         self._pipe.send(message)
@@ -160,21 +178,44 @@ class ProgressReporter:
     def _move(self, mask: str) -> dict[str, Any]:
         """Return the response of the displayed design."""
         from bellcrank.model import unpack_mask
-        from bellcrank.web.quick_calls import finite, flat
+        from bellcrank.web.quick_calls import finite, flat, item_states
 
         bits = unpack_mask(mask, self._problem.lattice.beam_count)
         response = self._evaluator.evaluate(bits)
         self._moved_at, self._moved_mask = time.monotonic(), mask
-        shown = response.is_admissible
+        shown, items = response.is_admissible, None
+        if shown and self._specification is not None:
+            items = item_states(self._problem, self._part, self._specification.results())
         return {
             "mask": mask,
             "efficiency": finite(response.efficiency),
             "displacement": flat(response.displacement) if shown else None,
+            "items": items,
         }
 
 
-def _number(value: float | None) -> float:
-    return float("-inf") if value is None else value
+def _refinement_of(states: dict[int, tuple[int, float, float]]) -> dict[str, Any] | None:
+    """Return the number of designs and geometries, and the best objective that meets all items."""
+    if not states:
+        return None
+    met = [objective for _, objective, violation in states.values() if violation <= MET]
+    return {
+        "designs": len(states),
+        "geometries": sum(evaluations for evaluations, _, _ in states.values()),
+        "objective": _finite(max(met)) if met else None,
+    }
+
+
+def _met_score(value: float) -> float | None:
+    """Return a score rounded for drawing; None for a design that misses items or constraints."""
+    from bellcrank.search.constraints.evaluator import BASE_PENALTY
+    from bellcrank.web.curves import rounded
+
+    return rounded(value) if value > -0.5 * BASE_PENALTY else None
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def _current_mask(state: Any) -> str:
@@ -228,11 +269,14 @@ def _search(
             workers=workers,
             progress=reporter,
             verifying=reporter.verifying,
+            refining=reporter.refining,
             stop=listener.stop,
         )
         if report is None and listener.command == "stop":
             try:
-                report = conclude(folder, settings, reporter.verifying)
+                # Without refinement, which takes minutes.
+                quick = replace(settings, before_refinement=False)
+                report = conclude(folder, quick, reporter.verifying)
                 assert report is not None  # without a request to stop
             except InvalidSettings:
                 return {"kind": "paused", "message": NO_DESIGN_YET}

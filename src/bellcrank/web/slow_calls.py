@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.model import write_design
-from bellcrank.web.quick_calls import design_of
+from bellcrank.web.quick_calls import design_of, item_states
 
 if TYPE_CHECKING:
     from bellcrank.model import Design
@@ -116,14 +116,14 @@ def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[s
     -------
     dict
         Results of one level, and ``picture``: deformed struts or triangles, in mm, with their
-        stress.
+        stress; in the sheet also ``items``, those of the specification.
     """
     from bellcrank.fem import FemSettings
     from bellcrank.part import PartSpec
     from bellcrank.workflows import validate
 
-    spec = PartSpec.from_dict(part)
-    validation = validate(design_of(text, mask), spec, [(level, FemSettings())])
+    spec, design = PartSpec.from_dict(part), design_of(text, mask)
+    validation = validate(design, spec, [(level, FemSettings())])
     analysis = validation.analyses[0]
     data: dict[str, Any] = validation.to_dict()["results"][0]
     field = analysis.field
@@ -140,7 +140,18 @@ def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[s
         "principal_strain", "input_force_N", "input_push_N", "mean_output_displacement_mm",
         "warnings", "discrete_model",
     )  # fmt: skip
-    return {**{key: data[key] for key in keys}, "doubts": validation.doubts, "picture": picture}
+    items = None
+    if level == "plane" and design.problem.is_specified:
+        from bellcrank.fem.specification import sheet_items
+
+        results = sheet_items(spec.of(design))
+        items = None if results is None else item_states(design.problem, spec, results)
+    return {
+        **{key: data[key] for key in keys},
+        "doubts": validation.doubts,
+        "picture": picture,
+        "items": items,
+    }
 
 
 def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:

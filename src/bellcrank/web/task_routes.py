@@ -15,9 +15,10 @@ from bellcrank.model.calls import call_with_keys
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.web import quick_calls
 from bellcrank.web.limits import check_lattice, check_size
-from bellcrank.web.requests import LatticeBody, SaveBody, TaskBody, TextBody
+from bellcrank.web.requests import LatticeBody, SaveBody, TableBody, TaskBody, TextBody
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of, read_task, write_task
+from bellcrank.web.task_tables import bundled_table, planar_tasks, task_data, task_of
 
 router = APIRouter(prefix="/api", tags=["tasks"])
 
@@ -53,6 +54,24 @@ def get_problem(name: str) -> dict[str, Any]:
     if direction != name and direction in DIRECTIONS:
         return problem_to_dict(elementary(ELEMENTARY_COLUMNS, direction))
     raise UnknownName(f"there is no task {name!r}")
+
+
+@router.get("/tasks")
+def list_tasks() -> list[dict[str, str]]:
+    """Return the bundled tasks with a specification."""
+    return planar_tasks()
+
+
+@router.get("/tasks/{name}")
+def get_task(name: str) -> dict[str, Any]:
+    """Return the table of a bundled task."""
+    return bundled_table(name)
+
+
+@router.post("/tasks/build")
+async def build(body: TableBody) -> dict[str, Any]:
+    """Return the problem, the part and the items of a table."""
+    return await run_in_threadpool(lambda: task_data(task_of(body.task)))
 
 
 @router.post("/lattices")

@@ -1,0 +1,197 @@
+"""Tasks with a specification: built from tables, evaluated, and searched."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from bellcrank.model import Design, problem_from_dict
+from bellcrank.search.verification import ELEMENTS
+from bellcrank.task import find_task
+from bellcrank.workflows.part_figures import part_figures
+from bellcrank.workflows.specification import item_rows, results_for
+
+from .conftest import wait_for
+from .test_api import refusal
+
+if TYPE_CHECKING:
+    from starlette.testclient import TestClient
+
+SIZED = {
+    "name": "own",
+    "domain": {"size": [62, 54]},
+    "supports": [{"at": {"edge": "bottom"}}],
+    "cases": [
+        {
+            "inputs": [
+                {"at": {"point": [51, 53], "count": 2}, "direction": "down", "displacement": "3mm"}
+            ],
+            "outputs": [
+                {
+                    "at": {"point": [11, 53], "count": 2},
+                    "direction": "left",
+                    "gain": "maximise",
+                    "off_axis": "10%",
+                }
+            ],
+        }
+    ],
+}
+
+
+def full_mask(problem: dict[str, Any]) -> str:
+    """Return the mask of all beams."""
+    return np.packbits(np.ones(len(problem["beams"]), dtype=bool)).tobytes().hex()
+
+
+def test_every_listed_task_is_built_with_its_items(client: TestClient) -> None:
+    listed = {each["name"] for each in client.get("/api/tasks").json()}
+    assert {"straight-crane", "gripper", "selector", "bracket"} <= listed
+    assert "twist-column" not in listed  # in space
+    for name in listed:
+        table = client.get(f"/api/tasks/{name}").json()
+        built = client.post("/api/tasks/build", json={"task": table}).json()
+        task = find_task(name)
+        assert task is not None
+        assert problem_from_dict(built["problem"]).hash == task.problem.hash
+        assert task.problem.specification is not None
+        assert [each["name"] for each in built["items"]] == [
+            item.name for item in task.problem.specification.items
+        ]
+        assert built["part"] == json.loads(json.dumps(task.part.to_dict()))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words", "key"),
+    [
+        ({"domain": {"outline": "../secret.svg"}}, "not the name of a file", "domain.outline"),
+        ({"domain": {"size": [4000, 4000]}}, "the limit of the page is", "domain"),
+        ({"domain": {"outline": {"circle": [0, 0], "radius": 4000}}}, "the limit", "domain"),
+        ({"domain": {"size": [60, 60, 60]}}, "in space", ""),
+        ({"part": {"width": 12}}, "not slender", "part.width"),
+        ({"part": {"material": "oak"}}, "oak", "part.material"),
+        ({"supports": [{"at": {"point": [200, 0]}}]}, "the node nearest to", "supports[0].at"),
+    ],
+)
+def test_a_task_that_cannot_be_built_is_refused_in_one_sentence(
+    client: TestClient, changes: dict[str, Any], words: str, key: str
+) -> None:
+    start = time.perf_counter()
+    message, named = refusal(client.post("/api/tasks/build", json={"task": {**SIZED, **changes}}))
+    assert time.perf_counter() - start < 10.0  # refused before a large domain is filled
+    assert words in message
+    assert named.startswith(key)
+
+
+def test_the_report_has_the_items_and_figures_of_the_part(client: TestClient) -> None:
+    built = client.post("/api/tasks/build", json={"task": SIZED}).json()
+    problem, part = built["problem"], built["part"]
+    mask = full_mask(problem)
+    body = {"problem": problem, "mask": mask, "part": part}
+    report = client.post("/api/report", json=body).json()
+    task = find_task("slider")
+    assert task is not None
+    own = problem_from_dict(problem)
+    bits = np.ones(own.lattice.beam_count, dtype=bool)
+    for model, elements in (("search", None), ("frames", ELEMENTS)):
+        results = results_for(own, bits, elements)
+        assert results is not None
+        rows = item_rows(own, task.part, {model: results})[1:]  # the part is the usual one
+        shown = report["items"][model]
+        assert [[each["label"], each["wanted"], each["reached"]] for each in shown] == [
+            row[:3] for row in rows
+        ]
+        assert [each["met"] for each in shown] == [row[-1] == "yes" for row in rows]
+    (figures,) = report["figures"]
+    (exact,) = part_figures(Design(own, bits), task.part)
+    assert figures == json.loads(json.dumps(exact))
+    assert {"off_axis", "rotation_deg", "payload_N", "sag_mm", "path_mm"} <= set(figures)
+
+
+def test_the_report_of_a_design_of_springs_is_that_of_its_part(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"], "part": {"width": 2.0}}
+    report = client.post("/api/report", json=body).json()
+    assert not report["specified"]
+    assert report["items"] == {"search": None, "frames": None}
+    (figures,) = report["figures"]
+    assert figures["efficiency"] == pytest.approx(1.17, abs=0.02)
+    assert figures["off_axis"] == pytest.approx(0.18, abs=0.01)
+
+
+def test_a_motion_is_that_of_the_chosen_load_case(client: TestClient) -> None:
+    table = client.get("/api/tasks/selector").json()
+    problem = client.post("/api/tasks/build", json={"task": table}).json()["problem"]
+    body = {"problem": problem, "mask": full_mask(problem)}
+    motions = {
+        case: client.post("/api/motion", json={**body, "case": case}).json()
+        for case in ("", "A", "B")
+    }
+    assert motions[""] == motions["A"]
+    assert motions["B"]["cases"] == ["A", "B"]
+    assert motions["B"]["input"] == problem["specification"]["cases"][0]["input"]["nodes"]
+    moved = np.reshape(motions["B"]["displacement"][-1], (-1, 2))[motions["B"]["input"]]
+    assert moved == pytest.approx(np.tile([-0.3, 0.0], (len(moved), 1)), abs=1e-6)
+    message, _ = refusal(client.post("/api/motion", json={**body, "case": "C"}))
+    assert message.startswith("case: expected one of A, B")
+
+
+def test_live_edits_show_the_items_first_quickly_then_verified(client: TestClient) -> None:
+    built = client.post("/api/tasks/build", json={"task": SIZED}).json()
+    problem, mask = built["problem"], full_mask(built["problem"])
+    own = problem_from_dict(problem)
+    with client.websocket_connect("ws://localhost:8642/api/edit") as socket:
+        first = {"id": 1, "problem": problem, "part": built["part"], "mask": mask}
+        socket.send_text(json.dumps({**first, "verified": False}))
+        quick = json.loads(socket.receive_text())
+        socket.send_text(json.dumps({"id": 2, "mask": mask}))
+        whole = json.loads(socket.receive_text())
+    results = results_for(own, np.ones(own.lattice.beam_count, dtype=bool))
+    assert results is not None
+    assert [each["met"] for each in whole["items"]] == [each.met for each in results]
+    assert [each["name"] for each in quick["items"]] == [each.item.name for each in results]
+    assert quick["displacement"] == pytest.approx(whole["displacement"], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "either a task or a problem"),
+        ({"task": SIZED, "part": {"width": 2.0}}, "part is that of the task"),
+    ],
+)
+def test_a_search_is_for_a_task_or_for_a_problem(
+    client: TestClient, changes: dict[str, Any], words: str
+) -> None:
+    body = {"title": "t", "session": "s", **changes}
+    message, _ = refusal(client.post("/api/runs", json=body))
+    assert words in message
+
+
+@pytest.mark.slow
+def test_a_task_is_searched_with_its_items_shown_and_stopped_without_refinement(
+    client: TestClient,
+) -> None:
+    body = {"title": "own", "session": "s", "task": SIZED, "steps": 200_000, "chains": 1}
+    name = client.post("/api/runs", json=body).json()["id"]
+    with client.websocket_connect(f"ws://localhost:8642/api/runs/{name}/live") as socket:
+
+        def items() -> Any:
+            moved = json.loads(socket.receive_text())["moved"]
+            return moved and moved["items"]
+
+        shown = wait_for(items)
+    assert shown[0]["label"] == "off-axis motion"
+    client.post(f"/api/runs/{name}/stop")
+    wait_for(lambda: client.get(f"/api/runs/{name}").json()["status"] == "stopped")
+    run = client.get(f"/api/runs/{name}").json()
+    assert run["task"] == SIZED
+    assert run["mask"]
+    assert "refinement" not in run["provenance"]
+    assert run["problem"]["specification"]["items"]
+    client.delete(f"/api/runs/{name}")

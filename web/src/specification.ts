@@ -1,0 +1,56 @@
+// The items of a specification and the figures of a part.
+
+import type { ItemState, PartFigures } from "./api";
+import { count, figure, h } from "./dom";
+
+/** The items that a design reaches in one model. */
+export interface Column { title: string; items: ItemState[] }
+
+/** One sentence on a list of items: whether all are met, and which one is farthest from it. */
+export function verdictOf(items: ItemState[]): string {
+  const missed = items.filter(({ met }) => !met);
+  if (!missed.length) return `All ${count(items.length, "item")} met`;
+  const worst = missed.reduce((a, b) => ((b.margin ?? -Infinity) < (a.margin ?? -Infinity) ? b : a));
+  return `${missed.length} of ${count(items.length, "item")} missed, farthest: ${worst.label}`;
+}
+
+/** A table of items: whether each is met in the last model, what is wanted, and what is reached. */
+export function itemTable(columns: Column[], wanted: ItemState[] = []): HTMLElement {
+  const last = columns.at(-1)?.items ?? wanted;
+  const rows = last.map((item, k) => h("tr", { class: columns.length ? (item.met ? "met" : "missed") : "open", "data-item": item.name },
+    h("td", {}, columns.length ? mark(item.met) : ""),
+    h("th", { scope: "row" }, item.label, h("small", {}, item.wanted)),
+    ...columns.map(({ items }) => h("td", {}, items[k]?.reached ?? "–")),
+    columns.length > 0 && h("td", { class: "more" }, item.margin === null ? "" : `${item.margin > 0 ? "+" : ""}${figure(100 * item.margin, 0)} %`)));
+  return h("table", { class: "items" },
+    h("caption", {}, "Specification"),
+    columns.length > 0 && h("thead", {}, h("tr", {}, h("td"), h("td"), ...columns.map(({ title }) => h("th", { scope: "col" }, title)), h("th", { scope: "col" }, "margin"))),
+    h("tbody", {}, ...rows));
+}
+
+function mark(met: boolean): HTMLElement {
+  return h("span", { class: "mark", role: "img", "aria-label": met ? "met" : "missed" }, met ? "✓" : "✗");
+}
+
+/** Motion, off-axis motion, rotation and load of each output, always beside each other. */
+export function figureTable(figures: PartFigures[]): HTMLElement {
+  const several = figures.length > 1;
+  const rows: [string, (row: PartFigures) => string][] = [
+    ["output / input motion", (row) => figure(row.efficiency, 2)],
+    ["motion of the output", (row) => unit(row.travel_mm, 2, "mm")],
+    ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)} %`)],
+    ["rotation of the output", (row) => unit(row.rotation_deg, 1, "°")],
+    ["load that halves the motion", (row) => (row.payload_N == null ? "none" : `${figure((1000 * row.payload_N) / 9.80665, 0)} g`)],
+    ["sag under own weight", (row) => unit(row.sag_mm, 2, "mm")],
+    ["largest input force", (row) => unit(row.largest_input_force_N, 2, "N")],
+    ["largest strain", (row) => (row.strain == null ? "–" : `${figure(100 * row.strain, 1)} %`)],
+  ];
+  return h("table", { class: "figures part" },
+    h("caption", {}, "Figures of the part, by frames with 8 elements in each strut"),
+    several && h("thead", {}, h("tr", {}, h("td"), ...figures.map((row) => h("th", { scope: "col" }, [row.case, row.output].filter((name) => name !== "case").join(", "))))),
+    h("tbody", {}, ...rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), ...figures.map((row) => h("td", {}, text(row)))))));
+}
+
+function unit(value: number | null | undefined, digits: number, name: string): string {
+  return value === null || value === undefined ? "–" : `${figure(value, digits)}${name === "°" ? "" : " "}${name}`;
+}
