@@ -43,6 +43,51 @@ def drag(page: Any, start: tuple[float, float], end: tuple[float, float]) -> Non
     page.mouse.up()
 
 
+def node(page: Any, x: float, y: float) -> tuple[float, float]:
+    """Return the position of the node nearest to a point of the lattice."""
+    return _nearest(page, ".dot.node", x, y)
+
+
+def strut(page: Any, x: float, y: float) -> tuple[float, float]:
+    """Return the middle of the strut nearest to a point of the lattice."""
+    return _nearest(page, ".beam.rule-auto", x, y)
+
+
+def _nearest(page: Any, marks: str, x: float, y: float) -> tuple[float, float]:
+    """Return the point nearest to another one: nodes, or middles of struts, of a drawn path."""
+    found = page.evaluate(
+        """([marks, x, y]) => {
+          const d = document.querySelector(`svg.canvas ${marks}`).getAttribute("d");
+          const numbers = (end) => end.split(/[ h]/).map(Number);
+          const lines = d.split("M").filter(Boolean).map((line) => line.split("L").map(numbers));
+          const mean = (ends, axis) => ends.reduce((sum, end) => sum + end[axis], 0) / ends.length;
+          const points = lines.map((ends) => [mean(ends, 0), mean(ends, 1)]);
+          const far = ([px, py]) => (px - x) ** 2 + (py + y) ** 2;
+          return points.reduce((a, b) => (far(b) < far(a) ? b : a));
+        }""",
+        [marks, x, y],
+    )
+    return found[0], -found[1]
+
+
+def section(page: Any, name: str) -> None:
+    """Open a section of the panel."""
+    head = page.locator(f".step.{name} h2 button")
+    if head.get_attribute("aria-expanded") == "false":
+        head.click()
+
+
+def field(page: Any, label: str) -> str:
+    """Return the text of a field."""
+    return str(page.get_by_label(label, exact=True).input_value())
+
+
+def fill(page: Any, label: str, text: str) -> None:
+    """Type a text into a field and leave it."""
+    page.get_by_label(label, exact=True).fill(text)
+    page.keyboard.press("Tab")
+
+
 def summary(page: Any, step: str) -> str:
     """Return the summary of a section of the panel."""
     return str(page.locator(f".step.{step} .summary").inner_text())
@@ -50,7 +95,7 @@ def summary(page: Any, step: str) -> str:
 
 def task(page: Any) -> Any:
     """Return the stored task."""
-    return page.evaluate("JSON.parse(localStorage.getItem('bellcrank-task'))")
+    return page.evaluate("JSON.parse(sessionStorage.getItem('bellcrank-task'))")
 
 
 def start_search(page: Any, effort: str = "Quick") -> str:

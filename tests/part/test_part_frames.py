@@ -23,7 +23,7 @@ from bellcrank.model import (
     write_design,
 )
 from bellcrank.part import Material, Part, PartSpec, frame_problem, materials, spring_problem
-from bellcrank.web.task_files import problem_of, read_task
+from bellcrank.web.task_files import problem_of, read_upload
 from bellcrank.workflows.fabricate import Grips
 from bellcrank.workflows.validation import validate
 
@@ -145,7 +145,7 @@ def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses(tmp_path) 
         lambda: validate(design, PartSpec(), [("plane", FemSettings())]),
         lambda: Grips(plate=True).applied(PartSpec().of(design)),
         lambda: problem_of(data),
-        lambda: read_task((tmp_path / "tower.json").read_text(), ".json"),
+        lambda: read_upload((tmp_path / "tower.json").read_text(), ".json"),
     ):
         with pytest.raises(BellcrankError, match=message):
             work()

@@ -10,12 +10,12 @@ import pytest
 import trimesh
 
 from bellcrank.fem import levels
-from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator, SpringEvaluator
+from bellcrank.machines.elementary import elementary
+from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model import find_problem, human_design, problem_to_dict
-from bellcrank.part import PartSpec, frame_problem, materials
+from bellcrank.part import materials
 from bellcrank.search import DEFAULT_SEARCH, searches
 from bellcrank.web.page_files import page_files
-from bellcrank.web.task_files import read_task, write_task
 
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
@@ -53,21 +53,6 @@ def refusal(answer: Any, status: int = 422) -> tuple[str, str]:
     return said["message"], said["key"]
 
 
-def test_every_problem_that_is_listed_can_be_opened(client: TestClient) -> None:
-    listed = client.get("/api/problems").json()
-    assert {"crane", "pliers", "elementary-down"} <= {each["name"] for each in listed}
-    for each in listed:
-        problem = client.get(f"/api/problems/{each['name']}").json()
-        assert problem["schema"] == "bellcrank/problem/1"
-
-
-def test_a_sound_task_is_answered_with_the_response_of_all_its_beams(client: TestClient) -> None:
-    problem = client.get("/api/problems/crane").json()
-    found = client.post("/api/tasks/check", json={"problem": problem}).json()
-    assert found["designable"] == 203
-    assert found["response"]["efficiency"] == pytest.approx(-0.0640859, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("change", "key", "words"),
     [
@@ -81,38 +66,26 @@ def test_a_sound_task_is_answered_with_the_response_of_all_its_beams(client: Tes
         ({"colour": "red"}, "", "unknown key 'colour'"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_task_is_one_sentence_about_one_thing(
+def test_what_is_wrong_with_a_problem_is_one_sentence_about_one_thing(
     client: TestClient, change: dict[str, Any], key: str, words: str
 ) -> None:
     problem = {**problem_to_dict(find_problem("crane")), **change}
-    message, about = refusal(client.post("/api/tasks/check", json={"problem": problem}))
+    body = {"problem": problem, "mask": "ff"}
+    message, about = refusal(client.post("/api/motion", json=body))
     assert words in message
     assert about.partition("[")[0] == key
 
 
-def test_a_lattice_without_mirror_symmetry_refuses_a_mirror(client: TestClient) -> None:
-    problem = client.get("/api/problems/discs").json()
-    body = {"problem": problem, "goals": ["mirror x"]}
-    message, _ = refusal(client.post("/api/tasks/check", json=body))
-    assert "not symmetric in x" in message
-
-
-@pytest.mark.parametrize("suffix", [".toml", ".json"])
-def test_a_task_is_the_same_after_saving_and_loading(suffix: str) -> None:
-    for name in ("crane", "pliers", "discs"):
-        problem = find_problem(name)
-        again, _, _ = read_task(write_task(problem, None, suffix), suffix)
-        assert again.hash == problem.hash
-
-
-def test_a_file_in_toml_keeps_the_table_of_its_lattice(client: TestClient) -> None:
+def test_a_problem_file_is_opened_as_a_task_on_its_lattice(client: TestClient) -> None:
     read = client.post("/api/tasks/read", json={"text": LIFT, "suffix": ".toml"}).json()
-    assert read["lattice"]["columns"] == 5
-    body = {"problem": read["problem"], "lattice": read["lattice"], "suffix": ".toml"}
-    text = client.post("/api/tasks/write", json=body).json()["text"]
-    assert "positions" not in text
-    again = client.post("/api/tasks/read", json={"text": text, "suffix": ".toml"}).json()
-    assert again["problem"] == read["problem"]
+    table = read["task"]
+    assert table["name"] == "lift"
+    built = client.post("/api/tasks/build", json={"task": table}).json()
+    assert built["fault"] is None
+    (given,) = table["cases"][0]["inputs"]
+    assert given["displacement"] == pytest.approx(2.0)  # 0.2 lattice units of 10 mm
+    assert built["problem"]["input"]["amount"] == pytest.approx(0.2)
+    assert built["problem"]["supports"]["fixed"] == [0, 1, 2, 3, 4]
 
 
 def test_a_design_file_is_opened_with_its_design(client: TestClient, crane: dict[str, Any]) -> None:
@@ -120,7 +93,9 @@ def test_a_design_file_is_opened_with_its_design(client: TestClient, crane: dict
         "/api/files/json", json={"problem": crane["problem"], "mask": crane["mask"]}
     ).text
     read = client.post("/api/tasks/read", json={"text": text, "suffix": ".json"}).json()
-    assert read["mask"] == crane["mask"]
+    where = read["design"]
+    opened = client.get(f"/api/gallery/{where['source']}/{where['key']}").json()
+    assert opened["mask"] == crane["mask"]
 
 
 @pytest.mark.parametrize(
@@ -141,16 +116,6 @@ def test_a_bad_file_is_refused_in_a_sentence_without_our_paths(
     assert words in message
     assert "/tmp" not in message
     assert "upload" not in message
-
-
-def test_lattices_are_made_and_refused_by_their_size(client: TestClient) -> None:
-    small = {"kind": "triangular-rectangle", "columns": 3, "rows": 4}
-    made = client.post("/api/lattices", json={"lattice": small}).json()
-    assert len(made["positions"]) == 14
-    message, key = refusal(client.post("/api/lattices", json={"lattice": {**small, "rows": 10**9}}))
-    assert "3000" in message
-    assert key == "lattice"
-    refusal(client.post("/api/lattices", json={"lattice": {"kind": "square"}}), 404)
 
 
 def test_a_motion_follows_the_true_path(client: TestClient, crane: dict[str, Any]) -> None:
@@ -267,7 +232,7 @@ def test_a_design_by_hand_is_kept_and_found_in_the_gallery(
 def test_two_parts_make_a_machine_and_parts_that_do_not_fit_are_named(client: TestClient) -> None:
     keys = []
     for name in ("elementary-down", "elementary-left"):
-        problem = client.get(f"/api/problems/{name}").json()
+        problem = problem_to_dict(elementary(7, name.removeprefix("elementary-")))
         body = {"problem": problem, "mask": problem["initial"], "title": name}
         keys.append(client.post("/api/gallery", json=body).json()["key"])
     parts = {
@@ -286,24 +251,6 @@ def test_two_parts_make_a_machine_and_parts_that_do_not_fit_are_named(client: Te
     assert "second" in message
     parts["second"]["entry"] = "/etc/passwd"
     refusal(client.post("/api/machines", json={"plan": plan}), 404)
-
-
-def test_a_task_for_a_part_is_answered_with_the_section_of_its_struts(client: TestClient) -> None:
-    problem = client.get("/api/problems/crane").json()
-    part = {"width": 1.6, "thickness": 5.0, "scale": 10.0, "material": "ninjaflex"}
-    plain = client.post("/api/tasks/check", json={"problem": problem}).json()
-    meant = client.post("/api/tasks/check", json={"problem": problem, "part": part}).json()
-    assert (plain["section"], plain["material"]) == (None, None)
-    frame = frame_problem(find_problem("crane"), PartSpec(width=1.6))
-    data = problem_to_dict(frame)
-    assert (meant["section"], meant["material"]) == (data["section"], data["material"])
-    response = FrameEvaluator(frame).evaluate(frame.initial)
-    assert meant["response"]["efficiency"] == pytest.approx(response.efficiency, abs=1e-9)
-    assert meant["response"]["efficiency"] != plain["response"]["efficiency"]
-    wide = client.post("/api/tasks/check", json={"problem": problem, "part": {**part, "width": 12}})
-    message, about = refusal(wide)
-    assert message.startswith("width: struts 12 mm wide are not slender where the shortest is")
-    assert about == "width"
 
 
 def test_the_page_is_served_every_registered_search_material_and_level(client: TestClient) -> None:

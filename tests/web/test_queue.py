@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from bellcrank.model import find_problem, read_design
+from bellcrank.model import find_problem, problem_to_dict, read_design
 from bellcrank.web.curves import MAX_POINTS, Curves
 from bellcrank.web.jobs import Jobs, Record
 from bellcrank.web.scheduler import Scheduler
@@ -109,7 +109,7 @@ def begin(client: TestClient) -> Any:
     """Begin a search and return its name."""
 
     def begin(**more: Any) -> str:
-        problem = client.get("/api/problems/scaling-8").json()
+        problem = problem_to_dict(find_problem("scaling-8"))
         body = {
             "title": "t",
             "session": "s",
@@ -199,7 +199,7 @@ def test_a_search_that_is_stopped_gives_the_best_it_has_found(
 
 
 def test_a_search_is_compared_with_the_design_by_hand(client: TestClient) -> None:
-    problem = client.get("/api/problems/crane").json()
+    problem = problem_to_dict(find_problem("crane"))
     body = {"title": "t", "session": "s", "problem": problem, "steps": 10, "chains": 1}
     name = client.post("/api/runs", json=body).json()["id"]
     human = client.get(f"/api/runs/{name}").json()["comparison"]
@@ -224,7 +224,7 @@ def test_a_search_is_compared_with_the_design_by_hand(client: TestClient) -> Non
 def test_searches_that_make_no_sense_are_refused_before_they_are_queued(
     client: TestClient, change: dict[str, Any], words: str
 ) -> None:
-    problem = client.get("/api/problems/scaling-8").json()
+    problem = problem_to_dict(find_problem("scaling-8"))
     before = len(client.get("/api/runs").json())
     answer = client.post(
         "/api/runs", json={"title": "t", "session": "s", "problem": problem, **change}

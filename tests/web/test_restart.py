@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bellcrank.model import find_problem, problem_to_dict
+
 httpx = pytest.importorskip("httpx2")
 
 from .conftest import wait_for  # noqa: E402
@@ -69,7 +71,7 @@ def _answers(client: Any) -> bool:
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL], ids=["told", "killed"])
 def test_a_search_goes_on_after_its_server_has_ended(tmp_path: Path, end: int) -> None:
     with serving(tmp_path, end) as client:
-        problem = client.get("/api/problems/scaling-8").json()
+        problem = problem_to_dict(find_problem("scaling-8"))
         body = {"title": "long", "session": "s", "problem": problem, "steps": 6_000, "chains": 2}
         name = client.post("/api/runs", json=body).json()["id"]
         wait_for(lambda: client.get(f"/api/runs/{name}").json()["done"] > 1000)

@@ -65,8 +65,8 @@ def test_websockets_from_other_pages_are_refused(client: TestClient) -> None:
 
 
 def test_a_form_elsewhere_cannot_send_what_we_read(client: TestClient) -> None:
-    body = json.dumps({"lattice": {"kind": "triangular-rectangle", "columns": 2, "rows": 2}})
-    answer = client.post("/api/lattices", content=body, headers={"content-type": "text/plain"})
+    body = json.dumps({"task": {"name": "a", "domain": {"size": [62, 54]}, "cases": []}})
+    answer = client.post("/api/tasks/build", content=body, headers={"content-type": "text/plain"})
     assert answer.status_code == 415
 
 
@@ -115,14 +115,14 @@ def test_names_that_are_no_runs_or_designs_are_not_looked_for(
     assert client.get(f"/{name}").status_code == 404
 
 
-@pytest.mark.parametrize("where", ["/api/tasks/check", "/api/motion", "/api/tasks/write"])
+@pytest.mark.parametrize("where", ["/api/tasks/from-problem", "/api/motion"])
 def test_a_task_cannot_name_a_file_of_this_machine(client: TestClient, where: str) -> None:
     problem = {
         "schema": "bellcrank/problem/1", "name": "spy",
         "lattice": {"kind": "imported", "path": "/etc/passwd"},
         "supports": {"fixed": [0]}, "input": {}, "output": {},
     }  # fmt: skip
-    more: dict[str, Any] = {"/api/motion": {"mask": "ff"}, "/api/tasks/write": {"suffix": ".json"}}
+    more: dict[str, Any] = {"/api/motion": {"mask": "ff"}}
     answer = client.post(where, json={"problem": problem, **more.get(where, {})})
     assert answer.status_code == 422
     text = 'schema = "bellcrank/problem/1"\nlattice = { kind = "imported", path = "/etc/passwd" }'

@@ -55,13 +55,17 @@ def test_every_listed_task_is_built_with_its_items(client: TestClient) -> None:
     for name in listed:
         table = client.get(f"/api/tasks/{name}").json()
         built = client.post("/api/tasks/build", json={"task": table}).json()
+        assert built["fault"] is None
         task = find_task(name)
+        if name.startswith("element-"):
+            continue
         assert task is not None
         assert problem_from_dict(built["problem"]).hash == task.problem.hash
-        assert task.problem.specification is not None
-        assert [each["name"] for each in built["items"]] == [
-            item.name for item in task.problem.specification.items
-        ]
+        wanted = task.problem.specification
+        assert wanted is not None
+        named = [each["name"] for each in built["items"]]
+        assert named[: len(wanted.items)] == [item.name for item in wanted.items]
+        assert len(named) == len(wanted.items) + len(wanted.maximise)
         assert built["part"] == json.loads(json.dumps(task.part.to_dict()))
 
 
@@ -74,7 +78,6 @@ def test_every_listed_task_is_built_with_its_items(client: TestClient) -> None:
         ({"domain": {"size": [60, 60, 60]}}, "in space", ""),
         ({"part": {"width": 12}}, "not slender", "part.width"),
         ({"part": {"material": "oak"}}, "oak", "part.material"),
-        ({"supports": [{"at": {"point": [200, 0]}}]}, "the node nearest to", "supports[0].at"),
     ],
 )
 def test_a_task_that_cannot_be_built_is_refused_in_one_sentence(
@@ -85,6 +88,78 @@ def test_a_task_that_cannot_be_built_is_refused_in_one_sentence(
     assert time.perf_counter() - start < 10.0  # refused before a large domain is filled
     assert words in message
     assert named.startswith(key)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words", "key"),
+    [
+        ({"supports": [{"at": {"point": [200, 0]}}]}, "the node nearest to", "supports[0].at"),
+        ({"limits": {"symmetry": "x"}}, "symmetr", "limits.symmetry"),
+        (
+            {"cases": [{**SIZED["cases"][0], "outputs": [{"at": {"nodes": [0]}}]}]},
+            "node 0",
+            "output.nodes",
+        ),
+    ],
+)
+def test_a_task_with_a_fault_is_still_drawn(
+    client: TestClient, changes: dict[str, Any], words: str, key: str
+) -> None:
+    built = client.post("/api/tasks/build", json={"task": {**SIZED, **changes}}).json()
+    assert len(built["lattice"]["positions"]) == 46
+    assert built["problem"] is None
+    assert words in built["fault"]["message"]
+    assert built["fault"]["key"].startswith(key)
+
+
+@pytest.mark.parametrize(
+    ("changes", "missing"),
+    [
+        ({"supports": []}, "supports"),
+        ({"supports": [{"at": []}]}, "supports[0]"),
+        ({"cases": [{"outputs": SIZED["cases"][0]["outputs"]}]}, "cases[0].inputs"),
+        ({"cases": [{"inputs": SIZED["cases"][0]["inputs"]}]}, "cases[0].outputs"),
+        ({"domain": {"problem": "crane"}, "supports": [], "cases": [{"outputs": [{}]}]}, None),
+    ],
+)
+def test_an_unfinished_task_is_drawn_and_says_what_is_missing(
+    client: TestClient, changes: dict[str, Any], missing: str | None
+) -> None:
+    built = client.post("/api/tasks/build", json={"task": {**SIZED, **changes}}).json()
+    assert built["missing"] == missing
+    assert built["fault"] is None
+    assert (built["problem"] is None) == (missing is not None)
+    assert built["lattice"]["beams"]
+
+
+def test_a_task_is_written_as_a_task_file_and_read_again(client: TestClient) -> None:
+    for name in ("gripper", "selector", "bracket", "arc", "inverter"):
+        table = client.get(f"/api/tasks/{name}").json()
+        text = client.post("/api/tasks/write", json={"task": table}).json()["text"]
+        read = client.post("/api/tasks/read", json={"text": text, "suffix": ".toml"}).json()
+        assert read["task"] == table
+
+
+def test_the_region_of_a_drawing_becomes_an_outline_with_holes(client: TestClient) -> None:
+    drawing = (
+        '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="80mm" '
+        'viewBox="0 0 100 80"><rect x="5" y="5" width="90" height="70"/>'
+        '<circle cx="50" cy="40" r="10"/></svg>'
+    )
+    region = client.post("/api/tasks/region", json={"text": drawing, "suffix": ".svg"}).json()
+    corners = np.array(region["outline"])
+    assert corners.min(axis=0) == pytest.approx([0.0, 0.0])
+    assert corners.max(axis=0) == pytest.approx([90.0, 70.0])
+    (hole,) = region["holes"]
+    assert np.mean(hole["polygon"], axis=0) == pytest.approx([45.0, 35.0], abs=0.1)
+    table = {**SIZED, "domain": region}
+    built = client.post("/api/tasks/build", json={"task": table}).json()
+    assert built["fault"] is None
+    message, _ = refusal(
+        client.post("/api/tasks/region", json={"text": "<svg/>", "suffix": ".svg"})
+    )
+    assert "closed curve" in message
+    assert "/tmp" not in message
 
 
 def test_the_report_has_the_items_and_figures_of_the_part(client: TestClient) -> None:

@@ -127,7 +127,7 @@ export interface RunUpdate {
   error?: { message: string };
 }
 
-export interface Part { width: number; thickness: number; scale: number; material: string; fillet?: number | null }
+export interface Part { width: number; thickness: number; scale: number; material: string | { name: string }; fillet?: number | null }
 
 export interface GalleryEntry {
   source: string;
@@ -254,7 +254,7 @@ type Evaluation = Response & { id: number; error?: { message: string; key: strin
 export class Solver {
   private socket: WebSocket | null = null;
   private sent = "";
-  private queued: { problem: Problem; mask: string } | null = null;
+  private queued: { problem: Problem; mask: string; part: Part; verified: boolean } | null = null;
   private busy = false;
   private number = 0;
   private since = 0;
@@ -263,8 +263,9 @@ export class Solver {
 
   constructor(private readonly onResult: (result: Evaluation, latency: number) => void) {}
 
-  evaluate(problem: Problem, mask: string): void {
-    this.queued = { problem, mask };
+  /** Evaluate a design, at once by few steps, or `verified` along the whole stroke. */
+  evaluate(problem: Problem, mask: string, part: Part, verified: boolean): void {
+    this.queued = { problem, mask, part, verified };
     this.next();
   }
 
@@ -285,14 +286,14 @@ export class Solver {
       return;
     }
     if (this.socket.readyState !== WebSocket.OPEN) return;
-    const { problem, mask } = this.queued;
+    const { problem, mask, part, verified } = this.queued;
     this.queued = null;
     this.busy = true;
     this.since = performance.now();
-    const text = JSON.stringify(problem);
+    const text = JSON.stringify([problem, part]);
     const changed = text !== this.sent;
     this.sent = text;
-    this.socket.send(JSON.stringify({ id: ++this.number, mask, ...(changed ? { problem } : {}) }));
+    this.socket.send(JSON.stringify({ id: ++this.number, mask, verified, ...(changed ? { problem, part } : {}) }));
   }
 
   private receive(result: Evaluation): void {

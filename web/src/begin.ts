@@ -1,26 +1,32 @@
-// The task that is shown first: from a link, from the last visit, or an example.
+// The task that is shown first, and where the current one is stored: each tab has its own.
 
-import { get, hexOf, post, type Problem } from "./api";
-import { isEach } from "./drawing";
-import { fromLink, isTask, taskOf, type Task } from "./task";
+import { get } from "./api";
+import { fromLink, isTask, type Table, type Task } from "./task";
 
-/** Key of the current task in the storage of the browser. */
+/** Key of the current task in the storages of the browser. */
 export const TASK_KEY = "bellcrank-task";
+const HISTORY_KEY = "bellcrank-history";
 
-/** A task on a lattice without supports, input and output. */
-export function emptyTask(lattice: Pick<Problem, "positions" | "beams">, table: Record<string, unknown> | null, like: Task): Task {
-  const { input, output } = like.problem;
-  const problem: Problem = {
-    ...like.problem, ...lattice,
-    supports: { fixed: [], fixed_x: [], fixed_y: [] },
-    input: { ...input, nodes: [], direction: isEach(input.direction) ? [0, -1] : input.direction },
-    output: { ...output, nodes: [], direction: isEach(output.direction) ? [-1, 0] : output.direction },
-    designable: [], initial: hexOf(new Uint8Array(lattice.beams.length).fill(1)),
-  };
-  return { ...like, problem, lattice: table, rules: lattice.beams.map(() => "auto"), hand: null };
+/** A task of one load case without supports, inputs and outputs. */
+export function emptyTask(): Task {
+  return { table: { name: "my part", domain: { size: [82, 72] }, supports: [], cases: [{ inputs: [], outputs: [] }] }, hand: null };
 }
 
-/** Return the task of a link, else the stored one, else an example that can be searched. */
+/** A rectangle that is held at the bottom and pushed down at the upper right; its output is at the upper left. */
+export function exampleTask(): Task {
+  return {
+    table: {
+      name: "my part", domain: { size: [82, 72] }, supports: [{ at: [{ edge: "bottom" }] }],
+      cases: [{
+        inputs: [{ at: [{ point: [76, 70] }, { point: [66, 70] }], direction: "down", displacement: 3 }],
+        outputs: [{ at: [{ point: [6, 70] }, { point: [16, 70] }], direction: "left", gain: [{ maximise: true }], off_axis: [{ at_most: "10%" }], rotation: [{ value: "5 deg" }], payload: [{ at_least: "10 g" }], sag: [{ at_most: "10%" }] }],
+      }],
+    },
+    hand: null,
+  };
+}
+
+/** Return the task of a link, else that of this tab, else the latest one, else an example. */
 export async function firstTask(link: string): Promise<Task> {
   if (link) {
     try {
@@ -28,34 +34,42 @@ export async function firstTask(link: string): Promise<Task> {
       if (isTask(given)) return given;
     } catch { /* not a link to a task: ignored */ }
   }
-  try {
-    const stored = JSON.parse(localStorage.getItem(TASK_KEY) ?? "null") as unknown;
-    if (isTask(stored)) return stored;
-  } catch { /* the stored text is no task: ignored */ }
+  for (const storage of [sessionStorage, localStorage]) {
+    try {
+      const stored = JSON.parse(storage.getItem(TASK_KEY) ?? "null") as unknown;
+      if (isTask(stored)) return stored;
+    } catch { /* the stored text is no task: ignored */ }
+  }
   return exampleTask();
 }
 
-/** A rectangle supported at its lowest row: input down at the upper right, output to the left at the upper left. */
-export async function exampleTask(): Promise<Task> {
-  const lattice = { kind: "triangular-rectangle", columns: 8, rows: 9 };
-  const made = await post<Pick<Problem, "positions" | "beams">>("/lattices", { lattice });
-  const problem: Problem = {
-    schema: "bellcrank/problem/1", name: "my actuator", ...made, initial: "", designable: [],
-    stiffness: { bond: 5, angle: 0.1 }, supports: { fixed: [], fixed_x: [], fixed_y: [] },
-    input: { nodes: [], direction: [0, -1], drive: "displacement", amount: 0.3 },
-    output: { nodes: [], direction: [-1, 0], spring: null, spring_kind: null }, aggregate: "mean",
-  };
-  const rows = made.positions.map(([x, y], k) => ({ x, y, k }));
-  const top = Math.max(...rows.map((node) => node.y));
-  const row = (y: number): number[] => rows.filter((n) => Math.abs(n.y - y) < 0.1).sort((a, b) => a.x - b.x).map((n) => n.k);
-  problem.supports.fixed = row(0);
-  problem.input.nodes = row(top).slice(-2);
-  problem.output.nodes = row(top).slice(0, 2);
-  problem.initial = hexOf(new Uint8Array(made.beams.length).fill(1));
-  const task = taskOf(problem, lattice);
-  return { ...task, rules: made.beams.map(() => "auto") };
+export async function bundledTask(name: string): Promise<Task> {
+  return { table: await get<Table>(`/tasks/${name}`), hand: null };
 }
 
-export async function builtInTask(name: string): Promise<Task> {
-  return taskOf(await get<Problem>(`/problems/${name}`));
+/** Store the task and the steps before it; the steps are left out if the storage is full. */
+export function store(task: Task, history: { past: string[]; future: string[] }): void {
+  const text = JSON.stringify(task);
+  for (const work of [
+    () => sessionStorage.setItem(TASK_KEY, text),
+    () => localStorage.setItem(TASK_KEY, text),
+    () => sessionStorage.setItem(HISTORY_KEY, JSON.stringify(history)),
+  ]) {
+    try { work(); } catch { sessionStorage.removeItem(HISTORY_KEY); }
+  }
+}
+
+export function storedHistory(): { past: string[]; future: string[] } | null {
+  try {
+    return JSON.parse(sessionStorage.getItem(HISTORY_KEY) ?? "null") as { past: string[]; future: string[] } | null;
+  } catch {
+    return null;
+  }
+}
+
+/** Make a task the current one of this tab; undo returns to the one before. */
+export function openTask(task: Task): void {
+  const before = sessionStorage.getItem(TASK_KEY) ?? localStorage.getItem(TASK_KEY);
+  const history = storedHistory() ?? { past: [], future: [] };
+  store(task, { past: before ? [...history.past, before] : history.past, future: [] });
 }

@@ -1,43 +1,49 @@
 // The interface of the task editor that its panels use; types only.
 
-import type { Registries, Response, Point, Problem } from "./api";
+import type { ItemState, Registries } from "./api";
 import type { Tool } from "./canvas";
-import type { Hold, Region, Task } from "./task";
+import type { Built, Hold, Table, Target, Task, ZoneKind, ZoneShape } from "./task";
 
-export type Brush = "keep" | "never" | "auto";
-
-/** Settings of a search; `forPart` searches frames with struts of a width in mm, else the spring model. */
-export interface Settings { method: string; steps: number; chains: number; seed: number; forPart: boolean; width: number; material: string }
+/** Settings of a search. */
+export interface Settings { method: string; steps: number; chains: number; seed: number }
 
 export interface Fault { key: string; message: string }
 
 export interface TaskEditor {
   readonly task: Task;
-  readonly problem: Problem;
+  readonly built: Built | null;
   readonly tool: Tool;
   readonly fault: Fault | null;
-  readonly response: Response | null;
   readonly registries: Registries | null;
-  /** The first region that has no nodes, and a message that names it. */
-  readonly missing: { region: Region; message: string } | null;
+  /** Key of the first table that has no nodes. */
+  readonly missing: string | null;
+  /** Number of the load case that is shown. */
+  readonly loadCase: number;
+  /** Table whose nodes are selected in the drawing. */
+  readonly target: Target;
   hold: Hold;
-  brush: Brush;
+  zone: { kind: ZoneKind; shape: ZoneShape };
   settings: Settings;
   choose(tool: Tool): void;
-  /** Replace the task by a changed one. */
-  set(task: Task, merge?: boolean): void;
+  aimAt(target: Target): void;
+  showCase(loadCase: number): void;
+  /** Replace the table of the task by a changed one. */
+  change(table: Table, merge?: boolean): void;
   /** Replace the task by another one. */
   open(task: Task): void;
-  selectRows(rows: boolean): void;
-  clearRegion(region: Region): void;
-  setDirection(region: "input" | "output", direction: Point): void;
-  change(region: "input" | "output", changes: Record<string, unknown>): void;
-  /** Evaluate again after a change of the part. */
-  updateModel(): void;
+  /** Items that the design drawn by hand reaches. */
+  readonly reached: ItemState[] | null;
+  /** Number of the support with the chosen hold; of a new one if there is none. */
+  supportIndex(): number;
+  setRows(rows: boolean): void;
+  restoreBeams(): void;
   startSearch(): Promise<void>;
   saveHandDesign(title: string): Promise<void>;
-  save(suffix: ".toml" | ".json"): Promise<void>;
+  save(): Promise<void>;
   /** Create a link to the task and return the text that the button shows then. */
   link(): Promise<string>;
+  /** Open a file with a task or a design. */
   load(file: File): Promise<void>;
+  /** Read the outline of the domain from a DXF or SVG file. */
+  loadOutline(file: File): Promise<void>;
 }

@@ -1,111 +1,107 @@
-// The page on which a task is defined, and a design is drawn by hand.
+// The page on which a task is stated, and a design is drawn by hand.
 
-import { bitsOf, fetchRegistries, hexOf, modelOf, post, ServerError, session, Solver, type Part, type Point, type Problem, type Registries, type Response } from "./api";
-import { TASK_KEY } from "./begin";
+import { bitsOf, fetchRegistries, hexOf, post, ServerError, session, Solver, type ItemState, type Point, type Registries, type Response } from "./api";
+import { store, storedHistory, TASK_KEY } from "./begin";
 import { Canvas, type Tool } from "./canvas";
 import { where } from "./drawing";
-import { announce, choice, clear, download, figure, h, iconButton } from "./dom";
-import type { Brush, Fault, Settings, TaskEditor } from "./editing";
+import { announce, button, choice, clear, download, figure, h, iconButton } from "./dom";
+import type { Fault, Settings, TaskEditor } from "./editing";
 import { Panels } from "./panels";
 import {
-  assign, goalsOf, History, images, nodesOf, problemOf, taskOf, toLink, type Hold, type Region, type Task,
+  assign, History, isTask, nodesOf, sectionsOf, toLink, vectorOf, withSection, withSections,
+  type Built, type Direction, type Domain, type Hold, type Kind, type Shape, type Table, type Target, type Task, type ZoneKind, type ZoneShape,
 } from "./task";
-import { fileName, sentence, suffixOf, undoKeys } from "./text";
+import { fileName, lengthIn, sentence, suffixOf, undoKeys } from "./text";
+import type { Arrow, View } from "./view";
 
 const TOOLS: [Tool, string, string][] = [
-  ["supports", "Supports", "Click nodes to support them; drag a box to select several, double-click to select a row."],
-  ["input", "Input", "Click the input nodes; drag the orange arrow to set direction and stroke."],
-  ["output", "Output", "Click the output nodes; drag the blue arrow to set the direction in which they should move."],
-  ["beams", "Beams", "Mark beams that must be present or absent."],
-  ["hand", "By hand", "Click beams to remove or add them; the computed response is shown at once."],
+  ["supports", "Supports", "Click nodes to hold them; drag a box to select several, double-click to select a row."],
+  ["inputs", "Inputs", "Click the nodes that are pushed; drag the orange arrow to set direction and stroke."],
+  ["outputs", "Outputs", "Click the nodes that must move; drag the blue arrow to set the direction."],
+  ["loads", "Loads", "Click nodes on which a force acts, or which a spring holds."],
+  ["zones", "Zones", "Drag to draw a hole, a zone that stays free, or a zone that stays solid."],
+  ["hand", "By hand", "Click struts to remove or add them; the part is computed at once."],
 ];
-
-const MISSING: [Region, string][] = [
-  ["supports", "No supports: choose Supports and click nodes."],
-  ["input", "No input: choose Input and click nodes."],
-  ["output", "No output: choose Output and click nodes."],
-];
-const WELCOME = "This example is supported at the bottom and pushed down at the right; its output should move left. Change it, or press Design it.";
+const WELCOME = "This example is held at the bottom and pushed down at the right; its output must move left. Change it, or press Design it.";
+/** What a first node makes of a kind without any table. */
+const FIRST: Record<Kind, Record<string, unknown>> = {
+  supports: { at: [] },
+  inputs: { at: [], direction: "down", displacement: 3 },
+  outputs: { at: [], direction: "left", gain: [{ maximise: true }], off_axis: [{ at_most: "10%" }] },
+  loads: { at: [], direction: "down", force: "10 g" },
+};
+const DELAY = 60;
+/** Milliseconds without a change after which a design by hand is verified along the whole stroke. */
+const REST = 250;
 
 export class Editor implements TaskEditor {
   readonly element = h("div", { class: "page draw" });
   tool: Tool = "supports";
-  hold: Hold = "fixed";
-  brush: Brush = "keep";
-  settings: Settings = { method: "", steps: 25000, chains: 2, seed: 0, forPart: true, width: 2, material: "" };
+  hold: Hold = "all";
+  zone: { kind: ZoneKind; shape: ZoneShape } = { kind: "holes", shape: "box" };
+  settings: Settings = { method: "", steps: 8000, chains: 2, seed: 0 };
   fault: Fault | null = null;
   registries: Registries | null = null;
-  response: Response | null = null;
+  built: Built | null = null;
+  loadCase = 0;
+  target: Target = { kind: "supports", index: 0 };
+  reached: ItemState[] | null = null;
   private history: History<Task>;
   private readonly canvas: Canvas;
   private readonly panels: Panels;
   private readonly solver: Solver;
-  private frame: Pick<Problem, "section" | "material"> = {};
   private readonly hint = h("p", { class: "hint" });
   private readonly errorLine = h("p", { class: "error", role: "alert" });
+  private readonly notice = h("p", { class: "notice", role: "status" });
   private readonly readout = h("div", { class: "readout", "aria-live": "polite" });
   private readonly tools = h("div", { class: "tools" });
   private readonly undoButton = iconButton("undo", "Undo (Ctrl+Z)", () => this.step("undo"));
   private readonly redoButton = iconButton("redo", "Redo (Ctrl+Shift+Z)", () => this.step("redo"));
-  private checking: AbortController | null = null;
+  private building: AbortController | null = null;
   private timer = 0;
-  private checked = "";
+  private rest = 0;
+  private sent = "";
   private readonly onLeave = (): void => this.store();
+  private readonly onStorage = (event: StorageEvent): void => this.noteOtherTab(event);
   private readonly keys = undoKeys((action) => this.step(action));
 
   constructor(task: Task, private readonly isFirstVisit = false) {
-    this.history = new History(task);
+    this.history = new History(task, storedHistory());
     this.canvas = new Canvas({
-      nodes: (region, nodes, add, merge) => this.set(assign(this.task, region, nodes, add, this.hold), merge),
+      nodes: (nodes, add) => this.pick(nodes, add),
       beams: (beams, merge) => this.paint(beams, merge),
-      aim: (region, direction, amount, merge) => this.aim(region, direction, amount, merge),
+      aim: (target, direction, stroke, merge) => this.aim(target, direction, stroke, merge),
+      zone: (shape) => this.addZone(shape),
     });
     this.solver = new Solver((result, latency) => this.showResponse(result, latency, result.error));
     this.panels = new Panels(this);
-    this.build();
+    this.layOut();
     this.choose("supports");
     document.addEventListener("keydown", this.keys);
     addEventListener("pagehide", this.onLeave);
+    addEventListener("storage", this.onStorage);
     this.changed();
     void fetchRegistries().then((found) => {
       this.registries = found;
-      this.settings = { ...this.settings, method: this.settings.method || found.searches[0]!.name, material: this.settings.material || found.materials[0]!.name };
+      this.settings = { ...this.settings, method: this.settings.method || found.searches[0]!.name };
       this.panels.show();
-      void this.check();
     }, (error: ServerError) => { this.errorLine.textContent = sentence(error.message); });
   }
 
   get task(): Task { return this.history.value; }
-  get problem(): Problem { return problemOf(this.task); }
-
-  /** The problem as a frame of the struts of the part, with the section computed by the server. */
-  private get partProblem(): Problem { return this.settings.forPart ? { ...this.problem, ...this.frame } : this.problem; }
-
-  /** The part to be designed; null without one, or before its material is known. */
-  private get part(): Part | null {
-    const { forPart, width, material } = this.settings;
-    return forPart && material ? { width, thickness: 5, scale: this.task.scale, material } : null;
-  }
-
-  updateModel(): void {
-    void this.check().then(() => this.evaluate());
-  }
-
-  get missing(): { region: Region; message: string } | null {
-    const { problem } = this.task;
-    const empty = MISSING.find(([region]) => !nodesOf(problem, region).length);
-    return empty ? { region: empty[0], message: empty[1] } : null;
-  }
+  get missing(): string | null { return this.built?.missing ?? null; }
 
   close(): void {
     removeEventListener("pagehide", this.onLeave);
+    removeEventListener("storage", this.onStorage);
     document.removeEventListener("keydown", this.keys);
     clearTimeout(this.timer);
-    this.checking?.abort();
+    clearTimeout(this.rest);
+    this.building?.abort();
     this.solver.close();
   }
 
-  private build(): void {
+  private layOut(): void {
     const stage = h("section", { class: "stage", "aria-label": "Drawing" },
       h("div", { class: "bar" }, this.tools,
         h("span", { class: "spring" }), this.undoButton, this.redoButton),
@@ -114,8 +110,8 @@ export class Editor implements TaskEditor {
     this.element.append(
       h("div", { class: "intro" },
         h("h1", {}, "Design a compliant mechanism"),
-        h("p", {}, "Define supports, input and output. The search determines which beams to remove, so that one piece of material produces the motion."),
-        this.isFirstVisit && h("p", { class: "welcome" }, WELCOME)),
+        h("p", {}, "State where the part is held, where it is pushed, and what its outputs must do. The search determines which struts to keep; the result is one piece that prints."),
+        this.isFirstVisit && h("p", { class: "welcome" }, WELCOME), this.notice),
       stage, this.panels.element);
   }
 
@@ -123,7 +119,8 @@ export class Editor implements TaskEditor {
     this.tool = tool;
     this.canvas.tool = tool;
     this.element.dataset.tool = tool;
-    if (tool === "hand" && !this.task.hand) this.set({ ...this.task, hand: this.problem.initial });
+    if (tool !== "zones" && tool !== "hand") this.target = { kind: tool, index: tool === "supports" ? this.supportIndex() : 0 };
+    if (tool === "hand") this.drawByHand();
     clear(this.tools, choice("Tool", TOOLS.map(([key, text]) => [key, text]), tool, (picked) => this.choose(picked)));
     this.tools.querySelectorAll("label").forEach((label, k) => label.classList.add("tool", TOOLS[k]![0]));
     this.hint.textContent = TOOLS.find(([key]) => key === tool)![2];
@@ -131,51 +128,101 @@ export class Editor implements TaskEditor {
     (this.tools.querySelector("input:checked") as HTMLElement | null)?.focus({ preventScroll: true });
   }
 
-  set(task: Task, merge = false): void {
+  aimAt(target: Target): void {
+    if (this.tool !== target.kind) this.choose(target.kind);
+    this.target = target;
+    this.show();
+  }
+
+  showCase(loadCase: number): void {
+    this.loadCase = loadCase;
+    this.target = { ...this.target, index: this.target.kind === "supports" ? this.target.index : 0 };
+    this.show();
+  }
+
+  setRows(rows: boolean): void { this.canvas.rows = rows; }
+
+  /** Number of the support with the chosen hold; of a new one if there is none. */
+  supportIndex(): number {
+    const supports = this.task.table.supports ?? [];
+    const found = supports.findIndex(({ hold }) => (hold ?? "all") === this.hold);
+    return found < 0 ? supports.length : found;
+  }
+
+  private set(task: Task, merge = false): void {
     this.history.set(task, merge);
     this.changed();
   }
 
+  change(table: Table, merge = false): void { this.set({ table, hand: this.task.hand }, merge); }
+
   open(task: Task): void {
+    this.loadCase = 0;
     this.set(task);
-    this.choose("supports");
+    this.choose(this.tool === "hand" ? "supports" : this.tool);
   }
 
-  private aim(region: "input" | "output", direction: [number, number], amount: number | null, merge: boolean): void {
-    const { problem } = this.task;
-    const next = region === "input"
-      ? { ...problem, input: { ...problem.input, direction, amount: amount ?? problem.input.amount } }
-      : { ...problem, output: { ...problem.output, direction } };
-    this.set({ ...this.task, problem: next }, merge);
+  /** Add nodes to the active table or remove them. */
+  private pick(nodes: number[], add: boolean): void {
+    const { built, loadCase } = this;
+    if (!built) return;
+    if (this.target.kind === "supports") this.target = { kind: "supports", index: this.supportIndex() };
+    const { kind, index } = this.target;
+    let { table } = this.task;
+    const sections = sectionsOf(table, loadCase, kind);
+    let now = built;
+    if (index >= sections.length) {
+      const fresh = kind === "supports" ? { at: [], ...(this.hold === "all" ? {} : { hold: this.hold }) } : FIRST[kind];
+      table = withSections(table, loadCase, kind, [...sections, fresh] as never);
+      now = withRegion(built, loadCase, { kind, index: sections.length }, []);
+      this.target = { kind, index: sections.length };
+    }
+    const next = assign({ ...this.task, table }, now, loadCase, this.target, nodes, add);
+    // The regions follow at once, since the next click may come before the server has answered.
+    const gone = new Set(nodes);
+    for (const other of ["supports", "inputs", "outputs"] as const) {
+      nodesOf(now, loadCase, other).forEach((known, k) => {
+        if (add && kind !== "loads" && known.some((node) => gone.has(node))) now = withRegion(now, loadCase, { kind: other, index: k }, known.filter((node) => !gone.has(node)));
+      });
+    }
+    const known = nodesOf(built, loadCase, kind)[this.target.index] ?? [];
+    this.built = withRegion(now, loadCase, this.target, add ? [...new Set([...known, ...nodes])] : known.filter((node) => !gone.has(node)));
+    this.set({ ...next, hand: null });
+  }
+
+  private aim(target: Target, direction: Direction, stroke: number | null, merge: boolean): void {
+    this.target = target;
+    const scale = this.built?.part.scale ?? 10;
+    const changes = { direction, ...(stroke === null ? {} : { displacement: Math.round(stroke * scale * 100) / 100 }) };
+    this.change(withSection(this.task.table, this.loadCase, target, changes), merge);
+  }
+
+  private addZone(shape: Shape): void {
+    const scale = this.built?.part.scale ?? 10;
+    const mm = (value: number): number => Math.round(value * scale * 10) / 10;
+    const own: Shape = shape.box ? { box: shape.box.map(mm) } : { circle: shape.circle!.map(mm) as Point, radius: mm(Number(shape.radius)) };
+    const { table } = this.task;
+    this.change({ ...table, domain: { ...table.domain, [this.zone.kind]: [...(table.domain[this.zone.kind] ?? []), own] } });
   }
 
   private paint(beams: number[], merge: boolean): void {
-    const all = beams.flatMap((beam) => images(this.problem, beam, this.task.mirror));
-    if (this.tool === "hand") {
-      const bits = bitsOf(this.task.hand ?? this.problem.initial, this.problem.beams.length);
-      const to = bits[beams[0]!] ? 0 : 1;
-      for (const beam of all) bits[beam] = to;
-      this.set({ ...this.task, hand: hexOf(bits) }, merge);
-      announce(`${to ? "added" : "removed"} beam ${beams[0]}`);
-      return;
-    }
-    const rules = [...this.task.rules];
-    const to = !merge && rules[beams[0]!] === this.brush ? "auto" : this.brush;
-    for (const beam of all) rules[beam] = to;
-    this.set({ ...this.task, rules, hand: null }, merge);
+    const problem = this.built?.problem;
+    if (!problem || !this.task.hand) return;
+    const bits = bitsOf(this.task.hand, problem.beams.length);
+    const to = bits[beams[0]!] ? 0 : 1;
+    for (const beam of beams) bits[beam] = to;
+    this.set({ ...this.task, hand: hexOf(bits) }, merge);
+    announce(`${to ? "added" : "removed"} strut ${beams[0]}`);
   }
 
-  selectRows(rows: boolean): void { this.canvas.rows = rows; }
+  restoreBeams(): void { if (this.built?.problem) this.set({ ...this.task, hand: this.built.problem.initial }); }
 
-  clearRegion(region: "supports" | "input" | "output"): void {
-    this.set(assign(this.task, region, nodesOf(this.task.problem, region), false));
-  }
-
-  setDirection(region: "input" | "output", direction: Point): void { this.change(region, { direction }); }
-
-  change(region: "input" | "output", changes: Record<string, unknown>): void {
-    const { problem } = this.task;
-    this.set({ ...this.task, problem: { ...problem, [region]: { ...problem[region], ...changes } } });
+  /** Begin with all struts if there is no design by hand yet. */
+  private drawByHand(): void {
+    const problem = this.built?.problem;
+    if (!problem) return;
+    if (!this.task.hand) this.history.set({ ...this.task, hand: problem.initial }, true);
+    this.evaluate();
   }
 
   private step(action: "undo" | "redo"): void {
@@ -185,117 +232,162 @@ export class Editor implements TaskEditor {
   }
 
   private changed(): void {
-    if (this.tool === "hand" && !this.task.hand) this.history.set({ ...this.task, hand: this.problem.initial }, true);
     clearTimeout(this.timer);
-    if (this.tool === "hand") {
+    this.loadCase = Math.min(this.loadCase, this.task.table.cases.length - 1);
+    if (this.tool === "hand" && JSON.stringify(this.task.table) === this.sent) {
       // The request is sent before the drawing is updated; the rest is delayed.
-      this.evaluate();
+      this.drawByHand();
       this.showDrawing();
-      this.timer = window.setTimeout(() => { this.store(); this.show(); void this.check(); }, 150);
+      this.timer = window.setTimeout(() => { this.store(); this.show(); }, 150);
       return;
     }
     this.store();
     this.show();
-    this.timer = window.setTimeout(() => void this.check(), 120);
+    this.timer = window.setTimeout(() => void this.build(), this.built ? DELAY : 0);
   }
 
-  private store(): void {
-    try { localStorage.setItem(TASK_KEY, JSON.stringify(this.task)); } catch { /* the storage is full: not stored */ }
+  private store(): void { store(this.task, this.history.stored); }
+
+  /** Offer the task of another tab, which does not replace the one of this tab. */
+  private noteOtherTab(event: StorageEvent): void {
+    if (event.key !== TASK_KEY || !event.newValue) return;
+    const other = JSON.parse(event.newValue) as unknown;
+    if (!isTask(other) || JSON.stringify(other) === JSON.stringify(this.task)) return;
+    clear(this.notice, "The task was changed in another tab; this tab keeps its own. ",
+      button("Open that one here", () => { clear(this.notice); this.open(other); }, "quiet small"));
   }
 
-  private evaluate(): void {
-    if (this.task.hand && !this.missing) this.solver.evaluate(this.partProblem, this.task.hand);
-  }
-
-  private show(): void {
-    this.showDrawing();
-    const byHand = this.tool === "hand" && this.task.hand;
-    this.undoButton.disabled = !this.history.canUndo;
-    this.redoButton.disabled = !this.history.canRedo;
-    this.errorLine.textContent = this.missing ? "" : (this.fault?.message ?? "");
-    if (!byHand) clear(this.readout);
-    this.panels.show();
-  }
-
-  private showDrawing(): void {
-    const byHand = this.tool === "hand" && this.task.hand;
-    const problem = this.problem;
-    const fault = this.fault ? [...this.fault.message.matchAll(/\bnode (\d+)/g)].map((m) => Number(m[1])) : [];
-    this.canvas.show(this.task, problem, byHand ? bitsOf(this.task.hand!, problem.beams.length) : null, fault);
-    if (!byHand) this.canvas.showMoved(null, []);
-    this.element.classList.toggle("by-hand", !!byHand);
-  }
-
-  /** Validate the task on the server, and evaluate the full lattice. */
-  private async check(): Promise<void> {
-    this.checking?.abort();
-    if (this.missing) {
-      this.fault = null;
-      this.show();
-      return;
-    }
-    const body = { problem: this.problem, goals: goalsOf(this.task), part: this.part };
-    const text = JSON.stringify(body);
-    if (text === this.checked) return;
+  /** Build the task on the server. */
+  private async build(): Promise<void> {
+    this.building?.abort();
     const requested = new AbortController();
-    this.checking = requested;
+    this.building = requested;
+    const text = JSON.stringify(this.task.table);
     try {
-      const found = await post<{ response: Response | null } & Pick<Problem, "section" | "material">>("/tasks/check", body, requested.signal);
-      this.checked = found.response ? text : "";
-      this.fault = null;
-      this.response = found.response;
-      const frame = found.section && found.material ? { section: found.section, material: found.material } : {};
-      if (JSON.stringify(frame) !== JSON.stringify(this.frame)) {
-        this.frame = frame;
-        this.evaluate();
+      const before = this.built?.lattice;
+      this.built = await post<Built>("/tasks/build", { task: this.task.table }, requested.signal);
+      this.fault = this.built.fault;
+      const { lattice } = this.built;
+      const same = !before || (before.beams.length === lattice.beams.length && JSON.stringify(before.positions) === JSON.stringify(lattice.positions));
+      if (this.task.hand && !(same && this.task.hand.length === hexOf(new Uint8Array(lattice.beams.length)).length)) {
+        this.history.set({ ...this.task, hand: null }, true);
       }
     } catch (error) {
       if (error instanceof DOMException) return;
       const refused = error as ServerError;
-      this.checked = "";
-      this.fault = { key: refused.key, message: errorText(refused.message) };
+      this.fault = { key: refused.key, message: refused.message };
     }
-    if (!requested.signal.aborted) this.show();
+    if (requested.signal.aborted) return;
+    this.sent = text;
+    this.reached = null;
+    if (this.tool === "hand") this.drawByHand();
+    this.show();
+  }
+
+  private evaluate(verified = false): void {
+    const { built, task } = this;
+    clearTimeout(this.rest);
+    if (!built?.problem || !task.hand) return;
+    this.solver.evaluate(built.problem, task.hand, built.part, verified);
+    if (!verified) this.rest = window.setTimeout(() => this.evaluate(true), REST);
+  }
+
+  private show(): void {
+    this.showDrawing();
+    this.undoButton.disabled = !this.history.canUndo;
+    this.redoButton.disabled = !this.history.canRedo;
+    this.errorLine.textContent = this.fault ? sentence(this.fault.message) : "";
+    if (this.tool !== "hand") clear(this.readout);
+    this.panels.show();
+  }
+
+  private get byHand(): boolean { return this.tool === "hand" && this.task.hand !== null && this.built?.problem != null; }
+
+  private showDrawing(): void {
+    const { built } = this;
+    if (!built) return;
+    const { table } = this.task;
+    const total = built.lattice.beams.length;
+    const designable = new Uint8Array(total);
+    if (built.problem) for (const beam of built.problem.designable) designable[beam] = 1;
+    else designable.fill(1);
+    const { domain } = table;
+    const view: View = {
+      built, target: this.target, designable, symmetry: table.limits?.symmetry ?? "",
+      held: (table.supports ?? []).map((each, k) => ({ nodes: built.regions.supports[k] ?? [], hold: each.hold ?? "all", active: this.target.kind === "supports" && this.target.index === k })),
+      arrows: this.arrows(built),
+      zones: [...outlineZone(domain), ...(["holes", "keep_out", "solid"] as const).flatMap((kind) => (domain[kind] ?? []).map((shape) => ({ kind, shape })))],
+      bits: this.byHand ? bitsOf(this.task.hand!, total) : null,
+      faults: this.fault ? [...this.fault.message.matchAll(/\bnode (\d+)/g)].map((m) => Number(m[1])) : [],
+    };
+    if (!view.held.length && built.regions.given.supports.length) view.held.push({ nodes: built.regions.given.supports, hold: "all", active: false });
+    this.canvas.zoneShape = this.zone.shape;
+    this.canvas.show(view);
+    if (!this.byHand) this.canvas.showMoved(null, []);
+    this.element.classList.toggle("by-hand", this.byHand);
+  }
+
+  private arrows(built: Built): Arrow[] {
+    const load_case = this.task.table.cases[this.loadCase]!;
+    const { scale } = built.part;
+    const problem = built.problem;
+    const drive = problem?.input.drive === "displacement" ? problem.input.amount : null;
+    const arrow = (kind: Kind, index: number, direction: Direction | undefined, usual: Point, stroke: number | null): Arrow => ({
+      target: { kind, index }, nodes: nodesOf(built, this.loadCase, kind)[index] ?? [], direction: vectorOf(direction, usual), stroke,
+    });
+    const first = (direction: Point | Point[] | undefined, usual: Point): Point => (direction === undefined ? usual : Array.isArray(direction[0]) ? direction[0] : direction as Point);
+    const found = [
+      ...(load_case.inputs ?? []).map((each, k) => arrow("inputs", k, each.direction, first(problem?.input.direction, [0, -1]),
+        each.displacement === undefined ? (each.force === undefined ? drive : null) : lengthIn(each.displacement) / scale)),
+      ...(load_case.outputs ?? []).map((each, k) => arrow("outputs", k, each.direction, first(problem?.output.direction, [0, 1]), null)),
+      ...(load_case.loads ?? []).map((each, k) => arrow("loads", k, each.direction, [0, -1], null)),
+    ];
+    if (!load_case.inputs?.length && built.regions.given.input.length) {
+      found.push({ target: { kind: "inputs", index: 0 }, nodes: built.regions.given.input, direction: first(problem?.input.direction, [0, -1]), stroke: drive });
+    }
+    return found;
   }
 
   private showResponse(response: Response, latency: number, error?: { message: string }): void {
-    if (this.tool !== "hand" || !this.task.hand) return;
-    const bits = bitsOf(this.task.hand, this.problem.beams.length);
+    const { built } = this;
+    if (!this.byHand || !built?.problem) return;
+    const bits = bitsOf(this.task.hand!, built.problem.beams.length);
     this.canvas.showMoved(error ? null : response.displacement, where(bits));
-    const full = this.response?.efficiency;
-    const converged = !error && response.status === "converged";
+    const isKnown = !error && response.displacement !== null;
     clear(this.readout,
       h("strong", {}, error ? "–" : figure(response.efficiency, 3)),
-      h("span", {}, error ? sentence(error.message) : converged ? `${modelOf(this.partProblem)}: output / input displacement` : sentence(response.message)),
-      converged && full !== null && full !== undefined && h("span", {}, `full lattice: ${figure(full, 3)}`),
-      h("span", { class: "latency" }, `${latency.toFixed(0)} ms, ${where(bits).length} beams`));
+      h("span", {}, error ? sentence(error.message) : isKnown ? "output / input motion, frames" : sentence(response.message)),
+      h("span", { class: "latency" }, `${latency.toFixed(0)} ms, ${where(bits).length} struts`));
     this.readout.dataset.latency = latency.toFixed(1);
+    this.reached = response.items;
+    this.panels.showItems();
     document.dispatchEvent(new CustomEvent("bellcrank-response", { detail: latency }));
   }
 
   /** Start the search and open its page. */
   async startSearch(): Promise<void> {
-    const { settings, task } = this;
+    const { settings, task, built } = this;
     const body = {
-      title: task.problem.name, session: session(), problem: this.problem, goals: goalsOf(task),
+      title: task.table.name, session: session(), task: task.table,
       method: settings.method, steps: settings.steps, chains: settings.chains, seed: settings.seed,
-      part: this.part,
-      reference: task.hand && task.hand !== this.problem.initial ? task.hand : null,
+      reference: task.hand && task.hand !== built?.problem?.initial ? task.hand : null,
     };
     const { id } = await post<{ id: string }>("/runs", body);
     location.hash = `#/run/${id}`;
   }
 
   async saveHandDesign(title: string): Promise<void> {
+    const { built, task } = this;
+    if (!built?.problem || !task.hand) return;
     const saved = await post<{ source: string; key: string }>("/gallery", {
-      problem: this.partProblem, mask: this.task.hand, title, provenance: { kind: "drawn", ...(this.part ? { part: this.part } : {}) },
+      problem: built.problem, mask: task.hand, title, provenance: { kind: "drawn", part: built.part, task: task.table },
     });
     location.hash = `#/design/${saved.source}/${saved.key}`;
   }
 
-  async save(suffix: ".toml" | ".json"): Promise<void> {
-    const { text } = await post<{ text: string }>("/tasks/write", { problem: this.problem, lattice: this.task.lattice, suffix });
-    download(new Blob([text], { type: "text/plain" }), `${fileName(this.task.problem.name)}${suffix}`);
+  async save(): Promise<void> {
+    const { text } = await post<{ text: string }>("/tasks/write", { task: this.task.table });
+    download(new Blob([text], { type: "text/plain" }), `${fileName(this.task.table.name)}.toml`);
   }
 
   async link(): Promise<string> {
@@ -310,14 +402,32 @@ export class Editor implements TaskEditor {
   }
 
   async load(file: File): Promise<void> {
-    const suffix = suffixOf(file.name);
-    const read = await post<{ problem: Problem; lattice: Record<string, unknown> | null; mask: string | null }>("/tasks/read", { text: await file.text(), suffix });
-    this.open({ ...taskOf(read.problem, read.lattice, this.task.scale), hand: read.mask });
+    const read = await post<{ task: Table | null; design: { source: string; key: string } | null }>("/tasks/read", { text: await file.text(), suffix: suffixOf(file.name) });
+    if (read.task) this.open({ table: read.task, hand: null });
+    if (read.design) location.hash = `#/design/${read.design.source}/${read.design.key}`;
+  }
+
+  async loadOutline(file: File): Promise<void> {
+    const region = await post<Pick<Domain, "outline" | "holes">>("/tasks/region", { text: await file.text(), suffix: suffixOf(file.name) });
+    this.change({ ...this.task.table, domain: region });
   }
 }
 
-/** Replace the message of a mirror constraint by the terms of the page; other messages are unchanged. */
-function errorText(message: string): string {
-  const unmatched = /^goal 'mirror .*: (\d+ of \d+) designable beams/.exec(message);
-  return unmatched ? `The task is not symmetric: ${unmatched[1]} beams have no mirror image. Select symmetric nodes, or switch the mirror symmetry off.` : sentence(message);
+/** The outline of a domain as a zone to be drawn. */
+function outlineZone({ outline, size }: Domain): { kind: ZoneKind; shape: Shape }[] {
+  const shape = Array.isArray(outline) ? { polygon: outline } : outline ?? (size ? { box: [0, 0, size[0]!, size[1]!] } : null);
+  return shape ? [{ kind: "outline" as ZoneKind, shape }] : [];
+}
+
+/** A built task with other nodes in one region. */
+function withRegion(built: Built, loadCase: number, { kind, index }: Target, nodes: number[]): Built {
+  const replaced = (lists: number[][]): number[][] => {
+    const next = [...lists];
+    next[index] = nodes;
+    return next;
+  };
+  const { regions } = built;
+  if (kind === "supports") return { ...built, regions: { ...regions, supports: replaced(regions.supports) } };
+  const cases = regions.cases.map((each, k) => (k === loadCase ? { ...each, [kind]: replaced(each[kind]) } : each));
+  return { ...built, regions: { ...regions, cases } };
 }

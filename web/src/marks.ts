@@ -2,7 +2,8 @@
 
 import type { Point } from "./api";
 import type { Box } from "./drawing";
-import { nodesOf, type Task } from "./task";
+import type { Shape } from "./task";
+import type { View } from "./view";
 
 /** Directions in which nodes may slide, as a path. */
 export function rollerLines(rest: Float64Array, along_y: number[], along_x: number[]): string {
@@ -44,12 +45,23 @@ export function nextInDirection(total: number, place: (k: number) => Point, at: 
   return found;
 }
 
-/** Describe a node or beam for screen readers. */
-export function describeTarget({ problem, rules }: Task, tool: string, bits: Uint8Array, k: number): string {
-  if (tool === "hand") return `beam ${k}, ${bits[k] ? "present" : "absent"}`;
-  if (tool === "beams") return `beam ${k}, ${{ auto: "designable", keep: "always present", never: "always absent", free: "designable" }[rules[k]!]}`;
-  const [x, y] = problem.positions[k]!;
-  const part = (["supports", "input", "output"] as const).find((region) => nodesOf(problem, region).includes(k));
-  const name = part ? { supports: "support", input: "input", output: "output" }[part] : "free";
-  return `node ${k} at ${x.toFixed(1)}, ${y.toFixed(1)}: ${name}`;
+/** Describe a node or beam for screen readers, with its position in mm. */
+export function describeTarget({ built, held, arrows, bits }: View, tool: string, k: number): string {
+  if (tool === "hand") return `beam ${k}, ${bits?.[k] ? "present" : "absent"}`;
+  const [x, y] = built.lattice.positions[k]!;
+  const arrow = arrows.find(({ nodes }) => nodes.includes(k));
+  const names = { supports: "support", inputs: "input", outputs: "output", loads: "load" };
+  const name = arrow ? names[arrow.target.kind] : held.some(({ nodes }) => nodes.includes(k)) ? "support" : "free";
+  return `node at ${(x * built.part.scale).toFixed(1)}, ${(y * built.part.scale).toFixed(1)} mm: ${name}`;
+}
+
+/** A shape as a path; `scale` is the length of a unit of the drawing in units of the shape. */
+export function shapePath({ circle, radius, box, polygon }: Shape, scale: number): string {
+  if (circle && radius !== undefined) {
+    const [x, y, r] = [circle[0] / scale, -circle[1] / scale, parseFloat(String(radius)) / scale];
+    return `M${x - r} ${y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`;
+  }
+  const [x0, y0, x1, y1] = box ?? [];
+  const corners = polygon ?? (box ? [[x0!, y0!], [x1!, y0!], [x1!, y1!], [x0!, y1!]] : []);
+  return corners.length ? `M${corners.map(([x, y]) => `${x! / scale} ${-y! / scale}`).join("L")}Z` : "";
 }

@@ -1,12 +1,12 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
 import { fetchBlob, fetchFile, fetchRegistries, get, post, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError } from "./api";
-import { bitsOf, hexOf } from "./api";
-import { TASK_KEY } from "./begin";
+import { bitsOf } from "./api";
+import { openTask } from "./begin";
 import { button, clear, download, field, figure, h, number, select } from "./dom";
 import { Player, type Picture } from "./player";
 import { figureTable, itemTable, verdictOf, type Column } from "./specification";
-import { taskOf } from "./task";
+import type { Table } from "./task";
 import { fileName, REMEDIES, sentence } from "./text";
 
 export interface Subject {
@@ -33,7 +33,7 @@ export class Result {
   readonly element = h("aside", { class: "panel", "aria-label": "Result" });
   private readonly headline = h("p", { class: "headline" });
   private readonly verdict = h("p", { class: "verdict", role: "status" });
-  private readonly reportBox = h("div", { class: "report" });
+  private readonly reportBox = h("div", { class: "report", tabindex: 0, role: "region", "aria-label": "Specification" });
   private readonly warnings = h("ul", { class: "warnings", role: "alert" });
   private readonly advice = h("div", { class: "advice" });
   private readonly table = h("table", { class: "figures" });
@@ -181,7 +181,10 @@ export class Result {
     };
     const size = (key: "width" | "thickness" | "scale", label: string): HTMLElement =>
       field(label, number(this.part[key], { min: 0.1, step: "any" }, (value) => change({ [key]: value })), "mm");
-    const material = select((this.registries?.materials ?? []).map(({ name, title }): [string, string] => [name, title]), this.part.material, (picked) => change({ material: picked }));
+    const { material: given } = this.part;
+    const own: [string, string][] = typeof given === "string" ? [] : [["", given.name]];
+    const material = select([...own, ...(this.registries?.materials ?? []).map(({ name, title }): [string, string] => [name, title])],
+      typeof given === "string" ? given : "", (picked) => change({ material: picked || given }));
     const { remarks } = this;
     clear(this.partBox,
       h("div", { class: "row" }, size("width", "Strut width"), size("thickness", "Thickness")),
@@ -242,25 +245,28 @@ export class Result {
 
   private nextSteps(): HTMLElement {
     const { problem, mask } = this.subject;
-    const open = (byHand: boolean): void => {
-      const task = taskOf(problem, null, this.part.scale);
-      const whole = hexOf(new Uint8Array(problem.beams.length).fill(1));
-      const from = byHand ? { ...task, hand: mask } : { ...task, problem: { ...problem, initial: problem.initial || whole } };
-      localStorage.setItem(TASK_KEY, JSON.stringify(from));
-      if (byHand) sessionStorage.setItem("bellcrank-tool", "hand");
-      location.hash = "#/draw";
+    const open = async (byHand: boolean): Promise<void> => {
+      try {
+        const stored = this.subject.task ?? this.subject.provenance["task"] as Table | undefined;
+        const table = (stored ?? await post<Table>("/tasks/from-problem", { problem, part: this.part })) as Table;
+        openTask({ table, hand: byHand ? mask : null });
+        if (byHand) sessionStorage.setItem("bellcrank-tool", "hand");
+        location.hash = "#/draw";
+      } catch (error) {
+        this.trouble.textContent = sentence((error as ServerError).message);
+      }
     };
     const { plan } = this.subject;
     return h("div", { class: "content buttons" },
       plan && button("Open its plan", () => { location.hash = `#/machine/${plan}`; }, "strong"),
-      button("Open as a new task", () => open(false)),
-      button("Change by hand", () => open(true)));
+      button("Open its task", () => void open(false)),
+      button("Change by hand", () => void open(true)));
   }
 }
 
 function partOf(subject: Subject): Partial<Part> {
   const stored = (subject.part ?? subject.provenance["part"] ?? {}) as Partial<Part>;
-  return Object.fromEntries(Object.entries(stored).filter(([key, value]) => ["width", "thickness", "scale", "material"].includes(key) && (typeof value === "number" || typeof value === "string")));
+  return Object.fromEntries(Object.entries(stored).filter(([key, value]) => ["width", "thickness", "scale", "material"].includes(key) && (key === "material" || typeof value === "number")));
 }
 
 /** Load a design of the gallery. */

@@ -15,7 +15,7 @@ export class RunPage {
   private readonly chart = new Chart();
   private readonly head = h("div", { class: "intro" });
   private readonly live = h("div", { class: "live" });
-  private readonly items = h("div", { class: "report" });
+  private readonly items = h("div", { class: "report", tabindex: 0, role: "region", "aria-label": "Specification" });
   private readonly stage = h("section", { class: "stage", "aria-label": "Design" });
   private readonly controls = h("div", { class: "buttons" });
   private readonly trouble = h("p", { class: "fault", role: "alert" });

@@ -1,148 +1,175 @@
-// The task as plain data, with undo, and its conversion to and from the form of the server.
+// The task as a table, as in a task file, with undo, and its conversion to a link.
 
-import { bitsOf, hexOf, type Point, type Problem } from "./api";
-import { isEach } from "./drawing";
+import type { Part, Point, Problem } from "./api";
 
-export type Rule = "auto" | "keep" | "never" | "free";
-export type Region = "supports" | "input" | "output";
-export type Hold = "fixed" | "fixed_x" | "fixed_y";
+/** A number in the usual unit, or a text with a unit. */
+export type Amount = number | string;
+export type Direction = string | Point;
+
+export interface Shape { circle?: Point; radius?: Amount; box?: number[]; polygon?: Point[] }
+export interface Region extends Shape { point?: Point; count?: number; edge?: string; between?: Point; nodes?: number[]; without?: Shape }
+export type Hold = "all" | "x" | "y";
+export interface Support { at: Region[]; hold?: Hold }
+export interface InputTable { at?: Region[]; direction?: Direction; displacement?: Amount; force?: Amount; during?: [Amount, Amount] }
+export interface LoadTable { at: Region[]; direction: Direction; force?: Amount; spring?: Amount }
+export interface Bounds {
+  value?: Amount; at_least?: Amount; at_most?: Amount; target?: Amount; tolerance?: Amount;
+  from?: Amount; to?: Amount; of?: string; maximise?: boolean; minimise?: boolean; scale?: Amount;
+}
+export interface PathTable { points?: Point[]; arc?: [Amount, Amount]; error?: Amount }
+
+export const QUANTITIES = ["gain", "travel", "off_axis", "rotation", "payload", "stiffness", "blocked_force", "sag"] as const;
+export type QuantityName = (typeof QUANTITIES)[number];
+
+export type OutputTable = { name?: string; at?: Region[]; direction?: Direction; spring?: Amount; path?: PathTable } & Partial<Record<QuantityName, Bounds[]>>;
+
+export interface CaseTable {
+  name?: string; supports?: Support[]; inputs?: InputTable[]; loads?: LoadTable[]; gravity?: Direction; outputs?: OutputTable[];
+  input_force?: Bounds[]; strain?: Bounds[];
+}
+export interface Material { name: string; young: number; poisson: number; density?: number; strain_limit?: number; [key: string]: unknown }
+export interface Domain {
+  size?: number[]; outline?: Shape | Point[]; lattice?: Record<string, unknown>; problem?: string;
+  holes?: Shape[]; keep_out?: Shape[]; solid?: Shape[];
+}
+export interface Limits { strain?: Amount | boolean; clearance?: Amount | boolean; stable_stroke?: Amount; strut_loss?: Amount; mass?: Amount; symmetry?: string; upright?: Direction }
+export interface Tolerance { width?: Amount; each_width?: Amount; node?: Amount; angle?: Amount; least_yield?: Amount }
+export interface Table {
+  name: string; description?: string;
+  part?: { width?: Amount; thickness?: Amount; spacing?: Amount; fillet?: Amount; joint?: Amount; material?: string | Material };
+  domain: Domain; supports?: Support[]; cases: CaseTable[]; limits?: Limits; tolerance?: Tolerance;
+}
 
 export interface Task {
-  problem: Problem;
-  /** Table of the lattice, if it was made from one. */
-  lattice: Record<string, unknown> | null;
-  /** Rule of each beam; `auto` makes it designable unless it touches a region. */
-  rules: Rule[];
-  mirror: { x: boolean; y: boolean };
-  /** Length of a lattice unit, mm. */
-  scale: number;
+  table: Table;
   /** A design drawn by hand, as a mask. */
   hand: string | null;
 }
 
-export function touching(problem: Problem): Uint8Array {
-  const taken = new Set([
-    ...problem.supports.fixed, ...problem.supports.fixed_x, ...problem.supports.fixed_y,
-    ...problem.input.nodes, ...problem.output.nodes,
-  ]);
-  return Uint8Array.from(problem.beams, ([a, b]) => (taken.has(a) || taken.has(b) ? 1 : 0));
+/** Nodes of the regions of a load case, in the order of its tables. */
+export interface CaseRegions { inputs: number[][]; outputs: number[][]; loads: number[][]; supports: number[][] }
+
+/** A task as the server builds it. */
+export interface Built {
+  lattice: Pick<Problem, "positions" | "beams">;
+  part: Part;
+  regions: { supports: number[][]; given: { input: number[]; output: number[]; supports: number[] }; cases: CaseRegions[] };
+  /** Key of the first table without a region. */
+  missing: string | null;
+  /** Why there is no problem. */
+  fault: { key: string; message: string } | null;
+  problem: Problem | null;
+  items: { name: string; label: string; wanted: string }[];
 }
 
-/** Convert a problem to a task. */
-export function taskOf(problem: Problem, lattice: Record<string, unknown> | null = null, scale = 10): Task {
-  const touches = touching(problem);
-  const designable = new Uint8Array(problem.beams.length);
-  for (const beam of problem.designable) designable[beam] = 1;
-  const initial = bitsOf(problem.initial, problem.beams.length);
-  const rules = problem.beams.map((_, k): Rule => {
-    if (touches[k]) return designable[k] ? "free" : initial[k] ? "auto" : "never";
-    return designable[k] ? "auto" : initial[k] ? "keep" : "never";
-  });
-  return { problem, lattice, rules, mirror: { x: false, y: false }, scale, hand: null };
+/** Kinds of zones of a domain. */
+export type ZoneKind = "holes" | "keep_out" | "solid";
+export type ZoneShape = "box" | "circle";
+
+export type Kind = "supports" | "inputs" | "outputs" | "loads";
+/** A table with a region: a support of the task, or an input, output or load of a load case. */
+export interface Target { kind: Kind; index: number }
+
+type Sections = Support[] | InputTable[] | OutputTable[] | LoadTable[];
+
+export function sectionsOf(table: Table, load_case: number, kind: Kind): Sections {
+  return kind === "supports" ? table.supports ?? [] : table.cases[load_case]?.[kind] ?? [];
 }
 
-/** Convert a task to a problem with its designable beams and initial design. */
-export function problemOf(task: Task): Problem {
-  const { problem, rules } = task;
-  const touches = touching(problem);
-  const initial = bitsOf(problem.initial, problem.beams.length);
-  const designable: number[] = [];
-  rules.forEach((rule, k) => {
-    if (rule === "free" || (rule === "auto" && !touches[k])) designable.push(k);
-    if (rule === "never") initial[k] = 0;
-    else if (rule === "keep" || touches[k]) initial[k] = 1;
-  });
-  return { ...problem, designable, initial: hexOf(initial) };
+export function withSections(table: Table, load_case: number, kind: Kind, sections: Sections): Table {
+  if (kind === "supports") return { ...table, supports: sections as Support[] };
+  return { ...table, cases: table.cases.map((each, k) => (k === load_case ? { ...each, [kind]: sections } : each)) };
 }
 
-export function goalsOf(task: Task): string[] {
-  return (["x", "y"] as const).filter((axis) => task.mirror[axis]).map((axis) => `mirror ${axis}`);
+export function withSection(table: Table, load_case: number, { kind, index }: Target, changes: Record<string, unknown>): Table {
+  const sections = sectionsOf(table, load_case, kind).map((each, k) => (k === index ? cleaned({ ...each, ...changes }) : each));
+  return withSections(table, load_case, kind, sections as Sections);
 }
 
-export function nodesOf(problem: Problem, region: Region): number[] {
-  if (region !== "supports") return problem[region].nodes;
-  const { fixed, fixed_x, fixed_y } = problem.supports;
-  return [...fixed, ...fixed_x, ...fixed_y];
+/** A table without the keys that are undefined. */
+export function cleaned<T extends object>(table: T): T {
+  return Object.fromEntries(Object.entries(table).filter(([, value]) => value !== undefined)) as T;
 }
 
-/** Add nodes to a region or remove them; a node belongs to one region only. */
-export function assign(task: Task, region: Region, nodes: number[], add: boolean, hold: Hold = "fixed"): Task {
-  const gone = new Set(nodes);
-  const without = (list: number[]): number[] => list.filter((node) => !gone.has(node));
-  const { supports, input, output } = task.problem;
-  const next = {
-    supports: { fixed: without(supports.fixed), fixed_x: without(supports.fixed_x), fixed_y: without(supports.fixed_y) },
-    input: withNodes(input, without(input.nodes)),
-    output: withNodes(output, without(output.nodes)),
-  };
-  if (add) {
-    const sorted = (list: number[]): number[] => [...new Set([...list, ...nodes])].sort((a, b) => a - b);
-    if (region === "supports") next.supports[hold] = sorted(next.supports[hold]);
-    else if (region === "input") next.input = withNodes(input, sorted(next.input.nodes));
-    else next.output = withNodes(output, sorted(next.output.nodes));
+export function nodesOf(built: Built, load_case: number, kind: Kind): number[][] {
+  return kind === "supports" ? built.regions.supports : built.regions.cases[load_case]?.[kind] ?? [];
+}
+
+/** Regions that name nodes: the whole lowest or highest row as an edge, else each node by its point in mm. */
+export function regionsOf(nodes: number[], positions: Point[], scale: number): Region[] {
+  const set = new Set(nodes);
+  const heights = positions.map(([, y]) => y);
+  for (const [edge, y] of [["bottom", Math.min(...heights)], ["top", Math.max(...heights)]] as [string, number][]) {
+    const row = positions.flatMap(([, py], k) => (Math.abs(py - y) < 0.1 ? [k] : []));
+    if (row.length > 2 && row.length === set.size && row.every((node) => set.has(node))) return [{ edge }];
   }
-  return { ...task, problem: { ...task.problem, ...next }, hand: null };
+  const round = (value: number): number => Math.round(value * scale * 100) / 100;
+  return nodes.map((node) => ({ point: [round(positions[node]![0]), round(positions[node]![1])] as Point }));
 }
 
-/** Change the nodes of a region and keep the directions of single nodes. */
-function withNodes<R extends Problem["input"] | Problem["output"]>(region: R, nodes: number[]): R {
-  if (!isEach(region.direction)) return { ...region, nodes };
-  const each = new Map(region.nodes.map((node, k) => [node, (region.direction as Point[])[k]!]));
-  const common = region.direction[0] ?? [0, -1];
-  return { ...region, nodes, direction: nodes.map((node) => each.get(node) ?? common) };
+/** Add nodes to a target or remove them; a node belongs to one support, input or output of a load case. */
+export function assign(task: Task, built: Built, load_case: number, target: Target, nodes: number[], add: boolean): Task {
+  const { positions } = built.lattice;
+  const scale = built.part.scale;
+  const given = new Set(nodes);
+  let { table } = task;
+  for (const kind of ["supports", "inputs", "outputs"] as const) {
+    nodesOf(built, load_case, kind).forEach((known, index) => {
+      const own = kind === target.kind && index === target.index;
+      if (own || target.kind === "loads" || !add || !known.some((node) => given.has(node))) return;
+      table = withSection(table, load_case, { kind, index }, { at: regionsOf(known.filter((node) => !given.has(node)), positions, scale) });
+    });
+  }
+  const known = nodesOf(built, load_case, target.kind)[target.index] ?? [];
+  const next = add ? [...new Set([...known, ...nodes])].sort((a, b) => a - b) : known.filter((node) => !given.has(node));
+  return { table: withSection(table, load_case, target, { at: regionsOf(next, positions, scale) }), hand: null };
 }
 
-export function directionOf(region: Problem["input"] | Problem["output"]): Point {
-  return isEach(region.direction) ? (region.direction[0] ?? [0, -1]) : region.direction;
+const DIRECTIONS: Record<string, Point> = { right: [1, 0], up: [0, 1], left: [-1, 0], down: [0, -1] };
+
+/** Unit vector of a direction: a name, an angle or a vector. */
+export function vectorOf(direction: Direction | undefined, usual: Point = [0, 1]): Point {
+  if (direction === undefined) return usual;
+  if (typeof direction !== "string") {
+    const size = Math.hypot(direction[0], direction[1]) || 1;
+    return [direction[0] / size, direction[1] / size];
+  }
+  const named = DIRECTIONS[direction];
+  if (named) return named;
+  const angle = (parseFloat(direction) * Math.PI) / 180;
+  return Number.isFinite(angle) ? [Math.cos(angle), Math.sin(angle)] : usual;
+}
+
+/** A direction as a table has it: a name for a multiple of 90 degrees, else an angle. */
+export function directionAt(angle: number): Direction {
+  const whole = ((Math.round(angle) % 360) + 360) % 360;
+  return Object.keys(DIRECTIONS)[whole / 90] ?? `${whole} deg`;
 }
 
 /** Nodes of the row of a node, from left to right. */
-export function rowOf(problem: Problem, node: number): number[] {
-  const y = problem.positions[node]![1];
-  return problem.positions
+export function rowOf(positions: Point[], node: number): number[] {
+  const y = positions[node]![1];
+  return positions
     .map(([px, py], k): [number, number, number] => [k, px, py])
     .filter(([, , py]) => Math.abs(py - y) < 0.05)
     .sort((a, b) => a[1] - b[1])
     .map(([k]) => k);
 }
 
-/** Return a beam and its mirror images. */
-export function images(problem: Problem, beam: number, mirror: { x: boolean; y: boolean }): number[] {
-  if (!mirror.x && !mirror.y) return [beam];
-  const { positions, beams, designable } = problem;
-  let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
-  for (const k of designable.length ? designable : beams.keys()) {
-    for (const node of beams[k]!) {
-      const [x, y] = positions[node]!;
-      x0 = Math.min(x0, x); x1 = Math.max(x1, x);
-      y0 = Math.min(y0, y); y1 = Math.max(y1, y);
-    }
-  }
-  const find = ([x, y]: Point): number =>
-    positions.findIndex(([px, py]) => Math.abs(px - x) < 1e-3 && Math.abs(py - y) < 1e-3);
-  const found = new Set([beam]);
-  for (const [fx, fy] of [[mirror.x, false], [false, mirror.y], [mirror.x, mirror.y]] as [boolean, boolean][]) {
-    if (!fx && !fy) continue;
-    const [a, b] = beams[beam]!.map((node) => {
-      const [x, y] = positions[node]!;
-      return find([fx ? x0 + x1 - x : x, fy ? y0 + y1 - y : y]);
-    }) as [number, number];
-    const other = beams.findIndex(([p, q]) => (p === a && q === b) || (p === b && q === a));
-    if (other >= 0) found.add(other);
-  }
-  return [...found];
-}
-
-/** A value with undo and redo. */
+/** A value with undo and redo, which outlasts a reload. */
 export class History<T> {
   private past: string[] = [];
   private future: string[] = [];
 
-  constructor(private now: T, private readonly most = 100) {}
+  constructor(private now: T, stored: { past?: string[]; future?: string[] } | null = null, private readonly most = 60) {
+    this.past = stored?.past ?? [];
+    this.future = stored?.future ?? [];
+  }
 
   get value(): T { return this.now; }
   get canUndo(): boolean { return this.past.length > 0; }
   get canRedo(): boolean { return this.future.length > 0; }
+  get stored(): { past: string[]; future: string[] } { return { past: this.past, future: this.future }; }
 
   /** Set the value; `merge` makes the change part of the last step, as during a drag. */
   set(value: T, merge = false): void {
@@ -184,7 +211,6 @@ export async function fromLink(text: string): Promise<Task> {
 
 export function isTask(value: unknown): value is Task {
   const task = value as Task | null;
-  return !!task && typeof task === "object" && !!task.problem && Array.isArray(task.problem.positions)
-    && Array.isArray(task.problem.beams) && Array.isArray(task.rules) && task.rules.length === task.problem.beams.length
-    && typeof task.scale === "number" && !!task.mirror;
+  return !!task && typeof task === "object" && !!task.table && typeof task.table === "object"
+    && typeof task.table.domain === "object" && Array.isArray(task.table.cases) && task.table.cases.length > 0;
 }

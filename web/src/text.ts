@@ -9,6 +9,15 @@ export function suffixOf(name: string): string {
   return found ? found[0].toLowerCase() : ".txt";
 }
 
+const LENGTHS: Record<string, number> = { mm: 1, cm: 10, m: 1000, um: 0.001, in: 25.4 };
+
+/** A length in mm; NaN if it is none. */
+export function lengthIn(value: number | string): number {
+  if (typeof value === "number") return value;
+  const found = /^\s*([-+.\deE]+)\s*([a-z]*)\s*$/.exec(value);
+  return found ? Number(found[1]) * (LENGTHS[found[2] || "mm"] ?? NaN) : NaN;
+}
+
 export function sentence(text: string): string {
   const trimmed = text.trim();
   if (!trimmed) return "";

@@ -24,6 +24,8 @@ _KINDS: dict[str, TypeAdapter[Any]] = {
     "str": TypeAdapter(str, config=_STRICT),
     "Sequence[int]": TypeAdapter(list[int], config=_STRICT),
     "Sequence[float]": TypeAdapter(list[float], config=_STRICT),
+    "Sequence[Sequence[int]]": TypeAdapter(list[list[int]], config=_STRICT),
+    "Sequence[Sequence[float]]": TypeAdapter(list[list[float]], config=_STRICT),
 }
 
 

@@ -6,7 +6,7 @@ lattice units. The tables of a task file are the classes of `bellcrank.task.sche
 page of the documentation describes every key.
 """
 
-from bellcrank.task.build import Task, build_task
+from bellcrank.task.build import Task, build_task, lattice_of
 from bellcrank.task.files import bundled_tasks, find_task, is_task, read_task, task_from_dict
 from bellcrank.task.schema import TaskTable
 from bellcrank.task.units import NAMES, ProblemUnits, units_of
@@ -20,6 +20,7 @@ __all__ = [
     "bundled_tasks",
     "find_task",
     "is_task",
+    "lattice_of",
     "read_task",
     "task_from_dict",
     "units_of",

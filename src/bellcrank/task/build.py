@@ -104,6 +104,27 @@ def build_task(table: TaskTable, folder: Path | None = None) -> Task:
         raise InvalidProblem(str(error)) from None
 
 
+def lattice_of(table: TaskTable, folder: Path | None = None) -> tuple[Lattice, PartSpec]:
+    """Return lattice and part of a task whose supports and load cases may be incomplete.
+
+    Parameters, errors
+        As `build_task`.
+
+    Examples
+    --------
+    >>> table = TaskTable(name="a", domain={"size": [62, 54]}, cases=[])
+    >>> lattice_of(table)[0].node_count
+    46
+    """
+    try:
+        builder = _Builder(table, folder or Path())
+    except (InvalidFile, InvalidProblem):
+        raise
+    except BellcrankError as error:
+        raise InvalidProblem(str(error)) from None
+    return builder.lattice, builder.part
+
+
 class _Builder:
     """Builds the problem of a task, part by part."""
 

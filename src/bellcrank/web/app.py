@@ -19,10 +19,11 @@ from bellcrank import __version__
 from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName, first_line
 from bellcrank.processes import default_workers
 from bellcrank.web import design_routes, run_routes, task_routes
+from bellcrank.web.errors import plain_error
 from bellcrank.web.gallery import BundledDesigns, Gallery, RunDesigns, SavedDesigns
 from bellcrank.web.jobs import Jobs
 from bellcrank.web.machine_gallery import Actuators, Machines, Struts
-from bellcrank.web.pools import Busy, TimeLimitExceeded, make_pools, plain_error
+from bellcrank.web.pools import Busy, TimeLimitExceeded, make_pools
 from bellcrank.web.registries import registered
 from bellcrank.web.requests import ErrorResponse
 from bellcrank.web.scheduler import Scheduler

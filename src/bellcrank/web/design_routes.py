@@ -12,10 +12,10 @@ from starlette.concurrency import run_in_threadpool
 from bellcrank.errors import BellcrankError, InvalidFile
 from bellcrank.model import Design, unpack_mask
 from bellcrank.web import quick_calls, slow_calls
+from bellcrank.web.errors import plain_error
 from bellcrank.web.gallery import design_data, entry_named
 from bellcrank.web.limits import MESSAGE
 from bellcrank.web.page_files import page_files
-from bellcrank.web.pools import plain_error
 from bellcrank.web.requests import (
     DesignBody,
     FemBody,

@@ -26,6 +26,10 @@ def _grid(given: Mapping[str, Any]) -> int:
     return _whole(given.get("columns")) * _whole(given.get("rows"))
 
 
+def _length(value: object) -> int:
+    return len(value) if isinstance(value, list) else 0
+
+
 def _rows(given: Mapping[str, Any]) -> int:
     counts = given.get("counts")
     return sum(map(_whole, counts)) if isinstance(counts, list) else 0
@@ -36,6 +40,7 @@ _SIZES: dict[str, Callable[[Mapping[str, Any]], int]] = {
     "displaced-delaunay": _grid,
     "triangular-rows": _rows,
     "jammed-discs": lambda given: _whole(given.get("discs")),
+    "nodes": lambda given: _length(given.get("positions")),
 }
 """Estimates of the number of nodes of a lattice, by kind."""
 

@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from bellcrank.errors import RunFailed
 from bellcrank.web import quick_calls
@@ -201,20 +201,3 @@ def make_pools() -> Pools:
         thorough=Pool(1, seconds=120, waiting=32, niceness=2),
         slow=Pool(1, seconds=600, waiting=12, niceness=5, recycle=40),
     )
-
-
-def plain_error(error: BaseException) -> dict[str, Any]:
-    """Return message and key of an error, as the page receives them.
-
-    Examples
-    --------
-    >>> plain_error(ValueError("task: output.nodes: node 5 is also in input.nodes"))
-    {'message': 'output.nodes: node 5 is also in input.nodes', 'key': 'output.nodes'}
-    """
-    message = str(error).splitlines()[0] if str(error) else type(error).__name__
-    message = (
-        message.removeprefix("task: ").removeprefix("the file: ").removeprefix("the machine: ")
-    )
-    head = message.partition(":")[0]
-    named = head.replace(".", "").replace("_", "").replace("[", "").replace("]", "").isalnum()
-    return {"message": message, "key": head if named and " " not in head else ""}

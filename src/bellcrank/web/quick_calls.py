@@ -172,24 +172,6 @@ def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def check(text: str, goals: tuple[str, ...]) -> dict[str, Any]:
-    """Check that a task can be searched; return its size and the response of its initial design."""
-    from bellcrank.search.constraints import parse_goal
-
-    entry = cached(text)
-    problem = entry.problem
-    for goal in goals:
-        parse_goal(goal).constraint(problem)
-    response = evaluate(text, np.packbits(problem.initial).tobytes().hex())
-    return {
-        "hash": problem.hash,
-        "nodes": problem.lattice.node_count,
-        "beams": problem.lattice.beam_count,
-        "designable": len(problem.designable),
-        "response": response,
-    }
-
-
 def motion(text: str, mask: str, case: str = "") -> dict[str, Any]:
     """Return the states of a design along its path in a load case, each computed from rest.
 

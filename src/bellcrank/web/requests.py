@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -55,25 +55,11 @@ class ErrorResponse(BaseModel):
     key: str = ""
 
 
-class LatticeBody(Body):
-    """Kind and parameters of a lattice."""
-
-    lattice: dict[str, Any]
-
-
 class TextBody(Body):
     """An uploaded file."""
 
     text: str = Field(max_length=1_900_000)
     suffix: str = Field(pattern=r"^\.[a-z0-9.]{1,12}$")
-
-
-class TaskBody(Body):
-    """A task with its constraints and its part."""
-
-    problem: dict[str, Any]
-    goals: Goals = ()
-    part: dict[str, Any] | None = None
 
 
 class TableBody(Body):
@@ -82,12 +68,11 @@ class TableBody(Body):
     task: dict[str, Any]
 
 
-class SaveBody(Body):
-    """A task to be written as a file."""
+class ProblemBody(Body):
+    """A problem and its part."""
 
     problem: dict[str, Any]
-    lattice: dict[str, Any] | None = None
-    suffix: Literal[".json", ".toml"]
+    part: dict[str, Any] = Field(default_factory=dict)
 
 
 class DesignBody(Body):

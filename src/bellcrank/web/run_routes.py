@@ -19,8 +19,8 @@ from bellcrank.errors import BellcrankError, InvalidSettings, UnknownName
 from bellcrank.model import human_counterpart, problem_to_dict
 from bellcrank.storage.history import HISTORY
 from bellcrank.web import curves, quick_calls
+from bellcrank.web.errors import plain_error
 from bellcrank.web.jobs import Record
-from bellcrank.web.pools import plain_error
 from bellcrank.web.requests import RunBody
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of

@@ -1,4 +1,4 @@
-"""Tasks as text: uploads and downloads of the page."""
+"""Tasks and designs as text: uploads and downloads of the page."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import InvalidFile
-from bellcrank.model import (
-    Design,
-    Problem,
-    problem_from_dict,
-    problem_to_dict,
-    read_design,
-    require_plane,
-)
+from bellcrank.errors import InvalidFile, InvalidProblem
+from bellcrank.model import problem_from_dict, read_design, require_plane
 from bellcrank.model.parsing import read_table
+from bellcrank.part import PartSpec
+from bellcrank.task import is_task
+from bellcrank.task.outlines import read_outline
 from bellcrank.web.limits import check_lattice, check_size
+from bellcrank.web.task_tables import plain_table, table_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from bellcrank.model import Design, Problem
+
+COORDINATE_DIGITS = 3
+"""Digits of the corners of an outline, mm."""
 UPLOAD = "the file"
 """Name of an upload in error messages, instead of its temporary path."""
 
@@ -45,16 +46,15 @@ def problem_of(data: Mapping[str, Any], source: str = "task") -> Problem:
     return problem
 
 
-def read_task(text: str, suffix: str) -> tuple[Problem, dict[str, Any] | None, Design | None]:
-    """Read an uploaded task or design.
+def read_upload(text: str, suffix: str) -> tuple[dict[str, Any] | None, Design | None]:
+    """Read an uploaded file.
 
     Returns
     -------
-    problem
-    lattice
-        Table that describes the lattice, if the file has one.
+    table
+        Table of the task, if the file has a task or a problem.
     design
-        Design, if the file holds one.
+        Design, if the file has one.
 
     Raises
     ------
@@ -65,80 +65,92 @@ def read_task(text: str, suffix: str) -> tuple[Problem, dict[str, Any] | None, D
         path.write_text(text, encoding="utf-8")
         try:
             return _read(path)
-        except (InvalidFile, OverflowError) as error:
-            raise InvalidFile(str(error).replace(str(path), UPLOAD)) from None
+        except (InvalidFile, InvalidProblem, OverflowError) as error:
+            kind = InvalidProblem if isinstance(error, InvalidProblem) else InvalidFile
+            raise kind(str(error).replace(str(path), UPLOAD)) from None
 
 
-def _read(path: Path) -> tuple[Problem, dict[str, Any] | None, Design | None]:
+def _read(path: Path) -> tuple[dict[str, Any] | None, Design | None]:
     table = read_table(path)
     if str(table.get("schema", "")).startswith("bellcrank/design/"):
         inner = table.get("problem")
         check_lattice(inner.get("lattice") if isinstance(inner, dict) else None)
         design = read_design(path)
-        _check(design.problem)
-        return design.problem, None, design
+        check_size(design.problem.lattice.node_count, design.problem.lattice.beam_count)
+        require_plane(design.problem, UPLOAD)
+        return None, design
+    if is_task(table):
+        return plain_table(table, UPLOAD), None
     problem = problem_of(table, UPLOAD)
-    _check(problem)
-    return problem, table.get("lattice"), None
-
-
-def _check(problem: Problem) -> None:
     check_size(problem.lattice.node_count, problem.lattice.beam_count)
     require_plane(problem, UPLOAD)
+    return table_of(problem, PartSpec()), None
 
 
-def write_task(problem: Problem, lattice: Mapping[str, Any] | None, suffix: str) -> str:
-    """Write a task as JSON or TOML.
+def read_region(text: str, suffix: str) -> dict[str, Any]:
+    """Return the region inside the closed curves of a DXF or SVG file, as keys of a domain.
 
-    Parameters
-    ----------
-    lattice
-        Table that generates the lattice; written instead of nodes and beams if given.
-    suffix
-        ``.json`` or ``.toml``.
+    Its lower left corner is moved to the origin.
 
-    Examples
-    --------
-    >>> from bellcrank.model import find_problem
-    >>> text = write_task(find_problem("crane"), None, ".toml")
-    >>> text.splitlines()[1], read_task(text, ".toml")[0].hash == find_problem("crane").hash
-    ('name = "crane"', True)
+    Raises
+    ------
+    InvalidFile
+        If the file has no closed curve, or several regions.
     """
-    data = problem_to_dict(problem)
-    if suffix == ".json":
-        return json.dumps(data, allow_nan=False) + "\n"
-    if lattice is not None:
-        made = problem_of({**_without_lattice(data), "lattice": dict(lattice)})
-        if made.hash == problem.hash:
-            data = {**_without_lattice(data), "lattice": dict(lattice)}
-    return to_toml(data)
+    with TemporaryDirectory(prefix="bellcrank-") as folder:
+        path = Path(folder) / f"upload{suffix}"
+        path.write_text(text, encoding="utf-8")
+        try:
+            region = read_outline(path)
+        except (InvalidFile, OverflowError) as error:
+            raise InvalidFile(str(error).replace(str(path), UPLOAD)) from None
+    if region.geom_type != "Polygon":
+        raise InvalidFile(f"{UPLOAD}: expected one region, got {len(region.geoms)}")
+    left, bottom, _, _ = region.bounds
 
+    def corners(ring: Any) -> list[list[float]]:
+        return [
+            [round(x - left, COORDINATE_DIGITS), round(y - bottom, COORDINATE_DIGITS)]
+            for x, y in list(ring.coords)[:-1]
+        ]
 
-def _without_lattice(data: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in data.items() if key not in {"positions", "beams"}}
+    holes = [{"polygon": corners(ring)} for ring in region.interiors]
+    return {"outline": corners(region.exterior), **({"holes": holes} if holes else {})}
 
 
 def to_toml(data: Mapping[str, Any]) -> str:
-    """Write tables of numbers, strings and lists as TOML, without the keys that are None.
+    """Write tables as TOML, without the keys that are None; inner tables are on one line.
 
     Examples
     --------
-    >>> print(to_toml({"name": "lift", "input": {"nodes": [1, 2], "amount": 0.5}}), end="")
+    >>> data = {"name": "lift", "part": {"width": 2.0}, "cases": [{"inputs": [{"force": 0.5}]}]}
+    >>> print(to_toml(data), end="")
     name = "lift"
     <BLANKLINE>
-    [input]
-    nodes = [1, 2]
-    amount = 0.5
+    [part]
+    width = 2.0
+    <BLANKLINE>
+    [[cases]]
+    inputs = [{ force = 0.5 }]
     """
-    plain = {key: value for key, value in data.items() if not isinstance(value, dict)}
-    lines = [f"{key} = {_value(value)}" for key, value in plain.items() if value is not None]
-    for key, table in data.items():
-        if isinstance(table, dict):
-            entries = [
-                f"{name} = {_value(value)}" for name, value in table.items() if value is not None
-            ]
-            lines += ["", f"[{key}]", *entries]
+    lines = _entries({key: value for key, value in data.items() if not _is_table(value)})
+    for key, value in data.items():
+        if isinstance(value, dict):
+            lines += ["", f"[{key}]", *_entries(value)]
+        elif _is_table(value):
+            for each in value:
+                lines += ["", f"[[{key}]]", *_entries(each)]
     return "\n".join(lines) + "\n"
+
+
+def _is_table(value: object) -> bool:
+    """Whether a value of the first level is a table, or a list of tables."""
+    is_list = isinstance(value, list) and bool(value) and isinstance(value[0], dict)
+    return is_list or isinstance(value, dict)
+
+
+def _entries(table: Mapping[str, Any]) -> list[str]:
+    return [f"{key} = {_value(value)}" for key, value in table.items() if value is not None]
 
 
 def _value(value: object) -> str:
@@ -146,6 +158,8 @@ def _value(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, list):
         return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(_entries(value))} }}"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)  # TOML escapes as JSON does
     if isinstance(value, float) and math.isfinite(value):

@@ -9,6 +9,7 @@ parameter ``rng``, which is set from the key ``seed``. Generators check the numb
 
 from bellcrank.model.lattices.crystals import body_centred, cubic, kelvin, octet
 from bellcrank.model.lattices.delaunay import displaced_delaunay, displaced_delaunay_space
+from bellcrank.model.lattices.given import given_nodes
 from bellcrank.model.lattices.jammed import jammed_discs
 from bellcrank.model.lattices.registry import lattices
 from bellcrank.model.lattices.triangular import triangular_rectangle, triangular_rows
@@ -18,6 +19,7 @@ __all__ = [
     "cubic",
     "displaced_delaunay",
     "displaced_delaunay_space",
+    "given_nodes",
     "jammed_discs",
     "kelvin",
     "lattices",

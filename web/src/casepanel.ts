@@ -1,0 +1,219 @@
+// Inputs, outputs and loads of a load case.
+
+import { button, choice, h, select } from "./dom";
+import { angleOf } from "./drawing";
+import type { TaskEditor } from "./editing";
+import { amount } from "./fields";
+import {
+  cleaned, directionAt, nodesOf, QUANTITIES, sectionsOf, vectorOf, withSection, withSections,
+  type Amount, type Bounds, type CaseTable, type InputTable, type LoadTable, type OutputTable, type QuantityName, type Target,
+} from "./task";
+
+/** What a single value of a quantity bounds, and an example. */
+const USUAL: Record<QuantityName, { title: string; bound: "at_least" | "at_most" | "value"; label: string; example: string }> = {
+  gain: { title: "gain", bound: "at_least", label: "at least", example: "2" },
+  travel: { title: "travel", bound: "at_least", label: "at least", example: "5 mm" },
+  off_axis: { title: "off-axis motion", bound: "at_most", label: "at most", example: "10%" },
+  rotation: { title: "rotation", bound: "value", label: "at most ±", example: "5 deg" },
+  payload: { title: "payload", bound: "at_least", label: "at least", example: "10 g" },
+  stiffness: { title: "stiffness", bound: "at_least", label: "at least", example: "0.1 N/mm" },
+  blocked_force: { title: "blocked force", bound: "at_least", label: "at least", example: "0.1 N" },
+  sag: { title: "sag under own weight", bound: "at_most", label: "at most", example: "10%" },
+};
+
+/** Quantities that are usually maximised. */
+const MAXIMISED: QuantityName[] = ["gain", "travel"];
+
+/** The panel of the inputs, outputs or loads of the shown load case. */
+export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "loads"): HTMLElement {
+  const sections = sectionsOf(editor.task.table, editor.loadCase, kind);
+  const make = { inputs: inputFields, outputs: outputFields, loads: loadFields }[kind];
+  const noun = { inputs: "input", outputs: "output", loads: "load" }[kind];
+  const add = (): void => editor.aimAt({ kind, index: sections.length });
+  const entries = sections.map((each, index) => {
+    const target: Target = { kind, index };
+    const isActive = editor.target.kind === kind && editor.target.index === index;
+    const nodes = editor.built ? nodesOf(editor.built, editor.loadCase, kind)[index]?.length ?? 0 : 0;
+    const drop = (): void => {
+      editor.change(withSections(editor.task.table, editor.loadCase, kind, sections.filter((_, k) => k !== index) as never));
+      editor.aimAt({ kind, index: 0 });
+    };
+    return h("fieldset", { class: `entry${isActive ? " active" : ""}`, "data-entry": `${kind}-${index}` },
+      h("legend", {}, `${noun} ${index + 1}`, h("small", {}, ` ${nodes} ${nodes === 1 ? "node" : "nodes"}`)),
+      sections.length > 1 && !isActive && button("Select its nodes", () => editor.aimAt(target), "quiet small", { "data-key": `aim-${kind}-${index}` }),
+      ...make(editor, each as never, target),
+      h("div", { class: "row between" },
+        button("Clear nodes", () => editor.change(withSection(editor.task.table, editor.loadCase, target, { at: [] })), "quiet small", { disabled: !nodes, "data-key": `clear-${kind}-${index}` }),
+        (sections.length > 1 || kind === "loads") && button(`Remove ${noun} ${index + 1}`, drop, "quiet small", { "data-key": `drop-${kind}-${index}` })));
+  });
+  const pending = editor.target.kind === kind && editor.target.index >= sections.length && sections.length > 0;
+  return h("div", { class: "content" }, ...entries,
+    pending ? h("p", { class: "note" }, `Click the nodes of the new ${noun}.`)
+      : sections.length > 0 && button(`Add another ${noun}`, add, "quiet", { "data-key": `add-${kind}` }),
+    !sections.length && h("p", { class: "note" }, `Click nodes in the drawing for the first ${noun}.`),
+    kind === "loads" && gravity(editor),
+    kind === "outputs" && caseTools(editor));
+}
+
+function set(editor: TaskEditor, target: Target, changes: Record<string, unknown>): void {
+  editor.change(withSection(editor.task.table, editor.loadCase, target, changes));
+}
+
+function directionFields(editor: TaskEditor, target: Target, given: InputTable["direction"]): HTMLElement {
+  const key = `${target.kind}-${target.index}`;
+  const angle = given === undefined ? undefined : angleOf(vectorOf(given));
+  return h("div", { class: "row" },
+    amount(`${key}-angle`, "Direction", angle, "°", (value) => set(editor, target, { direction: value === undefined ? undefined : directionAt(Number(value) || 0) })),
+    h("div", { class: "directions", role: "group", "aria-label": "Common directions" }, ...(["up", "right", "down", "left"] as const).map((name) =>
+      button({ up: "↑", right: "→", down: "↓", left: "←" }[name], () => set(editor, target, { direction: name }), "quiet", { "aria-label": name, title: name, "data-key": `${key}-${name}` }))));
+}
+
+function inputFields(editor: TaskEditor, each: InputTable, target: Target): HTMLElement[] {
+  const key = `inputs-${target.index}`;
+  const isForce = each.force !== undefined;
+  const during = each.during ?? [];
+  const range = (index: 0 | 1) => (value: Amount | undefined): void => {
+    const next = [during[0] ?? 0, during[1] ?? 1] as [Amount, Amount];
+    next[index] = value ?? index;
+    set(editor, target, { during: next });
+  };
+  return [
+    directionFields(editor, target, each.direction),
+    h("div", { class: "row" },
+      isForce ? amount(`${key}-amount`, "Force", each.force, "N", (value) => set(editor, target, { force: value ?? 1 }))
+        : amount(`${key}-amount`, "Stroke", each.displacement, "mm", (value) => set(editor, target, { displacement: value ?? 3 })),
+      choice("Prescribed", [["displacement", "motion"], ["force", "force"]] as ["displacement" | "force", string][], isForce ? "force" : "displacement", (picked) =>
+        set(editor, target, picked === "force" ? { force: 1, displacement: undefined, during: undefined } : { displacement: 3, force: undefined }), `prescribed-${target.index}`)),
+    ...(isForce ? [] : [h("details", { ...(each.during ? { open: true } : {}) }, h("summary", { "data-key": `${key}-when` }, "In a part of the stroke"),
+      h("div", { class: "row" }, amount(`${key}-from`, "From", during[0], "", range(0), "0 to 1, or a percentage"), amount(`${key}-to`, "To", during[1], "", range(1))))]),
+  ];
+}
+
+function loadFields(editor: TaskEditor, each: LoadTable, target: Target): HTMLElement[] {
+  const isSpring = each.spring !== undefined;
+  return [
+    directionFields(editor, target, each.direction),
+    h("div", { class: "row" },
+      isSpring ? amount(`loads-${target.index}-amount`, "Stiffness", each.spring, "N/mm", (value) => set(editor, target, { spring: value ?? 0.1 }))
+        : amount(`loads-${target.index}-amount`, "Force or mass", each.force, "", (value) => set(editor, target, { force: value ?? "10 g" }), "with its unit: 0.5 N, 50 g"),
+      choice("Kind of load", [["force", "force"], ["spring", "spring"]] as ["force" | "spring", string][], isSpring ? "spring" : "force", (picked) =>
+        set(editor, target, picked === "spring" ? { spring: 0.1, force: undefined } : { force: "10 g", spring: undefined }), `load-${target.index}`)),
+  ];
+}
+
+function gravity(editor: TaskEditor): HTMLElement {
+  const given = editor.task.table.cases[editor.loadCase]!.gravity;
+  const box = h("input", { type: "checkbox", checked: given !== undefined, "data-key": "gravity" });
+  box.addEventListener("change", () => changeCase(editor, { gravity: box.checked ? "down" : undefined }));
+  return h("label", { class: "tick" }, box, "The own weight acts, downwards");
+}
+
+function changeCase(editor: TaskEditor, changes: Partial<CaseTable>): void {
+  const cases = editor.task.table.cases.map((each, k) => (k === editor.loadCase ? cleaned({ ...each, ...changes }) : each));
+  editor.change({ ...editor.task.table, cases });
+}
+
+/** Bounds on the input force, and adding or removing load cases. */
+function caseTools(editor: TaskEditor): HTMLElement {
+  const { table } = editor.task;
+  const own = table.cases[editor.loadCase]!;
+  const bounds = own.input_force?.[0] ?? {};
+  const force = (changes: Bounds): void => {
+    const next = cleaned({ ...bounds, ...changes });
+    changeCase(editor, { input_force: Object.keys(next).length ? [next, ...(own.input_force?.slice(1) ?? [])] : undefined });
+  };
+  const addCase = (): void => {
+    const named = table.cases.map((each, k) => ({ ...each, name: each.name ?? `case ${k + 1}` }));
+    editor.change({ ...table, cases: [...named, { name: `case ${named.length + 1}`, inputs: [], outputs: [] }] });
+    editor.showCase(named.length);
+  };
+  const dropCase = (): void => {
+    editor.change({ ...table, cases: table.cases.filter((_, k) => k !== editor.loadCase) });
+    editor.showCase(0);
+  };
+  return h("details", { class: "more-case" }, h("summary", { "data-key": "case-more" }, "Input force, load cases"),
+    amount("case-force", "Input force at most", bounds.at_most, "N", (value) => force({ at_most: value })),
+    table.cases.length > 1 && nameField(editor, own),
+    h("div", { class: "buttons" },
+      button("Add a load case", addCase, "", { "data-key": "add-case" }),
+      table.cases.length > 1 && button("Remove this load case", dropCase, "quiet", { "data-key": "drop-case" })));
+}
+
+function nameField(editor: TaskEditor, own: CaseTable): HTMLElement {
+  return amount("case-name", "Name of the load case", own.name, "", (value) => changeCase(editor, { name: value === undefined ? undefined : String(value) }));
+}
+
+function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HTMLElement[] {
+  const key = `outputs-${target.index}`;
+  const several = sectionsOf(editor.task.table, editor.loadCase, "outputs").length > 1;
+  const rows = QUANTITIES.flatMap((name) => (each[name] ?? []).map((bounds, index) => itemRow(editor, each, target, name, index, bounds)));
+  const unused = QUANTITIES.filter((name) => !each[name]?.length);
+  const options: [string, string][] = [["", "choose …"], ...unused.map((name): [string, string] => [name, USUAL[name].title]), ...(each.path ? [] : [["path", "path"] as [string, string]])];
+  const add = select(options, "", (name) => {
+    if (!name) return;
+    if (name === "path") { set(editor, target, { path: { arc: [20, 60] } }); return; }
+    const { bound, example } = USUAL[name as QuantityName];
+    set(editor, target, { [name]: [name === "gain" ? { maximise: true } : { [bound]: example }] });
+  });
+  add.dataset.key = `${key}-add`;
+  add.setAttribute("aria-label", "Ask for");
+  return [
+    ...(several ? [amount(`${key}-name`, "Name", each.name, "", (value) => set(editor, target, { name: value === undefined ? undefined : String(value) }))] : []),
+    directionFields(editor, target, each.direction),
+    h("div", { class: "wanted" }, ...rows, each.path ? pathRow(editor, each, target) : null,
+      h("div", { class: "ask" }, h("span", {}, "Ask for"), add)),
+    h("details", { ...(each.spring !== undefined ? { open: true } : {}) }, h("summary", { "data-key": `${key}-workpiece` }, "Workpiece that resists"),
+      amount(`${key}-spring`, "Stiffness", each.spring, "N/mm", (value) => set(editor, target, { spring: value }))),
+  ];
+}
+
+/** What is wanted of a quantity: its usual bound, whether it is maximised, and everything else on demand. */
+function itemRow(editor: TaskEditor, each: OutputTable, target: Target, name: QuantityName, index: number, bounds: Bounds): HTMLElement {
+  const { title, bound, label, example } = USUAL[name];
+  const key = `outputs-${target.index}-${name}-${index}`;
+  const put = (next: Bounds | null): void => {
+    const list = (each[name] ?? []).flatMap((old, k) => (k === index ? (next ? [cleaned(next)] : []) : [old]));
+    set(editor, target, { [name]: list.length ? list : undefined });
+  };
+  const isMaximised = bounds.maximise === true || bounds.value === "maximise";
+  const single = bounds.value === "maximise" ? undefined : bounds.value;
+  const usual = single ?? (bound === "value" ? undefined : bounds[bound]);
+  const plain = { ...bounds, value: undefined };
+  const maximise = h("input", { type: "checkbox", checked: isMaximised, "data-key": `${key}-maximise` });
+  maximise.addEventListener("change", () => put({ ...plain, ...(usual === undefined ? {} : { [bound]: usual }), maximise: maximise.checked || undefined } as Bounds));
+  const largest = h("label", { class: "tick" }, maximise, "as large as possible");
+  const extra: (keyof Bounds)[] = ["at_least", "at_most", "target", "tolerance", "from", "to", "scale"];
+  const labels: Record<string, string> = { at_least: "at least", at_most: "at most", target: "target", tolerance: "tolerance", from: "from (stroke)", to: "to (stroke)", scale: "scale" };
+  const hasMore = extra.some((other) => other !== bound && bounds[other] !== undefined) || bounds.of !== undefined || bounds.minimise;
+  return h("div", { class: "item", "data-item": name },
+    h("div", { class: "ask-line" },
+      h("span", { class: "quantity" }, title),
+      amount(key, label, usual, "", (value) => put(bound === "value" ? cleaned({ ...bounds, value }) : { ...plain, maximise: isMaximised || undefined, [bound]: value } as Bounds), usual === undefined && !isMaximised ? `such as ${example}` : ""),
+      button("Remove", () => put(null), "quiet small", { "data-key": `${key}-drop`, "aria-label": `Remove ${title}` })),
+    MAXIMISED.includes(name) ? largest : null,
+    h("details", { ...(hasMore ? { open: true } : {}) }, h("summary", { "data-key": `${key}-more` }, "Other bounds"),
+      MAXIMISED.includes(name) ? null : largest,
+      h("div", { class: "row" }, ...extra.filter((other) => other !== bound).map((other) =>
+        amount(`${key}-${other}`, labels[other]!, bounds[other] as Amount | undefined, "", (value) => put({ ...plain, ...(single === undefined ? {} : { value: single }), [other]: value } as Bounds))))));
+}
+
+function pathRow(editor: TaskEditor, each: OutputTable, target: Target): HTMLElement {
+  const key = `outputs-${target.index}-path`;
+  const path = each.path!;
+  const isArc = path.arc !== undefined;
+  const put = (next: OutputTable["path"]): void => set(editor, target, { path: next && cleaned(next) });
+  const corners = (path.points ?? []).map((point) => point.join(", ")).join("; ");
+  const input = amount(`${key}-points`, "Corners from rest, mm", corners || undefined, "", (value) => {
+    const points = String(value ?? "").split(";").map((text) => text.split(",").map(Number) as [number, number]).filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
+    if (points.length) put({ ...path, points });
+  }, "such as 0, 0; −8, 0; −8, −8".replaceAll("−", "-"));
+  return h("div", { class: "item", "data-item": "path" },
+    h("div", { class: "ask-line" }, h("span", { class: "quantity" }, "path"),
+      choice("Kind of path", [["arc", "arc"], ["points", "corners"]] as ["arc" | "points", string][], isArc ? "arc" : "points", (picked) =>
+        put(picked === "arc" ? { arc: [20, 60], error: path.error } : { points: [[0, 0], [-10, 0]], error: path.error }), `${key}-kind`),
+      button("Remove", () => put(undefined), "quiet small", { "data-key": `${key}-drop`, "aria-label": "Remove path" })),
+    isArc ? h("div", { class: "row" },
+      amount(`${key}-radius`, "Radius", path.arc![0], "mm", (value) => put({ ...path, arc: [value ?? 20, path.arc![1]] })),
+      amount(`${key}-turn`, "Angle", path.arc![1], "°", (value) => put({ ...path, arc: [path.arc![0], value ?? 60] }))) : input,
+    amount(`${key}-error`, "Error at most", path.error, "", (value) => put({ ...path, error: value }), "a part of its length, 1% by default"));
+}

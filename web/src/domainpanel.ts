@@ -1,0 +1,142 @@
+// Size and material of the part, where material may be, and files of tasks.
+
+import { get } from "./api";
+import { bundledTask, emptyTask, exampleTask } from "./begin";
+import { button, choice, count, field, h, select } from "./dom";
+import type { TaskEditor } from "./editing";
+import { amount } from "./fields";
+import { cleaned, type Amount, type Domain, type Material, type Shape, type Table, type ZoneKind, type ZoneShape } from "./task";
+
+/** Problems of the paper on whose lattices a part can be designed. */
+const LATTICES = ["crane", "anti-parallel", "pliers", "scaling-8", "scaling-12", "discs"];
+const ZONES: [ZoneKind, string][] = [["holes", "Hole"], ["keep_out", "Free"], ["solid", "Solid"]];
+const OWN: Material = { name: "own", young: 12, poisson: 0.45, density: 1.2, strain_limit: 0.3 };
+
+export class DomainPanel {
+  private tasks: { name: string; about: string }[] = [];
+  private linked = "";
+
+  constructor(
+    private readonly editor: TaskEditor,
+    private readonly attempt: (work: () => Promise<void>) => void,
+    private readonly refresh: () => void,
+  ) {
+    void get<{ name: string; about: string }[]>("/tasks").then((found) => { this.tasks = found; this.refresh(); }, () => undefined);
+  }
+
+  summary(): string {
+    const { built } = this.editor;
+    return built ? `${count(built.lattice.positions.length, "node")}, ${count(built.lattice.beams.length, "strut")}` : "";
+  }
+
+  make(): HTMLElement {
+    const { editor } = this;
+    const { table } = editor.task;
+    const start = select([
+      ["", "choose …"], ["example", "an example"], ["empty", "an empty rectangle"],
+      ...this.tasks.map(({ name }): [string, string] => [name, name]),
+    ], "", (name) => name && this.attempt(async () => editor.open(name === "example" ? exampleTask() : name === "empty" ? emptyTask() : await bundledTask(name))));
+    start.dataset.key = "start";
+    const file = this.file("File to open", ".toml,.json", (picked) => this.attempt(() => editor.load(picked)));
+    const name = h("input", { type: "text", value: table.name, maxlength: 100, "data-key": "name" });
+    name.addEventListener("change", () => { if (name.value.trim()) editor.change({ ...table, name: name.value.trim() }); });
+    return h("div", { class: "content" },
+      h("div", { class: "row" }, field("Start from", start), field("Name", name)),
+      this.tasks.find((each) => each.name === table.name)?.about ? h("p", { class: "note" }, this.tasks.find((each) => each.name === table.name)!.about) : null,
+      this.part(), this.domain(), this.zones(),
+      h("div", { class: "buttons" },
+        button("Open a file", () => file.click(), "", { "data-key": "open" }), file,
+        button("Download the task", () => this.attempt(() => editor.save()), "", { "data-key": "toml" }),
+        button(this.linked || "Copy link", () => this.attempt(async () => { this.linked = await editor.link(); }), "", { "data-key": "link" })));
+  }
+
+  private file(label: string, accept: string, use: (file: File) => void): HTMLInputElement {
+    const input = h("input", { type: "file", accept, class: "visually-hidden", tabindex: -1, "aria-label": label });
+    input.addEventListener("change", () => {
+      const picked = input.files?.[0];
+      if (picked) use(picked);
+    });
+    return input;
+  }
+
+  private part(): HTMLElement {
+    const { editor } = this;
+    const { table } = editor.task;
+    const part = table.part ?? {};
+    const put = (changes: NonNullable<Table["part"]>): void => {
+      const next = cleaned({ ...part, ...changes });
+      editor.change(cleaned({ ...table, part: Object.keys(next).length ? next : undefined }));
+    };
+    const size = (key: "width" | "thickness" | "spacing", label: string, usual: number): HTMLElement =>
+      amount(`part-${key}`, label, part[key] ?? usual, "mm", (value) => put({ [key]: value }));
+    const own = typeof part.material === "object" ? part.material : null;
+    const material = select([
+      ...(editor.registries?.materials ?? []).map(({ name, title }): [string, string] => [name, title]), ["own", "own …"],
+    ], own ? "own" : String(part.material ?? "ninjaflex"), (picked) => put({ material: picked === "own" ? OWN : picked }));
+    material.dataset.key = "part-material";
+    const figure = (key: "young" | "poisson" | "density" | "strain_limit", label: string, unit: string): HTMLElement =>
+      amount(`material-${key}`, label, own?.[key], unit, (value) => put({ material: cleaned({ ...own!, [key]: value }) as Material }));
+    return h("div", {},
+      h("div", { class: "row" }, size("spacing", "Spacing of nodes", 10), size("width", "Strut width", 2)),
+      h("div", { class: "row" }, size("thickness", "Thickness", 5), field("Material", material)),
+      own && h("div", { class: "row" }, figure("young", "Young's modulus", "MPa"), figure("poisson", "Poisson's ratio", "")),
+      own && h("div", { class: "row" }, figure("density", "Density", "g/cm³"), figure("strain_limit", "Largest strain", "")));
+  }
+
+  private domain(): HTMLElement {
+    const { editor } = this;
+    const { table } = editor.task;
+    const { domain } = table;
+    const kind = domain.size ? "size" : domain.outline ? "outline" : domain.problem ? "problem" : "lattice";
+    const put = (next: Domain): void => editor.change({ ...table, domain: cleaned(next) });
+    const zones = { holes: domain.holes, keep_out: domain.keep_out, solid: domain.solid };
+    const drawing = this.file("Outline to read", ".dxf,.svg", (picked) => this.attempt(() => editor.loadOutline(picked)));
+    const options: [string, string][] = [["size", "Rectangle"], ["outline", "Outline"], ["problem", "Lattice of the paper"], ...(kind === "lattice" ? [["lattice", "Own lattice"] as [string, string]] : [])];
+    const pick = (picked: string): void => {
+      if (picked === "size") put({ size: [82, 72], ...zones });
+      else if (picked === "outline") put({ outline: [[0, 0], [80, 0], [80, 40], [40, 40], [40, 70], [0, 70]], ...zones });
+      else if (picked === "problem") editor.change({ ...table, domain: { problem: "crane" }, supports: [], cases: table.cases.map((each) => ({ ...each, inputs: [], outputs: (each.outputs ?? []).map((output) => cleaned({ ...output, at: undefined, direction: undefined })) })) });
+    };
+    const side = (index: 0 | 1) => (value: Amount | undefined): void => {
+      const size = [...domain.size!] as number[];
+      (size as Amount[])[index] = value ?? size[index]!;
+      put({ ...domain, size });
+    };
+    const lattice = select(LATTICES.map((name): [string, string] => [name, name]), domain.problem ?? "crane", (picked) => put({ problem: picked }));
+    lattice.dataset.key = "domain-problem";
+    const corners = Array.isArray(domain.outline) ? domain.outline : null;
+    return h("div", {},
+      choice("Kind of domain", options, kind, pick),
+      kind === "size" && h("div", { class: "row" },
+        amount("domain-width", "Width", domain.size![0], "mm", side(0)), amount("domain-height", "Height", domain.size![1], "mm", side(1))),
+      kind === "outline" && h("div", {},
+        corners ? amount("domain-corners", "Corners, mm", corners.length > 40 ? undefined : corners.map((point) => point.join(", ")).join("; "), "", (value) => {
+          const points = String(value ?? "").split(";").map((text) => text.split(",").map(Number) as [number, number]).filter((point) => point.length === 2 && point.every(Number.isFinite));
+          if (points.length > 2) put({ ...domain, outline: points });
+        }, corners.length > 40 ? `${corners.length} corners of a drawing` : "x, y; x, y; …") : h("p", { class: "note" }, "A round outline."),
+        button("Read DXF or SVG", () => drawing.click(), "", { "data-key": "outline" }), drawing),
+      kind === "problem" && field("Lattice", lattice, "", "With the supports, input and output of the paper unless you select others."));
+  }
+
+  private zones(): HTMLElement {
+    const { editor } = this;
+    const { table } = editor.task;
+    const known = ZONES.flatMap(([kind, title]) => (table.domain[kind] ?? []).map((shape, index) => ({ kind, title, shape, index })));
+    const drop = (kind: ZoneKind, index: number): void => {
+      const left = (table.domain[kind] ?? []).filter((_, k) => k !== index);
+      editor.change({ ...table, domain: cleaned({ ...table.domain, [kind]: left.length ? left : undefined }) });
+    };
+    return h("div", { class: "zones" },
+      editor.tool === "zones" ? h("div", { class: "row between" },
+        choice("Kind of zone", ZONES, editor.zone.kind, (picked) => { editor.zone = { ...editor.zone, kind: picked }; }),
+        choice("Shape of zone", [["box", "Box"], ["circle", "Circle"]] as [ZoneShape, string][], editor.zone.shape, (picked) => { editor.zone = { ...editor.zone, shape: picked }; editor.choose("zones"); }))
+        : button("Draw holes and zones", () => editor.choose("zones"), "quiet", { "data-key": "zones" }),
+      ...known.map(({ kind, title, shape, index }) => h("p", { class: "zone-row" }, `${title}: ${shapeText(shape)} `,
+        button("Remove", () => drop(kind, index), "quiet small", { "data-key": `zone-${kind}-${index}`, "aria-label": `Remove ${title.toLowerCase()} ${index + 1}` }))));
+  }
+}
+
+function shapeText({ circle, radius, box, polygon }: Shape): string {
+  if (circle) return `circle at ${circle.join(", ")} mm, radius ${radius} mm`;
+  return box ? `box from ${box.slice(0, 2).join(", ")} to ${box.slice(2).join(", ")} mm` : `polygon of ${polygon?.length ?? 0} corners`;
+}

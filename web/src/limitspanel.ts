@@ -1,0 +1,42 @@
+// Limits that hold in every load case, and tolerances.
+
+import { h, select } from "./dom";
+import type { TaskEditor } from "./editing";
+import { amount } from "./fields";
+import { cleaned, type Amount, type Limits, type Tolerance } from "./task";
+
+export function limitsPanel(editor: TaskEditor): HTMLElement {
+  const { table } = editor.task;
+  const limits = table.limits ?? {};
+  const put = (changes: Limits): void => {
+    const next = cleaned({ ...limits, ...changes });
+    editor.change(cleaned({ ...table, limits: Object.keys(next).length ? next : undefined }));
+  };
+  const value = (key: "strain" | "clearance"): Amount | undefined => (typeof limits[key] === "boolean" ? undefined : limits[key]);
+  const symmetry = select([["", "none"], ["x", "left and right"], ["y", "up and down"], ["xy", "both"]], limits.symmetry ?? "", (picked) => put({ symmetry: picked || undefined }));
+  symmetry.dataset.key = "limit-symmetry";
+  symmetry.id = "limit-symmetry";
+  const field = (key: keyof Limits, label: string, unit: string, help = ""): HTMLElement =>
+    amount(`limit-${key}`, label, limits[key] as Amount | undefined, unit, (given) => put({ [key]: given }), help);
+  const over = h("input", { type: "checkbox", checked: table.tolerance !== undefined, "data-key": "tolerance" });
+  over.addEventListener("change", () => editor.change(cleaned({ ...table, tolerance: over.checked ? {} : undefined })));
+  return h("div", { class: "content" },
+    h("div", { class: "row" },
+      amount("limit-strain", "Strain at most", value("strain"), "", (given) => put({ strain: given }), "empty: that of the material"),
+      amount("limit-clearance", "Gap between struts at least", value("clearance"), "mm", (given) => put({ clearance: given }), "empty: they must not touch")),
+    h("div", { class: "row" }, field("mass", "Mass at most", "g"), field("stable_stroke", "Stable up to", "", "such as 1.2 or 120%")),
+    h("div", { class: "row" }, field("strut_loss", "Loss of a strut costs at most", "", "such as 30%"),
+      h("div", { class: "field" }, h("label", { for: "limit-symmetry" }, "Mirror symmetry"), symmetry)),
+    h("label", { class: "tick" }, over, "Design over tolerances of print and drive"),
+    table.tolerance !== undefined && toleranceFields(editor, table.tolerance));
+}
+
+function toleranceFields(editor: TaskEditor, tolerance: Tolerance): HTMLElement {
+  const field = (key: keyof Tolerance, label: string, unit: string, help: string): HTMLElement =>
+    amount(`tolerance-${key}`, label, tolerance[key], unit, (given) =>
+      editor.change({ ...editor.task.table, tolerance: cleaned({ ...tolerance, [key]: given }) }), help);
+  return h("div", {},
+    h("div", { class: "row" }, field("width", "All widths", "", "such as 20%"), field("each_width", "Each width", "", "standard deviation, 5%")),
+    h("div", { class: "row" }, field("node", "Nodes", "mm", "0.1 mm"), field("angle", "Direction of the input", "°", "5 degrees")),
+    field("least_yield", "Prints that meet all items at least", "", "such as 95%"));
+}

@@ -1,0 +1,22 @@
+// What the drawing shows of a task; types only.
+
+import type { Point } from "./api";
+import type { Built, Shape, Target, ZoneKind } from "./task";
+
+/** An input, output or load of the shown load case. */
+export interface Arrow { target: Target; nodes: number[]; direction: Point; /** Displacement, lattice units. */ stroke: number | null }
+
+/** What the drawing shows of a task. */
+export interface View {
+  built: Built;
+  held: { nodes: number[]; hold: string; active: boolean }[];
+  arrows: Arrow[];
+  target: Target;
+  zones: { kind: ZoneKind; shape: Shape }[];
+  /** Whether each beam may be removed. */
+  designable: Uint8Array;
+  symmetry: string;
+  /** Present beams of the design drawn by hand, if there is one. */
+  bits: Uint8Array | null;
+  faults: number[];
+}
