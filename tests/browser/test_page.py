@@ -174,7 +174,7 @@ def test_holes_are_drawn_and_symmetry_is_asked_and_the_task_is_saved_and_loaded(
     until(page, lambda: "nodes" in summary(page, "domain") and beams(page) < 196)
     page.locator(".zones .choice label", has_text="Solid").click()
     page.locator(".zones .choice label", has_text="Circle").click()
-    drag(page, (6.5, 3.0), (7.2, 3.0))
+    drag(page, (6.0, 3.0), (7.6, 3.0))
     until(page, lambda: "circle" in task(page)["table"]["domain"].get("solid", [{}])[0])
     section(page, "limits")
     page.get_by_label("Mirror symmetry").select_option("y")
@@ -198,16 +198,22 @@ def test_holes_are_drawn_and_symmetry_is_asked_and_the_task_is_saved_and_loaded(
     assert task_from_dict(task(page)["table"]).problem.hash == task_from_dict(table).problem.hash
 
 
-def test_another_size_of_the_part_loses_no_nodes_without_a_word(page: Any) -> None:
-    """Points too far from the lattice are a fault of their section; a larger size mends it."""
+def test_nodes_keep_their_distance_from_the_sides_of_a_part_of_another_size(page: Any) -> None:
     section(page, "domain")
-    fill(page, "Width", "52")
-    page.locator(".step.inputs .fault", has_text="expected a point within").wait_for()
-    assert page.get_by_role("button", name="Design it").is_disabled()
-    fill(page, "Width", "82")
-    page.locator(".step.inputs .fault").wait_for(state="detached")
+    fill(page, "Width", "62")
+    fill(page, "Height", "54")
+    until(page, lambda: task(page)["table"]["domain"]["size"] == [62, 54])
     until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
-    assert summary(page, "inputs") == "2 nodes"
+    assert summary(page, "inputs") == summary(page, "outputs") == "2 nodes"
+    (given,) = task(page)["table"]["cases"][0]["inputs"]
+    assert given["at"] == [{"point": [56, 52]}, {"point": [46, 52]}]
+    # Too narrow for both: the fault is shown in its section, and undo mends it.
+    fill(page, "Width", "22")
+    page.locator(".faulty .fault").wait_for()
+    assert page.get_by_role("button", name="Design it").is_disabled()
+    page.get_by_role("button", name="Undo").click()
+    page.locator(".fault").first.wait_for(state="detached")
+    until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
 
 
 def test_fields_that_are_typed_quickly_one_after_the_other_keep_all_numbers(page: Any) -> None:

@@ -5,7 +5,7 @@ import { bundledTask, emptyTask, exampleTask } from "./begin";
 import { button, choice, count, field, h, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
-import { cleaned, type Amount, type Domain, type Material, type Shape, type Table, type ZoneKind, type ZoneShape } from "./task";
+import { cleaned, resized, type Amount, type Domain, type Material, type Shape, type Table, type ZoneKind, type ZoneShape } from "./task";
 
 /** Problems of the paper on whose lattices a part can be designed. */
 const LATTICES = ["crane", "anti-parallel", "pliers", "scaling-8", "scaling-12", "discs"];
@@ -100,7 +100,9 @@ export class DomainPanel {
     const side = (index: 0 | 1) => (value: Amount | undefined): void => {
       const size = [...domain.size!] as number[];
       (size as Amount[])[index] = value ?? size[index]!;
-      put({ ...domain, size });
+      // A text is not a length that the page knows: the server reads it.
+      if (typeof value === "string") put({ ...domain, size });
+      else editor.change(resized(table, size));
     };
     const lattice = select(LATTICES.map((name): [string, string] => [name, name]), domain.problem ?? "crane", (picked) => put({ problem: picked }));
     lattice.dataset.key = "domain-problem";

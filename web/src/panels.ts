@@ -39,6 +39,7 @@ export class Panels {
   private pressed = false;
   private stale = false;
   private shownTool = "";
+  private timer = 0;
 
   constructor(private readonly editor: TaskEditor) {
     this.searchBox = new SearchBox(editor, () => this.show());
@@ -61,7 +62,12 @@ export class Panels {
     addEventListener("pointercancel", release);
   }
 
+  /** Update after the present event: a field that is left must not be replaced before the next one has the focus. */
   show(): void {
+    if (!this.timer) this.timer = window.setTimeout(() => { this.timer = 0; this.update(); });
+  }
+
+  private update(): void {
     this.stale = this.pressed;
     if (this.pressed) return;
     const { editor } = this;

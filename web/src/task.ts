@@ -125,6 +125,16 @@ export function assign(task: Task, built: Built, load_case: number, target: Targ
   return { table: withSection(table, load_case, target, { at: regionsOf(next, positions, scale) }), hand: null };
 }
 
+/** A table whose selected nodes keep their distances from the nearer sides of a rectangle of another size. */
+export function resized(table: Table, size: number[]): Table {
+  const old = table.domain.size!;
+  const along = (value: number, axis: 0 | 1): number => (value > old[axis]! / 2 ? Math.round(100 * (value + size[axis]! - old[axis]!)) / 100 : value);
+  const moved = <T extends { at?: Region[] }>(sections: T[] | undefined): T[] | undefined => sections?.map((each) => (each.at
+    ? { ...each, at: each.at.map((region) => (region.point ? { ...region, point: [along(region.point[0], 0), along(region.point[1], 1)] as Point } : region)) } : each));
+  const cases = table.cases.map((each) => cleaned({ ...each, supports: moved(each.supports), inputs: moved(each.inputs), outputs: moved(each.outputs), loads: moved(each.loads) }));
+  return cleaned({ ...table, domain: { ...table.domain, size }, supports: moved(table.supports), cases });
+}
+
 const DIRECTIONS: Record<string, Point> = { right: [1, 0], up: [0, 1], left: [-1, 0], down: [0, -1] };
 
 /** Unit vector of a direction: a name, an angle or a vector. */
