@@ -253,8 +253,8 @@ type Evaluation = Response & { id: number; error?: { message: string; key: strin
 /** Evaluates designs one after the other; while one is being evaluated, only the latest is queued. */
 export class Solver {
   private socket: WebSocket | null = null;
-  private sent = "";
-  private queued: { problem: Problem; mask: string; part: Part; verified: boolean } | null = null;
+  private sent: Problem | null = null;
+  private queued: { problem: Problem; mask: string; part: Part } | null = null;
   private busy = false;
   private number = 0;
   private since = 0;
@@ -263,9 +263,9 @@ export class Solver {
 
   constructor(private readonly onResult: (result: Evaluation, latency: number) => void) {}
 
-  /** Evaluate a design, at once by few steps, or `verified` along the whole stroke. */
-  evaluate(problem: Problem, mask: string, part: Part, verified: boolean): void {
-    this.queued = { problem, mask, part, verified };
+  /** Evaluate a design at once, by few steps along its path. */
+  evaluate(problem: Problem, mask: string, part: Part): void {
+    this.queued = { problem, mask, part };
     this.next();
   }
 
@@ -278,7 +278,7 @@ export class Solver {
   private next(): void {
     if (this.busy || !this.queued) return;
     if (!this.socket || this.socket.readyState > WebSocket.OPEN) {
-      this.sent = "";
+      this.sent = null;
       this.socket = new WebSocket(address("/edit"));
       this.socket.onopen = () => this.next();
       this.socket.onmessage = (event: MessageEvent<string>) => this.receive(JSON.parse(event.data) as Evaluation);
@@ -286,14 +286,13 @@ export class Solver {
       return;
     }
     if (this.socket.readyState !== WebSocket.OPEN) return;
-    const { problem, mask, part, verified } = this.queued;
+    const { problem, mask, part } = this.queued;
     this.queued = null;
     this.busy = true;
     this.since = performance.now();
-    const text = JSON.stringify([problem, part]);
-    const changed = text !== this.sent;
-    this.sent = text;
-    this.socket.send(JSON.stringify({ id: ++this.number, mask, verified, ...(changed ? { problem, part } : {}) }));
+    const changed = problem !== this.sent;
+    this.sent = problem;
+    this.socket.send(JSON.stringify({ id: ++this.number, mask, ...(changed ? { problem, part } : {}) }));
   }
 
   private receive(result: Evaluation): void {

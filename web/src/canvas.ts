@@ -63,7 +63,7 @@ export class Canvas extends Drawing {
   show(view: View): void {
     const { lattice } = view.built;
     const before = this.view_?.built.lattice;
-    const changed = JSON.stringify(before?.positions) !== JSON.stringify(lattice.positions) || before?.beams.length !== lattice.beams.length;
+    const changed = before !== lattice && (JSON.stringify(before?.positions) !== JSON.stringify(lattice.positions) || before?.beams.length !== lattice.beams.length);
     this.view_ = view;
     if (changed) {
       this.setLattice(lattice.positions, lattice.beams, 1.4);

@@ -58,6 +58,7 @@ export class Editor implements TaskEditor {
   private readonly undoButton = iconButton("undo", "Undo (Ctrl+Z)", () => this.step("undo"));
   private readonly redoButton = iconButton("redo", "Redo (Ctrl+Shift+Z)", () => this.step("redo"));
   private building: AbortController | null = null;
+  private verifying: AbortController | null = null;
   private timer = 0;
   private rest = 0;
   private sent = "";
@@ -98,6 +99,7 @@ export class Editor implements TaskEditor {
     clearTimeout(this.timer);
     clearTimeout(this.rest);
     this.building?.abort();
+    this.verifying?.abort();
     this.solver.close();
   }
 
@@ -284,12 +286,26 @@ export class Editor implements TaskEditor {
     this.show();
   }
 
-  private evaluate(verified = false): void {
+  /** Compute the design drawn by hand at once, and along the whole stroke after a pause. */
+  private evaluate(): void {
     const { built, task } = this;
     clearTimeout(this.rest);
+    this.verifying?.abort();
     if (!built?.problem || !task.hand) return;
-    this.solver.evaluate(built.problem, task.hand, built.part, verified);
-    if (!verified) this.rest = window.setTimeout(() => this.evaluate(true), REST);
+    this.solver.evaluate(built.problem, task.hand, built.part);
+    this.rest = window.setTimeout(() => void this.verify(), REST);
+  }
+
+  private async verify(): Promise<void> {
+    const { built, task } = this;
+    const requested = new AbortController();
+    this.verifying = requested;
+    try {
+      const found = await post<Response>("/response", { problem: built!.problem, mask: task.hand, part: built!.part }, requested.signal);
+      if (!requested.signal.aborted) this.showResponse(found, null);
+    } catch (error) {
+      if (!(error instanceof DOMException)) this.errorLine.textContent = sentence((error as ServerError).message);
+    }
   }
 
   private show(): void {
@@ -348,7 +364,8 @@ export class Editor implements TaskEditor {
     return found;
   }
 
-  private showResponse(response: Response, latency: number, error?: { message: string }): void {
+  /** Show a response, at once with its latency, or one that is verified. */
+  private showResponse(response: Response, latency: number | null, error?: { message: string }): void {
     const { built } = this;
     if (!this.byHand || !built?.problem) return;
     const bits = bitsOf(this.task.hand!, built.problem.beams.length);
@@ -357,11 +374,13 @@ export class Editor implements TaskEditor {
     clear(this.readout,
       h("strong", {}, error ? "–" : figure(response.efficiency, 3)),
       h("span", {}, error ? sentence(error.message) : isKnown ? "output / input motion, frames" : sentence(response.message)),
-      h("span", { class: "latency" }, `${latency.toFixed(0)} ms, ${where(bits).length} struts`));
-    this.readout.dataset.latency = latency.toFixed(1);
-    this.reached = response.items;
-    this.panels.showItems();
-    document.dispatchEvent(new CustomEvent("bellcrank-response", { detail: latency }));
+      h("span", { class: "latency" }, `${latency === null ? "along the whole stroke" : `${latency.toFixed(0)} ms`}, ${where(bits).length} struts`));
+    // The items follow when the design is verified.
+    if (latency === null || error) {
+      this.reached = response.items;
+      this.panels.showItems();
+    }
+    if (latency !== null) document.dispatchEvent(new CustomEvent("bellcrank-response", { detail: latency }));
   }
 
   /** Start the search and open its page. */

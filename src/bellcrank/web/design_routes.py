@@ -53,6 +53,13 @@ async def describe_part(body: PartBody, state: State) -> dict[str, Any]:
     return await state.pools.thorough.call(slow_calls.part_summary, text, body.mask, body.part)
 
 
+@router.post("/response")
+async def get_response(body: PartBody, state: State) -> dict[str, Any]:
+    """Return the response of a design, verified along the whole stroke."""
+    text = json.dumps(body.problem)
+    return await state.pools.thorough.call(quick_calls.evaluate, text, body.mask, body.part)
+
+
 @router.post("/report")
 async def report_part(body: PartBody, state: State) -> dict[str, Any]:
     """Return the items of the specification of a design, and its figures as a part."""
@@ -128,8 +135,8 @@ async def build_machine(body: PlanBody, state: State) -> dict[str, Any]:
 async def edit(socket: WebSocket, state: State) -> None:
     """Return the response of each design that a client sends.
 
-    A message is ``{"id": number, "problem": ..., "part": ..., "mask": hex, "verified": bool}``;
-    without ``problem``, the problem and the part of the previous message are used.
+    A message is ``{"id": number, "problem": ..., "part": ..., "mask": hex}``; without ``problem``,
+    the problem and the part of the previous message are used. The path is followed in large steps.
     """
     await socket.accept()
     text, part = "", {}
@@ -147,7 +154,7 @@ async def edit(socket: WebSocket, state: State) -> None:
             if not text:
                 raise InvalidFile("problem: is missing")
             result = await state.pools.quick.call(
-                quick_calls.evaluate, text, message.mask, part, verified=message.verified
+                quick_calls.evaluate, text, message.mask, part, verified=False
             )
         except BellcrankError as error:
             result = {"error": plain_error(error)}
@@ -161,7 +168,6 @@ class _Edit(NamedTuple):
     problem: dict[str, Any] | None
     part: dict[str, Any]
     mask: str
-    verified: bool
 
 
 def _read_edit(raw: str) -> _Edit:
@@ -192,5 +198,4 @@ def _read_edit(raw: str) -> _Edit:
         problem,
         part,
         mask,
-        data.get("verified") is not False,
     )

@@ -107,11 +107,13 @@ def evaluate(
     part
         Size and material, for the items of a specification.
     verified
-        Follow the path in small steps, and check contact and stability along the whole stroke.
+        Follow the path in small steps, and return the items of a specification, with contact and
+        stability along the whole stroke.
     """
     entry = cached(text)
     bits = unpack_mask(mask, entry.problem.lattice.beam_count)
-    evaluator = entry.specification or entry.evaluator
+    specification = entry.specification if verified else None
+    evaluator = specification or entry.evaluator
     response = evaluator.evaluate(bits, VERIFICATION_INCREMENT if verified else 1.0)
     result: dict[str, Any] = {
         "status": response.status.label,
@@ -122,9 +124,9 @@ def evaluate(
     }
     if response.status in {Status.CONVERGED, Status.SNAPPED, Verdict.UNMET}:
         result["displacement"] = flat(response.displacement)
-    if entry.specification is not None and response.is_admissible:
+    if specification is not None and response.is_admissible:
         spec = PartSpec.from_dict(part or {}, "part")
-        result["items"] = item_states(entry.problem, spec, entry.specification.results())
+        result["items"] = item_states(entry.problem, spec, specification.results())
     return result
 
 
