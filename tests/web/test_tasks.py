@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from bellcrank.model import Design, problem_from_dict
+from bellcrank.model import Design, problem_from_dict, write_design
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.task import find_task
+from bellcrank.web.jobs import Record
 from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.specification import item_rows, results_for
 
@@ -199,6 +200,28 @@ def test_the_report_of_a_design_of_springs_is_that_of_its_part(
     assert figures["off_axis"] == pytest.approx(0.18, abs=0.01)
 
 
+def test_an_own_part_of_a_machine_is_joined_to_one_of_the_library(client: TestClient) -> None:
+    table = client.get("/api/tasks/element-left").json()
+    built = client.post("/api/tasks/build", json={"task": table}).json()
+    body = {
+        "problem": built["problem"], "mask": full_mask(built["problem"]), "title": "own",
+        "provenance": {"part": built["part"]},
+    }  # fmt: skip
+    key = client.post("/api/gallery", json=body).json()["key"]
+    (library,) = [each for each in client.get("/api/gallery").json() if each["source"] == "library"]
+    other = next(each["key"] for each in library["entries"] if each["key"].startswith("down-7-"))
+    plan = {
+        "name": "two",
+        "parts": {
+            "first": {"entry": f"kept/{key}"},
+            "second": {"entry": f"library/{other}", "join": "first.output"},
+        },
+        "input": {"ports": ["first.input"]},
+        "output": {"ports": ["second.output"]},
+    }
+    assert client.post("/api/machines", json={"plan": plan}).json()["status"] == "converged"
+
+
 def test_a_motion_is_that_of_the_chosen_load_case(client: TestClient) -> None:
     table = client.get("/api/tasks/selector").json()
     problem = client.post("/api/tasks/build", json={"task": table}).json()["problem"]
@@ -246,6 +269,25 @@ def test_a_search_is_for_a_task_or_for_a_problem(
     body = {"title": "t", "session": "s", **changes}
     message, _ = refusal(client.post("/api/runs", json=body))
     assert words in message
+
+
+def test_a_refined_design_is_shown_with_its_own_geometry(client: TestClient) -> None:
+    jobs = client.app.state.bellcrank.jobs  # type: ignore[attr-defined]
+    task = find_task("lever")
+    assert task is not None
+    settings = {"search": "basin-hopping", "steps": 10, "chains": 1, "goals": []}
+    job = jobs.add(
+        task.problem, Record(title="r", session="s", settings=settings, status="finished")
+    )
+    positions = task.problem.lattice.positions + 0.01
+    widths = np.full(task.problem.lattice.beam_count, 0.25)
+    moved = task.problem.with_geometry(positions, widths)
+    (job.path / "run").mkdir()
+    write_design(Design(moved, moved.initial), job.path / "run" / "design.json")
+    run = client.get(f"/api/runs/{job.name}").json()
+    assert problem_from_dict(run["problem"]).hash == moved.hash
+    assert run["mask"]
+    jobs.remove(job.name)
 
 
 @pytest.mark.slow

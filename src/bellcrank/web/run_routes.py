@@ -94,14 +94,17 @@ def _validated(body: RunBody) -> tuple[Problem, Record]:
 
 @router.get("/{name}")
 async def get_run(name: RunName, state: State) -> dict[str, Any]:
-    """Return a search with its task, its comparison and, if there is one, its design."""
+    """Return a search with its task, its comparison and, if there is one, its design.
+
+    The problem is that of the design, whose nodes a refinement has moved.
+    """
     job = state.jobs[name]
     problem, design = await run_in_threadpool(lambda: (job.problem(), job.design()))
     text = json.dumps(problem_to_dict(problem))
     return {
         **job.summary(),
         "place": state.scheduler.position(job),
-        "problem": problem_to_dict(problem),
+        "problem": problem_to_dict(problem if design is None else design.problem),
         "mask": None if design is None else design.mask_hex,
         "task": job.record.task,
         "provenance": {} if design is None else json.loads(json.dumps(dict(design.provenance))),
