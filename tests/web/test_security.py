@@ -15,7 +15,7 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.web.app import PAGES, STATIC, make_app
 from bellcrank.web.limits import BODY
 from bellcrank.web.security import is_loopback
-from bellcrank.web.serving import ServerSettings
+from bellcrank.web.serving import ServerSettings, address_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -101,6 +101,7 @@ def test_a_token_is_made_up_for_every_address_but_that_of_this_machine(tmp_path:
     assert ServerSettings(folder=tmp_path).needed_token is None
     assert len(ServerSettings(folder=tmp_path, host="0.0.0.0").needed_token or "") >= 20
     assert not is_loopback("0.0.0.0")
+    assert address_of("0.0.0.0") not in {"0.0.0.0", ""}
     with pytest.raises(InvalidSettings, match="token"):
         ServerSettings(folder=tmp_path, token="short")
 

@@ -15,6 +15,13 @@ export async function galleryPage(): Promise<HTMLElement> {
       tile(entry, entry.source === "runs" ? `#/run/${entry.key}` : `#/design/${entry.source}/${entry.key}`), SHOWN)));
 }
 
+/** The status of a search; one that has run and waits for its turn is not like one that has not started. */
+function statusText(run: Run, share: number): string {
+  if (run.status !== "queued") return run.status;
+  const state = run.done > 0 ? `waiting for its turn, ${figure(100 * share, 0)} % done` : "queued";
+  return run.place ? `${state}, ${count(run.place, "search", "searches")} ahead` : state;
+}
+
 export class RunsPage {
   readonly element = h("div", { class: "page wide" });
   private readonly list = h("ul", { class: "list" });
@@ -44,9 +51,9 @@ export class RunsPage {
       const active = run.status === "running" || run.status === "queued" || run.status === "paused";
       return h("li", {}, h("a", { class: "line", href: `#/run/${run.id}` },
         h("span", { class: "title" }, run.title),
-        h("span", { class: `status ${run.status}` }, run.status === "queued" && run.place ? `queued, ${count(run.place, "search", "searches")} ahead` : run.status),
+        h("span", { class: `status ${run.status}` }, statusText(run, share)),
         h("span", { class: "value" }, figure(run.efficiency)),
-        h("span", { class: "more" }, `${run.method} · ${ago(run.created)}`),
+        h("span", { class: "more" }, `${run.method}, ${count(run.settings.chains, "chain")} of ${run.settings.steps.toLocaleString("en")} steps, seed ${run.settings.seed} · ${ago(run.created)} · ${run.id.slice(0, 4)}`),
         active && h("progress", { max: 1, value: share, "aria-label": `${run.title}: progress` })));
     }));
     if (focused) this.list.querySelector<HTMLElement>(`[href="${focused}"]`)?.focus({ preventScroll: true });

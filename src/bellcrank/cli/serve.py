@@ -30,6 +30,7 @@ def serve(
 ) -> None:
     """Serve a page on which to define a task, follow its search and download the part."""
     try:
+        from bellcrank.web.security import is_loopback
         from bellcrank.web.serving import ServerSettings, default_folder
         from bellcrank.web.serving import serve as run
     except ModuleNotFoundError as error:  # pragma: no cover - without the extra
@@ -44,6 +45,11 @@ def serve(
         notes.print(
             f"runs are stored in {plain(settings.folder)}; Ctrl-C ends the server and pauses them"
         )
+        if not is_loopback(host):
+            notes.print(
+                "others reach it by plain HTTP, which can be read on the way: use it in a network "
+                "that you trust, or behind a proxy with TLS"
+            )
         if show:
             typer.launch(address)
 

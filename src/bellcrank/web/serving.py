@@ -22,6 +22,13 @@ if TYPE_CHECKING:
     from types import FrameType
 
 
+EVERY_ADDRESS = {
+    "0.0.0.0": (socket.AF_INET, "192.0.2.1"),
+    "::": (socket.AF_INET6, "2001:db8::1"),
+}
+"""Names of all addresses of a machine, with an address of documentation to find the usual one."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServerSettings:
     """Address and data of a server.
@@ -99,12 +106,34 @@ def serve(settings: ServerSettings, announce: Callable[[str], None]) -> None:
         )  # fmt: skip
         server = uvicorn.Server(config)
         port = listener.getsockname()[1]
-        host = f"[{settings.host}]" if ":" in settings.host else settings.host
+        host = address_of(settings.host)
         announce(f"http://{host}:{port}/" + (f"?token={token}" if token else ""))
         try:
             server.run(sockets=[listener])
         finally:  # after a second Ctrl-C the server skips its own shutdown
             app.state.bellcrank.pools.close()
+
+
+def address_of(host: str) -> str:
+    """Return a host as part of an address that a browser can open.
+
+    For all addresses of this machine (``0.0.0.0``, ``::``), the one by which other machines reach
+    it; its name if it has no network.
+
+    Examples
+    --------
+    >>> address_of("127.0.0.1"), address_of("::1")
+    ('127.0.0.1', '[::1]')
+    """
+    if host in EVERY_ADDRESS:
+        family, elsewhere = EVERY_ADDRESS[host]
+        try:
+            with socket.socket(family, socket.SOCK_DGRAM) as probe:
+                probe.connect((elsewhere, 9))  # sends nothing
+                host = str(probe.getsockname()[0])
+        except OSError:
+            host = socket.gethostname()
+    return f"[{host}]" if ":" in host else host
 
 
 @contextlib.contextmanager
