@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import signal
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -13,8 +14,15 @@ from bellcrank.fem import FemSettings
 from bellcrank.machines.elementary import elementary
 from bellcrank.machines.library import Library, bundled_folder
 from bellcrank.mechanics import VERIFICATION_INCREMENT
-from bellcrank.model import find_problem, human_design, problem_to_dict, read_design, unpack_mask
-from bellcrank.part import PartSpec
+from bellcrank.model import (
+    find_problem,
+    gallery_design,
+    human_design,
+    problem_to_dict,
+    read_design,
+    unpack_mask,
+)
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import find_task, read_task, task_from_dict
 from bellcrank.workflows import validate
@@ -389,6 +397,30 @@ def test_a_whole_search_is_compared_checked_by_finite_elements_and_leaves_its_hi
     page.locator(".stress path").first.wait_for(state="attached")
     assert downloaded(page, "history")[:4] == b"PAR1"
     assert downloaded(page, "svg").lstrip()[:1] == b"<"
+
+
+def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(
+    page: Any, server: Server
+) -> None:
+    page.goto(f"{server.address}/#/design/builtin/machine-crane")
+    page.locator(".figures.part").wait_for()
+    page.get_by_role("button", name="Compute the tolerance").click()
+    page.locator(".items.tolerance tbody tr").first.wait_for()
+    assert page.locator('.colour input[value="loss"]').is_checked()
+    assert page.locator(".player .beam.effect-3").get_attribute("d")
+    page.get_by_label("Compare with").select_option("builtin/human-crane")
+    table = page.locator(".compare .figures.part")
+    table.wait_for()
+    for name in ("human-crane", "machine-crane"):
+        human = (
+            human_design("crane") if name == "human-crane" else gallery_design("machine", "crane")
+        )
+        assert human is not None
+        spec = PartSpec()
+        design = replace(human, problem=frame_problem(human.problem, spec))
+        (figures,) = part_figures(design, spec)
+        assert f"{100 * figures['off_axis']:.1f} %" in table.inner_text()
+    page.locator('.player[data-ready="yes"]').nth(1).wait_for()
 
 
 def test_a_search_without_a_design_shows_the_reason_and_suggestions(

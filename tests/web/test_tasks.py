@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from bellcrank.model import Design, problem_from_dict, write_design
+from bellcrank.model import (
+    Design,
+    human_design,
+    problem_from_dict,
+    problem_to_dict,
+    write_design,
+)
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.task import find_task
 from bellcrank.web.jobs import Record
 from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.specification import item_rows, results_for
+from bellcrank.workflows.tolerance import compute_tolerance, deviations_of, tolerance_rows
 
 from .conftest import wait_for
 from .test_api import refusal
@@ -269,6 +278,25 @@ def test_a_search_is_for_a_task_or_for_a_problem(
     body = {"title": "t", "session": "s", **changes}
     message, _ = refusal(client.post("/api/runs", json=body))
     assert words in message
+
+
+@pytest.mark.slow
+def test_the_tolerance_of_a_part_is_that_of_the_command(client: TestClient) -> None:
+    human = human_design("crane")
+    assert human is not None
+    spec = PartSpec()
+    problem = frame_problem(human.problem, spec)
+    body = {"problem": problem_to_dict(problem), "mask": human.mask_hex, "part": spec.to_dict()}
+    found = client.post("/api/tolerance", json=body).json()
+    design = replace(human, problem=problem)
+    report = compute_tolerance(design, deviations_of(design, spec), spec, workers=1)
+    assert report is not None
+    assert found["rows"] == tolerance_rows(report)
+    assert found["sentence"].startswith(f"{len(report.tolerance.scenarios)} scenarios")
+    losses = report.tolerance.strut_losses()
+    assert found["losses"]["beams"] == list(losses)
+    costs = [None if each == np.inf else each for each in losses.values()]
+    assert found["losses"]["cost"] == pytest.approx(costs)
 
 
 def test_a_refined_design_is_shown_with_its_own_geometry(client: TestClient) -> None:

@@ -59,6 +59,9 @@ export interface PartReport {
   figures: PartFigures[];
 }
 
+/** A part over tolerances: rows of texts, and what the loss of each strut costs. */
+export interface ToleranceFound { sentence: string; rows: string[][]; losses: { beams: number[]; cost: (number | null)[] } }
+
 export interface Response {
   status: string;
   message: string;

@@ -3,6 +3,7 @@
 import { get, ServerError, type RunDetails } from "./api";
 import { firstTask, TASK_KEY } from "./begin";
 import { clear, count, figure, h } from "./dom";
+import { ComparePage } from "./compare";
 import { Editor } from "./editor";
 import { galleryPage, RunsPage } from "./gallery";
 import { MachinePage } from "./machine";
@@ -26,6 +27,7 @@ async function open(parts: string[]): Promise<Page> {
     case "runs": return new RunsPage();
     case "gallery": return { element: await galleryPage() };
     case "machine": return new MachinePage(rest[0] ? await get<WrittenPlan>(`/machines/${encodeURIComponent(rest[0])}`) : null);
+    case "compare": return ComparePage.open(rest.map(decodeURIComponent));
     case "design": return designPage(rest[0] ?? "", rest[1] ?? "");
     default: {
       const isFirstVisit = !rest[0] && localStorage.getItem(TASK_KEY) === null;
@@ -38,7 +40,7 @@ async function open(parts: string[]): Promise<Page> {
 }
 
 async function designPage(source: string, key: string): Promise<Page> {
-  const subject = await designSubject(encodeURIComponent(source), encodeURIComponent(key));
+  const subject = await designSubject(source, key);
   const result = new Result(subject);
   const origin = subject.provenance["origin"];
   const element = h("div", { class: "page run" },

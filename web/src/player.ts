@@ -1,12 +1,12 @@
 // Animation of a design along its computed path, with amplification and colours.
 
-import { modelOf, post, type Motion, type Problem } from "./api";
+import { modelOf, post, type Motion, type Problem, type ToleranceFound } from "./api";
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, where } from "./drawing";
 import { choice, clear, field, figure, h, icon, s } from "./dom";
 import { sentence } from "./text";
 
-export type Colour = "plain" | "energy" | "stress" | "sensitivity";
+export type Colour = "plain" | "energy" | "stress" | "sensitivity" | "loss";
 
 export interface Picture { points: number[]; cells: number[]; corners: number; stress: number[] }
 export interface Sensitivity { efficiency: number; beams: number[]; change: (number | null)[] }
@@ -34,6 +34,7 @@ export class Player {
   private began = 0;
   private updated = 0;
   private sensitivity: Sensitivity | null = null;
+  private losses: ToleranceFound["losses"] | null = null;
   private picture: Picture | null = null;
   private shares = new Float64Array(0);
   /** Called when the stress is selected before it is computed. */
@@ -67,7 +68,7 @@ export class Player {
   close(): void { this.stop(); }
 
   private colours(): HTMLElement {
-    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["sensitivity", "Sensitivity"], ["stress", "Stress"]] as [Colour, string][],
+    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["sensitivity", "Sensitivity"], ["stress", "Stress"], ...(this.losses ? [["loss", "Loss of struts"]] : [])] as [Colour, string][],
       this.colour, (picked) => this.paint(picked));
   }
 
@@ -79,6 +80,26 @@ export class Player {
     const input = this.element.querySelector<HTMLInputElement>(`.colour input[value="${colour}"]`);
     if (input) input.checked = true;
     this.show();
+  }
+
+  /** Colour the struts by what the loss of each costs. */
+  showLosses({ beams, cost }: ToleranceFound["losses"]): void {
+    this.losses = { beams, cost };
+    const bar = this.element.querySelector(".colour");
+    if (bar && !bar.querySelector('input[value="loss"]')) bar.firstElementChild!.replaceWith(this.colours());
+    this.paint("loss");
+  }
+
+  /** Struts by the part of the efficiency that their loss costs. */
+  private lossGroups({ beams, cost }: ToleranceFound["losses"]): { name: string; beams: number[] }[] {
+    const groups: Record<string, number[]> = { "effect-none": [], "effect-1": [], "effect-2": [], "effect-3": [], "effect-broken": [], "effect-given": [] };
+    const known = new Map(beams.map((beam, k) => [beam, cost[k] ?? null]));
+    for (const beam of this.beams) {
+      if (!known.has(beam)) { groups["effect-given"]!.push(beam); continue; }
+      const loss = known.get(beam)!;
+      groups[loss === null ? "effect-broken" : loss > 0.5 ? "effect-3" : loss > 0.3 ? "effect-2" : loss > 0.1 ? "effect-1" : "effect-none"]!.push(beam);
+    }
+    return Object.entries(groups).map(([name, list]) => ({ name, beams: list }));
   }
 
   showStress(picture: Picture | null): void {
@@ -187,6 +208,7 @@ export class Player {
     else if (this.stress.childNodes.length) this.stress.replaceChildren();
     if (stressed) drawing.draw([]);
     else if (this.colour === "sensitivity" && this.sensitivity) drawing.draw(this.effects(this.sensitivity));
+    else if (this.colour === "loss" && this.losses) drawing.draw(this.lossGroups(this.losses));
     else if (this.colour === "energy" && energy) drawing.draw(binned(this.beams, energy));
     else drawing.draw([{ name: "plain", beams: this.beams }]);
     if (stressed) for (const name of ["support", "input", "output"]) drawing.mark(name, []);
@@ -246,6 +268,7 @@ export class Player {
       plain: "Grey: at rest. Orange: input. Blue: output.",
       energy: "Strain energy of each beam, increasing from pale to red.",
       sensitivity: this.sensitivity ? (this.legend.dataset.beam || "Dark: removal lowers the efficiency most. Dashed: addition raises it. Point at a beam for its values.") : "Evaluating the removal of each beam …",
+      loss: "The loss of a strut costs: pale up to 10 % of the efficiency, then up to 30 %, up to 50 %, darkest more. Violet: the full stroke is not reached without it.",
       stress: this.picture ? `Von Mises stress, up to ${figure(Math.max(...sample(this.picture.stress)), 2)} MPa.` : "Check with finite elements to compute the stress.",
     };
     if (this.legend.textContent !== texts[this.colour]) this.legend.textContent = texts[this.colour];

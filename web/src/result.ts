@@ -1,7 +1,8 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { fetchBlob, fetchFile, fetchRegistries, get, post, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError } from "./api";
+import { fetchBlob, fetchFile, fetchRegistries, get, post, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
 import { bitsOf } from "./api";
+import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, download, field, figure, h, number, select } from "./dom";
 import { Player, type Picture } from "./player";
@@ -23,6 +24,10 @@ export interface Subject {
   plan: string | null;
   /** Table of the task that it was searched for, if there is one. */
   task: Record<string, unknown> | null;
+  /** Source and key in the gallery. */
+  place: [string, string] | null;
+  /** Called with its report, in a comparison. */
+  show?: (report: PartReport) => void;
 }
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null }
@@ -38,6 +43,8 @@ export class Result {
   private readonly advice = h("div", { class: "advice" });
   private readonly table = h("table", { class: "figures" });
   private readonly trouble = h("p", { class: "fault", role: "alert" });
+  private readonly toleranceBox = h("div", { class: "content" });
+  private tolerance: ToleranceFound | "running" | string | null = null;
   private readonly partBox = h("div", { class: "content" });
   private readonly filesBox = h("div", { class: "content" });
   private part: Part;
@@ -49,16 +56,18 @@ export class Result {
   private writing = "";
 
   constructor(private readonly subject: Subject) {
-    this.part = { width: 2, thickness: 5, scale: 10, material: "ninjaflex", ...partOf(subject) };
+    this.part = partOf(subject);
     this.player = new Player(subject.problem, subject.mask, this.part.scale);
     this.player.onError = (text) => { this.trouble.textContent = text; };
     this.player.onStressRequested = () => void this.validate("frame");
     this.element.append(
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Result"), this.headline, this.verdict, this.warnings, this.advice, this.reportBox, this.table, this.trouble),
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Tolerance"), this.toleranceBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Part"), this.partBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Download"), this.filesBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Next steps"), this.nextSteps()));
     this.showTable();
+    this.showTolerance();
     this.showPart();
     this.showFiles();
     void this.describe();
@@ -172,10 +181,51 @@ export class Result {
     this.showTable();
   }
 
+  private async computeTolerance(): Promise<void> {
+    this.tolerance = "running";
+    this.showTolerance();
+    const { problem, mask } = this.subject;
+    try {
+      this.tolerance = await post<ToleranceFound>("/tolerance", { problem, mask, part: this.part });
+      this.player.showLosses(this.tolerance.losses);
+    } catch (error) {
+      this.tolerance = sentence((error as ServerError).message);
+    }
+    this.showTolerance();
+  }
+
+  /** What the part does when print and drive deviate, and which struts it needs. */
+  private showTolerance(): void {
+    const { tolerance } = this;
+    if (tolerance === null) {
+      clear(this.toleranceBox, h("p", { class: "note" }, "Widths, nodes, direction and stroke deviate, and single struts are lost: some 350 scenarios."),
+        button("Compute the tolerance", () => void this.computeTolerance(), "", { "data-key": "tolerance" }), h("span", { class: "more" }, " ten seconds to a minute"));
+      return;
+    }
+    if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), "computing …")); return; }
+    if (typeof tolerance === "string") { clear(this.toleranceBox, h("p", { class: "fault", role: "alert" }, tolerance)); return; }
+    const [head, ...rows] = tolerance.rows;
+    const shown = head!.map((name, k) => ({ name, k })).filter(({ name }) => name !== "wanted");
+    clear(this.toleranceBox, h("p", {}, sentence(tolerance.sentence)),
+      h("div", { class: "report", tabindex: 0, role: "region", "aria-label": "Tolerance" },
+        h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and the worst of each kind of scenario"),
+          h("thead", {}, h("tr", {}, ...shown.map(({ name }) => h("th", { scope: "col" }, name)))),
+          h("tbody", {}, ...rows.map((row) => h("tr", {}, ...shown.map(({ k }) => (k === 0 ? h("th", { scope: "row" }, row[k]!, h("small", {}, row[1]!)) : h("td", {}, row[k]!)))))))),
+      this.lossText(tolerance.losses));
+  }
+
+  private lossText({ cost }: ToleranceFound["losses"]): HTMLElement {
+    const needed = cost.filter((each) => each === null).length;
+    const half = cost.filter((each) => each !== null && each > 0.5).length;
+    return h("p", { class: "note" }, `Of ${cost.length} struts, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the efficiency. They are coloured in the drawing.`);
+  }
+
   private showPart(fault = ""): void {
     const change = (changes: Partial<Part>): void => {
       this.part = { ...this.part, ...changes };
       this.fems = {};
+      this.tolerance = null;
+      this.showTolerance();
       void this.describe();
       void this.loadReport();
     };
@@ -256,21 +306,39 @@ export class Result {
         this.trouble.textContent = sentence((error as ServerError).message);
       }
     };
-    const { plan } = this.subject;
-    return h("div", { class: "content buttons" },
+    const { plan, place } = this.subject;
+    const others = select([["", "choose …"]], "", (picked) => {
+      const [source, key] = picked.split("/") as [string, string];
+      if (place && picked) location.hash = compareAddress(place, [source, key]);
+    });
+    others.id = "compare";
+    if (place) void this.offer(others, place);
+    return h("div", {}, h("div", { class: "content buttons" },
       plan && button("Open its plan", () => { location.hash = `#/machine/${plan}`; }, "strong"),
       button("Open its task", () => void open(false)),
-      button("Change by hand", () => void open(true)));
+      button("Change by hand", () => void open(true))),
+      place && h("div", { class: "content" }, field("Compare with", others)));
+  }
+
+  /** List the own designs and the bundled ones of a choice. */
+  private async offer(others: HTMLSelectElement, [source, key]: [string, string]): Promise<void> {
+    const collections = await get<Collection[]>("/gallery").catch(() => []);
+    for (const { entries, title } of collections.filter(({ source: each }) => ["runs", "kept", "builtin", "machines"].includes(each))) {
+      const options = entries.filter((each) => each.source !== source || each.key !== key);
+      if (options.length) others.append(h("optgroup", { label: title }, ...options.map((each) => h("option", { value: `${each.source}/${each.key}` }, each.title, each.note && `, ${each.note}`))));
+    }
   }
 }
 
-function partOf(subject: Subject): Partial<Part> {
+/** The part of a design; that of 2 mm struts if none is recorded. */
+export function partOf(subject: Subject): Part {
   const stored = (subject.part ?? subject.provenance["part"] ?? {}) as Partial<Part>;
-  return Object.fromEntries(Object.entries(stored).filter(([key, value]) => ["width", "thickness", "scale", "material"].includes(key) && (key === "material" || typeof value === "number")));
+  const known = Object.fromEntries(Object.entries(stored).filter(([key, value]) => ["width", "thickness", "scale", "material"].includes(key) && (key === "material" || typeof value === "number")));
+  return { width: 2, thickness: 5, scale: 10, material: "ninjaflex", ...known };
 }
 
 /** Load a design of the gallery. */
 export async function designSubject(source: string, key: string): Promise<Subject> {
-  const whole = await get<{ title: string; problem: Problem; note: string; mask: string; efficiency: number | null; provenance: Record<string, unknown> }>(`/gallery/${source}/${key}`);
-  return { ...whole, comparison: null, part: null, history: null, plan: source === "machines" ? key : null, task: null };
+  const whole = await get<{ title: string; problem: Problem; note: string; mask: string; efficiency: number | null; provenance: Record<string, unknown> }>(`/gallery/${encodeURIComponent(source)}/${encodeURIComponent(key)}`);
+  return { ...whole, comparison: null, part: null, history: null, plan: source === "machines" ? key : null, task: null, place: [source, key] };
 }

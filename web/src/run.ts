@@ -122,7 +122,7 @@ export class RunPage {
     this.result?.element.remove();
     this.result = new Result({
       title: whole.title, problem: whole.problem, mask: whole.mask, efficiency: whole.efficiency, provenance: whole.provenance,
-      comparison: whole.comparison, part: whole.part, history: whole.id, plan: null, task: whole.task,
+      comparison: whole.comparison, part: whole.part, history: whole.id, plan: null, task: whole.task, place: ["runs", whole.id],
     });
     clear(this.stage, this.result.player.element);
     this.side.prepend(this.result.element);

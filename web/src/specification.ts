@@ -33,7 +33,7 @@ function mark(met: boolean): HTMLElement {
 }
 
 /** Motion, off-axis motion, rotation and load of each output, always beside each other. */
-export function figureTable(figures: PartFigures[]): HTMLElement {
+export function figureTable(figures: PartFigures[], titles: string[] | null = null): HTMLElement {
   const several = figures.length > 1;
   const rows: [string, (row: PartFigures) => string][] = [
     ["output / input motion", (row) => figure(row.efficiency, 2)],
@@ -47,7 +47,7 @@ export function figureTable(figures: PartFigures[]): HTMLElement {
   ];
   return h("table", { class: "figures part" },
     h("caption", {}, "Figures of the part, by frames with 8 elements in each strut"),
-    several && h("thead", {}, h("tr", {}, h("td"), ...figures.map((row) => h("th", { scope: "col" }, [row.case, row.output].filter((name) => name !== "case").join(", "))))),
+    several && h("thead", {}, h("tr", {}, h("td"), ...figures.map((row, k) => h("th", { scope: "col" }, titles?.[k] ?? [row.case, row.output].filter((name) => name !== "case").join(", "))))),
     h("tbody", {}, ...rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), ...figures.map((row) => h("td", {}, text(row)))))));
 }
 

@@ -67,6 +67,13 @@ async def report_part(body: PartBody, state: State) -> dict[str, Any]:
     return await state.pools.thorough.call(quick_calls.part_report, text, body.mask, body.part)
 
 
+@router.post("/tolerance")
+async def get_tolerance(body: PartBody, state: State) -> dict[str, Any]:
+    """Return what a design does over tolerances of print and drive, and without single struts."""
+    text = json.dumps(body.problem)
+    return await state.pools.slow.call(slow_calls.tolerance, text, body.mask, body.part)
+
+
 @router.post("/validation")
 async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
     """Return the finite-element analysis of the part of a design."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.model import write_design
-from bellcrank.web.quick_calls import design_of, item_states
+from bellcrank.web.quick_calls import design_of, finite, item_states
 
 if TYPE_CHECKING:
     from bellcrank.model import Design
@@ -106,6 +106,35 @@ def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
         "mass": round(mass, 2) if math.isfinite(mass) else None,
         "stroke": bundle.part.stroke if math.isfinite(bundle.part.stroke) else None,
         "remarks": print_warnings(bundle, profile_for(None, spec)),
+    }
+
+
+def tolerance(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
+    """Return what a design does as a part in scenarios of tolerance, with the usual deviations.
+
+    Returns
+    -------
+    dict
+        ``sentence`` on the scenarios; ``rows`` of texts, the first with the names of the columns;
+        ``losses``, the part of the efficiency that the loss of each strut costs: ``beams``, and
+        ``cost``, None where the full stroke is not reached.
+    """
+    from bellcrank.part import PartSpec
+    from bellcrank.workflows.tolerance import (
+        compute_tolerance,
+        deviations_of,
+        tolerance_rows,
+        tolerance_sentence,
+    )
+
+    spec, design = PartSpec.from_dict(part), design_of(text, mask)
+    report = compute_tolerance(design, deviations_of(design, spec), spec, workers=1)
+    assert report is not None  # without a request to stop
+    losses = report.tolerance.strut_losses()
+    return {
+        "sentence": tolerance_sentence(report),
+        "rows": tolerance_rows(report),
+        "losses": {"beams": list(losses), "cost": [finite(each) for each in losses.values()]},
     }
 
 
