@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -194,6 +195,19 @@ def test_every_other_file_is_of_its_kind(
     answer = client.post(f"/api/files/{suffix}", json=body)
     assert answer.status_code == 200, answer.text
     assert answer.content[place:].replace(b"\r", b"").lstrip().startswith(sign)
+
+
+@pytest.mark.slow
+def test_all_files_come_in_one_archive(client: TestClient, crane: dict[str, Any]) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"]}
+    content = client.post("/api/files/zip", json=body).content
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        assert {each.filename for each in archive.filelist} == {
+            f"part.{suffix}" for suffix in page_files if suffix != "zip"
+        }
+        assert archive.testzip() is None
+        single = client.post("/api/files/stl", json=body).content
+        assert archive.read("part.stl") == single
 
 
 def test_a_part_that_cannot_be_is_refused_in_a_sentence(

@@ -44,5 +44,6 @@ for _suffix, _file in {
     "gif": PageFile("GIF", "movie", "image/gif"),
     "pdf": PageFile("PDF", "summary on one page", "application/pdf"),
     "json": PageFile("JSON", "design for bellcrank", "application/json", quick=True),
+    "zip": PageFile("All", "all files in one archive", "application/zip"),
 }.items():
     page_files.register(_suffix)(_file)

@@ -11,9 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
 from bellcrank.errors import InvalidFile, InvalidSettings
-from bellcrank.model import write_design
+from bellcrank.model import problem_to_dict, write_design
 from bellcrank.web.quick_calls import design_of, finite, item_states
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def design_file(
         provenance=about.get("provenance") or {},
     )
     spec = PartSpec.from_dict(part)
-    makers = {".json": _json, ".mp4": _movie, ".gif": _movie, ".pdf": _card}
+    makers = {".json": _json, ".mp4": _movie, ".gif": _movie, ".pdf": _card, ".zip": _archive}
     with TemporaryDirectory(prefix="bellcrank-") as folder:
         path = Path(folder) / f"part{suffix}"
         try:
@@ -58,6 +59,19 @@ def design_file(
         except InvalidSettings as error:
             raise InvalidSettings(str(error).removeprefix(f"{path}: ")) from None
         return path.read_bytes()
+
+
+def _archive(design: Design, spec: PartSpec, path: Path) -> None:
+    """Write all other files into one archive."""
+    from bellcrank.web.page_files import page_files
+
+    text = json.dumps(problem_to_dict(design.problem))
+    about = {"efficiency": design.efficiency, "provenance": dict(design.provenance)}
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for suffix in page_files:
+            if suffix != "zip":
+                content = design_file(text, design.mask_hex, f".{suffix}", spec.to_dict(), about)
+                archive.writestr(f"part.{suffix}", content)
 
 
 def _json(design: Design, spec: PartSpec, path: Path) -> None:
