@@ -123,6 +123,19 @@ def _cells(row: dict[str, Any]) -> list[str]:
     return [f"{row['yield']:.0%}", which, value]
 
 
+def redundant_table(robust: list[dict[str, Any]], runs: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield the rows of the table of ``TASK:redundant`` (`benchmarks.tasks`) in Markdown.
+
+    The gain with the same seed without the limit on the loss of a strut, with it, and its cost.
+    """
+    free = {(run["task"], run["seed"]): run.get("efficiency") for run in runs}
+    for run in robust:
+        task, _, kind = run["task"].partition(":")
+        if kind == "redundant":
+            whole, limited = free[task, run["seed"]], run["efficiency"]
+            yield f"| `{task}` | {whole:.2f} | {limited:.2f} | {1.0 - limited / whole:.0%} |"
+
+
 def robust_table(runs: list[dict[str, Any]]) -> Iterator[str]:
     """Yield the rows of the table of ``TASK:tolerant`` (`benchmarks.tasks`) in Markdown.
 

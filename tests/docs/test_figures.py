@@ -21,7 +21,7 @@ from benchmarks.refinement import mass_rows, specified_rows
 from benchmarks.size import table as size_rows
 from benchmarks.space import cost_rows, mesh_rows, task_rows
 from benchmarks.tasks import counts, summary
-from benchmarks.tolerance import robust_table
+from benchmarks.tolerance import redundant_table, robust_table
 from benchmarks.tolerance import table as tolerance_rows
 from tools.draw_tasks import best, identity, identity_in, recorded_runs
 
@@ -68,6 +68,7 @@ def sizes() -> Rows:
 def tolerances() -> Rows:
     yield from tolerance_rows(read("tolerance")["runs"])
     yield from robust_table(read("tasks/robust")["runs"])
+    yield from redundant_table(read("tasks/robust")["runs"], recorded_runs())
 
 
 def move_comparison() -> Rows:

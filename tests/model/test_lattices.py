@@ -22,6 +22,10 @@ EXAMPLES = {
     "body-centred": {"size": [3, 4, 3]},
     "kelvin": {"size": [6, 6, 6]},
     "displaced-delaunay-space": {"size": [3, 4, 3]},
+    "nodes": {
+        "positions": [[0.0, 0.0], [1.0, 0.0], [0.5, 0.8], [1.5, 0.8]],
+        "beams": [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]],
+    },
 }
 RANDOM = ("displaced-delaunay", "jammed-discs", "displaced-delaunay-space")
 SPACE = ("octet", "cubic", "body-centred", "kelvin", "displaced-delaunay-space")

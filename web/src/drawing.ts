@@ -215,16 +215,6 @@ export function angleOf([x, y]: Point): number {
   return (Math.round((Math.atan2(y, x) * 180) / Math.PI) + 360) % 360;
 }
 
-const NAMES: [number, string][] = [
-  [0, "right"], [45, "up and right"], [90, "up"], [135, "up and left"],
-  [180, "left"], [225, "down and left"], [270, "down"], [315, "down and right"],
-];
-
-export function directionName(direction: Point): string {
-  const angle = angleOf(direction);
-  return NAMES.find(([at]) => at === angle)?.[1] ?? `towards ${angle}°`;
-}
-
 export function isEach(direction: Point | Point[]): direction is Point[] {
   return Array.isArray(direction[0]);
 }

@@ -34,11 +34,9 @@ if TYPE_CHECKING:
 RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
-RESERVES = {"mass": 2e-3}
-"""The same for the mass, that of all models (more than `MET`)."""
-PAYLOAD = 1.2
-"""Factor of the payload that one element in each strut has to carry: near the largest one that a
-part carries, its motion is lost at once."""
+RESERVES = {"mass": 2e-3, "payload": 0.2}
+"""The same for the mass, that of all models (more than `MET`), and for the payload: near the
+largest one that a part carries, its motion is lost at once."""
 LOST_PAYLOAD = 3.0
 """Factor of the payload of one element in each strut where better models lose their path under
 it."""
@@ -105,7 +103,7 @@ class FrameRefinement:
         self.before = self.best = self.state_at(self.chosen)
         self.path = self.tried = [self.chosen]
         self.stable = STABLE
-        self.payload = PAYLOAD
+        self.payload = 1.0
         self.steps = self.evaluations = 0
         self.reason = "the response of the design is not stable"
         self.goes_on = True
@@ -138,7 +136,7 @@ class FrameRefinement:
             if state.met and (is_last or is_spent) and not is_edge:
                 return
             if state.is_stable and not state.met:
-                self.payload, models = PAYLOAD, self.models(vector, state.records)
+                self.payload, models = 1.0, self.models(vector, state.records)
             elif loses_payload(state.items):
                 self.payload *= LOST_PAYLOAD
             else:
@@ -165,7 +163,8 @@ class FrameRefinement:
             State and vector of the last geometry that meets all with eight elements, and whether
             it is the last one of all. None if the response is not stable.
         """
-        evaluator = self._start(stable, models, vector)
+        items = [self._tightened(each) for each in self.items if each.quantity != "strut_loss"]
+        evaluator = self._start(items, stable, models, vector)
         evaluations = max(least, self.settings.evaluations - self.evaluations)
         if self.is_reduced:
             steps = min(steps, REDUCED_STEPS)
@@ -195,30 +194,13 @@ class FrameRefinement:
         state = self._with_robustness(state, vectors[number])
         return state, vectors[number], number == len(vectors) - 1
 
-    def _start(self, stable: float, models: Models, vector: Values) -> ScenarioRows:
-        """Return rows as drawn and in the chosen scenarios.
-
-        Without the reserve of the payload if the geometry carries the payload but not the reserve.
-        """
-        wanted = [each for each in self.items if each.quantity != "strut_loss"]
-        rows = self._rows(wanted, self.payload, stable, models, vector)
-        if self.payload > 1.0 and rows.evaluate(vector) is None:
-            rows = self._rows(wanted, 1.0, stable, models, vector)
-        return rows
-
-    def _rows(
-        self,
-        wanted: Sequence[Item],
-        payload: float,
-        stable: float,
-        models: Models,
-        vector: Values,
+    def _start(
+        self, items: Sequence[Item], stable: float, models: Models, vector: Values
     ) -> ScenarioRows:
-        """Return rows as drawn, with a factor of the payload, and in the chosen scenarios.
+        """Return rows as drawn and in the chosen scenarios.
 
         Scenarios that the geometry is far from meeting have a part of their deviations.
         """
-        items = [self._tightened(each, payload) for each in wanted]
         # A path that is stable under a larger payload may not be so under the given one.
         payloads = {each.name: each for each in self.items if each.quantity == "payload"}
         in_scenarios = [payloads.get(each.name, each) for each in items]
@@ -264,15 +246,15 @@ class FrameRefinement:
         """Return the design with the geometry of a vector."""
         return replace(self.design, problem=self.variables.problem_at(vector))
 
-    def _tightened(self, item: Item, payload: float) -> Item:
+    def _tightened(self, item: Item) -> Item:
         """Return an item as the model of the refinement has to meet it."""
-        if item.quantity == "payload" and item.at_least is not None:
-            return replace(item, at_least=payload * item.at_least)
         tight = tightened(item, RESERVES.get(item.quantity, RESERVE))
         if item.quantity == "mass" and tight.at_most is not None:
             # The shape is that of the part as drawn alone; wider struts are heavier.
             return replace(tight, at_most=tight.at_most / self.choice.largest_area)
-        return tight
+        if item.quantity != "payload" or tight.at_least is None:
+            return tight
+        return replace(tight, at_least=self.payload * tight.at_least)
 
     def _is_ample(self, progress: Progress) -> bool:
         """Whether there is no objective, and the smallest margin is large."""

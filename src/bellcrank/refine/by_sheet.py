@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import item_results
-from bellcrank.refine.by_frames import LOST_PAYLOAD, PAYLOAD, stricter
+from bellcrank.refine.by_frames import LOST_PAYLOAD, stricter
 from bellcrank.refine.differences import NO_DIFFERENCE
 from bellcrank.refine.state import State, loses_payload, total_violation
 
@@ -84,7 +84,7 @@ class SheetRefinement:
         most = min(SHEETS, max(2, SHEET_CASES // len(job.design.problem.cases)))
         while job.goes_on and self.sheets < most and state.missed_in_sheet > 0.0:
             if state.is_on_path_of_sheet:
-                job.payload = PAYLOAD
+                job.payload = 1.0
                 models = job.models(vector, state.records, state.sheet_records)
             elif state.is_stable and not state.met:
                 models = (*job.models(vector, state.records), *models[1:])

@@ -112,6 +112,7 @@ def lattice_of(table: TaskTable, folder: Path | None = None) -> tuple[Lattice, P
 
     Examples
     --------
+    >>> from bellcrank.task.schema import TaskTable
     >>> table = TaskTable(name="a", domain={"size": [62, 54]}, cases=[])
     >>> lattice_of(table)[0].node_count
     46
