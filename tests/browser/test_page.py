@@ -94,7 +94,8 @@ def test_a_task_is_stated_searched_followed_stopped_played_and_downloaded(page: 
     page.get_by_label("Ask for").select_option("rotation")
     page.locator('.item[data-item="rotation"]').wait_for()
     page.locator('.specification [data-item="case.output.off_axis"]').wait_for()
-    assert page.locator(".specification tbody tr").count() == 5  # with strain, clearance and gain
+    items = page.locator(".specification tbody tr")
+    until(page, lambda: items.count() == 5)  # with strain, clearance and gain
     assert not page.locator(".error").inner_text()
 
     start_search(page, "Thorough")

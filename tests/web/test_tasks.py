@@ -12,6 +12,7 @@ import pytest
 
 from bellcrank.model import (
     Design,
+    gallery_design,
     human_design,
     problem_from_dict,
     problem_to_dict,
@@ -85,7 +86,19 @@ def test_every_listed_task_is_built_with_its_items(client: TestClient) -> None:
         ({"domain": {"outline": "../secret.svg"}}, "not the name of a file", "domain.outline"),
         ({"domain": {"size": [4000, 4000]}}, "the limit of the page is", "domain"),
         ({"domain": {"outline": {"circle": [0, 0], "radius": 4000}}}, "the limit", "domain"),
-        ({"domain": {"size": [60, 60, 60]}}, "in space", ""),
+        ({"domain": {"size": [60, 60, 60]}}, "in space", "domain"),
+        ({"domain": {"size": [4000, 4000, 4000]}}, "in space", "domain"),
+        ({"domain": {"size": [62, 54]}, "part": {"spacing": 0}}, "part.spacing", "part.spacing"),
+        (
+            {"domain": {"lattice": {"kind": "triangular-rectangle", "columns": 3, "rows": 10**9}}},
+            "the limit of the page is",
+            "lattice",
+        ),
+        (
+            {"domain": {"lattice": {"kind": "nodes", "positions": [[0, 0]] * 4000, "beams": []}}},
+            "the limit of the page is",
+            "lattice",
+        ),
         ({"part": {"width": 12}}, "not slender", "part.width"),
         ({"part": {"material": "oak"}}, "oak", "part.material"),
     ],
@@ -207,6 +220,22 @@ def test_the_report_of_a_design_of_springs_is_that_of_its_part(
     (figures,) = report["figures"]
     assert figures["efficiency"] == pytest.approx(1.17, abs=0.02)
     assert figures["off_axis"] == pytest.approx(0.18, abs=0.01)
+
+
+def test_the_report_without_a_specification_is_that_of_the_part_that_is_asked_for(
+    client: TestClient,
+) -> None:
+    found = gallery_design("machine", "crane")
+    assert found is not None
+    data, figures = problem_to_dict(found.problem), {}
+    for width in (2.0, 1.6):
+        spec = PartSpec(width=width)
+        body = {"problem": data, "mask": found.mask_hex, "part": spec.to_dict()}
+        (figures[width],) = client.post("/api/report", json=body).json()["figures"]
+        design = replace(found, problem=frame_problem(found.problem, spec))
+        (exact,) = part_figures(design, spec)
+        assert figures[width] == json.loads(json.dumps(exact))
+    assert figures[1.6]["input_force_N"] < 0.7 * figures[2.0]["input_force_N"]
 
 
 def test_an_own_part_of_a_machine_is_joined_to_one_of_the_library(client: TestClient) -> None:

@@ -7,57 +7,60 @@ import { designSubject, partOf, type Subject } from "./result";
 import { figureTable, itemTable, verdictOf } from "./specification";
 import { sentence } from "./text";
 
+/** One of the compared designs. */
+class Side {
+  readonly player: Player;
+  readonly element: HTMLElement;
+  private readonly verdict = h("p", { class: "verdict" });
+  private readonly items: HTMLElement;
+
+  constructor(readonly subject: Subject) {
+    const { title, note, problem, mask } = subject;
+    const trouble = h("p", { class: "fault", role: "alert" });
+    this.player = new Player(problem, mask, partOf(subject).scale);
+    this.player.onError = (text) => { trouble.textContent = text; };
+    this.items = h("div", { class: "report", tabindex: 0, role: "region", "aria-label": `Specification of ${title}` });
+    this.element = h("section", { class: "stage", "aria-label": title }, h("h2", {}, title), note && h("p", { class: "note content" }, sentence(note)),
+      this.player.element, h("div", { class: "content" }, this.verdict, this.items, trouble));
+  }
+
+  /** Compute the part, show its items and return its figures with a title each. */
+  async load(): Promise<{ title: string; row: PartFigures }[]> {
+    const { title, problem, mask } = this.subject;
+    const { figures, items: { frames }, specified } = await post<PartReport>("/report", { problem, mask, part: partOf(this.subject) });
+    this.verdict.className = `verdict ${frames === null ? "none" : frames.every(({ met }) => met) ? "met" : "missed"}`;
+    clear(this.verdict, frames ? `${verdictOf(frames)}.` : specified ? "The path is not stable." : "No specification.");
+    clear(this.items, frames && itemTable([{ title: "frames", items: frames }]));
+    return figures.map((row) => ({ title: figures.length > 1 ? `${title}: ${row.case}, ${row.output}` : title, row }));
+  }
+}
+
 export class ComparePage {
   readonly element = h("div", { class: "page wide compare" });
-  private readonly players: Player[] = [];
+  private readonly table = h("section", { class: "card" });
 
-  private constructor(private readonly subjects: Subject[]) {}
+  private constructor(private readonly sides: Side[]) {
+    this.element.append(
+      h("div", { class: "intro" }, h("h1", {}, "Comparison"), h("p", {}, "Figures of the parts, by frames with 8 elements in each strut.")),
+      h("div", { class: "pair" }, ...sides.map(({ element }) => element)), this.table);
+    void this.load();
+  }
 
   /** Open the page of designs given by sources and keys in turn. */
   static async open(parts: string[]): Promise<ComparePage> {
     const pairs = Array.from({ length: Math.floor(parts.length / 2) }, (_, k) => [parts[2 * k]!, parts[2 * k + 1]!] as const);
-    const page = new ComparePage(await Promise.all(pairs.map(([source, key]) => designSubject(source, key))));
-    page.layOut();
-    return page;
+    const subjects = await Promise.all(pairs.map(([source, key]) => designSubject(source, key)));
+    return new ComparePage(subjects.map((subject) => new Side(subject)));
   }
 
-  close(): void { this.players.forEach((player) => player.close()); }
+  close(): void { this.sides.forEach(({ player }) => player.close()); }
 
-  private layOut(): void {
-    const table = h("section", { class: "card" });
-    this.element.append(
-      h("div", { class: "intro" }, h("h1", {}, "Comparison"), h("p", {}, "Figures of the parts, by frames with 8 elements in each strut.")),
-      h("div", { class: "pair" }, ...this.subjects.map((subject) => {
-        const player = new Player(subject.problem, subject.mask, partOf(subject).scale);
-        this.players.push(player);
-        const verdict = h("p", { class: "verdict" });
-        const items = h("div", { class: "report", tabindex: 0, role: "region", "aria-label": `Specification of ${subject.title}` });
-        const trouble = h("p", { class: "fault", role: "alert" });
-        player.onError = (text) => { trouble.textContent = text; };
-        subject.show = (report) => {
-          const found = report.items.frames;
-          verdict.className = `verdict ${found === null ? "none" : found.every(({ met }) => met) ? "met" : "missed"}`;
-          clear(verdict, found ? `${verdictOf(found)}.` : report.specified ? "The path is not stable." : "No specification.");
-          clear(items, found && itemTable([{ title: "frames", items: found }]));
-        };
-        return h("section", { class: "stage", "aria-label": subject.title }, h("h2", {}, subject.title), subject.note && h("p", { class: "note content" }, sentence(subject.note)), player.element, h("div", { class: "content" }, verdict, items, trouble));
-      })),
-      table);
-    void this.load(table);
-  }
-
-  private async load(table: HTMLElement): Promise<void> {
-    const shown: { title: string; row: PartFigures }[] = [];
-    for (const subject of this.subjects) {
-      try {
-        const report = await post<PartReport>("/report", { problem: subject.problem, mask: subject.mask, part: partOf(subject) });
-        subject.show?.(report);
-        shown.push(...report.figures.map((row) => ({ title: `${subject.title}${report.figures.length > 1 ? `: ${row.case}, ${row.output}` : ""}`, row })));
-      } catch (error) {
-        clear(table, h("p", { class: "fault", role: "alert" }, sentence((error as ServerError).message)));
-        return;
-      }
+  private async load(): Promise<void> {
+    try {
+      const shown = (await Promise.all(this.sides.map((side) => side.load()))).flat();
+      clear(this.table, figureTable(shown.map(({ row }) => row), shown.map(({ title }) => title)));
+    } catch (error) {
+      clear(this.table, h("p", { class: "fault", role: "alert" }, sentence((error as ServerError).message)));
     }
-    clear(table, figureTable(shown.map(({ row }) => row), shown.map(({ title }) => title)));
   }
 }

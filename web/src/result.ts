@@ -1,7 +1,6 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { fetchBlob, fetchFile, fetchRegistries, get, post, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
-import { bitsOf } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, post, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, download, field, figure, h, number, select } from "./dom";
@@ -26,8 +25,6 @@ export interface Subject {
   task: Record<string, unknown> | null;
   /** Source and key in the gallery. */
   place: [string, string] | null;
-  /** Called with its report, in a comparison. */
-  show?: (report: PartReport) => void;
 }
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null }
@@ -237,14 +234,22 @@ export class Result {
       typeof given === "string" ? given : "", (picked) => change({ material: picked || given }));
     const { remarks } = this;
     clear(this.partBox,
-      h("div", { class: "row" }, size("width", "Strut width"), size("thickness", "Thickness")),
-      h("div", { class: "row" }, size("scale", "Beam length"), field("Material", material)),
+      // A specification is for the part that it was written for.
+      ...(this.subject.problem.specification ? [this.fixedPart()] : [
+        h("div", { class: "row" }, size("width", "Strut width"), size("thickness", "Thickness")),
+        h("div", { class: "row" }, size("scale", "Spacing of nodes"), field("Material", material))]),
       fault && h("p", { class: "fault", role: "alert" }, fault),
       remarks && h("p", { class: "more" }, `${remarks.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ")} mm`,
         remarks.mass === null ? "" : `, ${figure(remarks.mass, 1)} g`, remarks.stroke === null ? "" : `, stroke ${figure(remarks.stroke, 2)} mm`),
       remarks && remarks.remarks.length > 0 && h("details", { class: "remarks" },
         h("summary", {}, `${remarks.remarks.length} ${remarks.remarks.length === 1 ? "remark" : "remarks"} on printing`),
         h("ul", {}, ...remarks.remarks.map((text) => h("li", {}, sentence(text))))));
+  }
+
+  private fixedPart(): HTMLElement {
+    const { width, thickness, scale, material } = this.part;
+    const named = typeof material === "string" ? this.registries?.materials.find(({ name }) => name === material)?.title ?? material : material.name;
+    return h("p", {}, `Struts ${width} mm wide, ${thickness} mm thick, nodes ${scale} mm apart, ${named}. They belong to the specification; another part is another task.`);
   }
 
   private async describe(): Promise<void> {
@@ -332,9 +337,7 @@ export class Result {
 
 /** The part of a design; that of 2 mm struts if none is recorded. */
 export function partOf(subject: Subject): Part {
-  const stored = (subject.part ?? subject.provenance["part"] ?? {}) as Partial<Part>;
-  const known = Object.fromEntries(Object.entries(stored).filter(([key, value]) => ["width", "thickness", "scale", "material"].includes(key) && (key === "material" || typeof value === "number")));
-  return { width: 2, thickness: 5, scale: 10, material: "ninjaflex", ...known };
+  return { width: 2, thickness: 5, scale: 10, material: "ninjaflex", ...(subject.part ?? subject.provenance["part"] as Partial<Part> | undefined) };
 }
 
 /** Load a design of the gallery. */

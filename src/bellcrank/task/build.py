@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,7 +36,7 @@ from bellcrank.task.space import beams_in_space, body_of, fill_in_space
 from bellcrank.task.units import ProblemUnits, part_units
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -96,12 +97,8 @@ def build_task(table: TaskTable, folder: Path | None = None) -> Task:
     InvalidFile, InvalidProblem
         With the key of the first error.
     """
-    try:
+    with _invalid_problems():
         return _Builder(table, folder or Path()).task()
-    except (InvalidFile, InvalidProblem):
-        raise
-    except BellcrankError as error:  # an unknown material or lattice, a part that is too slender
-        raise InvalidProblem(str(error)) from None
 
 
 def lattice_of(table: TaskTable, folder: Path | None = None) -> tuple[Lattice, PartSpec]:
@@ -117,13 +114,20 @@ def lattice_of(table: TaskTable, folder: Path | None = None) -> tuple[Lattice, P
     >>> lattice_of(table)[0].node_count
     46
     """
-    try:
+    with _invalid_problems():
         builder = _Builder(table, folder or Path())
+        return builder.lattice, builder.part
+
+
+@contextmanager
+def _invalid_problems() -> Iterator[None]:
+    """Make other errors of a task an `InvalidProblem`: an unknown material, a part too slender."""
+    try:
+        yield
     except (InvalidFile, InvalidProblem):
         raise
     except BellcrankError as error:
         raise InvalidProblem(str(error)) from None
-    return builder.lattice, builder.part
 
 
 class _Builder:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, get_args
 import numpy as np
 
 from bellcrank.errors import BellcrankError, UnknownName
+from bellcrank.fem.results import finite
 from bellcrank.model import (
     IN_SPACE,
     Design,
@@ -25,7 +26,6 @@ from bellcrank.model import (
     write_design,
 )
 from bellcrank.model.gallery import Kind
-from bellcrank.web.quick_calls import finite
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -7,7 +7,6 @@ which its evaluator is cached.
 from __future__ import annotations
 
 import json
-import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -15,29 +14,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT, ModelEvaluator, Status, model_evaluator
 from bellcrank.model import Design, human_design, unpack_mask
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 from bellcrank.search.verification import ELEMENTS
-from bellcrank.task import units_of
+from bellcrank.web.items import item_states
 from bellcrank.web.task_files import problem_of
 from bellcrank.workflows.part_figures import part_figures
-from bellcrank.workflows.specification import (
-    item_label,
-    number_text,
-    results_for,
-    shown_value,
-    wanted_text,
-)
+from bellcrank.workflows.specification import results_for
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
-    from bellcrank.mechanics import ItemResult
     from bellcrank.model import Problem
 
 CACHED = 24
@@ -130,29 +121,11 @@ def evaluate(
     return result
 
 
-def item_states(
-    problem: Problem, spec: PartSpec, results: Sequence[ItemResult]
-) -> list[dict[str, Any]]:
-    """Return the items that a design reaches in one model, as the page shows them."""
-    units = units_of(problem, spec)
-    states = []
-    for each in results:
-        value = shown_value(each.item, each.value)
-        states.append(
-            {
-                "name": each.item.name,
-                "label": item_label(each.item, problem),
-                "wanted": wanted_text(each.item, units),
-                "reached": number_text(each.item, value, units),
-                "margin": finite(each.margin) if math.isfinite(value) else None,
-                "met": bool(each.met),
-            }
-        )
-    return states
-
-
 def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     """Return what a design does as a part: the items of its specification, and its figures.
+
+    A problem without a specification is computed for the given part; a specification is for the
+    part that its problem has.
 
     The figures are those of frames with eight elements in each strut, for each output of each load
     case. Items are given in the model of the search and by eight elements; None for a path that is
@@ -160,7 +133,7 @@ def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     """
     spec = PartSpec.from_dict(part, "part")
     design = design_of(text, mask)
-    if design.problem.section is None:
+    if not design.problem.is_specified:
         design = replace(design, problem=frame_problem(design.problem, spec))
     problem = design.problem
     items = {}
@@ -230,12 +203,6 @@ def sensitivity(text: str, mask: str) -> dict[str, Any]:
         "beams": entry.problem.designable.tolist(),
         "change": change,
     }
-
-
-def finite(value: float) -> float | None:
-    """Return a number, or None for NaN and infinities, which JSON does not have."""
-    value = float(value)
-    return value if math.isfinite(value) else None
 
 
 def flat(displacement: NDArray[np.float64]) -> list[float]:

@@ -24,7 +24,7 @@ from bellcrank.web.jobs import Record
 from bellcrank.web.requests import RunBody
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of
-from bellcrank.web.task_tables import task_of
+from bellcrank.web.task_tables import table_in, task_of
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
@@ -60,7 +60,7 @@ def _validated(body: RunBody) -> tuple[Problem, Record]:
     from bellcrank.search import read_settings
     from bellcrank.search.constraints import parse_goal
 
-    task = None if body.task is None else task_of(body.task)
+    task = None if body.task is None else task_of(table_in(body.task))
     problem = problem_of(body.problem or {}) if task is None else task.problem
     settings = read_settings(
         {

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import signal
-import sys
 import threading
 import time
 from dataclasses import replace
@@ -36,8 +34,6 @@ INTERVAL = 0.1
 MOVED_INTERVAL = 0.4
 """Seconds between two evaluations of the displayed design."""
 NICENESS = 5
-MET = 1e-3
-"""Sum of violations up to which a refined geometry meets all items."""
 
 
 class CommandListener:
@@ -84,6 +80,7 @@ class ProgressReporter:
         self._total = settings.chains * settings.steps
         self._lock = threading.Lock()
         self._chains: dict[int, dict[str, Any]] = {}
+        self._scores: dict[int, float] = {}
         self._points: dict[int, list[Point]] = {}
         self._made = 0
         self._start = time.monotonic()
@@ -119,11 +116,11 @@ class ProgressReporter:
         with self._lock:
             self._made += progress.steps
             self._done[progress.chain] = state.step
+            self._scores[progress.chain] = state.best
             self._chains[progress.chain] = {
                 "step": state.step,
                 "efficiency": now,
                 "best": best,
-                "score": state.best if math.isfinite(state.best) else -sys.float_info.max,
                 "temperature": progress.temperature,
                 "accepted": state.accepted,
                 "mask": _current_mask(state),
@@ -157,7 +154,7 @@ class ProgressReporter:
             points, self._points = self._points, {}
             chains = {chain: dict(state) for chain, state in self._chains.items()}
             done, made, tried = sum(self._done.values()), self._made, self._tried
-            refined = dict(self._refined)
+            refined, scores = dict(self._refined), dict(self._scores)
         speed = made / max(time.monotonic() - self._start, 1e-9)
         message: dict[str, Any] = {
             "kind": "progress",
@@ -170,15 +167,17 @@ class ProgressReporter:
             "tried": tried,
             "refined": _refinement_of(refined),
         }
-        best = max(chains.values(), key=lambda each: each["score"])
+        best = chains[max(scores, key=scores.__getitem__)]
         if time.monotonic() - self._moved_at > MOVED_INTERVAL and best["kept"] != self._moved_mask:
             message["moved"] = self._move(best["kept"])
         self._pipe.send(message)
 
     def _move(self, mask: str) -> dict[str, Any]:
         """Return the response of the displayed design."""
+        from bellcrank.fem.results import finite
         from bellcrank.model import unpack_mask
-        from bellcrank.web.quick_calls import finite, flat, item_states
+        from bellcrank.web.items import item_states
+        from bellcrank.web.quick_calls import flat
 
         bits = unpack_mask(mask, self._problem.lattice.beam_count)
         response = self._evaluator.evaluate(bits)
@@ -196,13 +195,15 @@ class ProgressReporter:
 
 def _refinement_of(states: dict[int, tuple[int, float, float]]) -> dict[str, Any] | None:
     """Return the number of designs and geometries, and the best objective that meets all items."""
+    from bellcrank.refine.by_frames import MET
+
     if not states:
         return None
     met = [objective for _, objective, violation in states.values() if violation <= MET]
     return {
         "designs": len(states),
         "geometries": sum(evaluations for evaluations, _, _ in states.values()),
-        "objective": _finite(max(met)) if met else None,
+        "objective": float(max(met)) if met else None,
     }
 
 
@@ -212,10 +213,6 @@ def _met_score(value: float) -> float | None:
     from bellcrank.web.curves import rounded
 
     return rounded(value) if value > -0.5 * BASE_PENALTY else None
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def _current_mask(state: Any) -> str:

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from bellcrank.errors import InvalidFile, InvalidSettings
+from bellcrank.fem.results import finite
 from bellcrank.model import problem_to_dict, write_design
-from bellcrank.web.quick_calls import design_of, finite, item_states
+from bellcrank.web.items import item_states
+from bellcrank.web.quick_calls import design_of
 
 if TYPE_CHECKING:
     from bellcrank.model import Design

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from bellcrank.web.limits import check_lattice, check_size
 from bellcrank.web.task_tables import plain_table, table_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from bellcrank.model import Design, Problem
 
@@ -60,11 +61,18 @@ def read_upload(text: str, suffix: str) -> tuple[dict[str, Any] | None, Design |
     ------
     InvalidFile, InvalidProblem
     """
+    with _uploaded(text, suffix) as path:
+        return _read(path)
+
+
+@contextmanager
+def _uploaded(text: str, suffix: str) -> Iterator[Path]:
+    """Write an upload to a temporary file, which errors name `UPLOAD`."""
     with TemporaryDirectory(prefix="bellcrank-") as folder:
         path = Path(folder) / f"upload{suffix}"
         path.write_text(text, encoding="utf-8")
         try:
-            return _read(path)
+            yield path
         except (InvalidFile, InvalidProblem, OverflowError) as error:
             kind = InvalidProblem if isinstance(error, InvalidProblem) else InvalidFile
             raise kind(str(error).replace(str(path), UPLOAD)) from None
@@ -76,15 +84,18 @@ def _read(path: Path) -> tuple[dict[str, Any] | None, Design | None]:
         inner = table.get("problem")
         check_lattice(inner.get("lattice") if isinstance(inner, dict) else None)
         design = read_design(path)
-        check_size(design.problem.lattice.node_count, design.problem.lattice.beam_count)
-        require_plane(design.problem, UPLOAD)
+        _check(design.problem)
         return None, design
     if is_task(table):
         return plain_table(table, UPLOAD), None
     problem = problem_of(table, UPLOAD)
+    _check(problem)
+    return table_of(problem, PartSpec()), None
+
+
+def _check(problem: Problem) -> None:
     check_size(problem.lattice.node_count, problem.lattice.beam_count)
     require_plane(problem, UPLOAD)
-    return table_of(problem, PartSpec()), None
 
 
 def read_region(text: str, suffix: str) -> dict[str, Any]:
@@ -97,13 +108,8 @@ def read_region(text: str, suffix: str) -> dict[str, Any]:
     InvalidFile
         If the file has no closed curve, or several regions.
     """
-    with TemporaryDirectory(prefix="bellcrank-") as folder:
-        path = Path(folder) / f"upload{suffix}"
-        path.write_text(text, encoding="utf-8")
-        try:
-            region = read_outline(path)
-        except (InvalidFile, OverflowError) as error:
-            raise InvalidFile(str(error).replace(str(path), UPLOAD)) from None
+    with _uploaded(text, suffix) as path:
+        region = read_outline(path)
     if region.geom_type != "Polygon":
         raise InvalidFile(f"{UPLOAD}: expected one region, got {len(region.geoms)}")
     left, bottom, _, _ = region.bounds

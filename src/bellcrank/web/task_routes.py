@@ -8,6 +8,7 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from bellcrank.part import PartSpec
+from bellcrank.task.schema import SCHEMA
 from bellcrank.web.requests import ProblemBody, TableBody, TextBody
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of, read_region, read_upload, to_toml
@@ -59,7 +60,7 @@ async def write_file(body: TableBody) -> dict[str, str]:
     """Return a task as the text of a task file."""
 
     def write() -> str:
-        return to_toml({"schema": "bellcrank/task/1", **plain_table(body.task)})
+        return to_toml({"schema": SCHEMA, **plain_table(body.task)})
 
     return {"text": await run_in_threadpool(write)}
 

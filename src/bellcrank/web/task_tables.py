@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.errors import InvalidFile, InvalidProblem, UnknownName
+from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings, UnknownName
 from bellcrank.machines.elementary import DIRECTIONS, elementary
-from bellcrank.model import Item, builtin, problem_to_dict, require_plane
+from bellcrank.model import builtin, problem_to_dict, require_plane
 from bellcrank.model.parsing import parse, read_table
 from bellcrank.part import PartSpec, frame_problem
-from bellcrank.search.symmetry import SymmetryGroups
+from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import Task, TaskTable, build_task, bundled_tasks, lattice_of, units_of
+from bellcrank.task.build import NARROWEST
+from bellcrank.task.domain import region_of
 from bellcrank.task.shapes import nodes_at
 from bellcrank.web.errors import plain_error
+from bellcrank.web.items import wanted_items
 from bellcrank.web.limits import NODES, check_lattice, check_size
-from bellcrank.workflows.specification import item_label, wanted_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,12 +29,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Lattice, Problem
-    from bellcrank.task.schema import Shape
 
+PLANE = 2
+"""Number of lengths of a domain in the plane."""
 NODES_PER_AREA = 2.0 / math.sqrt(3.0)
 """Nodes of a triangular lattice in the square of its spacing."""
-
-
+LARGEST_RATIO = 4.0
+"""Ratio of the nodes in the bounds of a domain to the limit above which it is not filled."""
 ELEMENT = "element-"
 """Start of the names of tasks for parts of machines."""
 ELEMENT_COLUMNS = 7
@@ -43,7 +47,7 @@ def planar_tasks() -> list[dict[str, str]]:
     found = []
     for name, path in bundled_tasks().items():
         table = read_table(path)
-        if len(table["domain"].get("size", ())) != 3:
+        if len(table["domain"].get("size", ())) <= PLANE:
             found.append({"name": name, "about": table.get("description", "")})
     parts = [
         {
@@ -168,67 +172,42 @@ def table_in(data: Mapping[str, Any]) -> TaskTable:
     if isinstance(table.domain.outline, str):
         raise InvalidFile("domain.outline: expected corners or a shape, not the name of a file")
     check_lattice(table.domain.lattice)
-    _check_area(table)
+    _check_domain(table)
     return table
 
 
-def task_of(data: Mapping[str, Any]) -> Task:
-    """Return the task of a request.
+def task_of(table: TaskTable) -> Task:
+    """Return the task of a table that `table_in` accepts, which a search can start with.
 
     Raises
     ------
     InvalidFile, InvalidProblem
     """
-    task = build_task(table_in(data))
+    task = build_task(table)
     check_size(task.problem.lattice.node_count, task.problem.lattice.beam_count)
     require_plane(task.problem, "task")
-    wanted = task.problem.specification
-    assert wanted is not None
     try:
-        SymmetryGroups(task.problem, wanted.symmetry)
-    except ValueError as error:
-        raise InvalidProblem(f"limits.symmetry: {error}") from None
+        SpecificationEvaluator(task.problem)
+    except InvalidSettings as error:  # the lattice is not as symmetric as the limits ask
+        raise InvalidProblem(str(error)) from None
     return task
 
 
-def _check_area(table: TaskTable) -> None:
-    """Refuse a domain that would be filled with too many nodes, before it is filled."""
+def _check_domain(table: TaskTable) -> None:
+    """Refuse a domain in space, and one for too many nodes, before it is filled."""
     domain = table.domain
-    size = domain.size
-    if size is None and domain.outline is not None:
-        size = _extent(domain.outline)
-    if size is None or len(size) != 2:
-        return
-    nodes = NODES_PER_AREA * size[0] * size[1] / table.part.spacing**2
-    if not nodes <= 4.0 * NODES:
+    if domain.size is not None and len(domain.size) != PLANE:
+        raise InvalidProblem("domain: the page designs parts in the plane; this one is in space")
+    is_filled = domain.size is not None or domain.outline is not None
+    if not is_filled or not table.part.spacing >= NARROWEST:
+        return  # `build_task` refuses the spacing
+    left, bottom, right, top = region_of(domain, Path()).bounds
+    nodes = NODES_PER_AREA * (right - left) * (top - bottom) / table.part.spacing**2
+    if not nodes <= LARGEST_RATIO * NODES:
         raise InvalidFile(
             f"domain: about {nodes:.0f} nodes; the limit of the page is {NODES}; choose a smaller "
             "part or a larger spacing"
         )
-
-
-def _extent(outline: Any) -> tuple[float, float] | None:
-    """Return width and height of an outline; None if it is not valid."""
-    from bellcrank.task.schema import Shape
-
-    try:
-        shape = parse(
-            Shape, outline if isinstance(outline, dict) else {"polygon": outline}, "domain.outline"
-        )
-    except InvalidFile:
-        return None  # `build_task` gives the reason
-    return _size_of(shape)
-
-
-def _size_of(shape: Shape) -> tuple[float, float] | None:
-    if shape.circle is not None and shape.radius is not None:
-        return 2.0 * shape.radius, 2.0 * shape.radius
-    if shape.box is not None and len(shape.box) == 4:
-        return shape.box[2] - shape.box[0], shape.box[3] - shape.box[1]
-    if shape.polygon:
-        xs, ys = zip(*(point[:2] for point in shape.polygon), strict=True)
-        return max(xs) - min(xs), max(ys) - min(ys)
-    return None
 
 
 def task_data(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -249,8 +228,6 @@ def task_data(data: Mapping[str, Any]) -> dict[str, Any]:
     table = table_in(data)
     lattice, part = lattice_of(table)
     check_size(lattice.node_count, lattice.beam_count)
-    if lattice.dimension != 2:
-        raise InvalidProblem("domain: the page designs parts in the plane; this one is in space")
     missing = _missing(table)
     found: dict[str, Any] = {
         "lattice": {"positions": lattice.positions.tolist(), "beams": lattice.beams.tolist()},
@@ -263,7 +240,7 @@ def task_data(data: Mapping[str, Any]) -> dict[str, Any]:
     }
     if missing is None:
         try:
-            task = task_of(data)
+            task = task_of(table)
         except (InvalidFile, InvalidProblem) as error:
             found["fault"] = plain_error(error)
         else:
@@ -307,10 +284,10 @@ def _regions(table: TaskTable, lattice: Lattice, part: PartSpec) -> dict[str, An
 
     given = [] if base is None else base.input.nodes.tolist()
     moved = [] if base is None else base.output.nodes.tolist()
-    held = {} if base is None else {"fixed": base.supports.fixed.tolist()}
+    held = [] if base is None else base.supports.fixed.tolist()
     return {
         "supports": [nodes(each) for each in table.supports],
-        "given": {"input": given, "output": moved, "supports": held.get("fixed", [])},
+        "given": {"input": given, "output": moved, "supports": held},
         "cases": [
             {
                 "inputs": [nodes(each, given) for each in case.inputs],
@@ -321,35 +298,3 @@ def _regions(table: TaskTable, lattice: Lattice, part: PartSpec) -> dict[str, An
             for case in table.cases
         ],
     }
-
-
-def wanted_items(problem: Problem, part: PartSpec) -> list[dict[str, str]]:
-    """Return name, label and bounds of the items of a specification, then its objectives.
-
-    Objectives have the name of their quantity with ``maximise:`` before it. None without a
-    specification.
-    """
-    wanted = problem.specification
-    if wanted is None:
-        return []
-    units = units_of(problem, part)
-    objectives = [
-        {
-            "name": f"maximise:{each.case}.{each.output}.{each.quantity}",
-            "label": item_label(
-                Item(quantity=each.quantity, case=each.case, output=each.output, at_least=0.0),
-                problem,
-            ),
-            "wanted": "as large as possible" if each.scale > 0.0 else "as small as possible",
-        }
-        for each in wanted.maximise
-    ]
-    items = [
-        {
-            "name": item.name,
-            "label": item_label(item, problem),
-            "wanted": wanted_text(item, units),
-        }
-        for item in wanted.items
-    ]
-    return [*items, *objectives]
