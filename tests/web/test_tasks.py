@@ -328,6 +328,22 @@ def test_the_tolerance_of_a_part_is_that_of_the_command(client: TestClient) -> N
     assert found["losses"]["cost"] == pytest.approx(costs)
 
 
+def test_the_best_figure_stays_when_a_search_is_resumed(client: TestClient) -> None:
+    """The process that resumes a search has reported smaller figures so far."""
+    jobs = client.app.state.bellcrank.jobs  # type: ignore[attr-defined]
+    task = find_task("lever")
+    assert task is not None
+    settings = {"search": "basin-hopping", "steps": 10, "chains": 2, "goals": []}
+    record = Record(title="r", session="s", settings=settings, status="running", efficiency=12.09)
+    job = jobs.add(task.problem, record)
+    shown = []
+    for best in (None, 8.22, 12.5):
+        job.progress = {"chains": {0: {"best": best}, 1: {"best": None}}}
+        shown.append(job.summary()["efficiency"])
+    assert shown == [12.09, 12.09, 12.5]
+    jobs.remove(job.name)
+
+
 def test_a_refined_design_is_shown_with_its_own_geometry(client: TestClient) -> None:
     jobs = client.app.state.bellcrank.jobs  # type: ignore[attr-defined]
     task = find_task("lever")
