@@ -1,6 +1,7 @@
 // Requests to the server, and the types of its responses.
 
-export type Point = [number, number];
+/** A point of the plane or of space. */
+export type Point = [number, number, number?];
 
 export interface Problem {
   schema: string;
@@ -10,13 +11,15 @@ export interface Problem {
   initial: string;
   designable: number[];
   stiffness: { bond: number; angle: number };
-  supports: { fixed: number[]; fixed_x: number[]; fixed_y: number[] };
+  supports: { fixed: number[]; fixed_x: number[]; fixed_y: number[]; fixed_z?: number[] };
   input: { nodes: number[]; direction: Point | Point[]; drive: "displacement" | "force"; amount: number };
   output: { nodes: number[]; direction: Point | Point[]; spring: number | null; spring_kind: string | null };
   aggregate: string;
   objective?: string;
   /** Cross-section and material of the beams of a frame, in lattice units; without them a problem is one of the spring model. */
   section?: { shape: string; width?: number; thickness?: number; diameter?: number } | null;
+  /** Width of each beam, if they differ. */
+  widths?: number[] | null;
   material?: { young: number; poisson: number } | null;
   /** Names of the first load case and its output, other outputs and load cases, and what is wanted of them. */
   specification?: Specification | null;
@@ -30,6 +33,8 @@ export interface Specification {
   items: unknown[];
   maximise: unknown[];
 }
+
+export function isInSpace({ positions }: Pick<Problem, "positions">): boolean { return positions[0]?.length === 3; }
 
 /** The mechanical model of a problem in words. */
 export function modelOf(problem: Problem): string { return problem.section ? "frames" : "spring model"; }
@@ -152,8 +157,10 @@ export interface Named { name: string; title: string }
 export interface Registries {
   searches: (Named & { summary: string; running_best: boolean })[];
   materials: Named[];
-  files: (Named & { purpose: string })[];
-  levels: (Named & { duration: string; missing: string })[];
+  files: (Named & { purpose: string; in_space: boolean })[];
+  /** Lattices that fill a domain in space. */
+  cells: Named[];
+  levels: (Named & { duration: string; missing: string; in_space: boolean })[];
 }
 
 /** An error reported by the server: a sentence, and the key of the request that it concerns. */

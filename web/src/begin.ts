@@ -12,6 +12,11 @@ export function emptyTask(): Task {
   return { table: { name: "my part", domain: { size: [82, 72] }, supports: [], cases: [{ inputs: [], outputs: [] }] }, hand: null };
 }
 
+/** A box in space of one load case without supports, inputs and outputs. */
+export function emptySpaceTask(): Task {
+  return { table: { name: "my part", domain: { size: [45, 17, 45] }, supports: [], cases: [{ inputs: [], outputs: [] }] }, hand: null };
+}
+
 /** A rectangle that is held at the bottom and pushed down at the upper right; its output is at the upper left. */
 export function exampleTask(): Task {
   return {

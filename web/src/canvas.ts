@@ -4,10 +4,8 @@ import type { Point } from "./api";
 import { angleOf, arrow, Drawing, range, where } from "./drawing";
 import { announce, s } from "./dom";
 import { describeTarget, mirrorAxes, nextInDirection, rollerLines, shapePath } from "./marks";
-import { directionAt, rowOf, type Direction, type Kind, type Shape, type Target, type ZoneShape } from "./task";
-import type { Arrow, View } from "./view";
-
-export type Tool = Kind | "zones" | "hand";
+import { directionAt, rowOf, type Direction, type Shape, type Target, type Tool, type ZoneShape } from "./task";
+import type { Arrow, TaskDrawing, View } from "./view";
 
 /** Length of the arrow of an input, in strokes. */
 export const STRETCH = 4;
@@ -22,7 +20,7 @@ export interface CanvasActions {
 
 type Drag = { kind: "box" | "paint" | "aim" | "zone"; from: Point; arrow?: Arrow; add: boolean; done: Set<number>; moved: boolean };
 
-export class Canvas extends Drawing {
+export class Canvas extends Drawing implements TaskDrawing {
   tool: Tool = "supports";
   rows = false;
   zoneShape: ZoneShape = "box";

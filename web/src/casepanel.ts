@@ -1,11 +1,11 @@
 // Inputs, outputs and loads of a load case.
 
-import { button, choice, h, select } from "./dom";
+import { button, choice, field, h, select } from "./dom";
 import { angleOf } from "./drawing";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
 import {
-  cleaned, directionAt, nodesOf, QUANTITIES, sectionsOf, vectorOf, withSection, withSections,
+  cleaned, directionAt, isSpatial, nodesOf, QUANTITIES, sectionsOf, vectorInSpace, vectorOf, withSection, withSections,
   type Amount, type Bounds, type CaseTable, type InputTable, type LoadTable, type OutputTable, type QuantityName, type Target,
 } from "./task";
 
@@ -61,11 +61,25 @@ function set(editor: TaskEditor, target: Target, changes: Record<string, unknown
 
 function directionFields(editor: TaskEditor, target: Target, given: InputTable["direction"]): HTMLElement {
   const key = `${target.kind}-${target.index}`;
+  if (isSpatial(editor.task.table)) return directionInSpace(editor, target, given, key);
   const angle = given === undefined ? undefined : angleOf(vectorOf(given));
   return h("div", { class: "row" },
     amount(`${key}-angle`, "Direction", angle, "°", (value) => set(editor, target, { direction: value === undefined ? undefined : directionAt(Number(value) || 0) })),
     h("div", { class: "directions", role: "group", "aria-label": "Common directions" }, ...(["up", "right", "down", "left"] as const).map((name) =>
       button({ up: "↑", right: "→", down: "↓", left: "←" }[name], () => set(editor, target, { direction: name }), "quiet", { "aria-label": name, title: name, "data-key": `${key}-${name}` }))));
+}
+
+/** A direction by name, or by the components of a vector. */
+function directionInSpace(editor: TaskEditor, target: Target, given: InputTable["direction"], key: string): HTMLElement {
+  const names = ["up", "down", "left", "right", "front", "back"] as const;
+  const isVector = Array.isArray(given);
+  const pick = select([...names.map((name): [string, string] => [name, name]), ["vector", "vector …"], ...(given === undefined ? [["", "choose …"] as [string, string]] : [])],
+    isVector ? "vector" : given ?? "", (picked) => set(editor, target, { direction: picked === "vector" ? vectorInSpace(given) : picked }));
+  pick.dataset.key = `${key}-direction`;
+  return h("div", { class: "row" }, field("Direction", pick), isVector ? amount(`${key}-vector`, "x, y, z", given.join(", "), "", (value) => {
+    const read = String(value ?? "").split(",").map(Number);
+    if (read.length === 3 && read.every(Number.isFinite)) set(editor, target, { direction: read });
+  }) : null);
 }
 
 function inputFields(editor: TaskEditor, each: InputTable, target: Target): HTMLElement[] {
@@ -148,7 +162,7 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
   const several = sectionsOf(editor.task.table, editor.loadCase, "outputs").length > 1;
   const rows = QUANTITIES.flatMap((name) => (each[name] ?? []).map((bounds, index) => itemRow(editor, each, target, name, index, bounds)));
   const unused = QUANTITIES.filter((name) => !each[name]?.length);
-  const options: [string, string][] = [["", "choose …"], ...unused.map((name): [string, string] => [name, USUAL[name].title]), ...(each.path ? [] : [["path", "path"] as [string, string]])];
+  const options: [string, string][] = [["", "choose …"], ...unused.map((name): [string, string] => [name, USUAL[name].title]), ...(each.path || isSpatial(editor.task.table) ? [] : [["path", "path"] as [string, string]])];
   const add = select(options, "", (name) => {
     if (!name) return;
     if (name === "path") { set(editor, target, { path: { arc: [20, 60] } }); return; }

@@ -1,15 +1,16 @@
 // Size and material of the part, where material may be, and files of tasks.
 
 import { get } from "./api";
-import { bundledTask, emptyTask, exampleTask } from "./begin";
+import { bundledTask, emptySpaceTask, emptyTask, exampleTask } from "./begin";
 import { button, choice, count, field, h, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
-import { cleaned, resized, type Amount, type Domain, type Material, type Shape, type Table, type ZoneKind, type ZoneShape } from "./task";
+import { cleaned, isSpatial, resized, type Amount, type Domain, type Material, type Shape, type Table, type Task, type ZoneKind, type ZoneShape } from "./task";
 
 /** Problems of the paper on whose lattices a part can be designed. */
 const LATTICES = ["crane", "anti-parallel", "pliers", "scaling-8", "scaling-12", "discs"];
 const ZONES: [ZoneKind, string][] = [["holes", "Hole"], ["keep_out", "Free"], ["solid", "Solid"]];
+const FRESH: Record<string, () => Task> = { example: exampleTask, empty: emptyTask, "empty-space": emptySpaceTask };
 const OWN: Material = { name: "own", young: 12, poisson: 0.45, density: 1.2, strain_limit: 0.3 };
 
 export class DomainPanel {
@@ -33,9 +34,9 @@ export class DomainPanel {
     const { editor } = this;
     const { table } = editor.task;
     const start = select([
-      ["", "choose …"], ["example", "an example"], ["empty", "an empty rectangle"],
+      ["", "choose …"], ["example", "an example"], ["empty", "an empty rectangle"], ["empty-space", "an empty box in space"],
       ...this.tasks.map(({ name }): [string, string] => [name, name]),
-    ], "", (name) => name && this.attempt(async () => editor.open(name === "example" ? exampleTask() : name === "empty" ? emptyTask() : await bundledTask(name))));
+    ], "", (name) => name && this.attempt(async () => editor.open(FRESH[name]?.() ?? await bundledTask(name))));
     start.dataset.key = "start";
     const file = this.file("File to open", ".toml,.json", (picked) => this.attempt(() => editor.load(picked)));
     const name = h("input", { type: "text", value: table.name, maxlength: 100, "data-key": "name" });
@@ -77,8 +78,8 @@ export class DomainPanel {
     const figure = (key: "young" | "poisson" | "density" | "strain_limit", label: string, unit: string): HTMLElement =>
       amount(`material-${key}`, label, own?.[key], unit, (value) => put({ material: cleaned({ ...own!, [key]: value }) as Material }));
     return h("div", {},
-      h("div", { class: "row" }, size("spacing", "Spacing of nodes", 10), size("width", "Strut width", 2)),
-      h("div", { class: "row" }, size("thickness", "Thickness", 5), field("Material", material)),
+      h("div", { class: "row" }, size("spacing", "Spacing of nodes", 10), size("width", isSpatial(table) ? "Strut diameter" : "Strut width", 2)),
+      h("div", { class: "row" }, isSpatial(table) ? null : size("thickness", "Thickness", 5), field("Material", material)),
       own && h("div", { class: "row" }, figure("young", "Young's modulus", "MPa"), figure("poisson", "Poisson's ratio", "")),
       own && h("div", { class: "row" }, figure("density", "Density", "g/cm³"), figure("strain_limit", "Largest strain", "")));
   }
@@ -87,17 +88,19 @@ export class DomainPanel {
     const { editor } = this;
     const { table } = editor.task;
     const { domain } = table;
-    const kind = domain.size ? "size" : domain.outline ? "outline" : domain.problem ? "problem" : "lattice";
+    const kind = domain.size?.length === 3 ? "space" : domain.size ? "size" : domain.outline ? "outline" : domain.problem ? "problem" : "lattice";
     const put = (next: Domain): void => editor.change({ ...table, domain: cleaned(next) });
-    const zones = { holes: domain.holes, keep_out: domain.keep_out, solid: domain.solid };
+    const zones = isSpatial(table) ? {} : { holes: domain.holes, keep_out: domain.keep_out, solid: domain.solid };
     const drawing = this.file("Outline to read", ".dxf,.svg", (picked) => this.attempt(() => editor.loadOutline(picked)));
-    const options: [string, string][] = [["size", "Rectangle"], ["outline", "Outline"], ["problem", "Lattice of the paper"], ...(kind === "lattice" ? [["lattice", "Own lattice"] as [string, string]] : [])];
+    const options: [string, string][] = [["size", "Rectangle"], ["outline", "Outline"], ["space", "Box in space"], ["problem", "Lattice of the paper"], ...(kind === "lattice" ? [["lattice", "Own lattice"] as [string, string]] : [])];
     const pick = (picked: string): void => {
-      if (picked === "size") put({ size: [82, 72], ...zones });
+      // Nodes of the plane are none of space: regions are selected anew.
+      if (picked === "space" || isSpatial(table)) editor.open({ table: { ...(picked === "space" ? emptySpaceTask() : emptyTask()).table, name: table.name }, hand: null });
+      else if (picked === "size") put({ size: [82, 72], ...zones });
       else if (picked === "outline") put({ outline: [[0, 0], [80, 0], [80, 40], [40, 40], [40, 70], [0, 70]], ...zones });
       else if (picked === "problem") editor.change({ ...table, domain: { problem: "crane" }, supports: [], cases: table.cases.map((each) => ({ ...each, inputs: [], outputs: (each.outputs ?? []).map((output) => cleaned({ ...output, at: undefined, direction: undefined })) })) });
     };
-    const side = (index: 0 | 1) => (value: Amount | undefined): void => {
+    const side = (index: 0 | 1 | 2) => (value: Amount | undefined): void => {
       const size = [...domain.size!] as number[];
       (size as Amount[])[index] = value ?? size[index]!;
       // A text is not a length that the page knows: the server reads it.
@@ -111,6 +114,9 @@ export class DomainPanel {
       choice("Kind of domain", options, kind, pick),
       kind === "size" && h("div", { class: "row" },
         amount("domain-width", "Width", domain.size![0], "mm", side(0)), amount("domain-height", "Height", domain.size![1], "mm", side(1))),
+      kind === "space" && h("div", {}, h("div", { class: "row three" },
+        amount("domain-width", "Width (x)", domain.size![0], "mm", side(0)), amount("domain-depth", "Depth (y)", domain.size![1], "mm", side(1)), amount("domain-height", "Height (z)", domain.size![2], "mm", side(2))),
+        this.cells(domain, put)),
       kind === "outline" && h("div", {},
         corners ? amount("domain-corners", "Corners, mm", corners.length > 40 ? undefined : corners.map((point) => point.join(", ")).join("; "), "", (value) => {
           const points = String(value ?? "").split(";").map((text) => text.split(",").map(Number) as [number, number]).filter((point) => point.length === 2 && point.every(Number.isFinite));
@@ -120,25 +126,72 @@ export class DomainPanel {
       kind === "problem" && field("Lattice", lattice, "", "With the supports, input and output of the paper unless you select others."));
   }
 
+  /** The lattice that fills a box. */
+  private cells(domain: Domain, put: (next: Domain) => void): HTMLElement {
+    const { cells } = domain;
+    const own = typeof cells === "object" ? cells : null;
+    const options = (this.editor.registries?.cells ?? []).map(({ name, title }): [string, string] => [name, title]);
+    const kinds = select([...options, ...(own ? [["own", `${own.kind} of the task`] as [string, string]] : [])], own ? "own" : String(cells ?? "octet"),
+      (picked) => { if (picked !== "own") put({ ...domain, cells: picked === "octet" ? undefined : picked }); });
+    kinds.dataset.key = "domain-cells";
+    return field("Lattice", kinds);
+  }
+
+  /** A hole or zone in space, by numbers. */
+  private zoneInSpace(): HTMLElement {
+    const { editor } = this;
+    const { table } = editor.task;
+    const [w, d, t] = table.domain.size as [number, number, number];
+    const shapes: Record<string, Shape> = {
+      box: { box: [0, 0, Math.round(0.8 * t), w, d, t] }, sphere: { sphere: [w / 2, d / 2, t], radius: Math.round(w / 4) }, cylinder: { cylinder: [w / 2, d / 2], radius: Math.round(w / 5) },
+    };
+    const add = select([["", "choose a shape …"], ["box", "box"], ["sphere", "sphere"], ["cylinder", "upright cylinder"]], "", (name) => {
+      const { kind } = editor.zone;
+      if (name) editor.change({ ...table, domain: { ...table.domain, [kind]: [...(table.domain[kind] ?? []), shapes[name]!] } });
+    });
+    add.dataset.key = "zone-add";
+    return h("div", { class: "row" },
+      field("Zone", Object.assign(select(ZONES.map(([kind, title]): [string, string] => [kind, title]), editor.zone.kind, (picked) => { editor.zone = { ...editor.zone, kind: picked as ZoneKind }; }))),
+      field("Add", add));
+  }
+
+  /** The numbers of a zone in space. */
+  private zoneFields(kind: ZoneKind, index: number, shape: Shape): HTMLElement | null {
+    if (!isSpatial(this.editor.task.table)) return null;
+    const { table } = this.editor.task;
+    const key = (["box", "sphere", "cylinder"] as const).find((name) => shape[name])!;
+    const put = (next: Shape): void => this.editor.change({ ...table, domain: { ...table.domain, [kind]: table.domain[kind]!.map((each, k) => (k === index ? next : each)) } });
+    const numbers = amount(`zone-${kind}-${index}-${key}`, { box: "x, y, z of two corners, mm", sphere: "Centre x, y, z, mm", cylinder: "Axis x, y, mm" }[key], (shape[key] as number[]).join(", "), "", (value) => {
+      const read = String(value ?? "").split(",").map(Number);
+      if (read.length === shape[key]!.length && read.every(Number.isFinite)) put({ ...shape, [key]: read });
+    });
+    return h("div", { class: "row" }, numbers, key === "box" ? null : amount(`zone-${kind}-${index}-radius`, "Radius", shape.radius, "mm", (value) => put({ ...shape, radius: value ?? shape.radius! })));
+  }
+
   private zones(): HTMLElement {
     const { editor } = this;
     const { table } = editor.task;
+    const { domain } = table;
     const known = ZONES.flatMap(([kind, title]) => (table.domain[kind] ?? []).map((shape, index) => ({ kind, title, shape, index })));
     const drop = (kind: ZoneKind, index: number): void => {
       const left = (table.domain[kind] ?? []).filter((_, k) => k !== index);
       editor.change({ ...table, domain: cleaned({ ...table.domain, [kind]: left.length ? left : undefined }) });
     };
     return h("div", { class: "zones" },
-      editor.tool === "zones" ? h("div", { class: "row between" },
+      domain.size?.length === 3 ? this.zoneInSpace() : editor.tool === "zones" ? h("div", { class: "row between" },
         choice("Kind of zone", ZONES, editor.zone.kind, (picked) => { editor.zone = { ...editor.zone, kind: picked }; }),
         choice("Shape of zone", [["box", "Box"], ["circle", "Circle"]] as [ZoneShape, string][], editor.zone.shape, (picked) => { editor.zone = { ...editor.zone, shape: picked }; editor.choose("zones"); }))
         : button("Draw holes and zones", () => editor.choose("zones"), "quiet", { "data-key": "zones" }),
       ...known.map(({ kind, title, shape, index }) => h("p", { class: "zone-row" }, `${title}: ${shapeText(shape)} `,
-        button("Remove", () => drop(kind, index), "quiet small", { "data-key": `zone-${kind}-${index}`, "aria-label": `Remove ${title.toLowerCase()} ${index + 1}` }))));
+        button("Remove", () => drop(kind, index), "quiet small", { "data-key": `zone-${kind}-${index}`, "aria-label": `Remove ${title.toLowerCase()} ${index + 1}` }),
+        this.zoneFields(kind, index, shape))));
   }
 }
 
-function shapeText({ circle, radius, box, polygon }: Shape): string {
+function shapeText({ circle, sphere, cylinder, radius, box, polygon }: Shape): string {
+  if (sphere) return `sphere, radius ${radius} mm`;
+  if (cylinder) return `upright cylinder, radius ${radius} mm`;
+  if (box?.length === 6) return "box";
   if (circle) return `circle at ${circle.join(", ")} mm, radius ${radius} mm`;
   return box ? `box from ${box.slice(0, 2).join(", ")} to ${box.slice(2).join(", ")} mm` : `polygon of ${polygon?.length ?? 0} corners`;
 }

@@ -16,7 +16,42 @@ export function flatten(positions: Point[]): Float64Array {
   return flat;
 }
 
-export class Drawing {
+/** Size of the struts in lattice units. */
+export interface Section { width: number; widths?: number[] | null; thickness?: number }
+
+/** Struts of a problem; those of the spring model are drawn with a usual width. */
+export function sectionOf({ section, widths }: Pick<Problem, "section" | "widths">): Section {
+  return { width: section?.diameter ?? section?.width ?? 0.2, widths, thickness: section?.thickness ?? 0.5 };
+}
+
+/** A drawing of a lattice whose nodes move, flat or in space. */
+export interface LatticeDrawing {
+  readonly element: Element;
+  /** Coordinates of all nodes in turn: at rest, and as drawn. */
+  rest: Float64Array;
+  at: Float64Array;
+  setLattice(positions: Point[], beams: [number, number][]): void;
+  draw(groups: Group[]): void;
+  ghost(name: string, beams: ArrayLike<number>): void;
+  mark(name: string, nodes: ArrayLike<number>): void;
+  makeRoom(beams: ArrayLike<number>, displacement: ArrayLike<number>): void;
+  /** Draw the paths of outputs, each from rest to the full stroke. */
+  trace(paths: number[][][]): void;
+  /** The beam next to the pointer; -1 for none. */
+  beamAt(event: { clientX: number; clientY: number }): number;
+  close(): void;
+}
+
+/** Positions as they are drawn flat: those in space in oblique view, as on the server. */
+export function projected(positions: Point[]): Point[] {
+  if (positions[0]?.length !== 3) return positions;
+  const [turn, tilt] = [(24 * Math.PI) / 180, (22 * Math.PI) / 180];
+  return positions.map(([x, y, z]) => [
+    x * Math.cos(turn) + y * Math.sin(turn),
+    z! * Math.cos(tilt) + (y * Math.cos(turn) - x * Math.sin(turn)) * Math.sin(tilt)]);
+}
+
+export class Drawing implements LatticeDrawing {
   readonly svg: SVGSVGElement;
   readonly overlay: SVGGElement;
   private readonly under: SVGGElement;
@@ -30,6 +65,7 @@ export class Drawing {
   /** Bounds of the lattice at rest, with a margin; `view` is the visible region. */
   box: Box = { x: 0, y: 0, w: 10, h: 10 };
   private view: Box = this.box;
+  private readonly path_ = s("path", { class: "output-path", "aria-hidden": "true" });
 
   constructor(label: string) {
     this.svg = s("svg", { class: "drawing", role: "img", "aria-label": label, preserveAspectRatio: "xMidYMid meet" });
@@ -38,7 +74,11 @@ export class Drawing {
     this.dots = s("g", { class: "dots" });
     this.overlay = s("g", { class: "overlay" });
     this.svg.append(this.under, this.layer, this.dots, this.overlay);
+    this.overlay.append(this.path_);
   }
+
+  get element(): SVGSVGElement { return this.svg; }
+  close(): void { /* nothing is held */ }
 
   setLattice(positions: Point[], beams: [number, number][], margin = 1.1): void {
     this.rest = flatten(positions);
@@ -81,6 +121,12 @@ export class Drawing {
     this.svg.setAttribute("viewBox", `${view.x} ${view.y} ${view.w} ${view.h}`);
     thicken(this.svg, view.w);
   }
+
+  trace(paths: number[][][]): void {
+    this.path_.setAttribute("d", paths.flatMap((path) => path.map(([x, y], k) => `${k ? "L" : "M"}${x!.toFixed(3)} ${(-y!).toFixed(3)}`)).join(""));
+  }
+
+  beamAt(event: { clientX: number; clientY: number }): number { return this.nearestBeam(this.locate(event), 0.4); }
 
   lines(beams: ArrayLike<number>, at: Float64Array = this.at): string {
     let d = "";
@@ -144,9 +190,7 @@ export class Drawing {
   }
 
   markRegions(problem: Problem): void {
-    this.mark("support", [...problem.supports.fixed, ...problem.supports.fixed_x, ...problem.supports.fixed_y]);
-    this.mark("input", problem.input.nodes);
-    this.mark("output", problem.output.nodes);
+    markRegions(this, problem);
   }
 
   /** Position of the pointer in lattice units. */
@@ -179,6 +223,13 @@ export class Drawing {
     });
     return found;
   }
+}
+
+/** Mark supports, input and output of a problem. */
+export function markRegions(drawing: Pick<LatticeDrawing, "mark">, { supports, input, output }: Problem): void {
+  drawing.mark("support", [...supports.fixed, ...supports.fixed_x, ...supports.fixed_y, ...(supports.fixed_z ?? [])]);
+  drawing.mark("input", input.nodes);
+  drawing.mark("output", output.nodes);
 }
 
 /** Make lines thicker in a picture of a large lattice; `width` is the visible width in beam lengths. */

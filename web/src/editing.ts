@@ -1,8 +1,7 @@
 // The interface of the task editor that its panels use; types only.
 
 import type { ItemState, Registries } from "./api";
-import type { Tool } from "./canvas";
-import type { Built, Hold, Table, Target, Task, ZoneKind, ZoneShape } from "./task";
+import type { Built, Hold, Table, Target, Task, Tool, ZoneKind, ZoneShape } from "./task";
 
 /** Settings of a search. */
 export interface Settings { method: string; steps: number; chains: number; seed: number }

@@ -1,18 +1,19 @@
 // The page on which a task is stated, and a design is drawn by hand.
 
-import { bitsOf, fetchRegistries, hexOf, post, ServerError, session, Solver, type ItemState, type Point, type Registries, type Response } from "./api";
+import { bitsOf, fetchRegistries, hexOf, isInSpace, post, ServerError, session, Solver, type ItemState, type Point, type Registries, type Response } from "./api";
 import { store, storedHistory, TASK_KEY } from "./begin";
-import { Canvas, type Tool } from "./canvas";
+import { Canvas, type CanvasActions } from "./canvas";
 import { where } from "./drawing";
 import { announce, button, choice, clear, download, figure, h, iconButton } from "./dom";
 import type { Fault, Settings, TaskEditor } from "./editing";
 import { Panels } from "./panels";
+import { SpaceCanvas } from "./spacecanvas";
 import {
-  assign, History, isTask, nodesOf, sectionsOf, toLink, vectorOf, withSection, withSections,
-  type Built, type Direction, type Domain, type Hold, type Kind, type Shape, type Table, type Target, type Task, type ZoneKind, type ZoneShape,
+  assign, History, isTask, nodesOf, sectionsOf, toLink, vectorInSpace, vectorOf, withSection, withSections,
+  type Built, type Direction, type Domain, type Hold, type Kind, type Shape, type Table, type Target, type Task, type Tool, type ZoneKind, type ZoneShape,
 } from "./task";
 import { fileName, lengthIn, sentence, suffixOf, undoKeys } from "./text";
-import type { Arrow, View } from "./view";
+import type { Arrow, TaskDrawing, View } from "./view";
 
 const TOOLS: [Tool, string, string][] = [
   ["supports", "Supports", "Click nodes to hold them; drag a box to select several, double-click to select a row."],
@@ -22,6 +23,13 @@ const TOOLS: [Tool, string, string][] = [
   ["zones", "Zones", "Drag to draw a hole, a zone that stays free, or a zone that stays solid."],
   ["hand", "By hand", "Click struts to remove or add them; the part is computed at once."],
 ];
+/** Hints for a task in space. */
+const IN_SPACE: Partial<Record<Tool, string>> = {
+  supports: "Click nodes to hold them; drag to turn the view. Choose a layer to select its nodes only, or all of them at once.",
+  inputs: "Click the nodes that are pushed; set direction and stroke in the panel.",
+  outputs: "Click the nodes that must move; set their direction in the panel.",
+  zones: "Add holes and zones in the panel, under Part and domain.",
+};
 const WELCOME = "This example is held at the bottom and pushed down at the right; its output must move left. Change it, or press Design it.";
 /** What a first node makes of a kind without any table. */
 const FIRST: Record<Kind, Record<string, unknown>> = {
@@ -47,7 +55,8 @@ export class Editor implements TaskEditor {
   target: Target = { kind: "supports", index: 0 };
   reached: ItemState[] | null = null;
   private history: History<Task>;
-  private readonly canvas: Canvas;
+  private canvas: TaskDrawing;
+  private readonly paper: HTMLElement;
   private readonly panels: Panels;
   private readonly solver: Solver;
   private readonly hint = h("p", { class: "hint" });
@@ -64,16 +73,18 @@ export class Editor implements TaskEditor {
   private sent = "";
   private readonly onLeave = (): void => this.store();
   private readonly onStorage = (event: StorageEvent): void => this.noteOtherTab(event);
+  private readonly actions: CanvasActions = {
+    nodes: (nodes, add) => this.pick(nodes, add),
+    beams: (beams, merge) => this.paint(beams, merge),
+    aim: (target, direction, stroke, merge) => this.aim(target, direction, stroke, merge),
+    zone: (shape) => this.addZone(shape),
+  };
   private readonly keys = undoKeys((action) => this.step(action));
 
   constructor(task: Task, private readonly isFirstVisit = false) {
     this.history = new History(task, storedHistory());
-    this.canvas = new Canvas({
-      nodes: (nodes, add) => this.pick(nodes, add),
-      beams: (beams, merge) => this.paint(beams, merge),
-      aim: (target, direction, stroke, merge) => this.aim(target, direction, stroke, merge),
-      zone: (shape) => this.addZone(shape),
-    });
+    this.canvas = new Canvas(this.actions);
+    this.paper = h("div", { class: "paper" }, this.readout, this.canvas.element);
     this.solver = new Solver((result, latency) => this.showResponse(result, latency, result.error));
     this.panels = new Panels(this);
     this.layOut();
@@ -101,13 +112,25 @@ export class Editor implements TaskEditor {
     this.building?.abort();
     this.verifying?.abort();
     this.solver.close();
+    this.canvas.close();
+  }
+
+  /** The drawing for a lattice in the plane or in space. */
+  private showCanvas(inSpace: boolean): void {
+    if (inSpace === this.canvas instanceof SpaceCanvas) return;
+    const { tool, rows } = this.canvas;
+    this.canvas.close();
+    this.canvas.element.remove();
+    this.canvas = Object.assign(inSpace ? new SpaceCanvas(this.actions) : new Canvas(this.actions), { tool, rows });
+    this.paper.append(this.canvas.element);
+    this.element.classList.toggle("in-space", inSpace);
   }
 
   private layOut(): void {
     const stage = h("section", { class: "stage", "aria-label": "Drawing" },
       h("div", { class: "bar" }, this.tools,
         h("span", { class: "spring" }), this.undoButton, this.redoButton),
-      h("div", { class: "paper" }, this.readout, this.canvas.svg),
+      this.paper,
       h("div", { class: "below" }, this.hint, this.errorLine));
     this.element.append(
       h("div", { class: "intro" },
@@ -125,7 +148,6 @@ export class Editor implements TaskEditor {
     if (tool === "hand") this.drawByHand();
     clear(this.tools, choice("Tool", TOOLS.map(([key, text]) => [key, text]), tool, (picked) => this.choose(picked)));
     this.tools.querySelectorAll("label").forEach((label, k) => label.classList.add("tool", TOOLS[k]![0]));
-    this.hint.textContent = TOOLS.find(([key]) => key === tool)![2];
     this.show();
     (this.tools.querySelector("input:checked") as HTMLElement | null)?.focus({ preventScroll: true });
   }
@@ -202,7 +224,7 @@ export class Editor implements TaskEditor {
   private addZone(shape: Shape): void {
     const scale = this.built?.part.scale ?? 10;
     const mm = (value: number): number => Math.round(value * scale * 10) / 10;
-    const own: Shape = shape.box ? { box: shape.box.map(mm) } : { circle: shape.circle!.map(mm) as Point, radius: mm(Number(shape.radius)) };
+    const own: Shape = shape.box ? { box: shape.box.map(mm) } : { circle: (shape.circle as number[]).map(mm) as Point, radius: mm(Number(shape.radius)) };
     const { table } = this.task;
     this.change({ ...table, domain: { ...table.domain, [this.zone.kind]: [...(table.domain[this.zone.kind] ?? []), own] } });
   }
@@ -310,6 +332,8 @@ export class Editor implements TaskEditor {
 
   private show(): void {
     this.showDrawing();
+    const inSpace = this.canvas instanceof SpaceCanvas;
+    this.hint.textContent = (inSpace && IN_SPACE[this.tool]) || TOOLS.find(([key]) => key === this.tool)![2];
     this.undoButton.disabled = !this.history.canUndo;
     this.redoButton.disabled = !this.history.canRedo;
     this.errorLine.textContent = this.fault ? sentence(this.fault.message) : "";
@@ -337,6 +361,7 @@ export class Editor implements TaskEditor {
       faults: this.fault ? [...this.fault.message.matchAll(/\bnode (\d+)/g)].map((m) => Number(m[1])) : [],
     };
     if (!view.held.length && built.regions.given.supports.length) view.held.push({ nodes: built.regions.given.supports, hold: "all", active: false });
+    this.showCanvas(isInSpace(built.lattice));
     this.canvas.zoneShape = this.zone.shape;
     this.canvas.show(view);
     if (!this.byHand) this.canvas.showMoved(null, []);
@@ -349,7 +374,7 @@ export class Editor implements TaskEditor {
     const problem = built.problem;
     const drive = problem?.input.drive === "displacement" ? problem.input.amount : null;
     const arrow = (kind: Kind, index: number, direction: Direction | undefined, usual: Point, stroke: number | null): Arrow => ({
-      target: { kind, index }, nodes: nodesOf(built, this.loadCase, kind)[index] ?? [], direction: vectorOf(direction, usual), stroke,
+      target: { kind, index }, nodes: nodesOf(built, this.loadCase, kind)[index] ?? [], direction: isInSpace(built.lattice) ? vectorInSpace(direction, usual.length === 3 ? usual : undefined) : vectorOf(direction, usual), stroke,
     });
     const first = (direction: Point | Point[] | undefined, usual: Point): Point => (direction === undefined ? usual : Array.isArray(direction[0]) ? direction[0] : direction as Point);
     const found = [

@@ -3,7 +3,11 @@
 import { h, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
-import { cleaned, type Amount, type Limits, type Tolerance } from "./task";
+import { cleaned, isSpatial, type Amount, type Limits, type Tolerance } from "./task";
+
+const SYMMETRIES: [string, string][] = [["", "none"], ["x", "left and right"], ["y", "up and down"], ["xy", "both"]];
+const SYMMETRIES_IN_SPACE: [string, string][] = [
+  ["", "none"], ["x", "left and right"], ["y", "front and back"], ["xy", "both"], ["3-fold", "3-fold about the middle"], ["4-fold", "4-fold about the middle"]];
 
 export function limitsPanel(editor: TaskEditor): HTMLElement {
   const { table } = editor.task;
@@ -13,7 +17,7 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
     editor.change(cleaned({ ...table, limits: Object.keys(next).length ? next : undefined }));
   };
   const value = (key: "strain" | "clearance"): Amount | undefined => (typeof limits[key] === "boolean" ? undefined : limits[key]);
-  const symmetry = select([["", "none"], ["x", "left and right"], ["y", "up and down"], ["xy", "both"]], limits.symmetry ?? "", (picked) => put({ symmetry: picked || undefined }));
+  const symmetry = select(isSpatial(table) ? SYMMETRIES_IN_SPACE : SYMMETRIES, limits.symmetry ?? "", (picked) => put({ symmetry: picked || undefined }));
   symmetry.dataset.key = "limit-symmetry";
   symmetry.id = "limit-symmetry";
   const field = (key: keyof Limits, label: string, unit: string, help = ""): HTMLElement =>

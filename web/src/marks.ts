@@ -48,11 +48,11 @@ export function nextInDirection(total: number, place: (k: number) => Point, at: 
 /** Describe a node or beam for screen readers, with its position in mm. */
 export function describeTarget({ built, held, arrows, bits }: View, tool: string, k: number): string {
   if (tool === "hand") return `beam ${k}, ${bits?.[k] ? "present" : "absent"}`;
-  const [x, y] = built.lattice.positions[k]!;
+  const place = built.lattice.positions[k]!.map((value) => (value! * built.part.scale).toFixed(1)).join(", ");
   const arrow = arrows.find(({ nodes }) => nodes.includes(k));
   const names = { supports: "support", inputs: "input", outputs: "output", loads: "load" };
   const name = arrow ? names[arrow.target.kind] : held.some(({ nodes }) => nodes.includes(k)) ? "support" : "free";
-  return `node at ${(x * built.part.scale).toFixed(1)}, ${(y * built.part.scale).toFixed(1)} mm: ${name}`;
+  return `node at ${place} mm: ${name}`;
 }
 
 /** A shape as a path; `scale` is the length of a unit of the drawing in units of the shape. */

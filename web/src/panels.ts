@@ -7,7 +7,7 @@ import type { TaskEditor } from "./editing";
 import { limitsPanel } from "./limitspanel";
 import { SearchBox } from "./searchbox";
 import { itemTable, verdictOf } from "./specification";
-import { nodesOf, type Kind } from "./task";
+import { isSpatial, nodesOf, type Hold, type Kind } from "./task";
 import { sentence } from "./text";
 import { button, choice } from "./dom";
 
@@ -26,6 +26,9 @@ const NEEDED: Record<string, string> = {
   outputs: "No output: choose Outputs and click nodes.",
   loads: "A load has no nodes: choose Loads and click nodes.",
 };
+
+const HOLDS: [Hold, string][] = [["all", "Fixed"], ["y", "Slides ↔"], ["x", "Slides ↕"]];
+const HOLDS_IN_SPACE: [Hold, string][] = [["all", "Fixed"], ["x", "Held in x"], ["y", "Held in y"], ["z", "Held in z"]];
 
 interface Kept { key: string; text: string | null; selection: [number, number] | null }
 
@@ -188,11 +191,11 @@ export class Panels {
     rows.addEventListener("change", () => { this.local["rows"] = rows.checked ? "yes" : ""; editor.setRows(rows.checked); });
     const clearAll = (): void => editor.change({ ...editor.task.table, supports: [] });
     return h("div", { class: "content" },
-      choice("Kind of support", [["all", "Fixed"], ["y", "Slides ↔"], ["x", "Slides ↕"]], editor.hold, (picked) => {
+      choice("Kind of support", isSpatial(editor.task.table) ? HOLDS_IN_SPACE : HOLDS, editor.hold, (picked) => {
         editor.hold = picked;
         editor.aimAt({ kind: "supports", index: editor.supportIndex() });
       }),
-      h("div", { class: "row between" }, h("label", { class: "tick" }, rows, "Whole rows"),
+      h("div", { class: "row between" }, h("label", { class: "tick" }, rows, isSpatial(editor.task.table) ? "Whole layers" : "Whole rows"),
         button("Clear", clearAll, "quiet", { disabled: !editor.task.table.supports?.length, "data-key": "clear-supports" })));
   }
 

@@ -1,8 +1,9 @@
 // Animation of a design along its computed path, with amplification and colours.
 
-import { modelOf, post, type Motion, type Problem, type ToleranceFound } from "./api";
+import { isInSpace, modelOf, post, type Motion, type Problem, type ToleranceFound } from "./api";
 import { bitsOf } from "./api";
-import { binned, BINS, Drawing, where } from "./drawing";
+import { binned, BINS, Drawing, markRegions, sectionOf, where, type LatticeDrawing } from "./drawing";
+import { loadSpace } from "./loadspace";
 import { choice, clear, field, figure, h, icon, s } from "./dom";
 import { sentence } from "./text";
 
@@ -14,7 +15,7 @@ export interface Sensitivity { efficiency: number; beams: number[]; change: (num
 const PERIOD = 3200;
 
 export class Player {
-  readonly drawing = new Drawing("The design");
+  private drawing: LatticeDrawing | null = null;
   readonly element = h("div", { class: "player" });
   readonly readout = h("div", { class: "readout" });
   private readonly controls = h("div", { class: "transport" });
@@ -22,7 +23,8 @@ export class Player {
   private readonly slider = h("input", { type: "range", min: 0, max: 1000, value: "1000", "aria-label": "Fraction of the stroke" });
   private readonly playButton = h("button", { type: "button", class: "round", onclick: () => this.toggle() });
   private readonly stress = s("g", { class: "stress" });
-  private readonly path = s("path", { class: "output-path", "aria-hidden": "true" });
+  private readonly paper = h("div", { class: "paper" }, this.readout);
+  private inSpace: boolean;
   private readonly cases = h("div", { class: "cases" });
   private loadCase = "";
   private motion: Motion | null = null;
@@ -44,31 +46,62 @@ export class Player {
   onMotion: (motion: Motion) => void = () => {};
 
   constructor(private readonly problem: Problem, private readonly mask: string, private readonly scale: number) {
-    this.drawing.setLattice(problem.positions, problem.beams);
-    this.drawing.overlay.append(this.stress, this.path);
-    const bits = bitsOf(mask, problem.beams.length);
-    this.beams = where(bits);
-    this.drawing.ghost("rest", this.beams);
+    this.inSpace = isInSpace(problem);
+    this.beams = where(bitsOf(mask, problem.beams.length));
     this.slider.addEventListener("input", () => { this.stop(); this.part = Number(this.slider.value) / 1000; this.show(); });
     const times = h("input", { type: "range", min: 1, max: 8, step: 0.5, value: "1", "aria-label": "Amplification of the motion" });
     const size = h("output", {}, "× 1");
     times.addEventListener("input", () => { this.times = Number(times.value); size.textContent = `× ${this.times}`; this.show(); });
-    this.controls.append(this.playButton, this.slider,
+    this.controls.append(this.playButton, this.slider, this.switcher() ?? "",
       h("span", { class: "amplify" }, field("Amplify", times), size));
-    this.element.append(this.cases, h("div", { class: "paper" }, this.readout, this.drawing.svg), this.controls,
+    this.element.append(this.cases, this.paper, this.controls,
       h("div", { class: "row between colour" }, this.colours(), this.legend));
     this.setPlaying(false);
-    this.drawing.svg.addEventListener("pointermove", (event) => this.point(event));
-    this.show();
+    void this.draw();
     void this.load();
+  }
+
+  /** Show the design flat, or in space. */
+  private async draw(): Promise<void> {
+    let drawing: LatticeDrawing;
+    try {
+      drawing = this.inSpace ? await loadSpace("The design", sectionOf(this.problem)) : new Drawing("The design");
+    } catch (error) {
+      this.inSpace = false;
+      this.onError(sentence((error as Error).message));
+      return;
+    }
+    this.drawing?.element.remove();
+    this.drawing?.close();
+    this.drawing = drawing;
+    this.paper.append(drawing.element);
+    drawing.setLattice(this.problem.positions, this.problem.beams);
+    drawing.ghost("rest", this.beams);
+    if (drawing instanceof Drawing) drawing.overlay.append(this.stress);
+    drawing.element.addEventListener("pointermove", (event) => this.point(event as PointerEvent));
+    if (this.motion) this.showMotion(this.motion);
+    this.show();
+  }
+
+  /** Switch between the flat drawing and the extruded part. */
+  private switcher(): HTMLElement | null {
+    if (isInSpace(this.problem)) return null;
+    return choice("Drawing", [["flat", "Flat"], ["space", "3D"]] as ["flat" | "space", string][], this.inSpace ? "space" : "flat", (picked) => {
+      this.inSpace = picked === "space";
+      if (this.inSpace && this.colour === "stress") this.paint("energy");
+      void this.draw();
+    });
   }
 
   get playing(): boolean { return this.frame !== 0; }
 
-  close(): void { this.stop(); }
+  close(): void {
+    this.stop();
+    this.drawing?.close();
+  }
 
   private colours(): HTMLElement {
-    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["sensitivity", "Sensitivity"], ["stress", "Stress"], ...(this.losses ? [["loss", "Loss of struts"]] : [])] as [Colour, string][],
+    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["sensitivity", "Sensitivity"], ...(isInSpace(this.problem) ? [] : [["stress", "Stress"]]), ...(this.losses ? [["loss", "Loss of struts"]] : [])] as [Colour, string][],
       this.colour, (picked) => this.paint(picked));
   }
 
@@ -76,7 +109,16 @@ export class Player {
     this.colour = colour;
     if (colour === "stress" && !this.picture) this.onStressRequested();
     if (colour === "sensitivity" && !this.sensitivity) void this.loadSensitivity();
-    if (colour === "stress") { this.stop(); this.part = 1; }
+    if (colour === "stress") {
+      this.stop();
+      this.part = 1;
+      if (this.inSpace) { // stress is drawn flat
+        this.inSpace = false;
+        const flat = this.controls.querySelector<HTMLInputElement>('input[value="flat"]');
+        if (flat) flat.checked = true;
+        void this.draw();
+      }
+    }
     const input = this.element.querySelector<HTMLInputElement>(`.colour input[value="${colour}"]`);
     if (input) input.checked = true;
     this.show();
@@ -110,9 +152,8 @@ export class Player {
   private async load(): Promise<void> {
     try {
       this.motion = await post<Motion>("/motion", { problem: this.problem, mask: this.mask, case: this.loadCase });
-      this.drawing.makeRoom(this.beams, this.motion.displacement.at(-1)!);
       this.showCases(this.motion);
-      this.drawPaths(this.motion);
+      this.showMotion(this.motion);
       this.show();
       this.element.dataset.ready = "yes";
       this.onMotion(this.motion);
@@ -132,16 +173,16 @@ export class Player {
     }));
   }
 
-  /** Draw the path of each output, from rest to the full stroke. */
-  private drawPaths({ displacement, outputs }: Motion): void {
-    const { rest } = this.drawing;
-    const mean = (nodes: number[], at: (index: number) => number, axis: number): number =>
-      nodes.reduce((sum, node) => sum + at(2 * node + axis), 0) / nodes.length;
-    const d = Object.values(outputs).flatMap((nodes) => displacement.map((moved, k) => {
-      const [x, y] = [0, 1].map((axis) => mean(nodes, (index) => rest[index]! + moved[index]!, axis)) as [number, number];
-      return `${k ? "L" : "M"}${x.toFixed(3)} ${(-y).toFixed(3)}`;
-    })).join("");
-    this.path.setAttribute("d", d);
+  /** Make room for the motion, and draw the path of each output. */
+  private showMotion({ displacement, outputs }: Motion): void {
+    const { drawing } = this;
+    if (!drawing) return;
+    drawing.makeRoom(this.beams, displacement.at(-1)!);
+    const dimension = isInSpace(this.problem) ? 3 : 2;
+    const mean = (nodes: number[], moved: number[], axis: number): number =>
+      nodes.reduce((sum, node) => sum + drawing.rest[dimension * node + axis]! + moved[dimension * node + axis]!, 0) / nodes.length;
+    drawing.trace(Object.values(outputs).map((nodes) =>
+      displacement.map((moved) => Array.from({ length: dimension }, (_, axis) => mean(nodes, moved, axis)))));
   }
 
   private async loadSensitivity(): Promise<void> {
@@ -181,6 +222,7 @@ export class Player {
 
   private show(): void {
     const { drawing, motion } = this;
+    if (!drawing) return;
     // Text that changes sixty times a second is not readable, and each change costs a layout.
     const now = performance.now();
     const calm = this.playing && now - this.updated < 100;
@@ -216,7 +258,7 @@ export class Player {
       drawing.mark("support", motion.supports);
       drawing.mark("input", motion.input);
       drawing.mark("output", Object.values(motion.outputs).flat());
-    } else drawing.markRegions(this.problem);
+    } else markRegions(drawing, this.problem);
     if (!calm) this.showLegend();
   }
 
@@ -252,8 +294,8 @@ export class Player {
   }
 
   private point(event: PointerEvent): void {
-    if (this.colour !== "sensitivity" || !this.sensitivity) return;
-    const beam = this.drawing.nearestBeam(this.drawing.locate(event), 0.4);
+    if (this.colour !== "sensitivity" || !this.sensitivity || !this.drawing) return;
+    const beam = this.drawing.beamAt(event);
     const k = this.sensitivity.beams.indexOf(beam);
     if (beam < 0 || k < 0) { this.legend.dataset.beam = ""; this.showLegend(); return; }
     const change = this.sensitivity.change[k] ?? null;

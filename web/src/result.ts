@@ -1,6 +1,6 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, post, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, download, field, figure, h, number, select } from "./dom";
@@ -78,6 +78,9 @@ export class Result {
     }, (error: ServerError) => { this.trouble.textContent = sentence(error.message); });
   }
 
+  /** Whether a level or a file is for parts of this dimension. */
+  private readonly isOffered = ({ in_space }: { in_space: boolean }): boolean => in_space || !isInSpace(this.subject.problem);
+
   /** Whether the design was selected by frame analysis of its part. */
   private get isPart(): boolean { return Boolean(this.subject.part ?? this.subject.provenance["part"]); }
 
@@ -142,7 +145,7 @@ export class Result {
       h("tr", {}, h("th", { scope: "row" }, this.subject.problem.section ? "As searched" : "Spring model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, `${beams} beams`)),
       comparison && h("tr", {}, h("th", { scope: "row" }, comparison.title === "yours" ? "Your design" : "Drawn by hand"), h("td", {}, figure(comparison.efficiency, 3)),
         h("td", { class: "more" }, comparison.efficiency && efficiency && comparison.efficiency > 0 && efficiency > comparison.efficiency ? `${figure(comparison.efficiency / efficiency, 2)} of the result` : "")),
-      ...(this.registries?.levels ?? []).map((level) => this.femRow(level)),
+      ...(this.registries?.levels ?? []).filter(this.isOffered).map((level) => this.femRow(level)),
     ];
     clear(this.table, h("caption", {}, "Efficiency by model"), h("tbody", {}, ...rows));
   }
@@ -233,10 +236,11 @@ export class Result {
     const material = select([...own, ...(this.registries?.materials ?? []).map(({ name, title }): [string, string] => [name, title])],
       typeof given === "string" ? given : "", (picked) => change({ material: picked || given }));
     const { remarks } = this;
+    const inSpace = isInSpace(this.subject.problem);
     clear(this.partBox,
       // A specification is for the part that it was written for.
       ...(this.subject.problem.specification ? [this.fixedPart()] : [
-        h("div", { class: "row" }, size("width", "Strut width"), size("thickness", "Thickness")),
+        h("div", { class: "row" }, size("width", inSpace ? "Strut diameter" : "Strut width"), inSpace ? null : size("thickness", "Thickness")),
         h("div", { class: "row" }, size("scale", "Spacing of nodes"), field("Material", material))]),
       fault && h("p", { class: "fault", role: "alert" }, fault),
       remarks && h("p", { class: "more" }, `${remarks.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ")} mm`,
@@ -249,7 +253,8 @@ export class Result {
   private fixedPart(): HTMLElement {
     const { width, thickness, scale, material } = this.part;
     const named = typeof material === "string" ? this.registries?.materials.find(({ name }) => name === material)?.title ?? material : material.name;
-    return h("p", {}, `Struts ${width} mm wide, ${thickness} mm thick, nodes ${scale} mm apart, ${named}. They belong to the specification; another part is another task.`);
+    const struts = isInSpace(this.subject.problem) ? `Round struts, diameter ${width} mm` : `Struts ${width} mm wide, ${thickness} mm thick`;
+    return h("p", {}, `${struts}, nodes ${scale} mm apart, ${named}. They belong to the specification; another part is another task.`);
   }
 
   private async describe(): Promise<void> {
@@ -266,7 +271,7 @@ export class Result {
   private showFiles(fault = ""): void {
     clear(this.filesBox,
       h("div", { class: "files" },
-        ...(this.registries?.files ?? []).map(({ name: suffix, title, purpose }) => h("button", {
+        ...(this.registries?.files ?? []).filter(this.isOffered).map(({ name: suffix, title, purpose }) => h("button", {
           type: "button", class: this.writing === suffix ? "file busy" : "file", disabled: this.writing !== "", "data-file": suffix,
           onclick: () => void this.downloadFile(suffix),
         }, h("strong", {}, title), h("span", {}, this.writing === suffix ? "writing …" : purpose))),

@@ -1,9 +1,9 @@
 // The progress of a search, and its result.
 
-import { fetchRegistries, follow, get, modelOf, post, remove, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
+import { fetchRegistries, follow, get, isInSpace, modelOf, post, remove, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
 import { bitsOf } from "./api";
 import { Chart } from "./chart";
-import { Drawing, where } from "./drawing";
+import { Drawing, flatten, projected, where } from "./drawing";
 import { announce, button, choice, clear, count, duration, figure, h } from "./dom";
 import { Result } from "./result";
 import { itemTable, verdictOf } from "./specification";
@@ -35,7 +35,7 @@ export class RunPage {
   private readonly curveNote = h("p", { class: "note" });
 
   constructor(private run: RunDetails) {
-    this.drawing.setLattice(run.problem.positions, run.problem.beams);
+    this.drawing.setLattice(projected(run.problem.positions), run.problem.beams);
     this.chart.configure(run.settings);
     if (run.comparison) this.chart.compare(run.comparison.title, run.comparison.efficiency);
     this.stage.append(this.switcher, this.paper);
@@ -92,7 +92,8 @@ export class RunPage {
     else if (update?.moved) this.draw(update.moved.mask, update.moved.displacement);
   }
 
-  private draw(mask: string, displacement: number[] | null): void {
+  private draw(mask: string, given: number[] | null): void {
+    const displacement = given && this.flat(given);
     const bits = bitsOf(mask, this.run.problem.beams.length);
     const old = bitsOf(this.shown || mask, bits.length);
     this.drawing.move(null);
@@ -111,6 +112,13 @@ export class RunPage {
     }
     this.drawing.markRegions(this.run.problem);
     this.shown = mask;
+  }
+
+  /** A displacement as it is drawn: that of a part in space in oblique view. */
+  private flat(displacement: number[]): ArrayLike<number> {
+    if (!isInSpace(this.run.problem)) return displacement;
+    const moved = Array.from({ length: displacement.length / 3 }, (_, k): [number, number, number] => [displacement[3 * k]!, displacement[3 * k + 1]!, displacement[3 * k + 2]!]);
+    return flatten(projected(moved));
   }
 
   private async open(): Promise<void> {

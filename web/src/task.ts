@@ -6,9 +6,9 @@ import type { Part, Point, Problem } from "./api";
 export type Amount = number | string;
 export type Direction = string | Point;
 
-export interface Shape { circle?: Point; radius?: Amount; box?: number[]; polygon?: Point[] }
-export interface Region extends Shape { point?: Point; count?: number; edge?: string; between?: Point; nodes?: number[]; without?: Shape }
-export type Hold = "all" | "x" | "y";
+export interface Shape { circle?: Point; sphere?: Point; cylinder?: Point; radius?: Amount; box?: number[]; polygon?: Point[] }
+export interface Region extends Shape { point?: Point; count?: number; edge?: string; face?: string; between?: Point; nodes?: number[]; without?: Shape }
+export type Hold = "all" | "x" | "y" | "z";
 export interface Support { at: Region[]; hold?: Hold }
 export interface InputTable { at?: Region[]; direction?: Direction; displacement?: Amount; force?: Amount; during?: [Amount, Amount] }
 export interface LoadTable { at: Region[]; direction: Direction; force?: Amount; spring?: Amount }
@@ -29,7 +29,7 @@ export interface CaseTable {
 }
 export interface Material { name: string; young: number; poisson: number; density?: number; strain_limit?: number; [key: string]: unknown }
 export interface Domain {
-  size?: number[]; outline?: Shape | Point[]; lattice?: Record<string, unknown>; problem?: string;
+  size?: number[]; outline?: Shape | Point[]; cells?: string | { kind: string; [key: string]: unknown }; lattice?: Record<string, unknown>; problem?: string;
   holes?: Shape[]; keep_out?: Shape[]; solid?: Shape[];
 }
 export interface Limits { strain?: Amount | boolean; clearance?: Amount | boolean; stable_stroke?: Amount; strut_loss?: Amount; mass?: Amount; symmetry?: string; upright?: Direction }
@@ -67,6 +67,8 @@ export type ZoneKind = "holes" | "keep_out" | "solid";
 export type ZoneShape = "box" | "circle";
 
 export type Kind = "supports" | "inputs" | "outputs" | "loads";
+/** What is selected or drawn with the pointer. */
+export type Tool = Kind | "zones" | "hand";
 /** A table with a region: a support of the task, or an input, output or load of a load case. */
 export interface Target { kind: Kind; index: number }
 
@@ -95,16 +97,15 @@ export function nodesOf(built: Built, load_case: number, kind: Kind): number[][]
   return kind === "supports" ? built.regions.supports : built.regions.cases[load_case]?.[kind] ?? [];
 }
 
-/** Regions that name nodes: the whole lowest or highest row as an edge, else each node by its point in mm. */
+/** Regions that name nodes: the whole lowest or highest row as an edge or a face, else each node by its point in mm. */
 export function regionsOf(nodes: number[], positions: Point[], scale: number): Region[] {
   const set = new Set(nodes);
-  const heights = positions.map(([, y]) => y);
-  for (const [edge, y] of [["bottom", Math.min(...heights)], ["top", Math.max(...heights)]] as [string, number][]) {
-    const row = positions.flatMap(([, py], k) => (Math.abs(py - y) < 0.1 ? [k] : []));
-    if (row.length > 2 && row.length === set.size && row.every((node) => set.has(node))) return [{ edge }];
+  const heights = positions.map((point) => point.at(-1)!);
+  for (const [name, height] of [["bottom", Math.min(...heights)], ["top", Math.max(...heights)]] as [string, number][]) {
+    const row = heights.flatMap((each, k) => (Math.abs(each - height) < 0.1 ? [k] : []));
+    if (row.length > 2 && row.length === set.size && row.every((node) => set.has(node))) return [positions[0]!.length === 3 ? { face: name } : { edge: name }];
   }
-  const round = (value: number): number => Math.round(value * scale * 100) / 100;
-  return nodes.map((node) => ({ point: [round(positions[node]![0]), round(positions[node]![1])] as Point }));
+  return nodes.map((node) => ({ point: positions[node]!.map((value) => Math.round(value! * scale * 100) / 100) as Point }));
 }
 
 /** Add nodes to a target or remove them; a node belongs to one support, input or output of a load case. */
@@ -128,14 +129,29 @@ export function assign(task: Task, built: Built, load_case: number, target: Targ
 /** A table whose selected nodes keep their distances from the nearer sides of a rectangle of another size. */
 export function resized(table: Table, size: number[]): Table {
   const old = table.domain.size!;
-  const along = (value: number, axis: 0 | 1): number => (value > old[axis]! / 2 ? Math.round(100 * (value + size[axis]! - old[axis]!)) / 100 : value);
+  const along = (value: number, axis: number): number => (value > old[axis]! / 2 ? Math.round(100 * (value + size[axis]! - old[axis]!)) / 100 : value);
   const moved = <T extends { at?: Region[] }>(sections: T[] | undefined): T[] | undefined => sections?.map((each) => (each.at
-    ? { ...each, at: each.at.map((region) => (region.point ? { ...region, point: [along(region.point[0], 0), along(region.point[1], 1)] as Point } : region)) } : each));
+    ? { ...each, at: each.at.map((region) => (region.point ? { ...region, point: region.point.map((value, axis) => along(value!, axis)) as Point } : region)) } : each));
   const cases = table.cases.map((each) => cleaned({ ...each, supports: moved(each.supports), inputs: moved(each.inputs), outputs: moved(each.outputs), loads: moved(each.loads) }));
   return cleaned({ ...table, domain: { ...table.domain, size }, supports: moved(table.supports), cases });
 }
 
 const DIRECTIONS: Record<string, Point> = { right: [1, 0], up: [0, 1], left: [-1, 0], down: [0, -1] };
+const IN_SPACE: Record<string, Point> = { right: [1, 0, 0], back: [0, 1, 0], up: [0, 0, 1], left: [-1, 0, 0], front: [0, -1, 0], down: [0, 0, -1] };
+
+/** Whether a task is for a part in space. */
+export function isSpatial({ domain }: Table): boolean {
+  const positions = domain.lattice?.["positions"] as Point[] | undefined;
+  return domain.size?.length === 3 || positions?.[0]?.length === 3;
+}
+
+/** Unit vector of a direction in space. */
+export function vectorInSpace(direction: Direction | undefined, usual: Point = IN_SPACE.up!): Point {
+  if (typeof direction === "string") return IN_SPACE[direction] ?? usual;
+  if (direction === undefined || direction.length !== 3) return usual;
+  const size = Math.hypot(...(direction as number[])) || 1;
+  return direction.map((value) => value! / size) as Point;
+}
 
 /** Unit vector of a direction: a name, an angle or a vector. */
 export function vectorOf(direction: Direction | undefined, usual: Point = [0, 1]): Point {

@@ -1,7 +1,7 @@
 // What the drawing shows of a task; types only.
 
 import type { Point } from "./api";
-import type { Built, Shape, Target, ZoneKind } from "./task";
+import type { Built, Shape, Target, Tool, ZoneKind, ZoneShape } from "./task";
 
 /** An input, output or load of the shown load case. */
 export interface Arrow { target: Target; nodes: number[]; direction: Point; /** Displacement, lattice units. */ stroke: number | null }
@@ -19,4 +19,17 @@ export interface View {
   /** Present beams of the design drawn by hand, if there is one. */
   bits: Uint8Array | null;
   faults: number[];
+}
+
+/** The drawing of a task, in the plane or in space. */
+export interface TaskDrawing {
+  readonly element: Element;
+  tool: Tool;
+  /** Whether a click selects the whole row or layer of a node. */
+  rows: boolean;
+  zoneShape: ZoneShape;
+  show(view: View): void;
+  /** Show the design in its deformed state. */
+  showMoved(displacement: number[] | null, beams: number[]): void;
+  close(): void;
 }

@@ -67,6 +67,8 @@ class Level:
         Function that returns which optional library is missing and how to install it, or None.
     title, duration
         Display name, and the usual duration of an analysis in words.
+    in_space
+        Whether it analyses parts in space.
     """
 
     analyse: Callable[..., Analysis]
@@ -74,6 +76,7 @@ class Level:
     missing: Callable[[], str | None] = lambda: None
     title: str = ""
     duration: str = ""
+    in_space: bool = True
 
     def __call__(
         self,

@@ -18,7 +18,7 @@ from starlette.middleware.gzip import GZipMiddleware
 from bellcrank import __version__
 from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName, first_line
 from bellcrank.processes import default_workers
-from bellcrank.web import design_routes, run_routes, task_routes
+from bellcrank.web import design_routes, quick_calls, run_routes, task_routes
 from bellcrank.web.errors import plain_error
 from bellcrank.web.gallery import BundledDesigns, Gallery, RunDesigns, SavedDesigns
 from bellcrank.web.jobs import Jobs
@@ -37,6 +37,7 @@ STATIC = Path(__file__).parent / "static"
 PAGES = {
     "/": ("index.html", "text/html; charset=utf-8"),
     "/app.js": ("app.js", "text/javascript; charset=utf-8"),
+    "/space.js": ("space.js", "text/javascript; charset=utf-8"),
     "/app.css": ("app.css", "text/css; charset=utf-8"),
     "/icon.svg": ("icon.svg", "image/svg+xml"),
 }
@@ -118,6 +119,8 @@ async def _prepare(state: AppState) -> None:
         state.error = first_line(error)
     else:
         state.ready = True
+        with contextlib.suppress(BellcrankError):  # the first task in space compiles them then
+            await state.pools.slow.call(quick_calls.load_space_kernels)
 
 
 def _add_pages(app: FastAPI) -> None:

@@ -17,7 +17,6 @@ import numpy as np
 from bellcrank.errors import BellcrankError, UnknownName
 from bellcrank.fem.results import finite
 from bellcrank.model import (
-    IN_SPACE,
     Design,
     builtin,
     gallery_design,
@@ -31,9 +30,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from bellcrank.web.jobs import Jobs
 
 NAME = re.compile(r"[a-z0-9]{12}")
+AZIMUTH, ELEVATION = 24.0, 22.0
+"""Direction from which parts in space are drawn, degrees: from the front, turned to the left, and
+from above."""
 CACHED = 200
 """Number of designs of runs that are cached."""
 
@@ -120,7 +124,7 @@ class BundledDesigns:
 
 
 def _built_in() -> Iterator[Entry]:
-    for problem in (name for name in builtin if name not in IN_SPACE):
+    for problem in builtin:
         for kind in get_args(Kind):
             design = gallery_design(kind, problem)
             if design is not None:
@@ -254,7 +258,8 @@ def thumbnail_data(source: str, entry: Entry) -> dict[str, Any]:
     """Return an entry with the coordinates of its present beams."""
     design = entry.design
     problem, lattice = design.problem, design.problem.lattice
-    ends = lattice.positions[lattice.beams[design.mask]]
+    drawn = projected(lattice.positions)
+    ends = drawn[lattice.beams[design.mask]]
     marks = (
         ("supports", problem.supports.nodes),
         ("input", problem.input.nodes),
@@ -271,12 +276,27 @@ def thumbnail_data(source: str, entry: Entry) -> dict[str, Any]:
         "beams": design.beam_count,
         "picture": {
             "lines": ends.round(2).ravel().tolist(),
-            **{name: lattice.positions[nodes].round(2).ravel().tolist() for name, nodes in marks},
-            "box": np.concatenate([lattice.positions.min(axis=0), lattice.positions.max(axis=0)])
-            .round(2)
-            .tolist(),
+            **{name: drawn[nodes].round(2).ravel().tolist() for name, nodes in marks},
+            "box": np.concatenate([drawn.min(axis=0), drawn.max(axis=0)]).round(2).tolist(),
         },
     }
+
+
+def projected(positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return positions (N, d) as they are drawn, (N, 2): those in space in oblique view.
+
+    Examples
+    --------
+    >>> projected(np.array([[0.0, 0.0, 1.0]])).round(2)
+    array([[0.  , 0.93]])
+    """
+    if positions.shape[1] == 2:
+        return positions
+    x, y, z = positions.T
+    turn, tilt = np.deg2rad(AZIMUTH), np.deg2rad(ELEVATION)
+    depth = -x * np.sin(turn) + y * np.cos(turn)
+    across, up = x * np.cos(turn) + y * np.sin(turn), z * np.cos(tilt) + depth * np.sin(tilt)
+    return np.column_stack([across, up])
 
 
 def design_data(entry: Entry) -> dict[str, Any]:

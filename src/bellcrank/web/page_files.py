@@ -23,12 +23,15 @@ class PageFile:
         Media type of the content.
     quick
         Whether it is written quickly and need not wait behind movies and finite elements.
+    in_space
+        Whether it is offered for parts in space.
     """
 
     title: str
     purpose: str
     media_type: str
     quick: bool = False
+    in_space: bool = True
 
 
 page_files: Registry[PageFile] = Registry("file format")
@@ -38,8 +41,8 @@ for _suffix, _file in {
     "stl": PageFile("STL", "3D printing", "model/stl", quick=True),
     "3mf": PageFile("3MF", "3D printing, with units", "model/3mf", quick=True),
     "step": PageFile("STEP", "CAD", "model/step"),
-    "svg": PageFile("SVG", "drawing, laser cutting", "image/svg+xml", quick=True),
-    "dxf": PageFile("DXF", "cutting", "image/vnd.dxf", quick=True),
+    "svg": PageFile("SVG", "drawing, laser cutting", "image/svg+xml", quick=True, in_space=False),
+    "dxf": PageFile("DXF", "cutting", "image/vnd.dxf", quick=True, in_space=False),
     "mp4": PageFile("MP4", "movie", "video/mp4"),
     "gif": PageFile("GIF", "movie", "image/gif"),
     "pdf": PageFile("PDF", "summary on one page", "application/pdf"),

@@ -36,6 +36,8 @@ CACHED = 24
 STATES = 41
 """Number of states of a motion, from rest to the full stroke."""
 DIGITS = 5
+TASK_IN_SPACE = "straight-orthogonal"
+"""A bundled task that needs the kernels of frames in space."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,6 +87,17 @@ def load_kernels() -> bool:
         evaluator = model_evaluator(problem)
         evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
         evaluator.predict_flips(design.mask)
+    return True
+
+
+def load_space_kernels() -> bool:
+    """Load the kernels of frames in space, or compile them, which takes a minute."""
+    from bellcrank.task import find_task
+
+    task = find_task(TASK_IN_SPACE)
+    evaluator = specification_of(task.problem)
+    assert evaluator is not None
+    evaluator.evaluate(task.problem.initial, VERIFICATION_INCREMENT)
     return True
 
 

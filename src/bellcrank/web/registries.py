@@ -8,6 +8,7 @@ from typing import Any
 from bellcrank.fem import levels
 from bellcrank.part import materials
 from bellcrank.search import DEFAULT_SEARCH, searches
+from bellcrank.task.space import CELLS
 from bellcrank.web.page_files import page_files
 
 MATERIAL_TITLES = {"ninjaflex": "NinjaFlex"}
@@ -16,13 +17,14 @@ MATERIAL_TITLES = {"ninjaflex": "NinjaFlex"}
 
 @cache
 def registered() -> dict[str, list[dict[str, Any]]]:
-    """Return searches, materials, file formats and finite-element levels as plain data.
+    """Return searches, materials, file formats, levels and lattices in space as plain data.
 
     The default search comes first; the other entries are in the order of registration. Each entry
     has ``name`` and ``title``.
     """
     methods = sorted(searches, key=lambda name: name != DEFAULT_SEARCH)
     return {
+        "cells": [{"name": name, "title": name.replace("-", " ")} for name in CELLS],
         "searches": [
             {
                 "name": name,
@@ -42,7 +44,12 @@ def registered() -> dict[str, list[dict[str, Any]]]:
             for name, material in materials.items()
         ],
         "files": [
-            {"name": name, "title": entry.title, "purpose": entry.purpose}
+            {
+                "name": name,
+                "title": entry.title,
+                "purpose": entry.purpose,
+                "in_space": entry.in_space,
+            }
             for name, entry in page_files.items()
         ],
         "levels": [
@@ -51,6 +58,7 @@ def registered() -> dict[str, list[dict[str, Any]]]:
                 "title": level.title or name,
                 "duration": level.duration,
                 "missing": level.missing() or "",
+                "in_space": level.in_space,
             }
             for name, level in levels.items()
         ],

@@ -70,8 +70,8 @@ def _archive(design: Design, spec: PartSpec, path: Path) -> None:
     text = json.dumps(problem_to_dict(design.problem))
     about = {"efficiency": design.efficiency, "provenance": dict(design.provenance)}
     with ZipFile(path, "w", ZIP_DEFLATED) as archive:
-        for suffix in page_files:
-            if suffix != "zip":
+        for suffix, file in page_files.items():
+            if suffix != "zip" and (design.problem.lattice.dimension == 2 or file.in_space):
                 content = design_file(text, design.mask_hex, f".{suffix}", spec.to_dict(), about)
                 archive.writestr(f"part.{suffix}", content)
 
@@ -109,15 +109,20 @@ def _export(design: Design, spec: PartSpec, path: Path) -> None:
 def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     """Return size, mass and stroke of a part, and remarks on its printability."""
     from bellcrank.part import PartSpec
-    from bellcrank.workflows.fabricate import Grips, bundle_of, print_warnings, profile_for
+    from bellcrank.workflows.fabricate import (
+        Grips,
+        bundle_of,
+        print_warnings,
+        profile_for,
+        size_and_volume,
+    )
 
     spec = PartSpec.from_dict(part)
     bundle = bundle_of(design_of(text, mask), spec, Grips(), layer=0.32)
-    left, bottom, right, top = bundle.outline().bounds
-    volume = bundle.outline().area * bundle.thickness
+    size, volume = size_and_volume(bundle)
     mass = volume * bundle.part.material.density / 1000.0
     return {
-        "size": [round(right - left, 2), round(top - bottom, 2), round(bundle.thickness, 3)],
+        "size": [round(length, 3) for length in size],
         "volume": round(volume / 1000.0, 3),
         "mass": round(mass, 2) if math.isfinite(mass) else None,
         "stroke": bundle.part.stroke if math.isfinite(bundle.part.stroke) else None,

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidFile, InvalidProblem
-from bellcrank.model import problem_from_dict, read_design, require_plane
+from bellcrank.model import problem_from_dict, read_design
 from bellcrank.model.parsing import read_table
 from bellcrank.part import PartSpec
 from bellcrank.task import is_task
@@ -43,7 +43,6 @@ def problem_of(data: Mapping[str, Any], source: str = "task") -> Problem:
         problem = problem_from_dict(data, source)
     except (OverflowError, RecursionError) as error:
         raise InvalidFile(f"{source}: a number is too large ({error})") from None
-    require_plane(problem, source)
     return problem
 
 
@@ -95,7 +94,6 @@ def _read(path: Path) -> tuple[dict[str, Any] | None, Design | None]:
 
 def _check(problem: Problem) -> None:
     check_size(problem.lattice.node_count, problem.lattice.beam_count)
-    require_plane(problem, UPLOAD)
 
 
 def read_region(text: str, suffix: str) -> dict[str, Any]:

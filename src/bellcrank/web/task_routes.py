@@ -14,8 +14,8 @@ from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of, read_region, read_upload, to_toml
 from bellcrank.web.task_tables import (
     bundled_table,
+    known_tasks,
     plain_table,
-    planar_tasks,
     table_of,
     task_data,
 )
@@ -25,8 +25,8 @@ router = APIRouter(prefix="/api/tasks", tags=["tasks"])
 
 @router.get("")
 def list_tasks() -> list[dict[str, str]]:
-    """Return the bundled tasks in the plane."""
-    return planar_tasks()
+    """Return name and description of the bundled tasks."""
+    return known_tasks()
 
 
 @router.post("/build")

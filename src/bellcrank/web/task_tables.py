@@ -11,7 +11,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings, UnknownName
 from bellcrank.machines.elementary import DIRECTIONS, elementary
-from bellcrank.model import builtin, problem_to_dict, require_plane
+from bellcrank.model import builtin, problem_to_dict
 from bellcrank.model.parsing import parse, read_table
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import SpecificationEvaluator
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 PLANE = 2
 """Number of lengths of a domain in the plane."""
-NODES_PER_AREA = 2.0 / math.sqrt(3.0)
-"""Nodes of a triangular lattice in the square of its spacing."""
+DENSITY = {2: 2.0 / math.sqrt(3.0), 3: math.sqrt(2.0)}
+"""Nodes of a triangular lattice in the square of its spacing, of an octet lattice in its cube."""
 LARGEST_RATIO = 4.0
 """Ratio of the nodes in the bounds of a domain to the limit above which it is not filled."""
 ELEMENT = "element-"
@@ -42,13 +42,16 @@ ELEMENT_COLUMNS = 7
 """Number of columns of their lattices."""
 
 
-def planar_tasks() -> list[dict[str, str]]:
-    """Return name and description of the bundled tasks in the plane, and of parts of machines."""
-    found = []
-    for name, path in bundled_tasks().items():
-        table = read_table(path)
-        if len(table["domain"].get("size", ())) <= PLANE:
-            found.append({"name": name, "about": table.get("description", "")})
+def known_tasks() -> list[dict[str, str]]:
+    """Return name and description of the bundled tasks, and of parts of machines.
+
+    Tasks in the plane come first.
+    """
+    tables = {name: read_table(path) for name, path in bundled_tasks().items()}
+    found = [
+        {"name": name, "about": table.get("description", "")}
+        for name, table in sorted(tables.items(), key=lambda item: _is_in_space(item[1]["domain"]))
+    ]
     parts = [
         {
             "name": ELEMENT + direction,
@@ -59,6 +62,10 @@ def planar_tasks() -> list[dict[str, str]]:
     return [*found, *parts]
 
 
+def _is_in_space(domain: Mapping[str, Any]) -> bool:
+    return len(domain.get("size", ())) > PLANE
+
+
 def bundled_table(name: str) -> dict[str, Any]:
     """Return the table of a bundled task.
 
@@ -66,7 +73,7 @@ def bundled_table(name: str) -> dict[str, Any]:
     ------
     UnknownName
     """
-    if name not in {each["name"] for each in planar_tasks()}:
+    if name not in {each["name"] for each in known_tasks()}:
         raise UnknownName(f"there is no task {name!r}")
     if name.startswith(ELEMENT):
         problem = elementary(ELEMENT_COLUMNS, name.removeprefix(ELEMENT))
@@ -103,7 +110,12 @@ def table_of(problem: Problem, part: PartSpec) -> dict[str, Any]:
     frame = problem if problem.section is not None else frame_problem(problem, part)
     units = units_of(frame, part)
     lattice, supports = problem.lattice, problem.supports
-    held = {"all": supports.fixed, "x": supports.fixed_x, "y": supports.fixed_y}
+    held = {
+        "all": supports.fixed,
+        "x": supports.fixed_x,
+        "y": supports.fixed_y,
+        "z": supports.fixed_z,
+    }
     given, output = problem.input, problem.output
     if given.drive == "displacement":
         drive = {"displacement": units.in_part("length", given.amount)}
@@ -185,7 +197,6 @@ def task_of(table: TaskTable) -> Task:
     """
     task = build_task(table)
     check_size(task.problem.lattice.node_count, task.problem.lattice.beam_count)
-    require_plane(task.problem, "task")
     try:
         SpecificationEvaluator(task.problem)
     except InvalidSettings as error:  # the lattice is not as symmetric as the limits ask
@@ -194,15 +205,18 @@ def task_of(table: TaskTable) -> Task:
 
 
 def _check_domain(table: TaskTable) -> None:
-    """Refuse a domain in space, and one for too many nodes, before it is filled."""
+    """Refuse a domain for too many nodes before it is filled."""
     domain = table.domain
-    if domain.size is not None and len(domain.size) != PLANE:
-        raise InvalidProblem("domain: the page designs parts in the plane; this one is in space")
     is_filled = domain.size is not None or domain.outline is not None
     if not is_filled or not table.part.spacing >= NARROWEST:
         return  # `build_task` refuses the spacing
-    left, bottom, right, top = region_of(domain, Path()).bounds
-    nodes = NODES_PER_AREA * (right - left) * (top - bottom) / table.part.spacing**2
+    if domain.size is not None and len(domain.size) > PLANE:
+        lengths = tuple(domain.size)
+    else:
+        left, bottom, right, top = region_of(domain, Path()).bounds
+        lengths = right - left, top - bottom
+    dimension = len(lengths)
+    nodes = DENSITY[dimension] * math.prod(lengths) / table.part.spacing**dimension
     if not nodes <= LARGEST_RATIO * NODES:
         raise InvalidFile(
             f"domain: about {nodes:.0f} nodes; the limit of the page is {NODES}; choose a smaller "

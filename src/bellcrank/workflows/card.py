@@ -7,8 +7,6 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bellcrank.export import Export, check_print
 from bellcrank.fem import FemSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, model_evaluator, objective_name
@@ -18,7 +16,7 @@ from bellcrank.plots.saving import check_target
 from bellcrank.plots.scene import Motion
 from bellcrank.provenance import provenance
 from bellcrank.search.verification import ELEMENTS
-from bellcrank.workflows.fabricate import profile_for
+from bellcrank.workflows.fabricate import profile_for, size_and_volume
 from bellcrank.workflows.figures import figure_text, figures_of, model_words
 from bellcrank.workflows.pictures import stressed_part, stroke_labels
 from bellcrank.workflows.specification import item_rows
@@ -123,16 +121,10 @@ def card_of(
 
 
 def _part_table(bundle: Export, part: Part) -> Table:
+    (wide, deep, high), volume = size_and_volume(bundle)
     if part.dimension == 3:
-        solid = bundle.solid()
-        wide, deep, high = np.ptp(solid.vertices, axis=0).tolist()
-        volume = solid.volume
         struts = f"diameter {_widths(part)} mm"
     else:
-        outline = bundle.outline()
-        left, bottom, right, top = outline.bounds
-        wide, deep, high = right - left, top - bottom, bundle.thickness
-        volume = outline.area * high
         struts = f"{_widths(part)} mm wide, fillets {part.fillet_radius:.2f} mm"
     mass = volume * part.material.density / 1000.0
     rows = [

@@ -161,6 +161,17 @@ def bundle_of(
     )
 
 
+def size_and_volume(bundle: Export) -> tuple[tuple[float, float, float], float]:
+    """Return width, depth and height of a part, mm, and its volume, mm^3."""
+    if bundle.part.dimension == 3:
+        solid = bundle.solid()
+        wide, deep, high = np.ptp(solid.vertices, axis=0).tolist()
+        return (wide, deep, high), float(solid.volume)
+    outline = bundle.outline()
+    left, bottom, right, top = outline.bounds
+    return (right - left, top - bottom, bundle.thickness), outline.area * bundle.thickness
+
+
 def print_warnings(bundle: Export, profile: PrintProfile) -> list[str]:
     """Return warnings about printing and motion of a part, as sentences."""
     part = bundle.part
