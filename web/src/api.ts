@@ -103,6 +103,8 @@ export interface Run {
   settings: { steps: number; chains: number; seed: number; goals: string[]; hot?: number; cold?: number; replicas?: number };
   part: Part | null;
   reference: string | null;
+  /** Whether a design is refined, without a search. */
+  refine: boolean;
   done: number;
   total: number;
   has_design: boolean;

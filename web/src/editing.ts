@@ -4,7 +4,7 @@ import type { ItemState, Registries } from "./api";
 import type { Built, Hold, Table, Target, Task, Tool, ZoneKind, ZoneShape } from "./task";
 
 /** Settings of a search. */
-export interface Settings { method: string; steps: number; chains: number; seed: number }
+export interface Settings { method: string; steps: number; chains: number; seed: number; /** Whether it begins with the design drawn by hand. */ fromHand: boolean }
 
 export interface Fault { key: string; message: string }
 
@@ -32,12 +32,15 @@ export interface TaskEditor {
   open(task: Task): void;
   /** Items that the design drawn by hand reaches. */
   readonly reached: ItemState[] | null;
+  /** Whether a design is drawn by hand that is not the full lattice. */
+  readonly hasHandDesign: boolean;
   /** Number of the support with the chosen hold; of a new one if there is none. */
   supportIndex(): number;
   setRows(rows: boolean): void;
   restoreBeams(): void;
   startSearch(): Promise<void>;
   saveHandDesign(title: string): Promise<void>;
+  refineHandDesign(): Promise<void>;
   save(): Promise<void>;
   /** Create a link to the task and return the text that the button shows then. */
   link(): Promise<string>;

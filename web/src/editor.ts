@@ -47,7 +47,7 @@ export class Editor implements TaskEditor {
   tool: Tool = "supports";
   hold: Hold = "all";
   zone: { kind: ZoneKind; shape: ZoneShape } = { kind: "holes", shape: "box" };
-  settings: Settings = { method: "", steps: 8000, chains: 2, seed: 0 };
+  settings: Settings = { method: "", steps: 8000, chains: 2, seed: 0, fromHand: false };
   fault: Fault | null = null;
   registries: Registries | null = null;
   built: Built | null = null;
@@ -101,6 +101,7 @@ export class Editor implements TaskEditor {
   }
 
   get task(): Task { return this.history.value; }
+  get hasHandDesign(): boolean { return this.task.hand !== null && this.task.hand !== this.built?.problem?.initial; }
   get missing(): string | null { return this.built?.missing ?? null; }
 
   close(): void {
@@ -410,13 +411,20 @@ export class Editor implements TaskEditor {
 
   /** Start the search and open its page. */
   async startSearch(): Promise<void> {
-    const { settings, task, built } = this;
+    const { settings, task } = this;
     const body = {
       title: task.table.name, session: session(), task: task.table,
       method: settings.method, steps: settings.steps, chains: settings.chains, seed: settings.seed,
-      reference: task.hand && task.hand !== built?.problem?.initial ? task.hand : null,
+      reference: this.hasHandDesign ? task.hand : null, start: this.hasHandDesign && settings.fromHand ? task.hand : null,
     };
     const { id } = await post<{ id: string }>("/runs", body);
+    location.hash = `#/run/${id}`;
+  }
+
+  /** Refine the design drawn by hand, and open the page of its refinement. */
+  async refineHandDesign(): Promise<void> {
+    const { task } = this;
+    const { id } = await post<{ id: string }>("/runs", { title: `${task.table.name}, by hand, refined`.slice(0, 120), session: session(), task: task.table, start: task.hand, refine: true });
     location.hash = `#/run/${id}`;
   }
 

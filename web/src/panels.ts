@@ -212,6 +212,7 @@ export class Panels {
         h("p", { class: "note" }, "The result of a search is compared with this design."),
         h("div", { class: "buttons" },
           button("Save this design", () => void this.attempt("hand", () => editor.saveHandDesign(editor.task.table.name)), "", { "data-key": "save" }),
+          button("Refine this design", () => void this.attempt("hand", () => editor.refineHandDesign()), "", { "data-key": "refine", disabled: !editor.built?.items.length }),
           button("Restore all struts", () => editor.restoreBeams(), "", { "data-key": "all" })),
         this.local["hand"] && h("p", { class: "fault", role: "alert" }, this.local["hand"])));
   }

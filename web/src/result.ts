@@ -1,6 +1,6 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, download, field, figure, h, number, select } from "./dom";
@@ -29,6 +29,9 @@ export interface Subject {
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null }
 interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[] }
+
+/** Effort of a search that begins with a design. */
+const CONTINUED = { steps: 8000, chains: 2 };
 
 export class Result {
   readonly player: Player;
@@ -325,9 +328,26 @@ export class Result {
     if (place) void this.offer(others, place);
     return h("div", {}, h("div", { class: "content buttons" },
       plan && button("Open its plan", () => { location.hash = `#/machine/${plan}`; }, "strong"),
+      problem.specification && button("Refine", () => void this.begin(true), "", { title: "Move the nodes and change the widths of this design" }),
+      button("Search on", () => void this.begin(false), "", { title: "A new search that begins with this design" }),
       button("Open its task", () => void open(false)),
       button("Change by hand", () => void open(true))),
       place && h("div", { class: "content" }, field("Compare with", others)));
+  }
+
+  /** Begin a search at this design, or its refinement. */
+  private async begin(refine: boolean): Promise<void> {
+    const { problem, mask, title } = this.subject;
+    const task = refine ? null : this.subject.task ?? this.subject.provenance["task"] ?? null;
+    try {
+      const { id } = await post<{ id: string }>("/runs", {
+        title: `${title.replace(/, (refined|searched on)$/, "")}, ${refine ? "refined" : "searched on"}`.slice(-120), session: session(), start: mask, refine,
+        ...(task ? { task } : { problem, part: this.part }), steps: CONTINUED.steps, chains: CONTINUED.chains, seed: Math.floor(Math.random() * 2 ** 31),
+      });
+      location.hash = `#/run/${id}`;
+    } catch (error) {
+      this.trouble.textContent = sentence((error as ServerError).message);
+    }
   }
 
   /** List the own designs and the bundled ones of a choice. */

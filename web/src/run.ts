@@ -42,6 +42,7 @@ export class RunPage {
     const card = h("section", { class: "card", "aria-label": "Efficiency along the search" },
       h("h2", {}, "Efficiency along the search"), this.chart.svg,
       this.curveNote);
+    card.hidden = run.refine;
     this.watch = h("aside", { class: "panel", "aria-label": "Search" },
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.items, this.controls, this.trouble));
     this.side.append(this.watch);
@@ -149,15 +150,15 @@ export class RunPage {
       this.showSwitcher();
     }
     const made = Object.values(this.update?.chains ?? {}).reduce((sum, chain) => sum + chain.step, 0);
-    const done = run.status === "finished" ? run.total : Math.max(run.done, made);
-    const share = Math.min(1, done / run.total);
+    const done = run.status === "finished" && !run.refine ? run.total : Math.max(run.done, made);
+    const share = run.status === "finished" ? 1 : Math.min(1, done / run.total);
     const running = run.status === "running";
     const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
     const refined = this.update?.refined;
     const last: [string, string] = refined ? ["refinement", `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.objective === null ? "" : `, best ${figure(refined.objective, 2)}`}`]
       : tried ? ["candidates verified", `${tried[0]} of at most ${tried[1]}`] : ["time left", duration(this.update?.left)];
-    const rows: [string, string][] = [
+    const rows: [string, string][] = run.refine ? [["refinement", refined ? last[1] : running ? "starting …" : `${done.toLocaleString("en")} geometries`]] : [
       [specified ? "largest objective" : "best so far", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
       ...(running ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], last] as [string, string][] : []),
@@ -197,7 +198,7 @@ export class RunPage {
   private showSwitcher(): void {
     const chains = [["best", "Best"], ...Array.from({ length: Math.min(6, this.run.settings.chains) }, (_, k) => [String(k), `Chain ${k + 1}`])] as [string, string][];
     if (this.run.comparison) chains.push(["human", this.run.comparison.title === "yours" ? "Yours" : "By hand"]);
-    clear(this.switcher, choice("Displayed design", chains, this.showing === "human" ? "human" : this.chain, (picked) => {
+    if (!this.run.refine) clear(this.switcher, choice("Displayed design", chains, this.showing === "human" ? "human" : this.chain, (picked) => {
       this.showing = picked === "human" ? "human" : "live";
       this.chain = picked === "human" ? "best" : picked;
       this.drawLive();
@@ -227,9 +228,9 @@ export class RunPage {
     const { status } = run;
     clear(this.controls,
       (status === "running" || status === "queued") && button("Pause", () => void act("pause")()),
-      status === "running" && button("Stop and choose the best", () => void act("stop")(), "strong"),
+      status === "running" && button(run.refine ? "Stop and take the result" : "Stop and choose the best", () => void act("stop")(), "strong"),
       (status === "paused" || status === "stopped" || status === "failed") && button(status === "failed" ? "Retry" : "Continue", () => void act("resume")(), "strong"),
-      status === "paused" && button("Choose the best", () => void act("stop")()),
+      status === "paused" && !run.refine && button("Choose the best", () => void act("stop")()),
       status !== "running" && button("Delete", () => void erase(), "quiet"));
   }
 }

@@ -45,10 +45,18 @@ export class SearchBox {
           h("summary", { "data-key": "more" }, "Method, steps, seed"),
           field("Method", method, "", methods.find(({ name }) => name === settings.method)?.summary ?? ""),
           h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000), whole("chains", "Chains", 1, 64), whole("seed", "Seed", 0, 2 ** 31))),
+        editor.hasHandDesign && h("label", { class: "tick" }, this.fromHand(), "Begin with the design by hand"),
         h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !editor.built?.problem || !!editor.fault || !settings.method || this.busy,
           onclick: () => void this.start() }, "Design it"),
         missing && h("p", { class: "note" }, "Supports, an input and an output are needed."),
         this.fault && h("p", { class: "fault", role: "alert" }, this.fault)));
+  }
+
+  private fromHand(): HTMLInputElement {
+    const { settings } = this.editor;
+    const box = h("input", { type: "checkbox", checked: settings.fromHand, "data-key": "from-hand" });
+    box.addEventListener("change", () => { this.editor.settings = { ...this.editor.settings, fromHand: box.checked }; });
+    return box;
   }
 
   private async start(): Promise<void> {

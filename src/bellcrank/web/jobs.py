@@ -49,6 +49,8 @@ class Record:
         Table of the task, if it was started from one.
     reference
         Mask of a design drawn by hand, for comparison.
+    refine
+        Whether the initial design is refined, without a search.
     created
         Seconds since 1970.
     status
@@ -67,6 +69,7 @@ class Record:
     part: dict[str, Any] | None = None
     task: dict[str, Any] | None = None
     reference: str | None = None
+    refine: bool = False
     created: float = 0.0
     status: str = "queued"
     message: str = ""
@@ -134,6 +137,7 @@ class Job:
             "settings": settings,
             "part": record.part,
             "reference": record.reference,
+            "refine": record.refine,
             "done": self.progress.get("done", record.done),
             "total": settings["steps"] * settings["chains"],
             "has_design": (self.path / "run" / "design.json").exists(),

@@ -95,6 +95,7 @@ def load_space_kernels() -> bool:
     from bellcrank.task import find_task
 
     task = find_task(TASK_IN_SPACE)
+    assert task is not None
     evaluator = specification_of(task.problem)
     assert evaluator is not None
     evaluator.evaluate(task.problem.initial, VERIFICATION_INCREMENT)

@@ -115,7 +115,11 @@ class SaveDesignBody(DesignBody):
 
 
 class RunBody(Body):
-    """A search to be started, for a task with a specification or for a problem."""
+    """A search to be started, for a task with a specification or for a problem.
+
+    It begins with the design ``start``, by default with the full lattice. With ``refine``, this
+    design is refined, without a search.
+    """
 
     title: str = Field(min_length=1, max_length=120)
     session: Session
@@ -128,6 +132,8 @@ class RunBody(Body):
     goals: Goals = ()
     part: dict[str, Any] | None = None
     reference: Mask | None = None
+    start: Mask | None = None
+    refine: bool = False
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -135,6 +141,8 @@ class RunBody(Body):
             raise ValueError("expected either a task or a problem")
         if self.task is not None and self.part is not None:
             raise ValueError("the part is that of the task")
+        if self.refine and self.start is None:
+            raise ValueError("start: expected the design to be refined")
         return self
 
 

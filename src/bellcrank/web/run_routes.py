@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
 RunName = Annotated[str, Field(pattern=r"^[a-z0-9]{12}$")]
+REFINEMENT = {"search": "refinement", "steps": 1000, "chains": 1, "seed": 0, "goals": []}
+"""Settings of a refinement; its steps are the largest number of geometries."""
 INTERVAL = 0.1
 """Seconds between two messages to a client."""
 
@@ -76,18 +79,25 @@ def _validated(body: RunBody) -> tuple[Problem, Record]:
     spec = None if task is None else task.part
     if body.part is not None:
         spec = PartSpec.from_dict(body.part)
-        problem = frame_problem(problem, spec)
+        if not problem.is_specified:  # else the problem is of its part already
+            problem = frame_problem(problem, spec)
     if spec is not None:
         spec.of(problem.full_design())
     if body.reference is not None:
         unpack_mask(body.reference, problem.lattice.beam_count)
+    if body.start is not None:
+        problem = replace(problem, initial=unpack_mask(body.start, problem.lattice.beam_count))
+    if body.refine and not problem.is_specified:
+        raise InvalidSettings("a refinement needs a specification: ask for something of an output")
+    plain = json.loads(json.dumps(settings.to_dict()))
     record = Record(
         title=body.title,
         session=body.session,
-        settings=json.loads(json.dumps(settings.to_dict())),
+        settings=REFINEMENT if body.refine else plain,
         part=None if spec is None else spec.to_dict(),
         task=body.task,
         reference=body.reference,
+        refine=body.refine,
     )
     return problem, record
 

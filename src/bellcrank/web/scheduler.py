@@ -226,5 +226,10 @@ class Scheduler:
             if resumes and not self._closing:
                 self.queue.append(job)
         else:
-            job.update(status=last["kind"], efficiency=last.get("efficiency"), done=done)
+            job.update(
+                status=last["kind"],
+                efficiency=last.get("efficiency"),
+                done=done,
+                message=last.get("message", ""),
+            )
         self._fill()

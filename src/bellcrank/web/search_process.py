@@ -258,6 +258,8 @@ def _search(
     from bellcrank.workflows import complete_design
     from bellcrank.workflows.design import conclude
 
+    if json.loads((where / "job.json").read_text(encoding="utf-8")).get("refine"):
+        return _refine(where, pipe, listener)
     folder = _start_or_reopen(where)
     settings = read_settings(folder.settings)
     with ProgressReporter(pipe, folder, settings) as reporter:
@@ -281,6 +283,41 @@ def _search(
     if report is None:
         return {"kind": "paused"}
     return {"kind": "finished", "efficiency": report.selection.efficiency_after}
+
+
+def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[str, Any]:
+    """Refine the initial design of a job, and write the result as that of a search."""
+    from bellcrank.fem.results import finite
+    from bellcrank.model import Design, read_problem, write_design
+    from bellcrank.refine import RefinementSettings
+    from bellcrank.workflows.refinement import refine_file
+
+    job = json.loads((where / "job.json").read_text(encoding="utf-8"))
+    problem = read_problem(where / "problem.json")
+    design = Design(problem, problem.initial, provenance={"part": job["part"]})
+    total = job["settings"]["steps"]
+
+    def report(progress: RefinementProgress) -> bool:
+        rows = progress.rows
+        state = {0: (progress.evaluations, rows.objective, rows.violation)}
+        message = {
+            "kind": "progress", "points": {}, "chains": {}, "speed": None, "left": None,
+            "done": progress.evaluations, "total": total, "tried": None,
+            "refined": _refinement_of(state),
+        }  # fmt: skip
+        with contextlib.suppress(OSError, BrokenPipeError):
+            pipe.send(message)
+        return not listener.stop.is_set()
+
+    found = refine_file(design, RefinementSettings(evaluations=total), report)
+    if listener.stop.is_set() and listener.command != "stop":
+        return {"kind": "paused"}
+    result = found.design
+    (where / "run").mkdir(exist_ok=True)
+    write_design(result, where / "run" / "design.json", overwrite=True)
+    message = "" if found.improved else f"the design was not improved: {found.reason}"
+    efficiency = None if result.efficiency is None else finite(result.efficiency)
+    return {"kind": "finished", "efficiency": efficiency, "message": message}
 
 
 def _start_or_reopen(where: Path) -> RunFolder:

@@ -1,0 +1,138 @@
+"""Searches that begin with a design, refinements, and parts in space."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from bellcrank.model import pack_mask, problem_from_dict
+from bellcrank.search import SpecificationEvaluator
+from bellcrank.task import find_task
+from bellcrank.web.page_files import page_files
+from bellcrank.web.requests import RunBody
+
+from .conftest import wait_for
+from .test_api import refusal
+from .test_tasks import SIZED, full_mask
+
+if TYPE_CHECKING:
+    from starlette.testclient import TestClient
+
+
+def status_of(client: TestClient, name: str) -> str:
+    status: str = client.get(f"/api/runs/{name}").json()["status"]
+    return status
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"refine": True}, "start: expected the design to be refined"),
+        ({"start": "abc"}, "mask"),
+    ],
+)
+def test_a_start_that_cannot_be_used_is_refused(
+    client: TestClient, changes: dict[str, Any], words: str
+) -> None:
+    body = {"title": "own", "session": "aa", "task": SIZED, **changes}
+    message, _ = refusal(client.post("/api/runs", json=body))
+    assert words in message
+    assert not client.get("/api/runs").json()
+
+
+def test_a_design_without_a_specification_is_not_refined(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    body = {"title": "own", "session": "aa", "problem": crane["problem"], "start": crane["mask"]}
+    message, _ = refusal(client.post("/api/runs", json={**body, "refine": True}))
+    assert "needs a specification" in message
+
+
+def test_a_request_keeps_what_it_begins_with() -> None:
+    body = RunBody(title="a", session="b", task={}, start="ff", refine=True)
+    assert (body.start, body.refine) == ("ff", True)
+
+
+@pytest.mark.slow
+def test_a_search_begins_with_the_given_design(client: TestClient) -> None:
+    problem = client.post("/api/tasks/build", json={"task": SIZED}).json()["problem"]
+    bits = np.ones(len(problem["beams"]), dtype=bool)
+    bits[problem["designable"][3]] = False
+    body = {"title": "own", "session": "aa", "task": SIZED, "steps": 40, "chains": 1}
+    name = client.post("/api/runs", json={**body, "start": pack_mask(bits)}).json()["id"]
+    run = client.get(f"/api/runs/{name}").json()
+    assert run["problem"]["initial"] == pack_mask(bits)
+
+    def first_point() -> Any:
+        with client.websocket_connect(f"ws://localhost:8642/api/runs/{name}/live") as live:
+            return json.loads(live.receive_text())["points"].get("0")
+
+    step, efficiency, *_ = wait_for(first_point)[0]
+    evaluator = SpecificationEvaluator(problem_from_dict(run["problem"]))
+    assert step == 0
+    assert efficiency == pytest.approx(evaluator.evaluate(bits).efficiency, abs=1e-4)
+    if status_of(client, name) == "running":
+        client.post(f"/api/runs/{name}/stop")
+    wait_for(lambda: status_of(client, name) in {"finished", "stopped", "paused"}, 400.0)
+
+
+@pytest.mark.slow
+def test_a_refinement_moves_the_nodes_of_a_design_and_can_be_stopped(client: TestClient) -> None:
+    problem = client.post("/api/tasks/build", json={"task": SIZED}).json()["problem"]
+    mask = full_mask(problem)
+    body = {"title": "own", "session": "aa", "task": SIZED, "start": mask, "refine": True}
+    name = client.post("/api/runs", json=body).json()["id"]
+    wait_for(lambda: client.get(f"/api/runs/{name}").json()["done"] > 10, 400.0)
+    client.post(f"/api/runs/{name}/stop")
+    wait_for(lambda: status_of(client, name) == "finished", 100.0)
+    run = client.get(f"/api/runs/{name}").json()
+    assert run["refine"]
+    assert run["mask"] == mask
+    moved = np.abs(np.subtract(run["problem"]["positions"], problem["positions"])).max()
+    assert 1e-3 < moved <= 0.9 + 1e-9
+    part = {"problem": run["problem"], "mask": mask, "part": run["part"]}
+    before = client.post("/api/report", json={**part, "problem": problem}).json()["figures"][0]
+    after = client.post("/api/report", json=part).json()["figures"][0]
+    assert after["off_axis"] < before["off_axis"] or after["efficiency"] > before["efficiency"]
+    # A refined design is refined further from its own geometry.
+    again = {"title": "own", "session": "aa", "problem": run["problem"], "part": run["part"]}
+    further = client.post("/api/runs", json={**again, "start": mask, "refine": True}).json()["id"]
+    stored = client.get(f"/api/runs/{further}").json()["problem"]["positions"]
+    assert stored == run["problem"]["positions"]
+    client.post(f"/api/runs/{further}/pause")
+    wait_for(lambda: status_of(client, further) == "paused", 100.0)
+
+
+@pytest.mark.slow
+def test_a_part_in_space_is_reported_played_and_written(client: TestClient) -> None:
+    task = find_task("straight-orthogonal")
+    assert task is not None
+    table = client.get("/api/tasks/straight-orthogonal").json()
+    built = client.post("/api/tasks/build", json={"task": table}).json()
+    body = {"problem": built["problem"], "mask": full_mask(built["problem"])}
+    nodes = task.problem.lattice.node_count
+    motion = client.post("/api/motion", json=body).json()
+    assert {len(each) for each in motion["displacement"]} == {3 * nodes}
+    report = client.post("/api/report", json={**body, "part": built["part"]}).json()
+    assert report["specified"]
+    assert [item["name"] for item in report["items"]["frames"]] == [
+        item["name"] for item in built["items"] if not item["name"].startswith("maximise:")
+    ]
+    assert len(report["figures"][0]["path_mm"][0]) == 3
+    summary = client.post("/api/part", json={**body, "part": built["part"]}).json()
+    assert np.allclose(summary["size"], (45.0, 17.0, 45.0), atol=10.0)
+    for suffix in ("stl", "3mf", "json"):
+        content = client.post(f"/api/files/{suffix}", json={**body, "part": built["part"]})
+        assert content.status_code == 200
+        assert len(content.content) > 5_000
+    message, _ = refusal(client.post("/api/files/svg", json={**body, "part": built["part"]}))
+    assert "in space" in message
+    assert not page_files["svg"].in_space
+    saved = client.post("/api/gallery", json={**body, "title": "mine"}).json()
+    entry = client.get(f"/api/gallery/{saved['source']}/{saved['key']}").json()
+    table = client.post("/api/tasks/from-problem", json={"problem": entry["problem"]}).json()
+    again = client.post("/api/tasks/build", json={"task": table}).json()
+    assert again["lattice"]["positions"] == built["lattice"]["positions"]
