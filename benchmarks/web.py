@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 SESSIONS, SEARCHES = 20, 8
 START_LIMIT = 120.0
 """Longest time until all searches have started, in seconds."""
+RARELY = 5
+"""Number of messages of a search that has hardly run."""
 PAUSE = 0.5
 """Time between two edits of a session, in seconds."""
 
@@ -102,19 +104,24 @@ async def edit(
 
 
 async def under_load(address: str, pid: int, design: dict[str, Any], seconds: float) -> None:
-    """Print the response times of many sessions that edit while searches are queued and run."""
+    """Print the response times of many sessions that edit while searches are queued and run.
+
+    The searches are those of the crane with its specification. Their messages are counted from the
+    first one with a design to the end of the measurement.
+    """
     async with httpx.AsyncClient(base_url=address, timeout=60) as client:
+        task = (await client.get("/api/tasks/straight-crane")).json()
         for k in range(SEARCHES):
             owner = "a" if k < SEARCHES - 2 else "bc"[k - SEARCHES + 2]
             body = {
-                "title": f"{owner}{k}", "session": owner, "problem": design["problem"],
-                "steps": 3000, "chains": 2, "seed": k,
+                "title": f"{owner}{k}", "session": owner, "task": task, "steps": 8000, "chains": 2,
+                "seed": k,
             }  # fmt: skip
             (await client.post("/api/runs", json=body)).raise_for_status()
         list_times: list[float] = []
         peak = megabytes(pid)
         order: list[str] = []
-        messages = 0
+        rates: list[float] = []
 
         async def poll() -> None:
             nonlocal peak
@@ -128,29 +135,37 @@ async def under_load(address: str, pid: int, design: dict[str, Any], seconds: fl
                 peak = max(peak, megabytes(pid))
                 await asyncio.sleep(0.5)
 
-        async def listen() -> None:
-            nonlocal messages
-            first = (await client.get("/api/runs")).json()[-1]["id"]
-            async with websockets.connect(
-                f"{address.replace('http', 'ws')}/api/runs/{first}/live"
-            ) as socket:
-                async for _ in socket:
-                    messages += 1
+        async def listen(name: str) -> None:
+            arrivals: list[float] = []
+            live = f"{address.replace('http', 'ws')}/api/runs/{name}/live"
+            try:
+                async with websockets.connect(live) as socket:
+                    async for text in socket:
+                        message = json.loads(text)
+                        if message["run"]["status"] == "running" and message["chains"]:
+                            arrivals.append(time.perf_counter())
+            finally:
+                if len(arrivals) > RARELY:
+                    rates.append((len(arrivals) - 1) / (arrivals[-1] - arrivals[0]))
 
-        tasks = [asyncio.create_task(poll()), asyncio.create_task(listen())]
+        names = [run["id"] for run in (await client.get("/api/runs")).json()]
+        tasks = [asyncio.create_task(poll()), *(asyncio.create_task(listen(n)) for n in names)]
         start = time.perf_counter()
         count = int(seconds / PAUSE)
         times = await asyncio.gather(
             *(edit(address, design, k, count, PAUSE) for k in range(SESSIONS))
         )
-        elapsed = time.perf_counter() - start
+        for listener in tasks[1:]:
+            listener.cancel()
+        await asyncio.gather(*tasks[1:], return_exceptions=True)
         while len(order) < SEARCHES and time.perf_counter() - start < START_LIMIT:
             await asyncio.sleep(0.5)
-        for task in tasks:
-            task.cancel()
+        tasks[0].cancel()
         print(f"edit, {SESSIONS} sessions, {SEARCHES} searches   {quantiles(sum(times, []))}")  # noqa: RUF017
         print(f"list of searches under load         {quantiles(list_times)}")
-        print(f"messages of a running search        {messages / elapsed:.1f} per second")
+        print(
+            f"messages of each running search     {', '.join(f'{r:.1f}' for r in rates)} per second"
+        )
         print(f"order in which searches started     {' '.join(order)}")
         print(f"largest memory of all processes     {peak:.0f} MB")
 

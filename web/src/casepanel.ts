@@ -10,7 +10,9 @@ import {
 } from "./task";
 
 /** What a single value of a quantity bounds, and an example. */
-const USUAL: Record<QuantityName, { title: string; bound: "at_least" | "at_most" | "value"; label: string; example: string }> = {
+interface Usual { title: string; bound: "at_least" | "at_most" | "value"; label: string; example: string }
+
+const USUAL: Record<QuantityName, Usual> = {
   gain: { title: "gain", bound: "at_least", label: "at least", example: "2" },
   travel: { title: "travel", bound: "at_least", label: "at least", example: "5 mm" },
   off_axis: { title: "off-axis motion", bound: "at_most", label: "at most", example: "10%" },
@@ -21,8 +23,10 @@ const USUAL: Record<QuantityName, { title: string; bound: "at_least" | "at_most"
   sag: { title: "sag under own weight", bound: "at_most", label: "at most", example: "10%" },
 };
 
+const INPUT_FORCE: Usual = { title: "input force", bound: "at_most", label: "at most", example: "1 N" };
+
 /** Quantities that are usually maximised. */
-const MAXIMISED: QuantityName[] = ["gain", "travel"];
+const MAXIMISED: string[] = ["gain", "travel"];
 
 /** The panel of the inputs, outputs or loads of the shown load case. */
 export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "loads"): HTMLElement {
@@ -131,11 +135,7 @@ function changeCase(editor: TaskEditor, changes: Partial<CaseTable>): void {
 function caseTools(editor: TaskEditor): HTMLElement {
   const { table } = editor.task;
   const own = table.cases[editor.loadCase]!;
-  const bounds = own.input_force?.[0] ?? {};
-  const force = (changes: Bounds): void => {
-    const next = cleaned({ ...bounds, ...changes });
-    changeCase(editor, { input_force: Object.keys(next).length ? [next, ...(own.input_force?.slice(1) ?? [])] : undefined });
-  };
+  const forces = own.input_force ?? [];
   const addCase = (): void => {
     const named = table.cases.map((each, k) => ({ ...each, name: each.name ?? `case ${k + 1}` }));
     editor.change({ ...table, cases: [...named, { name: `case ${named.length + 1}`, inputs: [], outputs: [] }] });
@@ -145,8 +145,9 @@ function caseTools(editor: TaskEditor): HTMLElement {
     editor.change({ ...table, cases: table.cases.filter((_, k) => k !== editor.loadCase) });
     editor.showCase(0);
   };
-  return h("details", { class: "more-case" }, h("summary", { "data-key": "case-more" }, "Input force, load cases"),
-    amount("case-force", "Input force at most", bounds.at_most, "N", (value) => force({ at_most: value })),
+  return h("details", { class: "more-case", ...(forces.length || table.cases.length > 1 ? { open: true } : {}) }, h("summary", { "data-key": "case-more" }, "Input force, load cases"),
+    ...forces.map((bounds, index) => itemRow(`case-force-${index}`, "input_force", INPUT_FORCE, bounds, (next) => changeCase(editor, { input_force: replaced(forces, index, next) }))),
+    button("Bound the input force", () => changeCase(editor, { input_force: [...forces, { at_most: INPUT_FORCE.example }] }), "quiet", { "data-key": "add-force" }),
     table.cases.length > 1 && nameField(editor, own),
     h("div", { class: "buttons" },
       button("Add a load case", addCase, "", { "data-key": "add-case" }),
@@ -160,14 +161,14 @@ function nameField(editor: TaskEditor, own: CaseTable): HTMLElement {
 function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HTMLElement[] {
   const key = `outputs-${target.index}`;
   const several = sectionsOf(editor.task.table, editor.loadCase, "outputs").length > 1;
-  const rows = QUANTITIES.flatMap((name) => (each[name] ?? []).map((bounds, index) => itemRow(editor, each, target, name, index, bounds)));
-  const unused = QUANTITIES.filter((name) => !each[name]?.length);
-  const options: [string, string][] = [["", "choose …"], ...unused.map((name): [string, string] => [name, USUAL[name].title]), ...(each.path || isSpatial(editor.task.table) ? [] : [["path", "path"] as [string, string]])];
+  const rows = QUANTITIES.flatMap((name) => (each[name] ?? []).map((bounds, index) => itemRow(`${key}-${name}-${index}`, name, USUAL[name], bounds, (next) => set(editor, target, { [name]: replaced(each[name], index, next) }))));
+  const options: [string, string][] = [["", "choose …"], ...QUANTITIES.map((name): [string, string] => [name, `${USUAL[name].title}${each[name]?.length ? ", in another range" : ""}`]), ...(each.path || isSpatial(editor.task.table) ? [] : [["path", "path"] as [string, string]])];
   const add = select(options, "", (name) => {
     if (!name) return;
     if (name === "path") { set(editor, target, { path: { arc: [20, 60] } }); return; }
     const { bound, example } = USUAL[name as QuantityName];
-    set(editor, target, { [name]: [name === "gain" ? { maximise: true } : { [bound]: example }] });
+    const known = each[name as QuantityName] ?? [];
+    set(editor, target, { [name]: [...known, name === "gain" && !known.length ? { maximise: true } : { [bound]: example }] });
   });
   add.dataset.key = `${key}-add`;
   add.setAttribute("aria-label", "Ask for");
@@ -182,33 +183,38 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
 }
 
 /** What is wanted of a quantity: its usual bound, whether it is maximised, and everything else on demand. */
-function itemRow(editor: TaskEditor, each: OutputTable, target: Target, name: QuantityName, index: number, bounds: Bounds): HTMLElement {
-  const { title, bound, label, example } = USUAL[name];
-  const key = `outputs-${target.index}-${name}-${index}`;
-  const put = (next: Bounds | null): void => {
-    const list = (each[name] ?? []).flatMap((old, k) => (k === index ? (next ? [cleaned(next)] : []) : [old]));
-    set(editor, target, { [name]: list.length ? list : undefined });
-  };
+function itemRow(key: string, name: string, { title, bound, label, example }: Usual, bounds: Bounds, put: (next: Bounds | null) => void): HTMLElement {
   const isMaximised = bounds.maximise === true || bounds.value === "maximise";
   const single = bounds.value === "maximise" ? undefined : bounds.value;
   const usual = single ?? (bound === "value" ? undefined : bounds[bound]);
   const plain = { ...bounds, value: undefined };
+  const canMaximise = MAXIMISED.includes(name);
   const maximise = h("input", { type: "checkbox", checked: isMaximised, "data-key": `${key}-maximise` });
   maximise.addEventListener("change", () => put({ ...plain, ...(usual === undefined ? {} : { [bound]: usual }), maximise: maximise.checked || undefined } as Bounds));
   const largest = h("label", { class: "tick" }, maximise, "as large as possible");
   const extra: (keyof Bounds)[] = ["at_least", "at_most", "target", "tolerance", "from", "to", "scale"];
   const labels: Record<string, string> = { at_least: "at least", at_most: "at most", target: "target", tolerance: "tolerance", from: "from (stroke)", to: "to (stroke)", scale: "scale" };
   const hasMore = extra.some((other) => other !== bound && bounds[other] !== undefined) || bounds.of !== undefined || bounds.minimise;
+  const own = single === undefined ? {} : { value: single };
+  const of = select([["", "every value"], ["largest", "the largest"], ["smallest", "the smallest"], ["spread", "the spread"]], bounds.of ?? "", (picked) => put({ ...plain, ...own, of: picked || undefined } as Bounds));
+  of.dataset.key = `${key}-of`;
   return h("div", { class: "item", "data-item": name },
     h("div", { class: "ask-line" },
       h("span", { class: "quantity" }, title),
       amount(key, label, usual, "", (value) => put(bound === "value" ? cleaned({ ...bounds, value }) : { ...plain, maximise: isMaximised || undefined, [bound]: value } as Bounds), usual === undefined && !isMaximised ? `such as ${example}` : ""),
       button("Remove", () => put(null), "quiet small", { "data-key": `${key}-drop`, "aria-label": `Remove ${title}` })),
-    MAXIMISED.includes(name) ? largest : null,
+    canMaximise ? largest : null,
     h("details", { ...(hasMore ? { open: true } : {}) }, h("summary", { "data-key": `${key}-more` }, "Other bounds"),
-      MAXIMISED.includes(name) ? null : largest,
+      canMaximise ? null : largest,
       h("div", { class: "row" }, ...extra.filter((other) => other !== bound).map((other) =>
-        amount(`${key}-${other}`, labels[other]!, bounds[other] as Amount | undefined, "", (value) => put({ ...plain, ...(single === undefined ? {} : { value: single }), [other]: value } as Bounds))))));
+        amount(`${key}-${other}`, labels[other]!, bounds[other] as Amount | undefined, "", (value) => put({ ...plain, ...own, [other]: value } as Bounds))),
+      field("In the range, bounds", of))));
+}
+
+/** A list of bounds with one of them replaced, or removed. */
+function replaced(list: Bounds[] | undefined, index: number, next: Bounds | null): Bounds[] | undefined {
+  const found = (list ?? []).flatMap((old, k) => (k === index ? (next ? [cleaned(next)] : []) : [old]));
+  return found.length ? found : undefined;
 }
 
 function pathRow(editor: TaskEditor, each: OutputTable, target: Target): HTMLElement {

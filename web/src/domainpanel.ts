@@ -5,7 +5,7 @@ import { bundledTask, emptySpaceTask, emptyTask, exampleTask } from "./begin";
 import { button, choice, count, field, h, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
-import { cleaned, isSpatial, resized, type Amount, type Domain, type Material, type Shape, type Table, type Task, type ZoneKind, type ZoneShape } from "./task";
+import { cleaned, isSpatial, resized, type Amount, type Domain, type Material, type OutputTable, type Shape, type Table, type Task, type ZoneKind, type ZoneShape } from "./task";
 
 /** Problems of the paper on whose lattices a part can be designed. */
 const LATTICES = ["crane", "anti-parallel", "pliers", "scaling-8", "scaling-12", "discs"];
@@ -98,7 +98,7 @@ export class DomainPanel {
       if (picked === "space" || isSpatial(table)) editor.open({ table: { ...(picked === "space" ? emptySpaceTask() : emptyTask()).table, name: table.name }, hand: null });
       else if (picked === "size") put({ size: [82, 72], ...zones });
       else if (picked === "outline") put({ outline: [[0, 0], [80, 0], [80, 40], [40, 40], [40, 70], [0, 70]], ...zones });
-      else if (picked === "problem") editor.change({ ...table, domain: { problem: "crane" }, supports: [], cases: table.cases.map((each) => ({ ...each, inputs: [], outputs: (each.outputs ?? []).map((output) => cleaned({ ...output, at: undefined, direction: undefined })) })) });
+      else if (picked === "problem") editor.change({ ...table, domain: { problem: "crane" }, supports: [], cases: table.cases.map((each) => ({ ...each, inputs: [], outputs: (each.outputs?.length ? each.outputs : [{ gain: [{ maximise: true }] }]).map((output: OutputTable) => cleaned({ ...output, at: undefined, direction: undefined })) })) });
     };
     const side = (index: 0 | 1 | 2) => (value: Amount | undefined): void => {
       const size = [...domain.size!] as number[];
@@ -121,9 +121,21 @@ export class DomainPanel {
         corners ? amount("domain-corners", "Corners, mm", corners.length > 40 ? undefined : corners.map((point) => point.join(", ")).join("; "), "", (value) => {
           const points = String(value ?? "").split(";").map((text) => text.split(",").map(Number) as [number, number]).filter((point) => point.length === 2 && point.every(Number.isFinite));
           if (points.length > 2) put({ ...domain, outline: points });
-        }, corners.length > 40 ? `${corners.length} corners of a drawing` : "x, y; x, y; …") : h("p", { class: "note" }, "A round outline."),
+        }, corners.length > 40 ? `${corners.length} corners of a drawing` : "x, y; x, y; …") : this.round(domain, put),
+        choice("Outline", [["corners", "Corners"], ["circle", "Circle"]] as ["corners" | "circle", string][], corners ? "corners" : "circle", (picked) =>
+          put({ ...domain, outline: picked === "circle" ? { circle: [40, 40], radius: 40 } : [[0, 0], [80, 0], [80, 40], [40, 40], [40, 70], [0, 70]] })),
         button("Read DXF or SVG", () => drawing.click(), "", { "data-key": "outline" }), drawing),
       kind === "problem" && field("Lattice", lattice, "", "With the supports, input and output of the paper unless you select others."));
+  }
+
+  /** Centre and radius of a round outline. */
+  private round(domain: Domain, put: (next: Domain) => void): HTMLElement {
+    const shape = domain.outline as Shape;
+    const centre = amount("domain-centre", "Centre x, y, mm", shape.circle?.join(", "), "", (value) => {
+      const read = String(value ?? "").split(",").map(Number);
+      if (read.length === 2 && read.every(Number.isFinite)) put({ ...domain, outline: { ...shape, circle: read as [number, number] } });
+    });
+    return h("div", { class: "row" }, centre, amount("domain-radius", "Radius", shape.radius, "mm", (value) => put({ ...domain, outline: { ...shape, radius: value ?? shape.radius! } })));
   }
 
   /** The lattice that fills a box. */
@@ -155,15 +167,17 @@ export class DomainPanel {
       field("Add", add));
   }
 
-  /** The numbers of a zone in space. */
+  /** The numbers of a zone, to correct what was drawn. */
   private zoneFields(kind: ZoneKind, index: number, shape: Shape): HTMLElement | null {
-    if (!isSpatial(this.editor.task.table)) return null;
     const { table } = this.editor.task;
-    const key = (["box", "sphere", "cylinder"] as const).find((name) => shape[name])!;
+    const key = (["box", "sphere", "cylinder", "circle"] as const).find((name) => shape[name]);
+    if (!key) return null;
     const put = (next: Shape): void => this.editor.change({ ...table, domain: { ...table.domain, [kind]: table.domain[kind]!.map((each, k) => (k === index ? next : each)) } });
-    const numbers = amount(`zone-${kind}-${index}-${key}`, { box: "x, y, z of two corners, mm", sphere: "Centre x, y, z, mm", cylinder: "Axis x, y, mm" }[key], (shape[key] as number[]).join(", "), "", (value) => {
+    const given = shape[key] as number[];
+    const labels = { box: given.length === 6 ? "x, y, z of two corners, mm" : "x, y of two corners, mm", sphere: "Centre x, y, z, mm", cylinder: "Axis x, y, mm", circle: "Centre x, y, mm" };
+    const numbers = amount(`zone-${kind}-${index}-${key}`, labels[key], given.join(", "), "", (value) => {
       const read = String(value ?? "").split(",").map(Number);
-      if (read.length === shape[key]!.length && read.every(Number.isFinite)) put({ ...shape, [key]: read });
+      if (read.length === given.length && read.every(Number.isFinite)) put({ ...shape, [key]: read });
     });
     return h("div", { class: "row" }, numbers, key === "box" ? null : amount(`zone-${kind}-${index}-radius`, "Radius", shape.radius, "mm", (value) => put({ ...shape, radius: value ?? shape.radius! })));
   }
@@ -188,10 +202,9 @@ export class DomainPanel {
   }
 }
 
-function shapeText({ circle, sphere, cylinder, radius, box, polygon }: Shape): string {
-  if (sphere) return `sphere, radius ${radius} mm`;
-  if (cylinder) return `upright cylinder, radius ${radius} mm`;
-  if (box?.length === 6) return "box";
-  if (circle) return `circle at ${circle.join(", ")} mm, radius ${radius} mm`;
-  return box ? `box from ${box.slice(0, 2).join(", ")} to ${box.slice(2).join(", ")} mm` : `polygon of ${polygon?.length ?? 0} corners`;
+function shapeText({ circle, sphere, cylinder, box, polygon }: Shape): string {
+  if (sphere) return "sphere";
+  if (cylinder) return "upright cylinder";
+  if (circle) return "circle";
+  return box ? "box" : `polygon of ${polygon?.length ?? 0} corners`;
 }

@@ -7,7 +7,7 @@ import type { Amount } from "./task";
 export function amount(
   key: string, label: string, value: Amount | undefined, unit: string, change: (value: Amount | undefined) => void, help = "",
 ): HTMLElement {
-  const input = h("input", { type: "text", inputmode: "decimal", value: value === undefined ? "" : shown(value), "data-key": key, maxlength: 40, size: 6 });
+  const input = h("input", { type: "text", inputmode: "decimal", value: value === undefined ? "" : shown(value), "data-key": key, maxlength: 2000, size: 6 });
   input.defaultValue = input.value;
   input.addEventListener("change", () => change(read(input.value)));
   return field(label, input, unit, help);

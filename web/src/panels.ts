@@ -81,6 +81,7 @@ export class Panels {
       this.open.add(editor.tool === "zones" ? "domain" : editor.tool);
     }
     const kept = this.kept();
+    const unfolded = [...this.element.querySelectorAll("details[open] > summary[data-key]")].map((summary) => (summary as HTMLElement).dataset.key!);
     clear(this.element,
       this.section("domain", "Part and domain", this.domain.summary(), () => this.domain.make()),
       this.section("supports", "Supports", this.nodeSummary("supports"), () => this.supports()),
@@ -92,6 +93,8 @@ export class Panels {
       editor.tool === "hand" && this.hand(),
       this.searchBox.make());
     this.showItems();
+    // What was unfolded stays so.
+    for (const key of unfolded) this.element.querySelector(`summary[data-key="${CSS.escape(key)}"]`)?.parentElement!.setAttribute("open", "");
     this.restore(kept);
   }
 
