@@ -24,7 +24,7 @@ USUAL = {
 }  # fmt: skip
 """Bound of a quantity that has the field beside its name."""
 TOOLS = {"supports": "Supports", "inputs": "Inputs", "outputs": "Outputs", "loads": "Loads"}
-SCAN = 9
+SCAN = 20
 """Distance of the points, in pixels, at which a drawing in space is searched for nodes."""
 
 
