@@ -68,7 +68,12 @@ def chromium() -> Iterator[Any]:
     """The browser, which can reach this machine only."""
     if CHROMIUM is None:
         pytest.skip("Chromium is not installed")
-    arguments = ["--no-sandbox", "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"]
+    arguments = [
+        "--no-sandbox",
+        "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",  # WebGL without a graphics processor
+    ]
     with playwright.sync_playwright() as started:
         browser = started.chromium.launch(executable_path=CHROMIUM, args=arguments)
         yield browser
