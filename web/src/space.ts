@@ -174,7 +174,8 @@ export class SpaceDrawing implements LatticeDrawing {
       const seen = point.clone().applyMatrix4(this.camera.matrixWorldInverse);
       half = Math.max(half, Math.abs(seen.y), (Math.abs(seen.x) * h) / w);
     }
-    half = MARGIN * half + 0.8;
+    // Arrows of a task extend beyond its nodes.
+    half = MARGIN * half + (this.canvas.getAttribute("role") === "application" ? 1.8 : 0.8);
     Object.assign(this.camera, { left: (-half * w) / h, right: (half * w) / h, top: half, bottom: -half, near: 0.01, far: 9 * this.radius });
     this.camera.updateProjectionMatrix();
   }
