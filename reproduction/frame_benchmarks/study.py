@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from reproduction.frame_benchmarks.definition import Benchmark
     from reproduction.result_store import ResultStore
 
-KINDS = {"linear": False, "shortened": True}
+KINDS = {"linear": False, "bowed": True}
 """Elements: linear in their deformations; shorter when they bend, as those of searches."""
 PATHS = {
     "lee-frame": (lee_force, 40, 58.0, LEE_LENGTH, "Lee's frame"),
@@ -141,7 +141,7 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
     """Draw the errors of both elements, and curves of the force and of the moment."""
     rows = figures["benchmarks"]
     charts = []
-    for kind, title in (("linear", "Linear elements"), ("shortened", "Elements with shortening")):
+    for kind, title in (("linear", "Linear elements"), ("bowed", "Elements with bowing")):
         series = [
             Series(
                 np.array(row["elements"], dtype=float),
@@ -208,7 +208,7 @@ def claims(figures: Mapping[str, Any]) -> list[Claim]:
                     reference_text(row, k),
                     f"{row['linear']['values'][-1][k]:.6g}",
                     f"{row['elements'][-1]} elements; error {percent(errors['linear'])}, with "
-                    f"shortening {percent(errors['shortened'])}",
+                    f"bowing {percent(errors['bowed'])}",
                 )
             )
     return rows

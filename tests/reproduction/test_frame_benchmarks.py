@@ -73,9 +73,9 @@ def test_the_shooting_solutions_are_those_of_the_record(name: str) -> None:
     assert exact() == pytest.approx(recorded["exact"], rel=1e-5)
 
 
-def test_elements_that_shorten_converge_at_fourth_order_where_the_axis_is_straight() -> None:
+def test_elements_with_bowing_converge_at_fourth_order_where_the_axis_is_straight() -> None:
     row: dict[str, Any] = measured(benchmarks["roll-up"], full=False)
-    for kind, order in (("linear", 2.0), ("shortened", 4.0)):
+    for kind, order in (("linear", 2.0), ("bowed", 4.0)):
         errors = np.array(largest(row[kind]["errors"]))
         assert np.log2(errors[:-1] / errors[1:]) == pytest.approx(order, abs=0.05)
 
@@ -94,6 +94,6 @@ def test_all_recorded_errors_are_below_a_tenth_of_a_percent() -> None:
     rows = json.loads(RECORD.read_text(encoding="utf-8"))["figures"]["benchmarks"]
     assert set(rows) == set(benchmarks)
     for row in rows.values():
-        for kind in ("linear", "shortened"):
+        for kind in ("linear", "bowed"):
             assert np.abs(row[kind]["errors"][-1]).max() < 1e-3
             assert np.abs(row[kind]["limit_errors"]).max() < 1e-3
