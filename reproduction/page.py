@@ -41,7 +41,8 @@ NOT_REPRODUCED = """\
 ## Parts that are not reproduced
 
 - Prints and measurements: no printer and no testing machine were available. Files for printing
-  are checked by reading and slicing them (`docs/fabrication.md`).
+  are checked by reading and slicing them (`docs/fabrication.md`). The models are compared with a
+  lattice that others printed and measured ([a measured lattice](measured.md)).
 - The full training of the paper's ResNet50: 8.7 million training samples require a GPU.
 - Machines that combine actuators: the paper reports no values; `docs/machines.md` describes
   ours.

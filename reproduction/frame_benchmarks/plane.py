@@ -144,10 +144,16 @@ benchmarks.register("lee-frame")(
         ],
         exact=lambda: [_exact_lee()],
         method="shooting, extensible",
-        full=(10, 20, 40, 80),
-        quick=(10, 20, 40),
+        published=(
+            Published(
+                values=(1.8532,), digits=4, elements=5,
+                source="Simo and Vu-Quoc 1986, 5 quadratic elements in each member, with shear",
+            ),
+        ),
+        full=(5, 10, 20, 40, 80),
+        quick=(5, 10, 20),
     )
-)
+)  # fmt: skip
 
 HALF_SPAN, RISE = 12.943, 0.386
 TOGGLE = Rigidity(1.885e6, 9.27e3)
@@ -240,6 +246,10 @@ benchmarks.register("arch")(
             Published(
                 values=(897.0,), digits=0,
                 source="DaDeppo and Schmidt 1975, Euler's theory, inextensible",
+            ),
+            Published(
+                values=(905.28,), digits=2, elements=40,
+                source="Simo and Vu-Quoc 1986, 40 linear elements",
             ),
         ),
         full=(20, 40, 80, 160),

@@ -64,7 +64,8 @@ def source_rows(figures: Mapping[str, Any]) -> Iterator[Row]:
             yield f"`{name}`", each["source"], published, *cells, exact
 
 
-def definition_rows() -> Iterator[Row]:
-    """Yield name, title, data, source and the method of the exact solution of all benchmarks."""
+def definition_lines() -> Iterator[str]:
+    """Yield an item of a list for each benchmark: title, data, source and exact solution."""
     for name, each in benchmarks.items():
-        yield f"`{name}`", each.title, each.data, each.source, each.method or "-"
+        text = f"- **`{name}`: {each.title}.** {each.data} Source: {each.source}."
+        yield text + (f" Exact solution: {each.method}." if each.method else "")
