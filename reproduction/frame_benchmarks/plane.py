@@ -86,7 +86,7 @@ def roll_up(count: int, bowed: bool, dimension: int = 2) -> Values:
 
 
 ROLL_UP = {
-    "source": "exact: the curvature of a beam under a moment is uniform",
+    "source": "closed form, the curvature of a beam under a moment is uniform",
     "quantities": ("u / L", "v / L"),
     "exact": lambda: [-1.0, 2.0 / math.pi],
     "method": "half a circle",

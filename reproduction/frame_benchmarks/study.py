@@ -231,11 +231,11 @@ def percent(error: float) -> str:
     Examples
     --------
     >>> percent(-0.000351), percent(2e-9)
-    ('-0.035 %', '0.0000 %')
+    ('-0.035 %', '< 0.0001 %')
     """
     value = 100.0 * error
     if abs(value) < 5e-5:
-        return "0.0000 %"
+        return "< 0.0001 %"
     return f"{value:.{4 if abs(value) < 0.01 else 3 if abs(value) < 1.0 else 2}f} %"
 
 
