@@ -1,4 +1,4 @@
-"""Reproduction of the figures and tables of the paper, Bonfanti et al. (2020).
+"""Reproduction of the figures and tables of the paper, Bonfanti et al. (2020), and comparisons.
 
 Each study is a module with full and quick settings. It computes plain figures from stored raw
 results, draws one picture, and compares the figures with the paper in rows. `run_study` writes
@@ -21,6 +21,8 @@ from reproduction import angular_springs
 from reproduction import learning
 from reproduction import regions
 from reproduction import rivals
+from reproduction.measured import study as measured
+from reproduction.frame_benchmarks import study as frame_benchmarks
 from reproduction.result_store import ResultStore
 from reproduction.records import draw_record, read_record, read_records, run_study
 from reproduction.registry import Claim, Study, studies
@@ -34,7 +36,9 @@ __all__ = [
     "angular_springs",
     "disorder",
     "draw_record",
+    "frame_benchmarks",
     "learning",
+    "measured",
     "paths",
     "read_record",
     "read_records",

@@ -33,13 +33,16 @@ of no value. Efficiencies of the paper are from finite elements and confirmed by
 noted. None of our designs has been printed.
 """
 
+PAGE = "paper"
+"""Name of this page."""
 RUNS = 100
 """Runs of each size in the scaling study of the paper."""
 NOT_REPRODUCED = """\
 ## Parts that are not reproduced
 
 - Prints and measurements: no printer and no testing machine were available. Files for printing
-  are checked by reading and slicing them (`docs/fabrication.md`).
+  are checked by reading and slicing them (`docs/fabrication.md`). The models are compared with a
+  lattice that others printed and measured ([a measured lattice](measured.md)).
 - The full training of the paper's ResNet50: 8.7 million training samples require a GPU.
 - Machines that combine actuators: the paper reports no values; `docs/machines.md` describes
   ours.
@@ -52,10 +55,11 @@ def page_of(records: Mapping[str, Mapping[str, Any]], pictures: str = "") -> str
     Parameters
     ----------
     records
-        Records of studies by name.
+        Records of studies by name; those of other pages are left out.
     pictures
         Path of the pictures relative to the page.
     """
+    records = {name: record for name, record in records.items() if studies[name].page == PAGE}
     parts = [INTRODUCTION, _overview(records)]
     parts += [_section(record, pictures) for record in records.values()]
     runs = records["scaling"]["figures"]["runs"] if "scaling" in records else [RUNS]

@@ -1,4 +1,4 @@
-"""Studies: parts of the paper, each reproduced by one command."""
+"""Studies: parts of the paper and comparisons, each computed by one command."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ class Claim:
     what
         The compared quantity.
     paper
-        Value of the paper; empty if it gives none.
+        Value of the paper, or the reference of a study that is not part of it; empty if there is
+        none.
     ours
         Value of this package.
     note
@@ -45,7 +46,7 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """The reproduction of one figure or table of the paper.
+    """The reproduction of one figure or table of the paper, or a comparison beside it.
 
     Parameters
     ----------
@@ -67,6 +68,9 @@ class Study:
         Function of the figures that returns the computed amount as text.
     deviations
         Differences from the procedure of the paper, as sentences.
+    page
+        Page of the documentation that shows the record, without suffix: ``"paper"`` for parts of
+        the paper and comparisons with it.
     """
 
     name: str
@@ -79,6 +83,7 @@ class Study:
     claims: Callable[[Mapping[str, Any]], list[Claim]]
     runs: Callable[[Mapping[str, Any]], str]
     deviations: tuple[str, ...] = ()
+    page: str = "paper"
 
 
 studies: Registry[Study] = Registry("study")

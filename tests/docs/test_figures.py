@@ -23,6 +23,8 @@ from benchmarks.space import cost_rows, mesh_rows, task_rows
 from benchmarks.tasks import counts, summary
 from benchmarks.tolerance import redundant_table, robust_table
 from benchmarks.tolerance import table as tolerance_rows
+from reproduction.frame_benchmarks import tables as frame_benchmarks
+from reproduction.measured import tables as measured
 from tools.draw_tasks import best, identity, identity_in, recorded_runs
 
 ROOT = Path(__file__).parents[2]
@@ -296,10 +298,35 @@ def space() -> Rows:
     yield from inverter_rows(read("space/inverters")["runs"])
 
 
+def published_benchmarks() -> Rows:
+    figures = read("studies/benchmarks")["figures"]
+    for rows in (
+        frame_benchmarks.value_rows, frame_benchmarks.convergence_rows,
+        frame_benchmarks.source_rows,
+    ):  # fmt: skip
+        for cells in rows(figures):
+            yield row(*cells)
+    yield from frame_benchmarks.definition_lines()
+
+
+def measured_lattice() -> Rows:
+    figures = read("studies/measured")["figures"]
+    for rows in (
+        measured.output_rows,
+        measured.gradient_rows,
+        measured.effect_rows,
+        measured.noise_rows,
+    ):
+        for cells in rows(figures):
+            yield row(*cells)
+
+
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (competition, cost_of_searches, sizes, move_comparison),
     "best": (best_designs,),
     "tolerance": (tolerances,),
+    "benchmarks": (published_benchmarks,),
+    "measured": (measured_lattice,),
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),

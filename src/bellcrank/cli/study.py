@@ -108,9 +108,12 @@ def _print_list(*, as_json: bool) -> None:
 
 
 def _print(record: Mapping[str, Any]) -> None:
-    """Print the comparison with the paper."""
+    """Print the comparison with the paper, or with another reference."""
+    from reproduction import studies
+
     results.print(f"[b]{plain(record['title'])}[/] ({record['mode']}; {plain(record['runs'])})")
-    table = Table("quantity", "paper", "bellcrank", box=SIMPLE)
+    of_paper = studies[record["study"]].page == "paper"
+    table = Table("quantity", "paper" if of_paper else "reference", "bellcrank", box=SIMPLE)
     for row in record["comparison"]:
         table.add_row(plain(row["what"]), plain(row["paper"] or "–"), plain(row["ours"]))
     results.print(table)

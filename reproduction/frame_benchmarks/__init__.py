@@ -1,0 +1,1 @@
+"""Published benchmarks of frames under large displacements, and their exact solutions."""

@@ -1,0 +1,1 @@
+"""A printed triangular lattice that others measured, by springs, frames and the sheet."""
