@@ -8,11 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from bellcrank.model import pack_mask, problem_from_dict
+from bellcrank.export.slicer import has_slicer
+from bellcrank.model import Design, pack_mask, problem_from_dict, unpack_mask
+from bellcrank.part import PartSpec
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import find_task
 from bellcrank.web.page_files import page_files
 from bellcrank.web.requests import RunBody
+from bellcrank.workflows.fabricate import (
+    Grips,
+    bundle_of,
+    contacts_of,
+    profile_for,
+    size_and_volume,
+)
 
 from .conftest import wait_for
 from .test_api import refusal
@@ -136,3 +145,45 @@ def test_a_part_in_space_is_reported_played_and_written(client: TestClient) -> N
     table = client.post("/api/tasks/from-problem", json={"problem": entry["problem"]}).json()
     again = client.post("/api/tasks/build", json={"task": table}).json()
     assert again["lattice"]["positions"] == built["lattice"]["positions"]
+
+
+def test_struts_that_touch_are_named(client: TestClient, crane: dict[str, Any]) -> None:
+    body = {"problem": crane["problem"], "mask": crane["mask"]}
+    part = {"width": 2.0, "thickness": 5.0, "scale": 10.0, "material": "ninjaflex"}
+    found = client.post("/api/part", json={**body, "part": part}).json()
+    wide = client.post("/api/part", json={**body, "part": {**part, "width": 4.0}}).json()
+    for summary, width in ((found, 2.0), (wide, 4.0)):
+        problem = problem_from_dict(crane["problem"])
+        design = Design(problem, unpack_mask(crane["mask"], problem.lattice.beam_count))
+        contacts = contacts_of(PartSpec(width=width).of(design))
+        assert summary["touching"] == np.unique(contacts.pairs).tolist()
+        assert any("touch" in each for each in summary["remarks"]) == bool(summary["touching"])
+    assert wide["touching"]
+
+
+def test_a_part_of_an_own_material_has_remarks(client: TestClient, crane: dict[str, Any]) -> None:
+    own = {"name": "own", "young": 12.0, "poisson": 0.45, "density": 1.2, "strain_limit": 0.3}
+    part = {"width": 2.0, "thickness": 5.0, "scale": 10.0, "material": own}
+    body = {"problem": crane["problem"], "mask": crane["mask"], "part": part}
+    answer = client.post("/api/part", json=body)
+    assert answer.status_code == 200
+    assert answer.json()["mass"] > 0.0
+
+
+@pytest.mark.skipif(not has_slicer(), reason="no slicer is installed")
+def test_the_print_time_is_that_of_the_command(client: TestClient, crane: dict[str, Any]) -> None:
+    assert client.get("/api/about").json()["slicer"]
+    part = PartSpec()
+    body = {"problem": crane["problem"], "mask": crane["mask"], "part": part.to_dict()}
+    found = client.post("/api/print", json=body).json()
+    design = Design(
+        problem_from_dict(crane["problem"]),
+        unpack_mask(crane["mask"], len(crane["problem"]["beams"])),
+    )
+    profile = profile_for(None, part)
+    bundle = bundle_of(design, part, Grips(), layer=profile.layer)
+    assert found["layers"] == round(bundle.thickness / profile.layer)
+    assert 10.0 < found["minutes"] < 600.0
+    assert found["mass"] == pytest.approx(
+        size_and_volume(bundle)[1] * part.registered_material.density / 1000.0, rel=0.01
+    )

@@ -2,7 +2,7 @@
 
 import { isInSpace, modelOf, post, type Motion, type Problem, type ToleranceFound } from "./api";
 import { bitsOf } from "./api";
-import { binned, BINS, Drawing, markRegions, sectionOf, where, type LatticeDrawing } from "./drawing";
+import { binned, BINS, Drawing, markRegions, sectionOf, where, type Group, type LatticeDrawing } from "./drawing";
 import { loadSpace } from "./loadspace";
 import { choice, clear, field, figure, h, icon, s } from "./dom";
 import { sentence } from "./text";
@@ -36,6 +36,7 @@ export class Player {
   private began = 0;
   private updated = 0;
   private sensitivity: Sensitivity | null = null;
+  private touching = new Set<number>();
   private losses: ToleranceFound["losses"] | null = null;
   private picture: Picture | null = null;
   private shares = new Float64Array(0);
@@ -142,6 +143,19 @@ export class Player {
       groups[loss === null ? "effect-broken" : loss > 0.5 ? "effect-3" : loss > 0.3 ? "effect-2" : loss > 0.1 ? "effect-1" : "effect-none"]!.push(beam);
     }
     return Object.entries(groups).map(([name, list]) => ({ name, beams: list }));
+  }
+
+  /** Mark struts that touch others along the stroke. */
+  showTouching(beams: number[]): void {
+    this.touching = new Set(beams);
+    this.show();
+  }
+
+  /** Groups of struts, with those that touch in one of their own. */
+  private marked(groups: Group[]): Group[] {
+    if (!this.touching.size) return groups;
+    const others = groups.map(({ name, beams }) => ({ name, beams: Array.from(beams).filter((beam) => !this.touching.has(beam)) }));
+    return [...others, { name: "touching", beams: this.beams.filter((beam) => this.touching.has(beam)) }];
   }
 
   showStress(picture: Picture | null): void {
@@ -251,8 +265,8 @@ export class Player {
     if (stressed) drawing.draw([]);
     else if (this.colour === "sensitivity" && this.sensitivity) drawing.draw(this.effects(this.sensitivity));
     else if (this.colour === "loss" && this.losses) drawing.draw(this.lossGroups(this.losses));
-    else if (this.colour === "energy" && energy) drawing.draw(binned(this.beams, energy));
-    else drawing.draw([{ name: "plain", beams: this.beams }]);
+    else if (this.colour === "energy" && energy) drawing.draw(this.marked(binned(this.beams, energy)));
+    else drawing.draw(this.marked([{ name: "plain", beams: this.beams }]));
     if (stressed) for (const name of ["support", "input", "output"]) drawing.mark(name, []);
     else if (motion) {
       drawing.mark("support", motion.supports);
@@ -313,7 +327,9 @@ export class Player {
       loss: "The loss of a strut costs: pale up to 10 % of the efficiency, then up to 30 %, up to 50 %, darkest more. Violet: the full stroke is not reached without it.",
       stress: this.picture ? `Von Mises stress, up to ${figure(Math.max(...sample(this.picture.stress)), 2)} MPa.` : "Check with finite elements to compute the stress.",
     };
-    if (this.legend.textContent !== texts[this.colour]) this.legend.textContent = texts[this.colour];
+    const touching = this.touching.size && (this.colour === "plain" || this.colour === "energy") ? ` Bright red: ${this.touching.size} struts touch others along the stroke.` : "";
+    const text = `${texts[this.colour]}${touching}`;
+    if (this.legend.textContent !== text) this.legend.textContent = text;
   }
 
   private drawStress({ points, cells, corners, stress }: Picture): void {

@@ -3,7 +3,7 @@
 import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
-import { button, clear, download, field, figure, h, number, select } from "./dom";
+import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
 import { Player, type Picture } from "./player";
 import { figureTable, itemTable, verdictOf, type Column } from "./specification";
 import type { Table } from "./task";
@@ -28,7 +28,8 @@ export interface Subject {
 }
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null }
-interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[] }
+interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[] }
+interface Print { minutes: number | null; layers: number; layer_mm: number; mass: number | null; slicer: string; profile: string }
 
 /** Effort of a search that begins with a design. */
 const CONTINUED = { steps: 8000, chains: 2 };
@@ -53,6 +54,8 @@ export class Result {
   private fems: Record<string, Fem | "running" | string> = {};
   private registries: Registries | null = null;
   private remarks: Remarks | null = null;
+  private hasSlicer = false;
+  private print: Print | "running" | string | null = null;
   private writing = "";
 
   constructor(private readonly subject: Subject) {
@@ -72,6 +75,7 @@ export class Result {
     this.showFiles();
     void this.describe();
     void this.loadReport();
+    void get<{ slicer: boolean }>("/about").then(({ slicer }) => { this.hasSlicer = slicer; this.showPart(); }, () => undefined);
     if (this.isPart) void this.validate("frame", false);
     void fetchRegistries().then((found) => {
       this.registries = found;
@@ -228,6 +232,7 @@ export class Result {
       this.part = { ...this.part, ...changes };
       this.fems = {};
       this.tolerance = null;
+      this.print = null;
       this.showTolerance();
       void this.describe();
       void this.loadReport();
@@ -248,9 +253,32 @@ export class Result {
       fault && h("p", { class: "fault", role: "alert" }, fault),
       remarks && h("p", { class: "more" }, `${remarks.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ")} mm`,
         remarks.mass === null ? "" : `, ${figure(remarks.mass, 1)} g`, remarks.stroke === null ? "" : `, stroke ${figure(remarks.stroke, 2)} mm`),
+      remarks && this.hasSlicer && this.printTime(),
       remarks && remarks.remarks.length > 0 && h("details", { class: "remarks" },
         h("summary", {}, `${remarks.remarks.length} ${remarks.remarks.length === 1 ? "remark" : "remarks"} on printing`),
         h("ul", {}, ...remarks.remarks.map((text) => h("li", {}, sentence(text))))));
+  }
+
+  /** The printing time, which the slicer takes some seconds to estimate. */
+  private printTime(): HTMLElement {
+    const { print } = this;
+    if (print === null) return h("p", {}, button("Compute the print time", () => void this.slice(), "quiet small", { "data-key": "print" }));
+    if (print === "running") return h("p", { class: "more" }, h("span", { class: "working" }), "slicing …");
+    if (typeof print === "string") return h("p", { class: "fault", role: "alert" }, print);
+    return h("p", { class: "more", "data-print": "yes" }, `Printed in ${duration(print.minutes === null ? null : 60 * print.minutes)}`,
+      `, ${count(print.layers, "layer")} of ${print.layer_mm} mm${print.mass === null ? "" : `, ${figure(print.mass, 1)} g`} (${print.slicer}, profile ${print.profile})`);
+  }
+
+  private async slice(): Promise<void> {
+    const { problem, mask } = this.subject;
+    this.print = "running";
+    this.showPart();
+    try {
+      this.print = await post<Print>("/print", { problem, mask, part: this.part });
+    } catch (error) {
+      this.print = sentence((error as ServerError).message);
+    }
+    this.showPart();
   }
 
   private fixedPart(): HTMLElement {
@@ -264,6 +292,7 @@ export class Result {
     const { problem, mask } = this.subject;
     try {
       this.remarks = await post<Remarks>("/part", { problem, mask, part: this.part });
+      this.player.showTouching(this.remarks.touching);
       this.showPart();
     } catch (error) {
       this.remarks = null;

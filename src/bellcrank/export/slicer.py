@@ -50,6 +50,11 @@ class Sliced:
     slicer: str
 
 
+def has_slicer() -> bool:
+    """Return whether a slicer is installed."""
+    return any(map(shutil.which, NAMES))
+
+
 def find_slicer(given: str | None = None) -> str:
     """Return the path of the slicer.
 

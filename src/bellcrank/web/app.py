@@ -17,6 +17,7 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from bellcrank import __version__
 from bellcrank.errors import BellcrankError, CorruptRun, StorageError, UnknownName, first_line
+from bellcrank.export.slicer import has_slicer
 from bellcrank.processes import default_workers
 from bellcrank.web import design_routes, quick_calls, run_routes, task_routes
 from bellcrank.web.errors import plain_error
@@ -98,6 +99,7 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
             "ready": state.ready,
             "error": state.error,
             "processors": default_workers(),
+            "slicer": has_slicer(),
             "searches": state.scheduler.slots,
             "running": len(state.scheduler.running),
             "queued": len(state.scheduler.queue),

@@ -62,6 +62,12 @@ async def describe_part(body: PartBody, state: State) -> dict[str, Any]:
     return await _computed(state.pools.thorough, slow_calls.part_summary, body, body.part)
 
 
+@router.post("/print")
+async def estimate_print(body: PartBody, state: State) -> dict[str, Any]:
+    """Return printing time, layers and mass of the part of a design by the slicer."""
+    return await _computed(state.pools.slow, slow_calls.print_estimate, body, body.part)
+
+
 @router.post("/response")
 async def get_response(body: PartBody, state: State) -> dict[str, Any]:
     """Return the response of a design, verified along the whole stroke."""

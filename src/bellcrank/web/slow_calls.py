@@ -13,6 +13,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
+import numpy as np
+
 from bellcrank.errors import InvalidFile, InvalidSettings
 from bellcrank.fem.results import finite
 from bellcrank.model import problem_to_dict, write_design
@@ -112,6 +114,7 @@ def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     from bellcrank.workflows.fabricate import (
         Grips,
         bundle_of,
+        contacts_of,
         print_warnings,
         profile_for,
         size_and_volume,
@@ -120,13 +123,51 @@ def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     spec = PartSpec.from_dict(part)
     bundle = bundle_of(design_of(text, mask), spec, Grips(), layer=0.32)
     size, volume = size_and_volume(bundle)
+    contacts = contacts_of(bundle.part)
     mass = volume * bundle.part.material.density / 1000.0
     return {
         "size": [round(length, 3) for length in size],
         "volume": round(volume / 1000.0, 3),
         "mass": round(mass, 2) if math.isfinite(mass) else None,
         "stroke": bundle.part.stroke if math.isfinite(bundle.part.stroke) else None,
-        "remarks": print_warnings(bundle, profile_for(None, spec)),
+        "remarks": print_warnings(bundle, profile_for(_profile_name(spec), spec), contacts),
+        "touching": np.unique(contacts.pairs).tolist(),
+    }
+
+
+def _profile_name(spec: PartSpec) -> str:
+    """Return the print profile of a material; for others that of the usual material."""
+    from bellcrank.export.profiles import profiles
+    from bellcrank.part import PartSpec
+
+    name = spec.registered_material.name
+    return name if name in profiles else str(PartSpec().material)
+
+
+def print_estimate(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
+    """Return printing time, layers and mass of a part by the slicer, with the usual profile.
+
+    Raises
+    ------
+    InvalidSettings
+        If there is no slicer.
+    """
+    from bellcrank.part import PartSpec
+    from bellcrank.workflows.fabricate import Grips, bundle_of, print_design, profile_for
+
+    spec = PartSpec.from_dict(part)
+    profile = profile_for(None, spec)
+    bundle = bundle_of(design_of(text, mask), spec, Grips(), layer=profile.layer)
+    with TemporaryDirectory(prefix="bellcrank-") as folder:
+        job = print_design(bundle, profile, Path(folder) / "part.gcode")
+    deposit = job.sliced.deposit
+    return {
+        "minutes": finite(deposit.seconds / 60.0),
+        "layers": deposit.layers,
+        "layer_mm": profile.layer,
+        "mass": finite(job.mass),
+        "slicer": job.sliced.slicer,
+        "profile": profile.name,
     }
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from bellcrank.export.profiles import PrintProfile
     from bellcrank.export.slicer import Sliced
+    from bellcrank.fem.contact import Contacts
     from bellcrank.model import Design
     from bellcrank.part import Part, PartSpec
     from bellcrank.part.outline import Outline
@@ -172,18 +173,33 @@ def size_and_volume(bundle: Export) -> tuple[tuple[float, float, float], float]:
     return (right - left, top - bottom, bundle.thickness), outline.area * bundle.thickness
 
 
-def print_warnings(bundle: Export, profile: PrintProfile) -> list[str]:
-    """Return warnings about printing and motion of a part, as sentences."""
-    part = bundle.part
-    sentences = [warning.sentence for warning in check_print(bundle, profile.rules)]
-    sentences += connection_warnings(part.design)
+def contacts_of(part: Part) -> Contacts:
+    """Return the struts of a part that touch or cross along its stroke."""
     evaluator = StrokeEvaluator(model_evaluator(part.design.problem))
     stroke = (
         (load, centre_lines((part.positions + part.scale * displacement)[part.struts]))
         for load, displacement in evaluator.displacements(part.design.mask)
     )
     beams, rest = np.flatnonzero(part.design.mask), centre_lines(part.positions[part.struts])
-    contacts = find_contacts(beams, rest, stroke, part.widths)
+    return find_contacts(beams, rest, stroke, part.widths)
+
+
+def print_warnings(
+    bundle: Export, profile: PrintProfile, contacts: Contacts | None = None
+) -> list[str]:
+    """Return warnings about printing and motion of a part, as sentences.
+
+    Parameters
+    ----------
+    bundle, profile
+        The part, and settings of printer and filament.
+    contacts
+        Struts that touch, if they are known.
+    """
+    part = bundle.part
+    sentences = [warning.sentence for warning in check_print(bundle, profile.rules)]
+    sentences += connection_warnings(part.design)
+    contacts = contacts_of(part) if contacts is None else contacts
     if len(contacts.pairs):
         sentences.append(contacts.message)
     return sentences
