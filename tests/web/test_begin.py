@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from bellcrank.export.slicer import has_slicer
-from bellcrank.model import Design, pack_mask, problem_from_dict, unpack_mask
+from bellcrank.model import (
+    Design,
+    gallery_design,
+    pack_mask,
+    problem_from_dict,
+    unpack_mask,
+)
 from bellcrank.part import PartSpec
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import find_task
@@ -147,18 +153,18 @@ def test_a_part_in_space_is_reported_played_and_written(client: TestClient) -> N
     assert again["lattice"]["positions"] == built["lattice"]["positions"]
 
 
-def test_struts_that_touch_are_named(client: TestClient, crane: dict[str, Any]) -> None:
-    body = {"problem": crane["problem"], "mask": crane["mask"]}
-    part = {"width": 2.0, "thickness": 5.0, "scale": 10.0, "material": "ninjaflex"}
-    found = client.post("/api/part", json={**body, "part": part}).json()
-    wide = client.post("/api/part", json={**body, "part": {**part, "width": 4.0}}).json()
-    for summary, width in ((found, 2.0), (wide, 4.0)):
-        problem = problem_from_dict(crane["problem"])
-        design = Design(problem, unpack_mask(crane["mask"], problem.lattice.beam_count))
-        contacts = contacts_of(PartSpec(width=width).of(design))
+def test_struts_that_touch_are_named(client: TestClient) -> None:
+    entry = client.get("/api/gallery/builtin/machine-anti-parallel").json()
+    body = {"problem": entry["problem"], "mask": entry["mask"]}
+    design = gallery_design("machine", "anti-parallel")
+    assert design is not None
+    for width, pairs in ((1.0, 0), (4.0, 9)):
+        part = PartSpec(width=width)
+        summary = client.post("/api/part", json={**body, "part": part.to_dict()}).json()
+        contacts = contacts_of(part.of(design))
+        assert len(contacts.pairs) == pairs
         assert summary["touching"] == np.unique(contacts.pairs).tolist()
-        assert any("touch" in each for each in summary["remarks"]) == bool(summary["touching"])
-    assert wide["touching"]
+        assert any("touch" in each for each in summary["remarks"]) == bool(pairs)
 
 
 def test_a_part_of_an_own_material_has_remarks(client: TestClient, crane: dict[str, Any]) -> None:
