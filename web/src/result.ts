@@ -397,5 +397,5 @@ export function partOf(subject: Subject): Part {
 /** Load a design of the gallery. */
 export async function designSubject(source: string, key: string): Promise<Subject> {
   const whole = await get<{ title: string; problem: Problem; note: string; mask: string; efficiency: number | null; provenance: Record<string, unknown> }>(`/gallery/${encodeURIComponent(source)}/${encodeURIComponent(key)}`);
-  return { ...whole, comparison: null, part: null, history: null, plan: source === "machines" ? key : null, task: null, place: [source, key] };
+  return { ...whole, comparison: null, part: null, history: null, plan: source === "machines" && !isInSpace(whole.problem) ? key : null, task: null, place: [source, key] };
 }

@@ -107,7 +107,7 @@ class Machines:
 
 
 def _machines() -> Iterator[Entry]:
-    for name in machines_in(2):
+    for name in (*machines_in(2), *machines_in(3)):
         machine = bundled_machine(name)
         table = machine.plan.table
         note = f"{table.about}; {bundled_contact(name).message}"
