@@ -25,6 +25,7 @@ export class Player {
   private readonly stress = s("g", { class: "stress" });
   private readonly paper = h("div", { class: "paper" }, this.readout);
   private inSpace: boolean;
+  private drawn = 0;
   private readonly cases = h("div", { class: "cases" });
   private loadCase = "";
   private motion: Motion | null = null;
@@ -64,6 +65,7 @@ export class Player {
 
   /** Show the design flat, or in space. */
   private async draw(): Promise<void> {
+    const asked = ++this.drawn;
     let drawing: LatticeDrawing;
     try {
       drawing = this.inSpace ? await loadSpace("The design", sectionOf(this.problem)) : new Drawing("The design");
@@ -72,6 +74,7 @@ export class Player {
       this.onError(sentence((error as Error).message));
       return;
     }
+    if (asked !== this.drawn) { drawing.close(); return; } // closed, or switched back meanwhile
     this.drawing?.element.remove();
     this.drawing?.close();
     this.drawing = drawing;
@@ -98,6 +101,7 @@ export class Player {
 
   close(): void {
     this.stop();
+    this.drawn++;
     this.drawing?.close();
   }
 

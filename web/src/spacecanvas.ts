@@ -32,13 +32,17 @@ export class SpaceCanvas implements TaskDrawing {
   private layers: { name: string; nodes: number[] }[] = [];
   private cursor = -1;
   private response: { displacement: number[]; beams: number[] } | null = null;
+  private isClosed = false;
   private pressed: [number, number] | null = null;
 
   constructor(private readonly actions: CanvasActions) {
     this.element.append(this.bar, this.tip);
   }
 
-  close(): void { this.drawing?.close(); }
+  close(): void {
+    this.isClosed = true;
+    this.drawing?.close();
+  }
 
   /** The canvas, which has the keyboard. */
   focus(): void { this.drawing?.canvas.focus({ preventScroll: true }); }
@@ -53,6 +57,7 @@ export class SpaceCanvas implements TaskDrawing {
       this.element.append(h("p", { class: "fault", role: "alert" }, sentence((error as Error).message)));
       return;
     }
+    if (this.isClosed) { drawing.close(); return; }
     this.drawing = drawing;
     const { canvas } = drawing;
     canvas.setAttribute("role", "application");
