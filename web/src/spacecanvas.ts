@@ -44,9 +44,6 @@ export class SpaceCanvas implements TaskDrawing {
     this.drawing?.close();
   }
 
-  /** The canvas, which has the keyboard. */
-  focus(): void { this.drawing?.canvas.focus({ preventScroll: true }); }
-
   private async open(view: View): Promise<void> {
     const { problem, part } = view.built;
     const section = problem ? sectionOf(problem) : { width: part.width / part.scale };
