@@ -17,6 +17,7 @@ from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder, kinds
 from benchmarks.competition import best_rows, step_rows, table_rows
 from benchmarks.inverters import rows_of as inverter_rows
+from benchmarks.measure import table as measure_rows
 from benchmarks.refinement import mass_rows, specified_rows
 from benchmarks.size import table as size_rows
 from benchmarks.space import cost_rows, mesh_rows, task_rows
@@ -69,6 +70,10 @@ def tolerances() -> Rows:
     yield from tolerance_rows(read("tolerance")["runs"])
     yield from robust_table(read("tasks/robust")["runs"])
     yield from redundant_table(read("tasks/robust")["runs"], recorded_runs())
+
+
+def measurements() -> Rows:
+    yield from measure_rows(read("benchmarks/measure"))
 
 
 def move_comparison() -> Rows:
@@ -300,6 +305,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "searches": (competition, cost_of_searches, sizes, move_comparison),
     "best": (best_designs,),
     "tolerance": (tolerances,),
+    "measure": (measurements,),
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),
@@ -343,6 +349,7 @@ NOT_MEASURED = {
     "| setting | default | meaning |",
     "| key | default | |",
     "| machine | parts | what it does |",
+    "| film | reason that is given |",
     "| name | E, MPa | Poisson's ratio | density, g/cm³ | strain limit | sources |",
 }
 """Heads of tables whose numbers are names, parts of the program, or have their sources beside."""
