@@ -184,6 +184,7 @@ def test_export_writes_markers_that_measure_reads(film: Path, tmp_path: Path) ->
         (("other.vtu", "--markers"), "expected a file for making the part"),
     ):
         assert reason in refusal("export", DESIGN, *words)
+    assert "the input is a force" in refusal("export", "machine:pliers", "p.svg", "--markers")
 
 
 def test_the_printed_sheet_has_its_true_size(tmp_path: Path) -> None:

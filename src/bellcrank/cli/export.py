@@ -153,6 +153,10 @@ def export(
         raise InvalidSettings("marker-size: expected --markers as well")
     height = read_length("layer", layer)
     check_folder(out)
+    if markers:
+        from bellcrank.workflows.measure import check_measurable
+
+        check_measurable(chosen)
     if moved:
         announce_compilation()
     whole = out.suffix.lower() in (*PRINTED, *CUT)

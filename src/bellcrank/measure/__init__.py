@@ -9,7 +9,7 @@
 >>> part = PartSpec().of(human_design("crane"))
 >>> layout = marker_layout(part, part.positions[None])
 >>> [round(side) for side in layout.frame_size]
-[170, 146]
+[164, 143]
 """
 
 from bellcrank.measure.by_markers import measure_by_markers

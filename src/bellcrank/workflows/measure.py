@@ -87,6 +87,24 @@ class ComputedMotion:
         return CubicSpline(self.motion.input, values, axis=0)
 
 
+def check_measurable(design: Design) -> None:
+    """Check that a film shows the efficiency of a design.
+
+    Raises
+    ------
+    InvalidProblem
+        If the part is in space.
+    InvalidSettings
+        If the input is a force.
+    """
+    require_plane(design.problem, "measurements")
+    if design.problem.input.drive != "displacement":
+        raise InvalidSettings(
+            f"{design.problem.name}: the input is a force, which a film does not show; expected a "
+            "design whose input is a displacement"
+        )
+
+
 def computed_motion(
     design: Design, spec: PartSpec, report: Callable[[int], None] = lambda _done: None
 ) -> ComputedMotion:
@@ -97,14 +115,10 @@ def computed_motion(
     InvalidProblem
         If the part is in space.
     InvalidSettings
-        If it has no stable equilibrium at its full stroke, or the input turns back on the way.
+        If the input is a force or turns back on the way, or there is no stable equilibrium at
+        the full stroke.
     """
-    require_plane(design.problem, "measurements")
-    if design.problem.input.drive != "displacement":
-        raise InvalidSettings(
-            f"{design.problem.name}: the input is a force, which a film does not show; expected a "
-            "design whose input is a displacement"
-        )
+    check_measurable(design)
     if design.problem.section is None:
         design = replace(design, problem=frame_problem(design.problem, spec))
     part, problem = spec.of(design), design.problem
