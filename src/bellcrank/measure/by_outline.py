@@ -42,8 +42,9 @@ BLURS = (1.2, 0.5, 0.2)
 STEPS = 12
 POINTS, ROW = 4000, 256
 """About the largest number of points of a block, and how many are sampled at once."""
-LARGEST_MISFIT = 0.35
-"""Difference of an aligned block from the first picture, over its contrast, that is refused."""
+LARGEST_MISFIT = 0.25
+"""Difference of an aligned block from the first picture, over that of part and background, that
+is refused."""
 MOVED_SUPPORT = 0.4
 """Motion of the supports that is refused, mm, if it is also a fifth of that of the input."""
 FLOOR = 0.05
@@ -298,8 +299,7 @@ def _aligned(
             misfit = float(np.sqrt((weight * rest**2).sum() / weight.sum()))
             if np.hypot(*change[:2]) + arm * abs(change[2]) < 0.002 * blur:
                 break
-    contrast = float(np.ptp(np.quantile(templates[-1][np.isfinite(templates[-1])], [0.1, 0.9])))
-    return motion, misfit / max(contrast, 1e-6)
+    return motion, misfit
 
 
 def _corners(blocks: list[Block], motions: Values) -> Values:
