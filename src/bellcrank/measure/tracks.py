@@ -28,6 +28,8 @@ LEAST_SPREAD = 0.15
 """Smallest ratio of the spreads of reference markers in two directions."""
 LARGEST_RESIDUAL = 2.0
 """Median distance of corners of reference markers from the sheet that is refused, pixels."""
+LATEST_START = 1
+"""Latest number of the first frame that shows all markers: motions are those from rest."""
 PARTLY_COVERED = 0.35
 """Deviation of the area of a marker from its median above which it is covered in part."""
 BLURRED = 0.45
@@ -127,6 +129,11 @@ def track_markers(
         raise UnreadableFilm(
             f"{film.name}: the markers of input and output are covered in part in all but "
             f"{len(frames)} frames; keep hands and tools off them"
+        )
+    if frames[0] > LATEST_START:
+        raise UnreadableFilm(
+            f"{film.name}: the first pictures, at rest, do not show all markers of input and "
+            f"output; picture {frames[0] + 1} is the first that does: film from nearer or sharper"
         )
     views = fitted_views(seen[frames][:, reference], points, film.size)
     spread = _spread(views)
