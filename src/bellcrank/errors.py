@@ -24,6 +24,10 @@ class InvalidSettings(BellcrankError, ValueError):
     """A setting or argument is not valid."""
 
 
+class UnreadableFilm(BellcrankError, ValueError):
+    """A film or its pictures do not show the motion of a part well enough to measure it."""
+
+
 class NoDesignFound(BellcrankError, RuntimeError):
     """A search found no design that can be built and satisfies its goals."""
 

@@ -24,7 +24,7 @@ except SystemExit as exit:
         "design nosuch", "design crane --steps 0", "design crane --search nosuch",
         "evaluate nosuch", "validate nosuch", "export nosuch part.stl", "print nosuch a.gcode",
         "card nosuch a.pdf", "campaign run nosuch.toml", "library search --direction nosuch",
-        "machine build nosuch", "design crane --nosuch",
+        "machine build nosuch", "design crane --nosuch", "measure nosuch.mp4 --design crane",
     ],
 )  # fmt: skip
 def test_wrong_input_is_refused_without_slow_libraries(command: str, tmp_path) -> None:

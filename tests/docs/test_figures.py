@@ -17,6 +17,7 @@ from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder, kinds
 from benchmarks.competition import best_rows, step_rows, table_rows
 from benchmarks.inverters import rows_of as inverter_rows
+from benchmarks.measure import table as measure_rows
 from benchmarks.refinement import mass_rows, specified_rows
 from benchmarks.size import table as size_rows
 from benchmarks.space import cost_rows, mesh_rows, task_rows
@@ -71,6 +72,10 @@ def tolerances() -> Rows:
     yield from tolerance_rows(read("tolerance")["runs"])
     yield from robust_table(read("tasks/robust")["runs"])
     yield from redundant_table(read("tasks/robust")["runs"], recorded_runs())
+
+
+def measurements() -> Rows:
+    yield from measure_rows(read("benchmarks/measure"))
 
 
 def move_comparison() -> Rows:
@@ -327,6 +332,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "tolerance": (tolerances,),
     "benchmarks": (published_benchmarks,),
     "measured": (measured_lattice,),
+    "measure": (measurements,),
     "goals": (goals,),
     "validation": (levels, joints, meshes, correlation, searched),
     "tasks": (tasks,),
@@ -370,6 +376,7 @@ NOT_MEASURED = {
     "| setting | default | meaning |",
     "| key | default | |",
     "| machine | parts | what it does |",
+    "| film | reason that is given |",
     "| name | E, MPa | Poisson's ratio | density, g/cm³ | strain limit | sources |",
 }
 """Heads of tables whose numbers are names, parts of the program, or have their sources beside."""

@@ -27,8 +27,12 @@ from bellcrank.cli.validate import record_of
 def card(
     design: DesignName,
     out: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="pdf, png or svg; default: NAME.pdf.")
+        Path | None, typer.Argument(metavar="FILE", help="pdf, png or svg. \\[NAME.pdf]")
     ] = None,
+    protocol: Annotated[
+        bool,
+        typer.Option("--protocol", help="Describe how to film the part for bellcrank measure."),
+    ] = False,
     part: PartFile = None,
     width: Width = None,
     thickness: Thickness = None,
@@ -39,14 +43,21 @@ def card(
         bool, typer.Option("--overwrite", help="Replace an existing file.")
     ] = False,
 ) -> None:
-    """Draw a one-page summary of a design as a part."""
+    """Draw a one-page summary of a design as a part, or how to film it."""
     chosen = design_named(design)
     from bellcrank.workflows import spec_for
     from bellcrank.workflows.card import make_card
 
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material)
-    target = out or Path(f"{chosen.problem.name}.pdf")
+    default = f"{chosen.problem.name}.protocol.pdf" if protocol else f"{chosen.problem.name}.pdf"
+    target = out or Path(default)
     announce_compilation()
+    if protocol:
+        from bellcrank.workflows.markers import write_protocol
+
+        write_protocol(chosen, spec, design, target, overwrite=overwrite)
+        notes.print(f"wrote {plain(target)}")
+        return
     make_card(chosen, spec, target, record=record_of(design), title=design, overwrite=overwrite)
     notes.print(f"wrote {plain(target)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +21,7 @@ from bellcrank.cli.arguments import (
     part_of,
 )
 from bellcrank.cli.console import announce_compilation, notes, plain
+from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
     from bellcrank.workflows.fabricate import Grips
@@ -65,6 +67,35 @@ def grips_of(plate: bool, screws: int, screw_diameter: str, pad: bool, pointer: 
     )
 
 
+def check_markers(out: Path, size: float | None, overwrite: bool) -> None:
+    """Check before any computation that the markers of an exported part can be written.
+
+    Raises
+    ------
+    InvalidSettings
+        If OpenCV is not installed, the size is out of range, or the format is not one for making
+        the part.
+    OutputExists
+        If one of the files exists and is not to be replaced.
+    """
+    from bellcrank.measure.corners import opencv
+    from bellcrank.measure.layout import check_size
+    from bellcrank.model.storage import already_exists
+    from bellcrank.workflows.markers import marker_files
+
+    opencv()
+    if out.suffix.lower() not in (*PRINTED, *CUT):
+        raise InvalidSettings(
+            f"markers: expected a file for making the part ({', '.join((*PRINTED, *CUT))}), "
+            f"got {out}"
+        )
+    if size is not None:
+        check_size("marker size", size)
+    for path in marker_files(out):
+        if path.exists() and not overwrite:
+            raise already_exists(path)
+
+
 @app.command()
 def export(
     design: DesignName,
@@ -87,6 +118,17 @@ def export(
     pad: Pad = False,
     pointer: Pointer = "0",
     printed_width: PrintedWidth = None,
+    markers: Annotated[
+        bool,
+        typer.Option(
+            "--markers",
+            help="Also write the markers for bellcrank measure (FILE.markers.pdf, .svg and .json), "
+            "and fill supports, input and output to pads for them.",
+        ),
+    ] = False,
+    marker_size: Annotated[
+        str | None, typer.Option(help="Side of the markers on the part. \\[12mm]")
+    ] = None,
     moved: Annotated[bool, typer.Option("--moved", help="Include the motion (vtu).")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
@@ -103,8 +145,18 @@ def export(
     lengths = {"width": width, "thickness": thickness, "scale": scale, "fillet": fillet}
     spec = part_of(spec_for(chosen), part, lengths, material)
     grips = grips_of(plate, screws, screw_diameter, pad, pointer)
+    size = None if marker_size is None else read_length("marker size", marker_size)
+    if markers:
+        check_markers(out, size, overwrite)
+        grips = replace(grips, plate=True, pad=True, output_pad=True)
+    elif size is not None:
+        raise InvalidSettings("marker-size: expected --markers as well")
     height = read_length("layer", layer)
     check_folder(out)
+    if markers:
+        from bellcrank.workflows.measure import check_measurable
+
+        check_measurable(chosen)
     if moved:
         announce_compilation()
     whole = out.suffix.lower() in (*PRINTED, *CUT)
@@ -114,8 +166,14 @@ def export(
         printed_width=1.0 if ratio is None else ratio,
     )  # fmt: skip
     write(bundle, out, overwrite=overwrite)
-    size = "high" if bundle.part.dimension == 3 else "thick"
-    notes.print(f"wrote {plain(out)}, {bundle.thickness:.4g} mm {size}")
+    direction = "high" if bundle.part.dimension == 3 else "thick"
+    notes.print(f"wrote {plain(out)}, {bundle.thickness:.4g} mm {direction}")
+    if markers:
+        from bellcrank.workflows.markers import write_markers
+
+        announce_compilation()
+        for path in write_markers(chosen, spec, out, size, overwrite=overwrite):
+            notes.print(f"wrote {plain(path)}")
     if out.suffix.lower() in PRINTED:
         for warning in check_print(bundle):
             notes.print(f"[yellow]printing:[/] {plain(warning.sentence)}")

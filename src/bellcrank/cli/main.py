@@ -21,6 +21,7 @@ COMMANDS = {
     "refine": "refine",
     "tolerance": "tolerance",
     "export": "export",
+    "measure": "measure",
     "print": "print_part",
     "card": "card",
     "plot": "plot",

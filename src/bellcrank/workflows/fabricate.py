@@ -48,6 +48,8 @@ class Grips:
         Whether to fill the holes between input nodes to a pad.
     pointer
         Length of an additional strut at the output, mm; 0 for none.
+    output_pad
+        Whether to fill the holes between output nodes to a pad, for a marker.
     """
 
     plate: bool = False
@@ -56,6 +58,7 @@ class Grips:
     wall: float = 1.5
     pad: bool = False
     pointer: float = 0.0
+    output_pad: bool = False
 
     def __post_init__(self) -> None:
         if self.screws < 0:
@@ -77,7 +80,7 @@ class Grips:
         """
         problem = part.design.problem
         if part.dimension == 3:
-            if self.plate or self.pad or self.pointer:
+            if self.plate or self.pad or self.pointer or self.output_pad:
                 require_plane(problem, "plate, pad and pointer")
             return None
         positions, beams = part.positions, part.struts
@@ -93,6 +96,8 @@ class Grips:
             outline = filled(outline, shown, drawn, problem.supports.nodes, width)
         if self.pad:
             outline = filled(outline, shown, drawn, problem.input.nodes, width)
+        if self.output_pad:
+            outline = filled(outline, shown, drawn, problem.output.nodes, width)
         if self.screws:
             points = screw_positions(
                 outline, shown, problem.supports.nodes, self.screws, self.screw_diameter, self.wall

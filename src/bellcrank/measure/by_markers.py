@@ -1,0 +1,229 @@
+"""Measurement by markers on the part and on a sheet behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.errors import UnreadableFilm
+from bellcrank.measure.measurement import Measurement, MeasureSettings, measured
+from bellcrank.measure.motion import Motion, motion_of_nodes, node_motion
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.measure.camera import Views
+    from bellcrank.measure.tracks import Tracks
+    from bellcrank.part import Part
+
+    Values = NDArray[np.float64]
+
+MOVED_SUPPORT = 0.25
+"""Motion of a support that is refused, mm, if it is also a tenth of that of the input."""
+MISPLACED = 8.0
+"""Distance of a marker on the part from its drawn position that is refused, mm."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaneTracks:
+    """Corners of markers in mm of the plane of the part.
+
+    Parameters
+    ----------
+    corners : (F, K, 4, 2) float64, mm
+        Corners of the markers on input and output.
+    supports : (F, S, 4, 2) float64, mm
+        Corners of those on supports.
+    height_scale
+        Size of the part as seen on the sheet over its size: it is nearer to the camera. Lengths
+        are divided by it already.
+    """
+
+    corners: Values
+    supports: Values
+    height_scale: float
+
+
+def plane_tracks(tracks: Tracks, views: Views, rest: slice, offsets: Values) -> PlaneTracks:
+    """Return the tracks in mm.
+
+    A point above the sheet is seen at the point of the sheet behind it. For a plane parallel to
+    the sheet this is a scaling about the foot of the camera. Its factor is that of the distances
+    between the markers on the part at rest.
+
+    Parameters
+    ----------
+    tracks
+        Tracks in pixels.
+    views
+        The camera.
+    rest
+        Frames at rest.
+    offsets : (K + S, 2), mm
+        Positions of the markers on the part less the drawn ones.
+    """
+    moving, held = views.plane(tracks.corners), views.plane(tracks.support_corners)
+    seen = np.concatenate([moving[rest], held[rest]], axis=1).mean(axis=(0, 2))
+    drawn = np.stack([marker.centre for marker in (*tracks.moving, *tracks.supports)]) + offsets
+    scale = float(np.hypot(*similarity(drawn, seen)[:2, 0]))
+    return PlaneTracks(moving / scale, held / scale, scale)
+
+
+def similarity(points: Values, image: Values) -> Values:
+    """Return the similarity (3, 3) that fits an image (n, 2) of points (n, 2) best.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    >>> found = similarity(square, 1.5 * square[:, ::-1] * [1.0, -1.0] + 5.0)
+    >>> found.round(9).tolist()
+    [[0.0, 1.5, 5.0], [-1.5, 0.0, 5.0], [0.0, 0.0, 1.0]]
+    """
+    middle, seen = points.mean(axis=0), image.mean(axis=0)
+    first, second = points - middle, image - seen
+    size = max(float((first**2).sum()), 1e-12)
+    cosine = float((first * second).sum()) / size
+    sine = float((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum()) / size
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    return np.vstack([np.column_stack([turn, seen - turn @ middle]), [0.0, 0.0, 1.0]])
+
+
+def part_on_sheet(tracks: Tracks) -> Values:
+    """Return the similarity (3, 3) from mm of the part at rest to where it is seen on the sheet."""
+    seen = np.concatenate(
+        [tracks.views.plane(tracks.corners)[0], tracks.views.plane(tracks.support_corners)[0]]
+    )
+    drawn = np.stack([marker.centre for marker in (*tracks.moving, *tracks.supports)])
+    return similarity(drawn, seen.mean(axis=1))
+
+
+def _sides(corners: Values) -> Values:
+    """Return the mean side (F, K) of squares (F, K, 4, 2)."""
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=2), axis=-1)
+    return np.asarray(edges.mean(axis=-1))
+
+
+def measure_by_markers(
+    name: str, part: Part, tracks: Tracks, nominal: float, settings: MeasureSettings
+) -> Measurement:
+    """Return the motion of a part from the tracks of its markers.
+
+    Parameters
+    ----------
+    name
+        Name of the film, for messages.
+    part
+        The part.
+    tracks
+        Tracks of its markers.
+    nominal
+        Full motion of the input, mm.
+    settings
+        Systematic errors and bootstrap.
+
+    Raises
+    ------
+    UnreadableFilm
+        If a support or a marker is not where it should be, or the motion is too small.
+
+    Notes
+    -----
+    A sample of the interval gives the reference markers random weights (the Bayesian bootstrap)
+    and draws from normal distributions the positions of the markers on the part, the size of
+    the sheet, and an error in each frame, equal in frames that show the same state. That error
+    has the spread of the frames about the fitted curve, and at least that of the centres of
+    reference markers about the sheet.
+
+    References
+    ----------
+    D. B. Rubin, Ann. Stat. 9, 130 (1981), the Bayesian bootstrap.
+    """
+    exact = np.zeros((len(tracks.moving) + len(tracks.supports), 2))
+    first = plane_tracks(tracks, tracks.views, slice(0, 1), exact)
+    _check_places(name, tracks, first)
+    count = len(tracks.reference)
+
+    def motion_for(rng: np.random.Generator | None, rest: slice) -> Motion:
+        if rng is None:
+            plane = plane_tracks(tracks, tracks.views, rest, exact)
+            return _motion(part, tracks, plane, rest, exact)
+        counts = count * rng.dirichlet(np.ones(count))
+        offsets = settings.placement * rng.standard_normal(exact.shape)
+        plane = plane_tracks(tracks, tracks.views.resampled(counts), rest, offsets)
+        stretch = 1.0 + settings.sheet * rng.standard_normal(2)
+        plane = PlaneTracks(plane.corners * stretch, plane.supports * stretch, plane.height_scale)
+        return _motion(part, tracks, plane, rest, offsets)
+
+    scale = _pixels_per_mm(tracks)
+    floor = _reference_error(tracks.views) / scale
+    found = measured(name, tracks.frames, scale, nominal, motion_for, settings, floor)
+    _check_supports(name, first, found)
+    return found
+
+
+def _motion(part: Part, tracks: Tracks, plane: PlaneTracks, rest: slice, offsets: Values) -> Motion:
+    problem = part.design.problem
+    corners = plane.corners
+    if plane.supports.shape[1]:
+        middle = plane.supports.mean(axis=(1, 2))
+        corners = corners - (middle - middle[rest].mean(axis=0))[:, None, None]
+    zero = corners[rest].mean(axis=0)
+    moved = []
+    for role, nodes in (("input", problem.input.nodes), ("output", problem.output.nodes)):
+        own = [k for k, marker in enumerate(tracks.moving) if marker.role == role]
+        moved.append(
+            node_motion(
+                [tracks.moving[k] for k in own], corners[:, own], zero[own], nodes,
+                part.positions, offsets[own],
+            )
+        )  # fmt: skip
+    return motion_of_nodes(problem, moved[0], moved[1], part.scale)
+
+
+def _reference_error(views: Views) -> float:
+    """Return the spread of the centres of reference markers about the sheet, pixels."""
+    centres = views.residual.mean(axis=2)
+    return float(np.nanmedian(np.abs(centres))) / 0.6745
+
+
+def _pixels_per_mm(tracks: Tracks) -> float:
+    """Return the length in pixels of a mm on the part, from the sides of its markers."""
+    sizes = np.array([marker.size for marker in tracks.moving])
+    return float(np.median(_sides(tracks.corners) / sizes))
+
+
+def _check_places(name: str, tracks: Tracks, plane: PlaneTracks) -> None:
+    """Check that the markers on the part are near their drawn positions, up to a common shift."""
+    markers = (*tracks.moving, *tracks.supports)
+    seen = np.concatenate([plane.corners[0], plane.supports[0]]).mean(axis=1)
+    drawn = np.stack([marker.centre for marker in markers])
+    away = seen - drawn
+    away = np.linalg.norm(away - np.median(away, axis=0), axis=1)
+    worst = int(np.argmax(away))
+    if away[worst] > MISPLACED:
+        marker = markers[worst]
+        raise UnreadableFilm(
+            f"{name}: the {marker.role} marker {marker.id} is {away[worst]:.0f} mm from its drawn "
+            "position; check that each marker is on the block of its role, that the film begins "
+            "at rest, and that the design is that of the part"
+        )
+
+
+def _check_supports(name: str, plane: PlaneTracks, found: Measurement) -> None:
+    if not plane.supports.shape[1]:
+        return
+    middle = plane.supports[: found.frames].mean(axis=2)
+    smooth = middle
+    if len(middle) >= 5:
+        window = np.lib.stride_tricks.sliding_window_view(middle, 5, axis=0)
+        smooth = np.median(window, axis=-1)
+    moved = np.linalg.norm(smooth - smooth[0], axis=-1)
+    most = float(moved.max())
+    if most > max(MOVED_SUPPORT, 0.1 * float(found.stroke[-1])):
+        raise UnreadableFilm(
+            f"{name}: supports moved: a marker on a support moves {most:.2f} mm while the input "
+            f"moves {found.stroke[-1]:.2f} mm; clamp the supports, and keep the sheet and the "
+            "camera still"
+        )
