@@ -186,10 +186,10 @@ def test_holes_are_drawn_and_symmetry_is_asked_and_the_task_is_saved_and_loaded(
     drag(page, (6.0, 3.0), (7.6, 3.0))
     until(page, lambda: "circle" in task(page)["table"]["domain"].get("solid", [{}])[0])
     section(page, "limits")
-    page.get_by_label("Mirror symmetry").select_option("y")
+    page.get_by_label("Symmetry of the design").select_option("y")
     page.locator(".step.limits .fault").wait_for()  # held at the bottom only
     assert page.get_by_role("button", name="Design it").is_disabled()
-    page.get_by_label("Mirror symmetry").select_option("")
+    page.get_by_label("Symmetry of the design").select_option("")
     page.locator(".step.limits .fault").wait_for(state="detached")
     with page.expect_download() as waiting:
         page.get_by_role("button", name="Download the task").click()

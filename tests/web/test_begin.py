@@ -18,6 +18,7 @@ from bellcrank.model import (
 )
 from bellcrank.part import PartSpec
 from bellcrank.search import SpecificationEvaluator
+from bellcrank.search.symmetry import beam_images
 from bellcrank.task import find_task
 from bellcrank.web.page_files import page_files
 from bellcrank.web.requests import RunBody
@@ -119,6 +120,68 @@ def test_a_refinement_moves_the_nodes_of_a_design_and_can_be_stopped(client: Tes
     assert stored == run["problem"]["positions"]
     client.post(f"/api/runs/{further}/pause")
     wait_for(lambda: status_of(client, further) == "paused", 100.0)
+
+
+@pytest.mark.slow
+def test_a_search_that_is_stopped_keeps_what_its_refinement_has_reached(
+    client: TestClient,
+) -> None:
+    problem = client.post("/api/tasks/build", json={"task": SIZED}).json()["problem"]
+    body = {"title": "own", "session": "aa", "task": SIZED, "steps": 40, "chains": 1}
+    name = client.post("/api/runs", json=body).json()["id"]
+
+    def is_refined() -> bool:
+        with client.websocket_connect(f"ws://localhost:8642/api/runs/{name}/live") as live:
+            refined = json.loads(live.receive_text())["refined"]
+        return refined is not None and refined["objective"] is not None
+
+    wait_for(is_refined, 400.0)
+    client.post(f"/api/runs/{name}/stop")
+    wait_for(lambda: status_of(client, name) == "stopped", 100.0)
+    run = client.get(f"/api/runs/{name}").json()
+    assert np.abs(np.subtract(run["problem"]["positions"], problem["positions"])).max() > 1e-3
+    part = {"problem": run["problem"], "mask": run["mask"], "part": run["part"]}
+    items = client.post("/api/report", json=part).json()["items"]["frames"]
+    assert all(each["met"] for each in items)
+
+
+@pytest.mark.slow
+def test_the_live_design_of_a_symmetric_search_has_all_images(client: TestClient) -> None:
+    table = client.get("/api/tasks/gripper").json()
+    body = {"title": "own", "session": "aa", "task": table, "steps": 300, "chains": 1}
+    name = client.post("/api/runs", json=body).json()["id"]
+    problem = problem_from_dict(client.get(f"/api/runs/{name}").json()["problem"])
+
+    def news() -> Any:
+        with client.websocket_connect(f"ws://localhost:8642/api/runs/{name}/live") as live:
+            update = json.loads(live.receive_text())
+        return update if update["moved"] and update["moved"]["items"] else None
+
+    update = wait_for(news, 400.0)
+    images = beam_images(problem, "x")
+    for mask in (update["moved"]["mask"], update["chains"]["0"]["mask"]):
+        bits = unpack_mask(mask, problem.lattice.beam_count)[problem.designable]
+        assert np.array_equal(bits, bits[images])
+    reached = {each["name"]: each["reached"] for each in update["moved"]["items"]}
+    assert reached["case.left jaw.off_axis"] == reached["case.right jaw.off_axis"]
+    assert update["moved"]["objectives"][0]["label"] == "left jaw: gain"
+    client.post(f"/api/runs/{name}/pause")
+    wait_for(lambda: status_of(client, name) in {"paused", "finished"}, 100.0)
+
+
+def test_a_report_has_the_quantity_that_is_maximised(client: TestClient) -> None:
+    case = SIZED["cases"][0]
+    output = {"at": case["outputs"][0]["at"], "rotation": "maximise", "payload": "1 g"}
+    table = {**SIZED, "cases": [{**case, "outputs": [output]}]}
+    built = client.post("/api/tasks/build", json={"task": table}).json()
+    payload = next(each for each in built["items"] if each["label"] == "payload")
+    assert payload["wanted"] == "at least 0.00981 N (1 g)"
+    body = {"problem": built["problem"], "mask": full_mask(built["problem"]), "part": built["part"]}
+    report = client.post("/api/report", json=body).json()
+    (objective,) = report["objectives"]
+    turn = report["figures"][0]["rotation_deg"]
+    assert (objective["quantity"], objective["label"]) == ("rotation", "rotation")
+    assert objective["reached"] in {f"{turn:.3g} deg", f"{-turn:.3g} deg"}
 
 
 @pytest.mark.slow

@@ -42,6 +42,9 @@ export function modelOf(problem: Problem): string { return problem.section ? "fr
 /** An item of a specification: what is wanted, and what a design reaches in one model. */
 export interface ItemState { name: string; label: string; wanted: string; reached: string; margin: number | null; met: boolean }
 
+/** A quantity that is maximised or minimised, and what a design reaches. */
+export interface Objective { quantity: string; label: string; reached: string }
+
 /** Figures of an output in one load case; none if the path is not stable. */
 export interface PartFigures {
   case: string;
@@ -61,6 +64,7 @@ export interface PartFigures {
 export interface PartReport {
   specified: boolean;
   items: { search: ItemState[] | null; frames: ItemState[] | null };
+  objectives: Objective[];
   figures: PartFigures[];
 }
 
@@ -132,8 +136,8 @@ export interface RunUpdate {
   speed: number | null;
   left: number | null;
   tried: [number, number] | null;
-  refined: { designs: number; geometries: number; objective: number | null } | null;
-  moved: { mask: string; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null } | null;
+  refined: { designs: number; geometries: number; sheets: number; objective: number | null } | null;
+  moved: { mask: string; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null; objectives: Objective[] } | null;
   error?: { message: string };
 }
 

@@ -1,11 +1,14 @@
 // The task that is shown first, and where the current one is stored: each tab has its own.
 
 import { get } from "./api";
+import type { Settings } from "./editing";
 import { fromLink, isTask, type Table, type Task } from "./task";
 
 /** Key of the current task in the storages of the browser. */
 export const TASK_KEY = "bellcrank-task";
 const HISTORY_KEY = "bellcrank-history";
+const SETTINGS_KEY = "bellcrank-settings";
+const SETTINGS: Settings = { method: "", steps: 8000, chains: 2, seed: 0, fromHand: false };
 
 /** A task of one load case without supports, inputs and outputs. */
 export function emptyTask(): Task {
@@ -77,4 +80,17 @@ export function openTask(task: Task): void {
   const before = sessionStorage.getItem(TASK_KEY) ?? localStorage.getItem(TASK_KEY);
   const history = storedHistory() ?? { past: [], future: [] };
   store(task, { past: before ? [...history.past, before] : history.past, future: [] });
+}
+
+/** Settings of the latest search of this tab. */
+export function storedSettings(): Settings {
+  try {
+    return { ...SETTINGS, ...JSON.parse(sessionStorage.getItem(SETTINGS_KEY) ?? "{}") as Partial<Settings>, fromHand: false };
+  } catch {
+    return SETTINGS;
+  }
+}
+
+export function storeSettings(settings: Settings): void {
+  try { sessionStorage.setItem(SETTINGS_KEY, JSON.stringify(settings)); } catch { /* the storage is full: the settings hold for this page only */ }
 }

@@ -1,7 +1,7 @@
 // The drawing of the task, on which nodes are selected, arrows are dragged and zones are drawn.
 
 import type { Point } from "./api";
-import { angleOf, arrow, Drawing, range, where } from "./drawing";
+import { angleOf, arrow, Drawing, range, turnArrow, where } from "./drawing";
 import { announce, s } from "./dom";
 import { describeTarget, mirrorAxes, nextInDirection, rollerLines, shapePath } from "./marks";
 import { directionAt, rowOf, type Direction, type Shape, type Target, type Tool, type ZoneShape } from "./task";
@@ -67,6 +67,7 @@ export class Canvas extends Drawing implements TaskDrawing {
       this.setLattice(lattice.positions, lattice.beams, 1.4);
       this.cursor = -1;
     }
+    this.dimensions(view.built.part.scale);
     this.at = this.rest;
     const { bits, designable } = view;
     this.ghost("possible", bits ? where(bits, 0) : []);
@@ -124,6 +125,10 @@ export class Canvas extends Drawing implements TaskDrawing {
     const { target } = this.view_!;
     const isActive = target.kind === each.target.kind && target.index === each.target.index;
     const group = s("g", { class: `arrow ${each.target.kind}${isActive ? " active" : ""}` });
+    if (each.turns) {
+      group.append(s("path", { class: "shaft", d: turnArrow(from) }));
+      return [group];
+    }
     group.append(s("path", { class: "shaft", d: arrow(from, [tip[0] - from[0], tip[1] - from[1]]) }),
       s("circle", { class: "handle", cx: tip[0], cy: -tip[1], r: 0.42 }));
     return [group];
@@ -134,7 +139,7 @@ export class Canvas extends Drawing implements TaskDrawing {
 
   private handleAt(point: Point): Arrow | null {
     const reached = (this.view_?.arrows ?? []).filter((each) => {
-      if (!each.nodes.length) return false;
+      if (!each.nodes.length || each.turns) return false;
       const tip = this.tip(each);
       return Math.hypot(tip[0] - point[0], tip[1] - point[1]) < 0.45;
     });

@@ -5,28 +5,35 @@ import { angleOf } from "./drawing";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
 import {
-  cleaned, directionAt, isSpatial, nodesOf, QUANTITIES, sectionsOf, vectorInSpace, vectorOf, withSection, withSections,
+  cleaned, directionAt, imagesOf, isSpatial, isTurn, nodesOf, QUANTITIES, regionsOf, sectionsOf, vectorInSpace, vectorOf, withSection, withSections,
   type Amount, type Bounds, type CaseTable, type InputTable, type LoadTable, type OutputTable, type QuantityName, type Target,
 } from "./task";
 
-/** What a single value of a quantity bounds, and an example. */
-interface Usual { title: string; bound: "at_least" | "at_most" | "value"; label: string; example: string }
+type Bound = "at_least" | "at_most" | "value" | "target";
+
+/** What a single value of a quantity bounds, an example, and what the quantity is. */
+interface Usual { title: string; bound: Bound; example: string; about: string }
 
 const USUAL: Record<QuantityName, Usual> = {
-  gain: { title: "gain", bound: "at_least", label: "at least", example: "2" },
-  travel: { title: "travel", bound: "at_least", label: "at least", example: "5 mm" },
-  off_axis: { title: "off-axis motion", bound: "at_most", label: "at most", example: "10%" },
-  rotation: { title: "rotation", bound: "value", label: "at most ±", example: "5 deg" },
-  payload: { title: "payload", bound: "at_least", label: "at least", example: "10 g" },
-  stiffness: { title: "stiffness", bound: "at_least", label: "at least", example: "0.1 N/mm" },
-  blocked_force: { title: "blocked force", bound: "at_least", label: "at least", example: "0.1 N" },
-  sag: { title: "sag under own weight", bound: "at_most", label: "at most", example: "10%" },
+  gain: { title: "gain", bound: "at_least", example: "2", about: "Motion of the output along its direction, over the stroke of the input." },
+  travel: { title: "travel", bound: "at_least", example: "5 mm", about: "Motion of the output along its direction." },
+  off_axis: { title: "off-axis motion", bound: "at_most", example: "10%", about: "Largest motion normal to the direction, over the travel." },
+  rotation: { title: "rotation", bound: "value", example: "5 deg", about: "Rotation of the output, counter-clockwise positive." },
+  payload: { title: "payload", bound: "at_least", example: "10 g", about: "Load against the direction of the output that halves its travel." },
+  stiffness: { title: "stiffness", bound: "at_least", example: "0.1 N/mm", about: "Stiffness of the output along its direction at the full stroke." },
+  blocked_force: { title: "blocked force", bound: "at_least", example: "0.1 N", about: "Force of the output on a stop that prevents its travel." },
+  sag: { title: "sag under own weight", bound: "at_most", example: "10%", about: "Motion of the output by the own weight, over its travel." },
 };
 
-const INPUT_FORCE: Usual = { title: "input force", bound: "at_most", label: "at most", example: "1 N" };
+const INPUT_FORCE: Usual = { title: "input force", bound: "at_most", example: "1 N", about: "Force of the input along its direction." };
+const ROTATION_IN_SPACE = "Size of the rotation of the output, about whatever axis it has.";
 
-/** Quantities that are usually maximised. */
-const MAXIMISED: string[] = ["gain", "travel"];
+/** Quantities that may be maximised. */
+const MAXIMISED: string[] = ["gain", "travel", "rotation", "payload", "stiffness", "blocked_force"];
+
+/** What an output begins with that turns, or moves along a direction. */
+const TURN = { direction: undefined, gain: undefined, travel: undefined, off_axis: undefined, path: undefined, payload: undefined, sag: undefined, rotation: [{ maximise: true }] };
+const MOTION = { direction: "left", rotation: undefined, gain: [{ maximise: true }], off_axis: [{ at_most: "10%" }] };
 
 /** The panel of the inputs, outputs or loads of the shown load case. */
 export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "loads"): HTMLElement {
@@ -46,6 +53,7 @@ export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "load
       h("legend", {}, `${noun} ${index + 1}`, h("small", {}, ` ${nodes} ${nodes === 1 ? "node" : "nodes"}`)),
       sections.length > 1 && !isActive && button("Select its nodes", () => editor.aimAt(target), "quiet small", { "data-key": `aim-${kind}-${index}` }),
       ...make(editor, each as never, target),
+      kind !== "loads" && imageButton(editor, kind, target),
       h("div", { class: "row between" },
         button("Clear nodes", () => editor.change(withSection(editor.task.table, editor.loadCase, target, { at: [] })), "quiet small", { disabled: !nodes, "data-key": `clear-${kind}-${index}` }),
         (sections.length > 1 || kind === "loads") && button(`Remove ${noun} ${index + 1}`, drop, "quiet small", { "data-key": `drop-${kind}-${index}` })));
@@ -57,6 +65,33 @@ export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "load
     !sections.length && h("p", { class: "note" }, `Click nodes in the drawing for the first ${noun}.`),
     kind === "loads" && gravity(editor),
     kind === "outputs" && caseTools(editor));
+}
+
+/** A button that adds the mirror image of an input or output of a symmetric design, where it has none. */
+function imageButton(editor: TaskEditor, kind: "inputs" | "outputs", { index }: Target): HTMLElement | null {
+  const { task: { table }, built, loadCase } = editor;
+  const { symmetry } = table.limits ?? {};
+  const axis = symmetry === "x" || symmetry === "y" ? symmetry : null;
+  if (!built || !axis || isSpatial(table)) return null;
+  const regions = nodesOf(built, loadCase, kind);
+  const nodes = regions[index] ?? [];
+  const images = imagesOf(built, axis, nodes);
+  const same = (one: number[], two: number[]): boolean => one.length === two.length && one.every((node) => two.includes(node));
+  if (!nodes.length || images.includes(-1) || regions.some((each) => same(each, images))) return null;
+  const add = (): void => {
+    const sections = sectionsOf(table, loadCase, kind) as (InputTable & OutputTable)[];
+    const each = sections[index]!;
+    const [x, y] = vectorOf(each.direction);
+    // Bounds on one side of a rotation would be those of the other side.
+    const rotation = each.rotation?.filter(({ value }) => value !== undefined);
+    const image = cleaned({
+      ...each, name: undefined, at: regionsOf(images, built.lattice.positions, built.part.scale),
+      direction: each.direction === undefined ? undefined : directionAt(angleOf(axis === "x" ? [-x, y] : [x, -y])),
+      rotation: rotation?.length ? rotation : undefined,
+    });
+    editor.change(withSections(table, loadCase, kind, [...sections, image] as never));
+  };
+  return button("Add its mirror image", add, "quiet small", { "data-key": `image-${kind}-${index}` });
 }
 
 function set(editor: TaskEditor, target: Target, changes: Record<string, unknown>): void {
@@ -161,7 +196,9 @@ function nameField(editor: TaskEditor, own: CaseTable): HTMLElement {
 function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HTMLElement[] {
   const key = `outputs-${target.index}`;
   const several = sectionsOf(editor.task.table, editor.loadCase, "outputs").length > 1;
-  const rows = QUANTITIES.flatMap((name) => (each[name] ?? []).map((bounds, index) => itemRow(`${key}-${name}-${index}`, name, USUAL[name], bounds, (next) => set(editor, target, { [name]: replaced(each[name], index, next) }))));
+  const usual = (name: QuantityName): Usual => (name === "rotation" && isSpatial(editor.task.table) ? { ...USUAL[name], about: ROTATION_IN_SPACE } : USUAL[name]);
+  const turns = isTurn(each);
+  const rows = QUANTITIES.flatMap((name) => (each[name] ?? []).map((bounds, index) => itemRow(`${key}-${name}-${index}`, name, usual(name), bounds, (next) => set(editor, target, { [name]: replaced(each[name], index, next) }))));
   const options: [string, string][] = [["", "choose …"], ...QUANTITIES.map((name): [string, string] => [name, `${USUAL[name].title}${each[name]?.length ? ", in another range" : ""}`]), ...(each.path || isSpatial(editor.task.table) ? [] : [["path", "path"] as [string, string]])];
   const add = select(options, "", (name) => {
     if (!name) return;
@@ -174,7 +211,8 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
   add.setAttribute("aria-label", "Ask for");
   return [
     ...(several ? [amount(`${key}-name`, "Name", each.name, "", (value) => set(editor, target, { name: value === undefined ? undefined : String(value) }))] : []),
-    directionFields(editor, target, each.direction),
+    choice("Motion of the output", [["moves", "moves"], ["turns", "turns"]] as ["moves" | "turns", string][], turns ? "turns" : "moves", (picked) => set(editor, target, picked === "turns" ? TURN : MOTION), `motion-${target.index}`),
+    turns ? h("p", { class: "note" }, isSpatial(editor.task.table) ? ROTATION_IN_SPACE : "Its rotation counts: counter-clockwise is positive.") : directionFields(editor, target, each.direction),
     h("div", { class: "wanted" }, ...rows, each.path ? pathRow(editor, each, target) : null,
       h("div", { class: "ask" }, h("span", {}, "Ask for"), add)),
     h("details", { ...(each.spring !== undefined ? { open: true } : {}) }, h("summary", { "data-key": `${key}-workpiece` }, "Workpiece that resists"),
@@ -182,32 +220,40 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
   ];
 }
 
-/** What is wanted of a quantity: its usual bound, whether it is maximised, and everything else on demand. */
-function itemRow(key: string, name: string, { title, bound, label, example }: Usual, bounds: Bounds, put: (next: Bounds | null) => void): HTMLElement {
+/** What is wanted of a quantity: one bound, whether it is maximised, and everything else on demand. */
+function itemRow(key: string, name: string, { title, bound: usual, example, about }: Usual, bounds: Bounds, put: (next: Bounds | null) => void): HTMLElement {
   const isMaximised = bounds.maximise === true || bounds.value === "maximise";
-  const single = bounds.value === "maximise" ? undefined : bounds.value;
-  const usual = single ?? (bound === "value" ? undefined : bounds[bound]);
-  const plain = { ...bounds, value: undefined };
-  const canMaximise = MAXIMISED.includes(name);
+  // Only a rotation has a single value that means a bound on both sides.
+  const offered: [Bound, string][] = [["at_least", "at least"], ["at_most", "at most"], ["target", "equal to"]];
+  if (usual === "value") offered.unshift(["value", "at most ±"]);
+  const given = bounds.value === "maximise" ? undefined : bounds.value;
+  const known = cleaned({ ...bounds, value: undefined, [given === undefined || usual === "value" ? "value" : usual]: given, maximise: isMaximised || undefined }) as Bounds;
+  const bound = [usual, ...offered.map(([each]) => each)].find((each) => known[each] !== undefined) ?? (isMaximised && usual === "value" ? "at_least" : usual);
+  const value = known[bound];
+  const change = (changes: Bounds): void => put(cleaned({ ...known, ...changes }) as Bounds);
+  const kind = select(offered.map(([each, text]): [string, string] => [each, text]), bound, (picked) => change({ [bound]: undefined, [picked]: value ?? example }));
+  kind.dataset.key = `${key}-bound`;
+  kind.setAttribute("aria-label", `Bound of the ${title}`);
   const maximise = h("input", { type: "checkbox", checked: isMaximised, "data-key": `${key}-maximise` });
-  maximise.addEventListener("change", () => put({ ...plain, ...(usual === undefined ? {} : { [bound]: usual }), maximise: maximise.checked || undefined } as Bounds));
-  const largest = h("label", { class: "tick" }, maximise, "as large as possible");
+  maximise.addEventListener("change", () => change({ maximise: maximise.checked || undefined }));
   const extra: (keyof Bounds)[] = ["at_least", "at_most", "target", "tolerance", "from", "to", "scale"];
-  const labels: Record<string, string> = { at_least: "at least", at_most: "at most", target: "target", tolerance: "tolerance", from: "from (stroke)", to: "to (stroke)", scale: "scale" };
-  const hasMore = extra.some((other) => other !== bound && bounds[other] !== undefined) || bounds.of !== undefined || bounds.minimise;
-  const own = single === undefined ? {} : { value: single };
-  const of = select([["", "every value"], ["largest", "the largest"], ["smallest", "the smallest"], ["spread", "the spread"]], bounds.of ?? "", (picked) => put({ ...plain, ...own, of: picked || undefined } as Bounds));
+  const labels: Record<string, string> = { at_least: "at least", at_most: "at most", target: "equal to", tolerance: "tolerance", from: "from (stroke)", to: "to (stroke)", scale: "scale" };
+  const hasMore = extra.some((other) => other !== bound && known[other] !== undefined) || known.of !== undefined || known.minimise;
+  const of = select([["", "every value"], ["largest", "the largest"], ["smallest", "the smallest"], ["spread", "the spread"]], known.of ?? "", (picked) => change({ of: picked || undefined } as Bounds));
   of.dataset.key = `${key}-of`;
+  const input = amount(key, "", value, "", (next) => change({ [bound]: next }), value === undefined && !isMaximised ? `such as ${example}` : "");
+  input.querySelector("label")!.remove();
+  input.querySelector("input")!.setAttribute("aria-label", title);
   return h("div", { class: "item", "data-item": name },
     h("div", { class: "ask-line" },
-      h("span", { class: "quantity" }, title),
-      amount(key, label, usual, "", (value) => put(bound === "value" ? cleaned({ ...bounds, value }) : { ...plain, maximise: isMaximised || undefined, [bound]: value } as Bounds), usual === undefined && !isMaximised ? `such as ${example}` : ""),
-      button("Remove", () => put(null), "quiet small", { "data-key": `${key}-drop`, "aria-label": `Remove ${title}` })),
-    canMaximise ? largest : null,
+      h("span", { class: "quantity", title: about }, title), kind, input,
+      button("✕", () => put(null), "quiet small", { "data-key": `${key}-drop`, "aria-label": `Remove ${title}`, title: "Remove" })),
+    MAXIMISED.includes(name) && h("label", { class: "tick" }, maximise, "as large as possible"),
     h("details", { ...(hasMore ? { open: true } : {}) }, h("summary", { "data-key": `${key}-more` }, "Other bounds"),
-      canMaximise ? null : largest,
+      h("p", { class: "note" }, about),
+      MAXIMISED.includes(name) ? null : h("label", { class: "tick" }, maximise, "as large as possible"),
       h("div", { class: "row" }, ...extra.filter((other) => other !== bound).map((other) =>
-        amount(`${key}-${other}`, labels[other]!, bounds[other] as Amount | undefined, "", (value) => put({ ...plain, ...own, [other]: value } as Bounds))),
+        amount(`${key}-${other}`, labels[other]!, known[other] as Amount | undefined, "", (next) => change({ [other]: next } as Bounds))),
       field("In the range, bounds", of))));
 }
 

@@ -28,7 +28,7 @@ export function thumbnail({ picture }: GalleryEntry): SVGElement {
 export function tile(entry: GalleryEntry, href: string): HTMLElement {
   return h("a", { class: "tile", href }, thumbnail(entry),
     h("span", { class: "title" }, entry.title),
-    h("span", { class: "note" }, entry.efficiency === null ? entry.note : `${figure(entry.efficiency)} · ${entry.note}`));
+    h("span", { class: "note" }, entry.efficiency === null ? entry.note : `output / input motion ${figure(entry.efficiency)} · ${entry.note}`));
 }
 
 /** Show a collection as tiles, with filters for its facets, and at most `most` entries until all are requested. */

@@ -2,10 +2,11 @@
 
 import { get } from "./api";
 import { bundledTask, emptySpaceTask, emptyTask, exampleTask } from "./begin";
-import { button, choice, count, field, h, select } from "./dom";
+import { button, choice, clear, count, field, h, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
 import { cleaned, isSpatial, resized, type Amount, type Domain, type Material, type OutputTable, type Shape, type Table, type Task, type ZoneKind, type ZoneShape } from "./task";
+import { lengthIn } from "./text";
 
 /** Problems of the paper on whose lattices a part can be designed. */
 const LATTICES = ["crane", "anti-parallel", "pliers", "scaling-8", "scaling-12", "discs"];
@@ -14,15 +15,17 @@ const FRESH: Record<string, () => Task> = { example: exampleTask, empty: emptyTa
 const OWN: Material = { name: "own", young: 12, poisson: 0.45, density: 1.2, strain_limit: 0.3 };
 
 export class DomainPanel {
-  private tasks: { name: string; about: string }[] = [];
+  private tasks: { name: string; kind: string; about: string }[] = [];
   private linked = "";
+  /** What a task may start from, above the drawing. */
+  readonly start = h("div", { class: "start" });
 
   constructor(
     private readonly editor: TaskEditor,
     private readonly attempt: (work: () => Promise<void>) => void,
     private readonly refresh: () => void,
   ) {
-    void get<{ name: string; about: string }[]>("/tasks").then((found) => { this.tasks = found; this.refresh(); }, () => undefined);
+    void get<{ name: string; kind: string; about: string }[]>("/tasks").then((found) => { this.tasks = found; this.showStart(); this.refresh(); }, () => undefined);
   }
 
   summary(): string {
@@ -33,22 +36,45 @@ export class DomainPanel {
   make(): HTMLElement {
     const { editor } = this;
     const { table } = editor.task;
-    const start = select([
-      ["", "choose …"], ["example", "an example"], ["empty", "an empty rectangle"], ["empty-space", "an empty box in space"],
-      ...this.tasks.map(({ name }): [string, string] => [name, name]),
-    ], "", (name) => name && this.attempt(async () => editor.open(FRESH[name]?.() ?? await bundledTask(name))));
-    start.dataset.key = "start";
     const file = this.file("File to open", ".toml,.json", (picked) => this.attempt(() => editor.load(picked)));
     const name = h("input", { type: "text", value: table.name, maxlength: 100, "data-key": "name" });
     name.addEventListener("change", () => { if (name.value.trim()) editor.change({ ...table, name: name.value.trim() }); });
     return h("div", { class: "content" },
-      h("div", { class: "row" }, field("Start from", start), field("Name", name)),
-      this.tasks.find((each) => each.name === table.name)?.about ? h("p", { class: "note" }, this.tasks.find((each) => each.name === table.name)!.about) : null,
+      field("Name", name),
       this.part(), this.domain(), this.zones(),
       h("div", { class: "buttons" },
         button("Open a file", () => file.click(), "", { "data-key": "open" }), file,
         button("Download the task", () => this.attempt(() => editor.save()), "", { "data-key": "toml" }),
         button(this.linked || "Copy link", () => this.attempt(async () => { this.linked = await editor.link(); }), "", { "data-key": "link" })));
+  }
+
+  /** Offer an empty domain in the plane or in space, an example, and the bundled tasks. */
+  private showStart(): void {
+    const { editor } = this;
+    const open = (name: string): void => this.attempt(async () => {
+      editor.open(FRESH[name]?.() ?? await bundledTask(name));
+      about.textContent = this.tasks.find((each) => each.name === name)?.about ?? "";
+    });
+    const about = h("span", { class: "more", role: "status" });
+    const pick = h("select", { "data-key": "start", id: "start", onchange: () => { if (pick.value) open(pick.value); } }, h("option", { value: "" }, "choose …"),
+      h("option", { value: "example" }, "the example"), h("option", { value: "empty" }, "an empty rectangle"), h("option", { value: "empty-space" }, "an empty box in space"),
+      ...[...new Set(this.tasks.map(({ kind }) => kind))].map((kind) => h("optgroup", { label: `Tasks ${kind}`.replace("Tasks parts", "Parts") },
+        ...this.tasks.filter((each) => each.kind === kind).map(({ name }) => h("option", { value: name }, name)))));
+    clear(this.start, button("Empty rectangle", () => open("empty")), button("Empty box in space", () => open("empty-space")),
+      h("label", { for: "start" }, "or start from"), pick, about);
+  }
+
+  /** How much of the domain the lattice fills, if that is not all of it. */
+  private filled(): HTMLElement | null {
+    const { built, task: { table: { domain: { size } } } } = this.editor;
+    if (!built || !size || size.some((length) => typeof length !== "number")) return null;
+    const lengths = size.map((_, axis) => {
+      const values = built.lattice.positions.map((point) => point[axis]!);
+      return built.part.scale * (Math.max(...values) - Math.min(...values));
+    });
+    // The struts extend by half of their width beyond the nodes.
+    if (lengths.every((length, axis) => length + built.part.width > 0.93 * size[axis]!)) return null;
+    return h("p", { class: "note" }, `The lattice fills ${lengths.map((length) => length.toFixed(1)).join(" × ")} mm of it: whole cells with nodes ${built.part.scale} mm apart.`);
   }
 
   private file(label: string, accept: string, use: (file: File) => void): HTMLInputElement {
@@ -102,9 +128,10 @@ export class DomainPanel {
     };
     const side = (index: 0 | 1 | 2) => (value: Amount | undefined): void => {
       const size = [...domain.size!] as number[];
-      (size as Amount[])[index] = value ?? size[index]!;
-      // A text is not a length that the page knows: the server reads it.
-      if (typeof value === "string") put({ ...domain, size });
+      const length = value === undefined ? size[index]! : lengthIn(value);
+      (size as Amount[])[index] = Number.isNaN(length) ? value! : length;
+      // The server says what is wrong with a text that is no length.
+      if (Number.isNaN(length)) put({ ...domain, size });
       else editor.change(resized(table, size));
     };
     const lattice = select(LATTICES.map((name): [string, string] => [name, name]), domain.problem ?? "crane", (picked) => put({ problem: picked }));
@@ -117,6 +144,7 @@ export class DomainPanel {
       kind === "space" && h("div", {}, h("div", { class: "row three" },
         amount("domain-width", "Width (x)", domain.size![0], "mm", side(0)), amount("domain-depth", "Depth (y)", domain.size![1], "mm", side(1)), amount("domain-height", "Height (z)", domain.size![2], "mm", side(2))),
         this.cells(domain, put)),
+      this.filled(),
       kind === "outline" && h("div", {},
         corners ? amount("domain-corners", "Corners, mm", corners.length > 40 ? undefined : corners.map((point) => point.join(", ")).join("; "), "", (value) => {
           const points = String(value ?? "").split(";").map((text) => text.split(",").map(Number) as [number, number]).filter((point) => point.length === 2 && point.every(Number.isFinite));

@@ -42,15 +42,6 @@ export interface LatticeDrawing {
   close(): void;
 }
 
-/** Positions as they are drawn flat: those in space in oblique view, as on the server. */
-export function projected(positions: Point[]): Point[] {
-  if (positions[0]?.length !== 3) return positions;
-  const [turn, tilt] = [(24 * Math.PI) / 180, (22 * Math.PI) / 180];
-  return positions.map(([x, y, z]) => [
-    x * Math.cos(turn) + y * Math.sin(turn),
-    z! * Math.cos(tilt) + (y * Math.cos(turn) - x * Math.sin(turn)) * Math.sin(tilt)]);
-}
-
 export class Drawing implements LatticeDrawing {
   readonly svg: SVGSVGElement;
   readonly overlay: SVGGElement;
@@ -65,6 +56,7 @@ export class Drawing implements LatticeDrawing {
   /** Bounds of the lattice at rest, with a margin; `view` is the visible region. */
   box: Box = { x: 0, y: 0, w: 10, h: 10 };
   private view: Box = this.box;
+  private readonly dims = s("g", { class: "dims", "aria-hidden": "true" });
   private readonly path_ = s("path", { class: "output-path", "aria-hidden": "true" });
 
   constructor(label: string) {
@@ -120,6 +112,21 @@ export class Drawing implements LatticeDrawing {
     this.view = view;
     this.svg.setAttribute("viewBox", `${view.x} ${view.y} ${view.w} ${view.h}`);
     thicken(this.svg, view.w);
+  }
+
+  /** Write width and height of the lattice at rest beside it; `scale` is the length of a unit in mm. */
+  dimensions(scale: number): void {
+    if (!this.dims.parentNode) this.under.append(this.dims);
+    const [x0, x1] = [least(this.rest, 0), most(this.rest, 0)];
+    const [y0, y1] = [-least(this.rest, 1), -most(this.rest, 1)];
+    const text = (length: number): string => `${(length * scale).toFixed(length * scale < 100 ? 1 : 0).replace(/\.0$/, "")} mm`;
+    const [below, right] = [y0 + 0.85, x1 + 0.85];
+    const size = 0.028 * Math.max(this.view.h, this.view.w / 1.5);
+    this.dims.style.fontSize = `${size.toFixed(3)}px`;
+    this.dims.replaceChildren(
+      s("path", { d: `M${x0} ${below}H${x1}M${x0} ${below - 0.15}v0.3M${x1} ${below - 0.15}v0.3M${right} ${y0}V${y1}M${right - 0.15} ${y0}h0.3M${right - 0.15} ${y1}h0.3` }),
+      s("text", { x: (x0 + x1) / 2, y: below + size / 3, "text-anchor": "middle" }, text(x1 - x0)),
+      s("text", { x: right, y: (y0 + y1) / 2, "text-anchor": "middle", transform: `rotate(-90 ${right} ${(y0 + y1) / 2}) translate(0 ${(size / 3).toFixed(3)})` }, text(y0 - y1)));
   }
 
   trace(paths: number[][][]): void {
@@ -189,10 +196,6 @@ export class Drawing implements LatticeDrawing {
     path.setAttribute("d", d);
   }
 
-  markRegions(problem: Problem): void {
-    markRegions(this, problem);
-  }
-
   /** Position of the pointer in lattice units. */
   locate(event: { clientX: number; clientY: number }): Point {
     const matrix = this.svg.getScreenCTM();
@@ -225,11 +228,25 @@ export class Drawing implements LatticeDrawing {
   }
 }
 
-/** Mark supports, input and output of a problem. */
-export function markRegions(drawing: Pick<LatticeDrawing, "mark">, { supports, input, output }: Problem): void {
+function least(flat: ArrayLike<number>, axis: number): number {
+  let found = Infinity;
+  for (let k = axis; k < flat.length; k += 2) found = Math.min(found, flat[k]!);
+  return found;
+}
+
+function most(flat: ArrayLike<number>, axis: number): number {
+  let found = -Infinity;
+  for (let k = axis; k < flat.length; k += 2) found = Math.max(found, flat[k]!);
+  return found;
+}
+
+/** Mark supports, inputs and outputs of a problem, those of all load cases. */
+export function markRegions(drawing: Pick<LatticeDrawing, "mark">, { supports, input, output, specification }: Problem): void {
+  const cases = specification?.cases ?? [];
+  const outputs = [specification?.outputs ?? {}, ...cases.map((each) => each.outputs)].flatMap((each) => Object.values(each));
   drawing.mark("support", [...supports.fixed, ...supports.fixed_x, ...supports.fixed_y, ...(supports.fixed_z ?? [])]);
-  drawing.mark("input", input.nodes);
-  drawing.mark("output", output.nodes);
+  drawing.mark("input", [...new Set([input, ...cases.map((each) => each.input)].flatMap(({ nodes }) => nodes))]);
+  drawing.mark("output", [...new Set([output, ...outputs].flatMap(({ nodes }) => nodes))]);
 }
 
 /** Make lines thicker in a picture of a large lattice; `width` is the visible width in beam lengths. */
@@ -282,4 +299,9 @@ export function arrow([x, y]: Point, [dx, dy]: Point, head = 0.34): string {
     return `${px.toFixed(3)} ${(-py).toFixed(3)}`;
   };
   return `M${x.toFixed(3)} ${(-y).toFixed(3)}L${tx.toFixed(3)} ${(-ty).toFixed(3)}M${side(1)}L${tx.toFixed(3)} ${(-ty).toFixed(3)}L${side(-1)}`;
+}
+
+/** Three quarters of a turn about a point, counter-clockwise, as a path with its head. */
+export function turnArrow([x, y]: Point, radius = 0.9): string {
+  return `M${x} ${-y - radius}A${radius} ${radius} 0 1 0 ${x + radius} ${-y}M${x + radius - 0.25} ${-y + 0.3}L${x + radius} ${-y}L${x + radius + 0.25} ${-y + 0.3}`;
 }

@@ -6,7 +6,8 @@ import type { Built, Hold, Table, Target, Task, Tool, ZoneKind, ZoneShape } from
 /** Settings of a search. */
 export interface Settings { method: string; steps: number; chains: number; seed: number; /** Whether it begins with the design drawn by hand. */ fromHand: boolean }
 
-export interface Fault { key: string; message: string }
+/** Why there is no problem: the message of the server, and as the page writes it. */
+export interface Fault { key: string; message: string; text: string }
 
 export interface TaskEditor {
   readonly task: Task;

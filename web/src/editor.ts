@@ -1,7 +1,7 @@
 // The page on which a task is stated, and a design is drawn by hand.
 
-import { bitsOf, fetchRegistries, hexOf, isInSpace, post, ServerError, session, Solver, type ItemState, type Point, type Registries, type Response } from "./api";
-import { store, storedHistory, TASK_KEY } from "./begin";
+import { bitsOf, fetchRegistries, get, hexOf, isInSpace, post, ServerError, session, Solver, type ItemState, type Point, type Registries, type Response, type Run } from "./api";
+import { store, storedHistory, storedSettings, storeSettings, TASK_KEY } from "./begin";
 import { Canvas, type CanvasActions } from "./canvas";
 import { where } from "./drawing";
 import { announce, button, choice, clear, download, figure, h, iconButton } from "./dom";
@@ -9,10 +9,10 @@ import type { Fault, Settings, TaskEditor } from "./editing";
 import { Panels } from "./panels";
 import { SpaceCanvas } from "./spacecanvas";
 import {
-  assign, History, isTask, nodesOf, sectionsOf, toLink, vectorInSpace, vectorOf, withSection, withSections,
+  assign, History, isSpatial, isTask, isTurn, nodesOf, sectionsOf, toLink, vectorInSpace, vectorOf, withImages, withSection, withSections,
   type Built, type Direction, type Domain, type Hold, type Kind, type Shape, type Table, type Target, type Task, type Tool, type ZoneKind, type ZoneShape,
 } from "./task";
-import { fileName, lengthIn, sentence, suffixOf, undoKeys } from "./text";
+import { faultText, fileName, lengthIn, sentence, suffixOf, undoKeys } from "./text";
 import type { Arrow, TaskDrawing, View } from "./view";
 
 const TOOLS: [Tool, string, string][] = [
@@ -25,10 +25,10 @@ const TOOLS: [Tool, string, string][] = [
 ];
 /** Hints for a task in space. */
 const IN_SPACE: Partial<Record<Tool, string>> = {
-  supports: "Click nodes to hold them; drag to turn the view. Choose a layer to select its nodes only, or all of them at once.",
+  supports: "Click nodes to hold them; drag to turn the view. Choose a layer to see its nodes only, or to add all of them at once. Solid bars are kept; the search decides on the thin lines.",
   inputs: "Click the nodes that are pushed; set direction and stroke in the panel.",
   outputs: "Click the nodes that must move; set their direction in the panel.",
-  zones: "Add holes and zones in the panel, under Part and domain.",
+  zones: "Add holes and zones in the panel, under Part, domain, files.",
 };
 const WELCOME = "This example is held at the bottom and pushed down at the right; its output must move left. Change it, or press Design it.";
 /** What a first node makes of a kind without any table. */
@@ -47,7 +47,7 @@ export class Editor implements TaskEditor {
   tool: Tool = "supports";
   hold: Hold = "all";
   zone: { kind: ZoneKind; shape: ZoneShape } = { kind: "holes", shape: "box" };
-  settings: Settings = { method: "", steps: 8000, chains: 2, seed: 0, fromHand: false };
+  private chosen: Settings = storedSettings();
   fault: Fault | null = null;
   registries: Registries | null = null;
   built: Built | null = null;
@@ -61,6 +61,7 @@ export class Editor implements TaskEditor {
   private readonly solver: Solver;
   private readonly hint = h("p", { class: "hint" });
   private readonly errorLine = h("p", { class: "error", role: "alert" });
+  private readonly welcome = h("p", { class: "welcome" }, WELCOME);
   private readonly notice = h("p", { class: "notice", role: "status" });
   private readonly readout = h("div", { class: "readout", "aria-live": "polite" });
   private readonly tools = h("div", { class: "tools" });
@@ -81,7 +82,8 @@ export class Editor implements TaskEditor {
   };
   private readonly keys = undoKeys((action) => this.step(action));
 
-  constructor(task: Task, private readonly isFirstVisit = false) {
+  constructor(task: Task, isFirstVisit = false) {
+    this.welcome.hidden = !isFirstVisit;
     this.history = new History(task, storedHistory());
     this.canvas = new Canvas(this.actions);
     this.paper = h("div", { class: "paper" }, this.readout, this.canvas.element);
@@ -99,6 +101,9 @@ export class Editor implements TaskEditor {
       this.panels.show();
     }, (error: ServerError) => { this.errorLine.textContent = sentence(error.message); });
   }
+
+  get settings(): Settings { return this.chosen; }
+  set settings(settings: Settings) { this.chosen = settings; storeSettings(settings); }
 
   get task(): Task { return this.history.value; }
   get hasHandDesign(): boolean { return this.task.hand !== null && this.task.hand !== this.built?.problem?.initial; }
@@ -137,7 +142,7 @@ export class Editor implements TaskEditor {
       h("div", { class: "intro" },
         h("h1", {}, "Design a compliant mechanism"),
         h("p", {}, "State where the part is held, where it is pushed, and what its outputs must do. The search determines which struts to keep; the result is one piece that prints."),
-        this.isFirstVisit && h("p", { class: "welcome" }, WELCOME), this.notice),
+        this.panels.start, this.welcome, this.notice),
       stage, this.panels.element);
   }
 
@@ -175,6 +180,7 @@ export class Editor implements TaskEditor {
   }
 
   private set(task: Task, merge = false): void {
+    this.welcome.hidden = true;
     this.history.set(task, merge);
     this.changed();
   }
@@ -194,6 +200,8 @@ export class Editor implements TaskEditor {
     if (this.target.kind === "supports") this.target = { kind: "supports", index: this.supportIndex() };
     const { kind, index } = this.target;
     let { table } = this.task;
+    // Supports of a symmetric design are symmetric.
+    if (kind === "supports" && table.limits?.symmetry && !isSpatial(table)) nodes = withImages(built, table.limits.symmetry, nodes);
     const sections = sectionsOf(table, loadCase, kind);
     let now = built;
     if (index >= sections.length) {
@@ -291,7 +299,7 @@ export class Editor implements TaskEditor {
     try {
       const before = this.built?.lattice;
       this.built = await post<Built>("/tasks/build", { task: this.task.table }, requested.signal);
-      this.fault = this.built.fault;
+      this.fault = this.built.fault && this.faultOf(this.built.fault);
       const { lattice } = this.built;
       const same = !before || (before.beams.length === lattice.beams.length && JSON.stringify(before.positions) === JSON.stringify(lattice.positions));
       if (this.task.hand && !(same && this.task.hand.length === hexOf(new Uint8Array(lattice.beams.length)).length)) {
@@ -300,13 +308,22 @@ export class Editor implements TaskEditor {
     } catch (error) {
       if (error instanceof DOMException) return;
       const refused = error as ServerError;
-      this.fault = { key: refused.key, message: refused.message };
+      this.fault = this.faultOf(refused);
     }
     if (requested.signal.aborted) return;
     this.sent = text;
     this.reached = null;
     if (this.tool === "hand") this.drawByHand();
     this.show();
+  }
+
+  private faultOf({ key, message }: { key: string; message: string }): Fault {
+    const { lattice, part } = this.built ?? {};
+    const place = (node: number): string => {
+      const at = lattice?.positions[node];
+      return at && part ? `the node at ${at.map((value) => (value! * part.scale).toFixed(1)).join(", ")} mm` : `node ${node}`;
+    };
+    return { key, message, text: faultText(message, place) };
   }
 
   /** Compute the design drawn by hand at once, and along the whole stroke after a pause. */
@@ -337,7 +354,7 @@ export class Editor implements TaskEditor {
     this.hint.textContent = (inSpace && IN_SPACE[this.tool]) || TOOLS.find(([key]) => key === this.tool)![2];
     this.undoButton.disabled = !this.history.canUndo;
     this.redoButton.disabled = !this.history.canRedo;
-    this.errorLine.textContent = this.fault ? sentence(this.fault.message) : "";
+    this.errorLine.textContent = this.fault?.text ?? "";
     if (this.tool !== "hand") clear(this.readout);
     this.panels.show();
   }
@@ -374,18 +391,18 @@ export class Editor implements TaskEditor {
     const { scale } = built.part;
     const problem = built.problem;
     const drive = problem?.input.drive === "displacement" ? problem.input.amount : null;
-    const arrow = (kind: Kind, index: number, direction: Direction | undefined, usual: Point, stroke: number | null): Arrow => ({
-      target: { kind, index }, nodes: nodesOf(built, this.loadCase, kind)[index] ?? [], direction: isInSpace(built.lattice) ? vectorInSpace(direction, usual.length === 3 ? usual : undefined) : vectorOf(direction, usual), stroke,
+    const arrow = (kind: Kind, index: number, direction: Direction | undefined, usual: Point, stroke: number | null, turns = false): Arrow => ({
+      turns, target: { kind, index }, nodes: nodesOf(built, this.loadCase, kind)[index] ?? [], direction: isInSpace(built.lattice) ? vectorInSpace(direction, usual.length === 3 ? usual : undefined) : vectorOf(direction, usual), stroke,
     });
     const first = (direction: Point | Point[] | undefined, usual: Point): Point => (direction === undefined ? usual : Array.isArray(direction[0]) ? direction[0] : direction as Point);
     const found = [
       ...(load_case.inputs ?? []).map((each, k) => arrow("inputs", k, each.direction, first(problem?.input.direction, [0, -1]),
         each.displacement === undefined ? (each.force === undefined ? drive : null) : lengthIn(each.displacement) / scale)),
-      ...(load_case.outputs ?? []).map((each, k) => arrow("outputs", k, each.direction, first(problem?.output.direction, [0, 1]), null)),
+      ...(load_case.outputs ?? []).map((each, k) => arrow("outputs", k, each.direction, first(problem?.output.direction, [0, 1]), null, isTurn(each))),
       ...(load_case.loads ?? []).map((each, k) => arrow("loads", k, each.direction, [0, -1], null)),
     ];
     if (!load_case.inputs?.length && built.regions.given.input.length) {
-      found.push({ target: { kind: "inputs", index: 0 }, nodes: built.regions.given.input, direction: first(problem?.input.direction, [0, -1]), stroke: drive });
+      found.push({ turns: false, target: { kind: "inputs", index: 0 }, nodes: built.regions.given.input, direction: first(problem?.input.direction, [0, -1]), stroke: drive });
     }
     return found;
   }
@@ -413,12 +430,20 @@ export class Editor implements TaskEditor {
   async startSearch(): Promise<void> {
     const { settings, task } = this;
     const body = {
-      title: task.table.name, session: session(), task: task.table,
+      title: await this.freeTitle(task.table.name), session: session(), task: task.table,
       method: settings.method, steps: settings.steps, chains: settings.chains, seed: settings.seed,
       reference: this.hasHandDesign ? task.hand : null, start: this.hasHandDesign && settings.fromHand ? task.hand : null,
     };
     const { id } = await post<{ id: string }>("/runs", body);
     location.hash = `#/run/${id}`;
+  }
+
+  /** A title that no search has yet. */
+  private async freeTitle(name: string): Promise<string> {
+    const known = new Set((await get<Run[]>("/runs")).map(({ title }) => title));
+    let title = name;
+    for (let number = 2; known.has(title); number++) title = `${name.slice(0, 100)} (${number})`;
+    return title;
   }
 
   /** Refine the design drawn by hand, and open the page of its refinement. */

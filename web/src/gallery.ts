@@ -3,6 +3,7 @@
 import { get, type Run, type Collection } from "./api";
 import { ago, count, figure, h } from "./dom";
 import { collectionView, tile } from "./collections";
+import { sentence } from "./text";
 
 /** Number of designs of a collection shown at first: three rows. */
 const SHOWN = 15;
@@ -40,7 +41,10 @@ export class RunsPage {
     let runs: Run[];
     try {
       runs = await get<Run[]>("/runs");
-    } catch { return; }
+    } catch (error) {
+      if (!this.list.childElementCount) this.list.replaceChildren(h("li", { class: "empty" }, sentence((error as Error).message)));
+      return;
+    }
     const focused = document.activeElement?.getAttribute("href");
     if (!runs.length) {
       this.list.replaceChildren(h("li", { class: "empty" }, "No searches. ", h("a", { href: "#/draw" }, "Define a task"), " and press Design it."));

@@ -30,7 +30,7 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
       amount("limit-clearance", "Gap between struts at least", value("clearance"), "mm", (given) => put({ clearance: given }), "empty: they must not touch")),
     h("div", { class: "row" }, field("mass", "Mass at most", "g"), field("stable_stroke", "Stable up to", "", "such as 1.2 or 120%")),
     h("div", { class: "row" }, field("strut_loss", "Loss of a strut costs at most", "", "such as 30%"),
-      h("div", { class: "field" }, h("label", { for: "limit-symmetry" }, "Mirror symmetry"), symmetry)),
+      h("div", { class: "field" }, h("label", { for: "limit-symmetry" }, "Symmetry of the design"), symmetry)),
     h("label", { class: "tick" }, over, "Design over tolerances of print and drive"),
     table.tolerance !== undefined && toleranceFields(editor, table.tolerance));
 }

@@ -1,7 +1,7 @@
 // The page on which parts are placed, rotated and linked, and assembled to one design.
 
 import { bitsOf, get, modelOf, post, type Point, type Problem, type ServerError, type Collection, type GalleryEntry } from "./api";
-import { arrow, Drawing, isEach, where } from "./drawing";
+import { arrow, Drawing, isEach, markRegions, where } from "./drawing";
 import { announce, button, choice, clear, field, figure, h, iconButton, number, s, select } from "./dom";
 import { emptyPlan, isPlan, MOST, portLabel, portsOf, readPlan, withoutPart, withPart, writePlan, type Plan, type PlanEnd, type PlanPart, type Port, type WrittenPlan } from "./plan";
 import { collectionView, thumbnail } from "./collections";
@@ -158,7 +158,7 @@ export class MachinePage {
     });
     const painted = [0, 1, 2, 3].map((k) => ({ name: `part-${k}`, beams: groups.filter(({ name }) => name === `part-${k}`).flatMap(({ beams }) => beams) }));
     drawing.draw([...painted, { name: "bridge", beams: where(bits).filter((beam) => !owned.has(beam)) }]);
-    drawing.markRegions(problem);
+    markRegions(drawing, problem);
     drawing.overlay.replaceChildren(...(["input", "output"] as const).flatMap((region) => arrows(problem, region)));
     const reversed = built.efficiency !== null && built.efficiency < 0;
     clear(this.readout, h("strong", {}, figure(built.efficiency, 3)),

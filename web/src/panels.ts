@@ -50,6 +50,9 @@ export class Panels {
     this.element.addEventListener("pointerdown", () => this.press());
   }
 
+  /** What a task may start from. */
+  get start(): HTMLElement { return this.domain.start; }
+
   /** Postpone updates until the pointer is released: a replaced element would receive no click. */
   private press(): void {
     this.pressed = true;
@@ -81,9 +84,10 @@ export class Panels {
       this.open.add(editor.tool === "zones" ? "domain" : editor.tool);
     }
     const kept = this.kept();
+    const place = kept && this.placeOf(kept.key);
     const unfolded = [...this.element.querySelectorAll("details[open] > summary[data-key]")].map((summary) => (summary as HTMLElement).dataset.key!);
     clear(this.element,
-      this.section("domain", "Part and domain", this.domain.summary(), () => this.domain.make()),
+      this.section("domain", "Part, domain, files", this.domain.summary(), () => this.domain.make()),
       this.section("supports", "Supports", this.nodeSummary("supports"), () => this.supports()),
       editor.task.table.cases.length > 1 && this.cases(),
       ...(["inputs", "outputs", "loads"] as const).map((kind) =>
@@ -96,6 +100,14 @@ export class Panels {
     // What was unfolded stays so.
     for (const key of unfolded) this.element.querySelector(`summary[data-key="${CSS.escape(key)}"]`)?.parentElement!.setAttribute("open", "");
     this.restore(kept);
+    // The focused element stays where it is on the screen, whatever is shown above it.
+    const now = kept && this.placeOf(kept.key);
+    if (place != null && now != null && Math.abs(now - place) > 1) scrollBy({ top: now - place, behavior: "instant" });
+  }
+
+  /** Distance of an element from the upper edge of the window. */
+  private placeOf(key: string): number | null {
+    return this.element.querySelector(`[data-key="${CSS.escape(key)}"]`)?.getBoundingClientRect().top ?? null;
   }
 
   /** The focused field, with a text that is not taken over yet, and its selection. */
@@ -128,7 +140,7 @@ export class Panels {
     const items = editor.built?.items ?? [];
     const reached = editor.tool === "hand" ? editor.reached : null;
     if (!items.length) {
-      clear(this.items, h("h2", { class: "plain" }, "Specification"), h("p", { class: "note" }, editor.missing ? "It is listed here when supports, an input and an output are known." : "Nothing but the motion is asked for."));
+      clear(this.items, h("h2", { class: "plain" }, "Specification"), h("p", { class: "note" }, editor.fault ? "It is listed here when the task is without errors." : editor.missing ? "It is listed here when supports, an input and an output are known." : "Nothing but the motion is asked for."));
       return;
     }
     const wanted = items.map((item) => ({ ...item, reached: "", margin: null, met: false }));
@@ -158,7 +170,7 @@ export class Panels {
     const { fault, missing } = this.editor;
     if (this.local[key]) return this.local[key]!;
     const owner = (text: string): string => OWNERS.find(([pattern]) => pattern.test(text))?.[1] ?? "domain";
-    if (fault) return owner(fault.key || fault.message) === key ? sentence(fault.message) : "";
+    if (fault) return owner(fault.key || fault.message) === key ? fault.text : "";
     return missing && owner(missing) === key ? NEEDED[key] ?? "" : "";
   }
 

@@ -81,7 +81,10 @@ export class Player {
     this.paper.append(drawing.element);
     drawing.setLattice(this.problem.positions, this.problem.beams);
     drawing.ghost("rest", this.beams);
-    if (drawing instanceof Drawing) drawing.overlay.append(this.stress);
+    if (drawing instanceof Drawing) {
+      drawing.overlay.append(this.stress);
+      drawing.dimensions(this.scale);
+    }
     drawing.element.addEventListener("pointermove", (event) => this.point(event as PointerEvent));
     if (this.motion) this.showMotion(this.motion);
     this.show();

@@ -5,7 +5,7 @@ import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
 import { Player, type Picture } from "./player";
-import { figureTable, itemTable, verdictOf, type Column } from "./specification";
+import { figureTable, itemTable, otherObjective, verdictOf, type Column } from "./specification";
 import type { Table } from "./task";
 import { fileName, REMEDIES, sentence } from "./text";
 
@@ -122,9 +122,10 @@ export class Result {
       return;
     }
     const first = report.figures[0];
-    clear(this.headline, h("strong", {}, figure(first?.efficiency, 2)),
+    const objective = otherObjective(report.objectives);
+    clear(this.headline, h("strong", {}, objective?.reached ?? figure(first?.efficiency, 2)),
       h("span", {}, h("b", { class: "model" }, "frames, 8 elements in each strut"), h("br"),
-        `Output / input motion of the part with ${this.part.width} mm struts`));
+        `${objective ? sentence(objective.label).slice(0, -1) : "Output / input motion"} of the part with ${this.part.width} mm struts`));
     const columns: Column[] = [];
     if (report.items.search) columns.push({ title: "search", items: report.items.search });
     if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
@@ -138,8 +139,9 @@ export class Result {
       : last ? `${verdictOf(last)} (${columns.at(-1)!.title === "sheet" ? "in the sheet" : "by frames"}).` : "No specification: the task says nothing about straightness, rotation or load.");
     clear(this.reportBox, columns.length > 0 && itemTable(columns), figureTable(report.figures));
     const better = this.subject.comparison?.efficiency ?? null;
-    const defect = unstable || (first.efficiency ?? 0) <= 0 ? "The output does not move in its direction along a stable path."
+    const defect = unstable ? "The part has no stable path to the full stroke."
       : last && !isMet ? "The specification is not met."
+      : !last && (first.efficiency ?? 0) <= 0 ? "The output does not move in its direction."
       : better !== null && this.subject.efficiency !== null && better > this.subject.efficiency ? "The design drawn by hand has a higher efficiency." : "";
     clear(this.advice, defect && h("p", {}, defect), defect && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
   }
@@ -154,7 +156,7 @@ export class Result {
         h("td", { class: "more" }, comparison.efficiency && efficiency && comparison.efficiency > 0 && efficiency > comparison.efficiency ? `${figure(comparison.efficiency / efficiency, 2)} of the result` : "")),
       ...(this.registries?.levels ?? []).filter(this.isOffered).map((level) => this.femRow(level)),
     ];
-    clear(this.table, h("caption", {}, "Efficiency by model"), h("tbody", {}, ...rows));
+    clear(this.table, h("caption", {}, "Output / input motion by model"), h("tbody", {}, ...rows));
   }
 
   private femRow({ name, title, duration, missing }: Registries["levels"][number]): HTMLElement {
@@ -301,12 +303,14 @@ export class Result {
   }
 
   private showFiles(fault = ""): void {
+    // One process computes finite elements, tolerances and files, one after the other.
+    const waits = Object.values(this.fems).includes("running") || this.tolerance === "running" || this.print === "running";
     clear(this.filesBox,
       h("div", { class: "files" },
         ...(this.registries?.files ?? []).filter(this.isOffered).map(({ name: suffix, title, purpose }) => h("button", {
           type: "button", class: this.writing === suffix ? "file busy" : "file", disabled: this.writing !== "", "data-file": suffix,
           onclick: () => void this.downloadFile(suffix),
-        }, h("strong", {}, title), h("span", {}, this.writing === suffix ? "writing …" : purpose))),
+        }, h("strong", {}, title), h("span", {}, this.writing === suffix ? (waits ? "written after the other computations …" : "writing …") : purpose))),
         this.subject.history && h("button", { type: "button", class: "file", "data-file": "history", disabled: this.writing !== "", onclick: () => void this.downloadHistory() },
           h("strong", {}, "History"), h("span", {}, "all proposals"))),
       fault && h("p", { class: "fault", role: "alert" }, fault));

@@ -3,15 +3,16 @@
 import { fetchRegistries, follow, get, isInSpace, modelOf, post, remove, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
 import { bitsOf } from "./api";
 import { Chart } from "./chart";
-import { Drawing, flatten, projected, where } from "./drawing";
+import { Drawing, markRegions, sectionOf, where, type LatticeDrawing } from "./drawing";
+import { loadSpace } from "./loadspace";
 import { announce, button, choice, clear, count, duration, figure, h } from "./dom";
 import { Result } from "./result";
-import { itemTable, verdictOf } from "./specification";
+import { itemTable, otherObjective, verdictOf } from "./specification";
 import { runMessage, REMEDIES, sentence } from "./text";
 
 export class RunPage {
   readonly element = h("div", { class: "page run" });
-  private readonly drawing = new Drawing("The best design so far, deformed");
+  private drawing: LatticeDrawing | null = null;
   private readonly chart = new Chart();
   private readonly head = h("div", { class: "intro" });
   private readonly live = h("div", { class: "live" });
@@ -22,33 +23,36 @@ export class RunPage {
   private readonly readout = h("div", { class: "readout" });
   private readonly watch: HTMLElement;
   private readonly side = h("div", { class: "side" });
-  private readonly paper = h("div", { class: "paper" }, this.readout, this.drawing.svg);
+  private readonly paper = h("div", { class: "paper" }, this.readout);
   private readonly switcher = h("div", { class: "bar" });
   private result: Result | null = null;
   private shown = "";
+  private isAtRest = false;
+  private isClosed = false;
+  /** What the user has asked for that the server has not done yet. */
+  private asked = "";
   private update: RunUpdate | null = null;
   private chain = "best";
   private readonly leave: () => void;
   private showing: "live" | "human" = "live";
   private shownStatus = "";
   private method: Registries["searches"][number] | null = null;
+  private readonly curveTitle = h("h2");
   private readonly curveNote = h("p", { class: "note" });
 
   constructor(private run: RunDetails) {
-    this.drawing.setLattice(projected(run.problem.positions), run.problem.beams);
     this.chart.configure(run.settings);
     if (run.comparison) this.chart.compare(run.comparison.title, run.comparison.efficiency);
     this.stage.append(this.switcher, this.paper);
-    const card = h("section", { class: "card", "aria-label": "Efficiency along the search" },
-      h("h2", {}, "Efficiency along the search"), this.chart.svg,
-      this.curveNote);
+    const card = h("section", { class: "card", "aria-label": "Progress of the search" }, this.curveTitle, this.chart.svg, this.curveNote);
+    this.curveTitle.textContent = run.problem.specification ? "Objective along the search" : "Efficiency along the search";
     card.hidden = run.refine;
     this.watch = h("aside", { class: "panel", "aria-label": "Search" },
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.items, this.controls, this.trouble));
     this.side.append(this.watch);
     this.element.append(this.head, h("div", { class: "main" }, this.stage, card), this.side);
     this.show(run);
-    this.draw(run.problem.initial, null);
+    void this.openDrawing();
     if (run.mask) void this.open();
     void fetchRegistries().then(({ searches }) => this.describeMethod(searches.find(({ name }) => name === run.method)), () => undefined);
     this.leave = follow(`/runs/${run.id}/live`, (update) => this.receive(update), (lost) => {
@@ -57,7 +61,9 @@ export class RunPage {
   }
 
   close(): void {
+    this.isClosed = true;
     this.leave();
+    this.drawing?.close();
     this.result?.close();
   }
 
@@ -65,8 +71,9 @@ export class RunPage {
   private describeMethod(search: Registries["searches"][number] | undefined): void {
     if (!search) return;
     this.method = search;
-    const curve = search.running_best ? "Best efficiency of each chain so far." : "Efficiency of the current design of each chain.";
-    this.curveNote.textContent = `${curve}${this.run.settings.replicas === undefined ? " Shaded: phases of higher temperature." : ""}`;
+    const curve = search.running_best ? "The best design of each chain so far." : "The current design of each chain.";
+    const missed = this.run.problem.specification ? " Designs that miss items have no point." : "";
+    this.curveNote.textContent = `${curve}${missed}${this.run.settings.replicas === undefined ? " Shaded: phases of higher temperature." : ""}`;
     this.show(this.run);
   }
 
@@ -93,33 +100,48 @@ export class RunPage {
     else if (update?.moved) this.draw(update.moved.mask, update.moved.displacement);
   }
 
-  private draw(mask: string, given: number[] | null): void {
-    const displacement = given && this.flat(given);
-    const bits = bitsOf(mask, this.run.problem.beams.length);
-    const old = bitsOf(this.shown || mask, bits.length);
-    this.drawing.move(null);
-    this.drawing.ghost("possible", where(bits, 0));
-    this.drawing.ghost("rest", where(bits));
-    this.drawing.move(displacement);
-    if (displacement) this.drawing.makeRoom(where(bits), displacement);
-    const gone = where(Uint8Array.from(bits, (bit, k) => (old[k] && !bit ? 1 : 0)));
-    const came = where(Uint8Array.from(bits, (bit, k) => (!old[k] && bit ? 1 : 0)));
-    this.drawing.draw([{ name: "plain", beams: where(bits) }, { name: "gone", beams: gone }, { name: "came", beams: came }]);
-    for (const name of ["gone", "came"]) {
-      const path = this.drawing.path(name);
-      path.style.animation = "none";
-      path.getBoundingClientRect();
-      path.style.animation = "";
+  /** Open the drawing, flat or in space, with the design that the search begins with. */
+  private async openDrawing(): Promise<void> {
+    const { problem } = this.run;
+    const label = "The best design so far, deformed";
+    try {
+      const drawing = isInSpace(problem) ? await loadSpace(label, sectionOf(problem)) : new Drawing(label);
+      if (this.isClosed) { drawing.close(); return; }
+      this.drawing = drawing;
+    } catch (error) {
+      this.trouble.textContent = sentence((error as Error).message);
+      return;
     }
-    this.drawing.markRegions(this.run.problem);
-    this.shown = mask;
+    this.drawing.setLattice(problem.positions, problem.beams);
+    if (this.drawing instanceof Drawing && this.run.part) this.drawing.dimensions(this.run.part.scale);
+    this.paper.append(this.drawing.element);
+    this.draw(problem.initial, null);
+    this.drawLive();
   }
 
-  /** A displacement as it is drawn: that of a part in space in oblique view. */
-  private flat(displacement: number[]): ArrayLike<number> {
-    if (!isInSpace(this.run.problem)) return displacement;
-    const moved = Array.from({ length: displacement.length / 3 }, (_, k): [number, number, number] => [displacement[3 * k]!, displacement[3 * k + 1]!, displacement[3 * k + 2]!]);
-    return flatten(projected(moved));
+  private draw(mask: string, displacement: number[] | null): void {
+    const { drawing } = this;
+    if (!drawing || (mask === this.shown && !displacement && this.isAtRest)) return;
+    const bits = bitsOf(mask, this.run.problem.beams.length);
+    const old = bitsOf(this.shown || mask, bits.length);
+    this.isAtRest = !displacement;
+    drawing.ghost("possible", drawing instanceof Drawing ? where(bits, 0) : []);
+    drawing.ghost("rest", where(bits));
+    drawing.at = displacement ? Float64Array.from(drawing.rest, (value, k) => value + displacement[k]!) : drawing.rest;
+    if (displacement) drawing.makeRoom(where(bits), displacement);
+    const gone = where(Uint8Array.from(bits, (bit, k) => (old[k] && !bit ? 1 : 0)));
+    const came = where(Uint8Array.from(bits, (bit, k) => (!old[k] && bit ? 1 : 0)));
+    if (drawing instanceof Drawing) {
+      drawing.draw([{ name: "plain", beams: where(bits) }, { name: "gone", beams: gone }, { name: "came", beams: came }]);
+      for (const name of ["gone", "came"]) {
+        const path = drawing.path(name);
+        path.style.animation = "none";
+        path.getBoundingClientRect();
+        path.style.animation = "";
+      }
+    } else drawing.draw([{ name: "plain", beams: where(bits) }]);
+    markRegions(drawing, this.run.problem);
+    this.shown = mask;
   }
 
   private async open(): Promise<void> {
@@ -153,15 +175,20 @@ export class RunPage {
     const done = run.status === "finished" && !run.refine ? run.total : Math.max(run.done, made);
     const share = run.status === "finished" ? 1 : Math.min(1, done / run.total);
     const running = run.status === "running";
+    if (!running && this.asked) { this.asked = ""; this.showControls(run); }
     const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
     const refined = this.update?.refined;
-    const last: [string, string] = refined ? ["refinement", `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.objective === null ? "" : `, best ${figure(refined.objective, 2)}`}`]
-      : tried ? ["candidates verified", `${tried[0]} of at most ${tried[1]}`] : ["time left", duration(this.update?.left)];
-    const rows: [string, string][] = run.refine ? [["refinement", refined ? last[1] : running ? "starting …" : `${done.toLocaleString("en")} geometries`]] : [
+    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.sheets ? `, ${count(refined.sheets, "check")} in the better model` : ""}${refined.objective === null ? "" : `, best ${figure(refined.objective, 2)}`}`;
+    const phase = refined ? "refinement" : tried ? "verification" : "search";
+    const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
+    const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${done.toLocaleString("en")} geometries`)]] : [
+      ...(running ? [["phase", `${phases.indexOf(phase) + 1} of ${phases.length}: ${phase}`]] as [string, string][] : []),
       [specified ? "largest objective" : "best so far", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
-      ...(running ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], last] as [string, string][] : []),
+      ...(running && phase === "search" ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], ["left of this phase", duration(this.update?.left)]] as [string, string][] : []),
+      ...(running && tried && !refined ? [["candidates verified", `${tried[0]} of at most ${tried[1]}`]] as [string, string][] : []),
+      ...(refining ? [["refinement", refining]] as [string, string][] : []),
       ["method", `${this.method?.title ?? run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
       ...(settings.goals.length ? [["constraints", settings.goals.join(", ")]] as [string, string][] : []),
     ];
@@ -178,8 +205,12 @@ export class RunPage {
     if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {
       const moved = this.update?.moved;
+      const objective = otherObjective(moved?.objectives ?? []);
       const value = moved?.efficiency ?? run.efficiency ?? this.chart.best;
-      clear(this.readout, value !== null && h("strong", {}, figure(value, 3)), h("span", {}, this.stateText(run, value !== null, done)));
+      if (objective) this.curveTitle.textContent = `Objective along the search: ${objective.label}`;
+      else if (moved?.objectives.length) this.curveTitle.textContent = `Objective along the search: ${moved.objectives[0]!.label}`;
+      clear(this.readout, value !== null && h("strong", {}, objective?.reached ?? figure(value, 3)),
+        h("span", {}, `${objective ? `${objective.label} of the ` : ""}${this.stateText(run, value !== null, done)}`));
     }
   }
 
@@ -211,11 +242,28 @@ export class RunPage {
     return done ? "No admissible design yet." : "Starting …";
   }
 
-  private showControls(run: Run): void {
-    const act = (action: string) => async (): Promise<void> => {
+  private showControls(given: Run): void {
+    const run = { ...this.run, ...given };
+    const act = (action: string, asked = "") => async (): Promise<void> => {
       try {
         this.trouble.textContent = "";
+        this.asked = asked;
+        this.showControls(this.run);
         await post(`/runs/${run.id}/${action}`);
+      } catch (error) {
+        this.asked = "";
+        this.trouble.textContent = sentence((error as ServerError).message);
+        this.showControls(this.run);
+      }
+    };
+    const keep = async (): Promise<void> => {
+      const { moved } = this.update ?? {};
+      if (!moved) { this.trouble.textContent = "There is no design yet."; return; }
+      try {
+        const { source, key } = await post<{ source: string; key: string }>("/gallery", {
+          problem: run.problem, mask: moved.mask, title: `${run.title}, best so far`.slice(0, 120), provenance: { kind: "machine", part: run.part, task: run.task },
+        });
+        open(`#/design/${source}/${key}`, "_blank", "noopener");
       } catch (error) {
         this.trouble.textContent = sentence((error as ServerError).message);
       }
@@ -226,11 +274,15 @@ export class RunPage {
       location.hash = "#/runs";
     };
     const { status } = run;
+    if (this.asked) { clear(this.controls, h("p", { class: "note", role: "status" }, h("span", { class: "working" }), ` ${this.asked}`)); return; }
+    const refines = Boolean(run.problem.specification) && !run.refine;
     clear(this.controls,
-      (status === "running" || status === "queued") && button("Pause", () => void act("pause")()),
-      status === "running" && button(run.refine ? "Stop and take the result" : "Stop and choose the best", () => void act("stop")(), "strong"),
+      (status === "running" || status === "queued") && button("Pause", () => void act("pause", "Pausing …")()),
+      status === "running" && button(run.refine ? "Stop and take the result" : "Stop and choose the best", () => void act("stop", run.refine ? "Stopping the refinement …" : "Choosing and verifying the best design …")(), "strong"),
+      status === "running" && !run.refine && button("Open the best so far", () => void keep(), "", { title: "Store it in the gallery, and open it in another tab; the search goes on" }),
       (status === "paused" || status === "stopped" || status === "failed") && button(status === "failed" ? "Retry" : "Continue", () => void act("resume")(), "strong"),
       status === "paused" && !run.refine && button("Choose the best", () => void act("stop")()),
+      status === "running" && refines && h("p", { class: "note" }, "A search that is stopped keeps what its refinement has reached; its design can be refined further later."),
       status !== "running" && button("Delete", () => void erase(), "quiet"));
   }
 }

@@ -95,11 +95,12 @@ export class SpaceCanvas implements TaskDrawing {
   }
 
   private showLayers(): void {
-    const pick = select([["", "All layers"], ...this.layers.map(({ name }, k): [string, string] => [String(k), name])], this.layer, (layer) => { this.layer = layer; this.paint(); });
+    const pick = select([["", "All layers"], ...this.layers.map(({ name }, k): [string, string] => [String(k), name])], this.layer, (layer) => { this.layer = layer; this.showLayers(); this.paint(); });
+    pick.id = "layer";
     pick.setAttribute("aria-label", "Layer of nodes");
     pick.dataset.key = "layer";
-    const all = h("button", { type: "button", class: "quiet small", "data-key": "whole-layer", onclick: () => this.pickLayer() }, "Select the layer");
-    this.bar.replaceChildren(pick, all);
+    const all = h("button", { type: "button", class: "small", "data-key": "whole-layer", disabled: this.layer === "", onclick: () => this.pickLayer() }, "Add all nodes of the layer");
+    this.bar.replaceChildren(h("label", { for: "layer" }, "Nodes of"), pick, all);
   }
 
   private get pickable(): number[] {
@@ -107,7 +108,7 @@ export class SpaceCanvas implements TaskDrawing {
   }
 
   private pickLayer(): void {
-    if (this.layer === "" || !this.picksNodes) { announce("choose a layer first"); return; }
+    if (!this.picksNodes) return;
     this.actions.nodes(this.pickable, true);
   }
 
@@ -124,12 +125,16 @@ export class SpaceCanvas implements TaskDrawing {
     const held = view.held.flatMap(({ nodes }) => nodes);
     const marked = new Set([...held, ...view.arrows.flatMap(({ nodes }) => nodes)]);
     drawing.mark("node", this.picksNodes ? this.pickable.filter((node) => !marked.has(node)) : []);
-    drawing.mark("support", view.held.filter(({ hold }) => hold === "all").flatMap(({ nodes }) => nodes));
-    drawing.mark("roller", view.held.filter(({ hold }) => hold !== "all").flatMap(({ nodes }) => nodes));
+    // Marks of other layers than the chosen one are pale: seen from above, all lie over each other.
+    const inside = new Set(this.pickable);
+    const near = (nodes: number[]): number[] => nodes.filter((node) => inside.has(node));
+    drawing.mark("far", [...marked].filter((node) => !inside.has(node)));
+    drawing.mark("support", near(view.held.filter(({ hold }) => hold === "all").flatMap(({ nodes }) => nodes)));
+    drawing.mark("roller", near(view.held.filter(({ hold }) => hold !== "all").flatMap(({ nodes }) => nodes)));
     for (const [name, kind] of [["input", "inputs"], ["output", "outputs"], ["load", "loads"]] as const) {
-      drawing.mark(name, view.arrows.filter(({ target }) => target.kind === kind).flatMap(({ nodes }) => nodes));
+      drawing.mark(name, near(view.arrows.filter(({ target }) => target.kind === kind).flatMap(({ nodes }) => nodes)));
     }
-    drawing.arrows(view.arrows.filter(({ nodes }) => nodes.length).map(({ nodes, direction, stroke, target }) => {
+    drawing.arrows(view.arrows.filter(({ nodes, turns }) => nodes.length && !turns).map(({ nodes, direction, stroke, target }) => {
       const length = stroke === null ? ARROW : Math.max(0.7, STRETCH * stroke);
       const middle = [0, 1, 2].map((axis) => nodes.reduce((sum, node) => sum + drawing.at[3 * node + axis]!, 0) / nodes.length);
       // The arrow of an input ends at its nodes, as a push.
@@ -152,7 +157,7 @@ export class SpaceCanvas implements TaskDrawing {
     this.pressed = null;
     if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return; // the view was turned
     const { node, beam } = this.found(event);
-    if (node >= 0) this.toggle(node);
+    if (node >= 0) { this.toggle(node); this.point(-1, -1); }
     if (beam >= 0) this.actions.beams([beam], false);
   }
 

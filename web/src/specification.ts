@@ -1,10 +1,16 @@
 // The items of a specification and the figures of a part.
 
-import type { ItemState, PartFigures } from "./api";
+import type { ItemState, Objective, PartFigures } from "./api";
 import { count, figure, h } from "./dom";
 
 /** The items that a design reaches in one model. */
 export interface Column { title: string; items: ItemState[] }
+
+/** What is maximised, unless it is the motion of the output over that of the input, which a headline shows anyway. */
+export function otherObjective(objectives: Objective[]): Objective | null {
+  const first = objectives[0];
+  return first && first.quantity !== "gain" ? first : null;
+}
 
 /** One sentence on a list of items: whether all are met, and which one is farthest from it. */
 export function verdictOf(items: ItemState[]): string {

@@ -126,14 +126,51 @@ export function assign(task: Task, built: Built, load_case: number, target: Targ
   return { table: withSection(table, load_case, target, { at: regionsOf(next, positions, scale) }), hand: null };
 }
 
-/** A table whose selected nodes keep their distances from the nearer sides of a rectangle of another size. */
+/** Whether an output is to turn, whatever its motion. */
+export function isTurn({ direction, rotation, gain, travel }: OutputTable): boolean {
+  return direction === undefined && rotation !== undefined && !gain && !travel;
+}
+
+/** Mirror images of nodes in a plane lattice, about the middle of its designable struts; -1 for none. */
+export function imagesOf(built: Built, axis: "x" | "y", nodes: number[]): number[] {
+  const { positions, beams } = built.lattice;
+  const index = axis === "x" ? 0 : 1;
+  const designable = built.problem?.designable.map((beam) => beams[beam]!) ?? beams;
+  const values = designable.flat().map((node) => positions[node]![index]);
+  const sum = Math.min(...values) + Math.max(...values);
+  return nodes.map((node) => {
+    const wanted = positions[node]!.map((value, k) => (k === index ? sum - value! : value!));
+    return positions.findIndex(([x, y]) => Math.hypot(x - wanted[0]!, y - wanted[1]!) < 0.05);
+  });
+}
+
+/** Nodes with their images by the mirror symmetry of a design in the plane. */
+export function withImages(built: Built, symmetry: string, nodes: number[]): number[] {
+  const all = new Set(nodes);
+  for (const axis of ["x", "y"] as const) {
+    if (symmetry === axis || symmetry === "xy") for (const image of imagesOf(built, axis, [...all])) if (image >= 0) all.add(image);
+  }
+  return [...all];
+}
+
+/** A table whose selected nodes and zones keep their distances from the nearer sides of a domain of another size. */
 export function resized(table: Table, size: number[]): Table {
   const old = table.domain.size!;
   const along = (value: number, axis: number): number => (value > old[axis]! / 2 ? Math.round(100 * (value + size[axis]! - old[axis]!)) / 100 : value);
-  const moved = <T extends { at?: Region[] }>(sections: T[] | undefined): T[] | undefined => sections?.map((each) => (each.at
-    ? { ...each, at: each.at.map((region) => (region.point ? { ...region, point: region.point.map((value, axis) => along(value!, axis)) as Point } : region)) } : each));
+  const point = (given: Point | undefined): Point | undefined => given?.map((value, axis) => along(value!, axis)) as Point | undefined;
+  const shape = <T extends Shape>(given: T): T => cleaned({
+    ...given, circle: point(given.circle), sphere: point(given.sphere), cylinder: point(given.cylinder),
+    box: given.box?.map((value, k) => along(value, k % size.length)), polygon: given.polygon?.map((each) => point(each)!),
+  });
+  const region = (given: Region): Region => cleaned({
+    ...shape(given), point: point(given.point), without: given.without && shape(given.without),
+    between: given.between?.map((value) => (typeof value === "number" ? along(value, given.edge === "left" || given.edge === "right" ? 1 : 0) : value)) as Point | undefined,
+  });
+  const moved = <T extends { at?: Region[] }>(sections: T[] | undefined): T[] | undefined => sections?.map((each) => (each.at ? { ...each, at: each.at.map(region) } : each));
   const cases = table.cases.map((each) => cleaned({ ...each, supports: moved(each.supports), inputs: moved(each.inputs), outputs: moved(each.outputs), loads: moved(each.loads) }));
-  return cleaned({ ...table, domain: { ...table.domain, size }, supports: moved(table.supports), cases });
+  const { holes, keep_out, solid } = table.domain;
+  const domain = cleaned({ ...table.domain, size, holes: holes?.map(shape), keep_out: keep_out?.map(shape), solid: solid?.map(shape) });
+  return cleaned({ ...table, domain, supports: moved(table.supports), cases });
 }
 
 const DIRECTIONS: Record<string, Point> = { right: [1, 0], up: [0, 1], left: [-1, 0], down: [0, -1] };

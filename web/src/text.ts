@@ -24,10 +24,35 @@ export function sentence(text: string): string {
   return trimmed.charAt(0).toUpperCase() + trimmed.slice(1) + (/[.!?]$/.test(trimmed) ? "" : ".");
 }
 
+const SECTIONS: Record<string, string> = { supports: "Support", inputs: "Input", outputs: "Output", loads: "Load", input: "Input", output: "Output" };
+const PARTS: Record<string, string> = { domain: "Domain", limits: "Limits", part: "Part", tolerance: "Tolerance" };
+
+/** A message of the server on a task, with the titles of the page instead of keys; `place` describes a node by its number. */
+export function faultText(message: string, place: (node: number) => string): string {
+  const named = message.replace(/^key '([^']+)' is missing/, (_, key: string) => `${key}: the ${key.split(".").at(-1)} is missing`);
+  const found = /^([\w[\].]+): /.exec(named);
+  const key = found?.[1] ?? "";
+  const rest = (found ? named.slice(found[0].length) : named)
+    .replace(/, the first is \d+$/, "").replace(/problem '[^']*'/, "the lattice").replaceAll(/\bdesignable beams\b/g, "struts").replaceAll(/\bdesignable image\b/g, "image that the search may change")
+    .replaceAll(/\bnode (\d+)\b/g, (_, node: string) => place(Number(node)));
+  const section = /(supports|inputs|outputs|loads)\[(\d+)\]|^(input|output|supports)\b/.exec(key);
+  const inside = key.replace(/^cases\[\d+\]\./, "").split(".").slice(1).map((word) => word.replace(/\[\d+\]$/, "").replaceAll("_", " "));
+  const field = inside.filter((word) => word !== "at" && word !== "nodes").join(", ");
+  const loadCase = /^cases\[(\d+)\]/.exec(key);
+  const of = loadCase && Number(loadCase[1]) > 0 ? ` of load case ${Number(loadCase[1]) + 1}` : "";
+  if (section) {
+    const title = section[1] ? `${SECTIONS[section[1]]} ${Number(section[2]) + 1}` : SECTIONS[section[3]!]!;
+    return sentence(`${title}${of}${field && `, ${field}`}: ${rest}`);
+  }
+  const part = PARTS[key.split(".")[0]!];
+  if (part) return sentence(`${part}${field && `, ${field}`}: ${rest}`);
+  return sentence(key ? `${key.replaceAll("_", " ")}: ${rest}` : rest);
+}
+
 /** Suggestions for a search that has found no good design. */
 export const REMEDIES = [
   "Search longer: Thorough, or more chains.",
-  "Make more beams designable: fewer supports, fewer fixed beams, no mirror symmetry.",
+  "Let the search decide on more struts: fewer supports, fewer struts that are kept, no symmetry.",
   "Reduce the requirement: a shorter stroke, or an output closer to the input.",
 ];
 

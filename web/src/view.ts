@@ -4,7 +4,7 @@ import type { Point } from "./api";
 import type { Built, Shape, Target, Tool, ZoneKind, ZoneShape } from "./task";
 
 /** An input, output or load of the shown load case. */
-export interface Arrow { target: Target; nodes: number[]; direction: Point; /** Displacement, lattice units. */ stroke: number | null }
+export interface Arrow { target: Target; nodes: number[]; direction: Point; /** Whether it turns, whatever its direction. */ turns: boolean; /** Displacement, lattice units. */ stroke: number | null }
 
 /** What the drawing shows of a task. */
 export interface View {

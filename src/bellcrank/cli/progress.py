@@ -69,6 +69,8 @@ class SearchProgress(Live):
             self._bar.update(self._task, description="refining ")
             rows = step.rows
             figures = f"objective {rows.objective:.3f}, violation {rows.violation:.3f}"
+            if step.sheets:
+                figures += f", sheet {step.sheets}"
             line = f"refining design {number + 1}: step {step.step}, {figures}"
             self._refined = max(self._refined, min(step.evaluations, total))
             self._show(self._refined, total, figures, line)

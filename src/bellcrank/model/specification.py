@@ -224,6 +224,11 @@ class ObjectiveTerm:
                 f"{self.scale!r}"
             )
 
+    @property
+    def item(self) -> Item:
+        """The quantity at the full stroke as an item, with a bound that has no meaning."""
+        return Item(quantity=self.quantity, case=self.case, output=self.output, at_least=0.0)
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; values that equal their defaults are left out."""
         data: dict[str, Any] = {"quantity": self.quantity}

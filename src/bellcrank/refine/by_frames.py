@@ -81,6 +81,8 @@ class FrameRefinement:
         Factor of the payload that one element in each strut has to carry.
     goes_on
         Whether the refinement has not been stopped.
+    latest
+        The progress that was reported last.
     """
 
     def __init__(
@@ -107,6 +109,7 @@ class FrameRefinement:
         self.steps = self.evaluations = 0
         self.reason = "the response of the design is not stable"
         self.goes_on = True
+        self.latest: Progress | None = None
 
     def run(self) -> None:
         """Refine until all items are met with eight elements."""
@@ -179,7 +182,7 @@ class FrameRefinement:
         path = []
         for progress in refine_rows(evaluator, left, vector):
             path.append(progress)
-            self.goes_on = self.report(progress)
+            self.report_progress(progress)
             is_met = progress.rows.violation < MET
             if not self.goes_on or (is_met and (near or self._is_ample(progress))):
                 break
@@ -193,6 +196,20 @@ class FrameRefinement:
         self.tried = vectors[: number + 1]
         state = self._with_robustness(state, vectors[number])
         return state, vectors[number], number == len(vectors) - 1
+
+    def report_progress(self, progress: Progress) -> None:
+        """Report progress with the number of all geometries so far, and the design."""
+        self.latest = replace(
+            progress,
+            evaluations=self.evaluations + progress.evaluations,
+            design=self._design_at(progress.vector),
+        )
+        self.goes_on = self.report(self.latest)
+
+    def report_sheet(self, sheets: int) -> None:
+        """Report that the sheet is being computed."""
+        if self.latest is not None:
+            self.goes_on &= self.report(replace(self.latest, sheets=sheets))
 
     def _start(
         self, items: Sequence[Item], stable: float, models: Models, vector: Values

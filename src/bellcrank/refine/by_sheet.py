@@ -145,6 +145,7 @@ class SheetRefinement:
         """Return the state of a geometry with its items in the sheet, if it is stable there."""
         job = self.job
         self.sheets += 1
+        job.report_sheet(self.sheets)
         problem = job.variables.problem_at(vector)
         records = self.sheet(replace(job.design, problem=problem))
         if records is None:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bellcrank.model import Design
     from bellcrank.refine.rows import Rows
     from bellcrank.refine.scenarios import ScenarioRows
 
@@ -94,6 +95,10 @@ class Progress:
         Size of the trust region, beam lengths.
     reason
         Why the refinement ended; empty while it goes on.
+    sheets
+        Number of times the sheet has been or is being computed.
+    design
+        The design with this geometry, where it is known.
     """
 
     step: int
@@ -102,6 +107,8 @@ class Progress:
     rows: Rows
     region: float
     reason: str = ""
+    sheets: int = 0
+    design: Design | None = None
 
 
 def refine_rows(

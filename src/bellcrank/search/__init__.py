@@ -25,6 +25,7 @@ from bellcrank.search.default_specification import specified
 from bellcrank.search.evaluator import (
     Evaluator,
     make_evaluator,
+    symmetry_groups,
     verification_evaluator,
     with_stable_initial,
 )
@@ -118,6 +119,7 @@ __all__ = [
     "select",
     "specified",
     "start_chain",
+    "symmetry_groups",
     "verification_evaluator",
     "with_stable_initial",
 ]

@@ -16,9 +16,10 @@ from bellcrank.mechanics import (
     check_memory,
     model_evaluator,
 )
-from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes
+from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes, parse_goal
 from bellcrank.search.relaxation import relaxed
 from bellcrank.search.specification import RESERVE, SpecificationEvaluator
+from bellcrank.search.symmetry import SymmetryGroups
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -100,6 +101,22 @@ def make_evaluator(
         return model_evaluator(problem, *options)
     cases = at_strokes(problem, settings.strokes)
     return ConstrainedEvaluator(cases, settings.goals, *options)
+
+
+def symmetry_groups(problem: Problem, settings: SearchSettings) -> SymmetryGroups:
+    """Return the groups of images in which a search flips the beams of a problem.
+
+    Parameters
+    ----------
+    problem
+        Problem of the search.
+    settings
+        Its settings, whose goals may demand mirror symmetry.
+    """
+    if problem.specification is not None:
+        return SymmetryGroups(problem, problem.specification.symmetry)
+    goals = [parse_goal(goal) for goal in settings.goals]
+    return SymmetryGroups(problem, [goal.value for goal in goals if goal.name == "mirror"])
 
 
 def verification_evaluator(

@@ -376,3 +376,7 @@ class SpecificationEvaluator:
     def results(self) -> list[ItemResult]:
         """Return the items with the values of the design evaluated last."""
         return item_results(self.items, self.records)
+
+    def objective_results(self) -> list[ItemResult]:
+        """Return the objectives with the values of the design evaluated last."""
+        return item_results([each.item for each in self.objectives], self.records)

@@ -33,63 +33,73 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bellcrank.web.pools import Pool
+    from bellcrank.web.state import AppState
 
 router = APIRouter(prefix="/api", tags=["designs"])
 
 
 async def _computed(
-    pool: Pool, function: Callable[..., dict[str, Any]], body: DesignBody, *more: Any
+    state: AppState,
+    pool: Pool,
+    function: Callable[..., dict[str, Any]],
+    body: DesignBody,
+    *more: Any,
 ) -> dict[str, Any]:
     """Return the result of a function of a problem as text, a mask and further arguments."""
-    return await pool.call(function, json.dumps(body.problem), body.mask, *more)
+    text = json.dumps(body.problem)
+    key = function.__name__, text, body.mask, json.dumps(more, sort_keys=True)
+    return await state.results.get(key, lambda: pool.call(function, text, body.mask, *more))
 
 
 @router.post("/motion")
 async def get_motion(body: MotionBody, state: State) -> dict[str, Any]:
     """Return the states of a design along its path, from rest to the full stroke."""
-    return await _computed(state.pools.thorough, quick_calls.motion, body, body.case)
+    return await _computed(state, state.pools.thorough, quick_calls.motion, body, body.case)
 
 
 @router.post("/sensitivity")
 async def get_sensitivity(body: DesignBody, state: State) -> dict[str, Any]:
     """Return the change of the efficiency by flipping each beam, evaluated beam by beam."""
-    return await _computed(state.pools.thorough, quick_calls.sensitivity, body)
+    return await _computed(state, state.pools.thorough, quick_calls.sensitivity, body)
 
 
 @router.post("/part")
 async def describe_part(body: PartBody, state: State) -> dict[str, Any]:
     """Return size, mass and printability remarks of the part of a design."""
-    return await _computed(state.pools.thorough, slow_calls.part_summary, body, body.part)
+    return await _computed(state, state.pools.thorough, slow_calls.part_summary, body, body.part)
 
 
 @router.post("/print")
 async def estimate_print(body: PartBody, state: State) -> dict[str, Any]:
     """Return printing time, layers and mass of the part of a design by the slicer."""
-    return await _computed(state.pools.slow, slow_calls.print_estimate, body, body.part)
+    return await _computed(state, state.pools.slow, slow_calls.print_estimate, body, body.part)
 
 
 @router.post("/response")
 async def get_response(body: PartBody, state: State) -> dict[str, Any]:
     """Return the response of a design, verified along the whole stroke."""
-    return await _computed(state.pools.thorough, quick_calls.evaluate, body, body.part)
+    text = json.dumps(body.problem)
+    return await state.pools.thorough.call(quick_calls.evaluate, text, body.mask, body.part)
 
 
 @router.post("/report")
 async def report_part(body: PartBody, state: State) -> dict[str, Any]:
     """Return the items of the specification of a design, and its figures as a part."""
-    return await _computed(state.pools.thorough, quick_calls.part_report, body, body.part)
+    return await _computed(state, state.pools.thorough, quick_calls.part_report, body, body.part)
 
 
 @router.post("/tolerance")
 async def get_tolerance(body: PartBody, state: State) -> dict[str, Any]:
     """Return what a design does over tolerances of print and drive, and without single struts."""
-    return await _computed(state.pools.slow, slow_calls.tolerance, body, body.part)
+    return await _computed(state, state.pools.slow, slow_calls.tolerance, body, body.part)
 
 
 @router.post("/validation")
 async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
     """Return the finite-element analysis of the part of a design."""
-    return await _computed(state.pools.slow, slow_calls.validation, body, body.part, body.level)
+    return await _computed(
+        state, state.pools.slow, slow_calls.validation, body, body.part, body.level
+    )
 
 
 @router.post("/files/{suffix}", response_class=Response)

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.fem.results import finite
-from bellcrank.model import Item
+from bellcrank.part.units import GRAVITY
 from bellcrank.task import units_of
 from bellcrank.workflows.specification import item_label, number_text, shown_value, wanted_text
 
@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bellcrank.mechanics import ItemResult
-    from bellcrank.model import Problem
+    from bellcrank.model import Item, Problem
     from bellcrank.part import PartSpec
+    from bellcrank.search import SpecificationEvaluator
     from bellcrank.task import ProblemUnits
 
 
@@ -30,16 +31,30 @@ def wanted_items(problem: Problem, part: PartSpec) -> list[dict[str, str]]:
     units = units_of(problem, part)
     items = [_texts(item, problem, units) for item in wanted.items]
     for each in wanted.maximise:
-        item = Item(quantity=each.quantity, case=each.case, output=each.output, at_least=0.0)
         size = "large" if each.scale > 0.0 else "small"
         items.append(
             {
-                "name": f"maximise:{item.name}",
-                "label": item_label(item, problem),
+                "name": f"maximise:{each.item.name}",
+                "label": item_label(each.item, problem),
                 "wanted": f"as {size} as possible",
             }
         )
     return items
+
+
+def objective_states(
+    problem: Problem, part: PartSpec, evaluator: SpecificationEvaluator
+) -> list[dict[str, str]]:
+    """Return quantity, label and value of what is maximised, of the design evaluated last."""
+    units = units_of(problem, part)
+    return [
+        {
+            "quantity": each.item.quantity,
+            "label": item_label(each.item, problem),
+            "reached": number_text(each.item, shown_value(each.item, each.value), units),
+        }
+        for each in evaluator.objective_results()
+    ]
 
 
 def item_states(
@@ -53,7 +68,7 @@ def item_states(
         states.append(
             {
                 **_texts(each.item, problem, units),
-                "reached": number_text(each.item, value, units),
+                "reached": _reached(each.item, value, units),
                 "margin": finite(each.margin) if math.isfinite(value) else None,
                 "met": bool(each.met),
             }
@@ -66,5 +81,19 @@ def _texts(item: Item, problem: Problem, units: ProblemUnits) -> dict[str, str]:
     return {
         "name": item.name,
         "label": item_label(item, problem),
-        "wanted": wanted_text(item, units),
+        "wanted": wanted_text(item, units) + _grams(item, item.at_least, units),
     }
+
+
+def _reached(item: Item, value: float, units: ProblemUnits) -> str:
+    """Return a value with its unit; a payload above the wanted one is not always determined."""
+    if value == math.inf and item.at_least is not None:
+        return f"more than {number_text(item, item.at_least, units)}"
+    return number_text(item, value, units) + _grams(item, value, units)
+
+
+def _grams(item: Item, value: float | None, units: ProblemUnits) -> str:
+    """Return a payload as a mass in brackets; empty for other quantities."""
+    if item.quantity != "payload" or value is None or not math.isfinite(value):
+        return ""
+    return f" ({1000.0 * units.in_part('force', value) / GRAVITY:.3g} g)"

@@ -21,10 +21,10 @@ from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.search.verdict import Verdict
 from bellcrank.search.verification import ELEMENTS
-from bellcrank.web.items import item_states
+from bellcrank.web.items import item_states, objective_states
 from bellcrank.web.task_files import problem_of
 from bellcrank.workflows.part_figures import part_figures
-from bellcrank.workflows.specification import results_for
+from bellcrank.workflows.specification import evaluated
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -143,20 +143,22 @@ def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
 
     The figures are those of frames with eight elements in each strut, for each output of each load
     case. Items are given in the model of the search and by eight elements; None for a path that is
-    not stable.
+    not stable. Objectives are by eight elements.
     """
     spec = PartSpec.from_dict(part, "part")
     design = design_of(text, mask)
     if not design.problem.is_specified:
         design = replace(design, problem=frame_problem(design.problem, spec))
     problem = design.problem
-    items = {}
+    items, objectives = {}, []
     for model, elements in (("search", None), ("frames", ELEMENTS)):
-        results = results_for(problem, design.mask, elements)
-        items[model] = None if results is None else item_states(problem, spec, results)
+        found = evaluated(problem, design.mask, elements)
+        items[model] = None if found is None else item_states(problem, spec, found.results())
+        objectives = [] if found is None else objective_states(problem, spec, found)
     return {
         "specified": problem.is_specified,
         "items": items,
+        "objectives": objectives,
         "figures": part_figures(design, spec, ELEMENTS),
     }
 

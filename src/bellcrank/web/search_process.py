@@ -18,11 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from bellcrank.errors import BellcrankError, InvalidSettings, first_line
+from bellcrank.model import pack_mask, unpack_mask
 from bellcrank.storage.locking import locked
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
     from multiprocessing.connection import Connection
 
+    from bellcrank.model import Design
     from bellcrank.refine.refinement import Progress as RefinementProgress
     from bellcrank.search import Progress, SearchSettings
     from bellcrank.storage import RunFolder
@@ -70,10 +73,12 @@ class ProgressReporter:
     def __init__(self, pipe: Connection, folder: RunFolder, settings: SearchSettings) -> None:
         from bellcrank.mechanics import model_evaluator
         from bellcrank.part import PartSpec
+        from bellcrank.search import symmetry_groups
         from bellcrank.web.quick_calls import specification_of
 
         self._pipe = pipe
         self._problem = folder.problem
+        self._groups = symmetry_groups(folder.problem, settings)
         self._specification = specification_of(folder.problem)
         self._evaluator = self._specification or model_evaluator(folder.problem)
         self._part = PartSpec.from_dict(folder.provenance.get("part") or {}, "part")
@@ -86,7 +91,8 @@ class ProgressReporter:
         self._start = time.monotonic()
         self._moved_at, self._moved_mask = 0.0, ""
         self._tried: tuple[int, int] | None = None
-        self._refined: dict[int, tuple[int, float, float]] = {}
+        self._refined: dict[int, RefinementProgress] = {}
+        self._best_refined: dict[int, RefinementProgress] = {}
         self._done = {chain: folder.progress(chain)[0] for chain in range(settings.chains)}
         self._points.update(self._first_points(settings))
         self._end = threading.Event()
@@ -96,7 +102,8 @@ class ProgressReporter:
         """Return the first point of the curve of each chain that has not started."""
         from bellcrank.web.curves import rounded
 
-        efficiency = rounded(self._evaluator.evaluate(self._problem.initial).efficiency)
+        initial = self._groups.expand(self._groups.problem.initial)
+        efficiency = rounded(self._evaluator.evaluate(initial).efficiency)
         temperature = float(getattr(settings, "temperatures", [0.0])[0])
         point = (0, efficiency, efficiency, temperature)
         return {chain: [point] for chain, done in self._done.items() if not done}
@@ -136,9 +143,20 @@ class ProgressReporter:
 
     def refining(self, number: int, progress: RefinementProgress) -> None:
         """Record the progress of the refinement of a design."""
-        rows = progress.rows
+        from bellcrank.refine.by_frames import MET
+
         with self._lock:
-            self._refined[number] = progress.evaluations, rows.objective, rows.violation
+            self._refined[number] = progress
+            best = self._best_refined.get(number)
+            is_better = best is None or progress.rows.objective > best.rows.objective
+            if progress.rows.violation <= MET and is_better:
+                self._best_refined[number] = progress
+
+    def refined_designs(self) -> list[Design]:
+        """Return the best design of each refinement that meets all items, the best first."""
+        with self._lock:
+            found = sorted(self._best_refined.values(), key=lambda each: -each.rows.objective)
+        return [each.design for each in found if each.design is not None]
 
     def _send_regularly(self) -> None:
         while not self._end.wait(INTERVAL):
@@ -152,7 +170,7 @@ class ProgressReporter:
             if not self._chains:
                 return
             points, self._points = self._points, {}
-            chains = {chain: dict(state) for chain, state in self._chains.items()}
+            chains = {chain: self._whole(state) for chain, state in self._chains.items()}
             done, made, tried = sum(self._done.values()), self._made, self._tried
             refined, scores = dict(self._refined), dict(self._scores)
         speed = made / max(time.monotonic() - self._start, 1e-9)
@@ -165,44 +183,58 @@ class ProgressReporter:
             "total": self._total,
             "left": round((self._total - done) / max(speed, 1e-9), 1),
             "tried": tried,
-            "refined": _refinement_of(refined),
+            "refined": _refinement_of(refined.values()),
         }
         best = chains[max(scores, key=scores.__getitem__)]
         if time.monotonic() - self._moved_at > MOVED_INTERVAL and best["kept"] != self._moved_mask:
             message["moved"] = self._move(best["kept"])
         self._pipe.send(message)
 
+    def _whole(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Return the state of a chain with all images of the beams of its designs."""
+        count = self._problem.lattice.beam_count
+        masks = {
+            name: pack_mask(self._groups.expand(unpack_mask(state[name], count)))
+            for name in ("mask", "kept")
+        }
+        return {**state, **masks}
+
     def _move(self, mask: str) -> dict[str, Any]:
         """Return the response of the displayed design."""
         from bellcrank.fem.results import finite
-        from bellcrank.model import unpack_mask
-        from bellcrank.web.items import item_states
+        from bellcrank.web.items import item_states, objective_states
         from bellcrank.web.quick_calls import flat
 
         bits = unpack_mask(mask, self._problem.lattice.beam_count)
         response = self._evaluator.evaluate(bits)
         self._moved_at, self._moved_mask = time.monotonic(), mask
-        shown, items = response.is_admissible, None
+        shown, items, objectives = response.is_admissible, None, []
         if shown and self._specification is not None:
             items = item_states(self._problem, self._part, self._specification.results())
+            objectives = objective_states(self._problem, self._part, self._specification)
         return {
             "mask": mask,
             "efficiency": finite(response.efficiency),
             "displacement": flat(response.displacement) if shown else None,
             "items": items,
+            "objectives": objectives,
         }
 
 
-def _refinement_of(states: dict[int, tuple[int, float, float]]) -> dict[str, Any] | None:
-    """Return the number of designs and geometries, and the best objective that meets all items."""
+def _refinement_of(latest: Collection[RefinementProgress]) -> dict[str, Any] | None:
+    """Return how far refinements are: designs, geometries, sheets, the best objective.
+
+    The objective is that of designs that meet all items.
+    """
     from bellcrank.refine.by_frames import MET
 
-    if not states:
+    if not latest:
         return None
-    met = [objective for _, objective, violation in states.values() if violation <= MET]
+    met = [each.rows.objective for each in latest if each.rows.violation <= MET]
     return {
-        "designs": len(states),
-        "geometries": sum(evaluations for evaluations, _, _ in states.values()),
+        "designs": len(latest),
+        "geometries": sum(each.evaluations for each in latest),
+        "sheets": sum(each.sheets for each in latest),
         "objective": float(max(met)) if met else None,
     }
 
@@ -273,9 +305,10 @@ def _search(
         )
         if report is None and listener.command == "stop":
             try:
-                # Without refinement, which takes minutes.
+                # Without further refinement, which takes minutes.
                 quick = replace(settings, before_refinement=False)
-                report = conclude(folder, quick, reporter.verifying)
+                refined = reporter.refined_designs()
+                report = conclude(folder, quick, reporter.verifying, refined=refined)
                 assert report is not None  # without a request to stop
             except InvalidSettings:
                 return {"kind": "paused", "message": NO_DESIGN_YET}
@@ -298,12 +331,10 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
     total = job["settings"]["steps"]
 
     def report(progress: RefinementProgress) -> bool:
-        rows = progress.rows
-        state = {0: (progress.evaluations, rows.objective, rows.violation)}
         message = {
             "kind": "progress", "points": {}, "chains": {}, "speed": None, "left": None,
             "done": progress.evaluations, "total": total, "tried": None,
-            "refined": _refinement_of(state),
+            "refined": _refinement_of([progress]),
         }  # fmt: skip
         with contextlib.suppress(OSError, BrokenPipeError):
             pipe.send(message)

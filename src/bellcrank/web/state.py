@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 from fastapi import Depends
 from starlette.requests import HTTPConnection
+
+from bellcrank.web.results import Results
 
 if TYPE_CHECKING:
     from bellcrank.web.gallery import Gallery, SavedDesigns
@@ -34,6 +36,7 @@ class AppState:
     gallery: Gallery
     saved: SavedDesigns
     machines: Machines
+    results: Results = field(default_factory=Results)
     ready: bool = False
     error: str = ""
 

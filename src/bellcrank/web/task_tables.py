@@ -43,18 +43,23 @@ ELEMENT_COLUMNS = 7
 
 
 def known_tasks() -> list[dict[str, str]]:
-    """Return name and description of the bundled tasks, and of parts of machines.
+    """Return name, kind and description of the bundled tasks, and of parts of machines.
 
     Tasks in the plane come first.
     """
     tables = {name: read_table(path) for name, path in bundled_tasks().items()}
     found = [
-        {"name": name, "about": table.get("description", "")}
+        {
+            "name": name,
+            "kind": "in space" if _is_in_space(table["domain"]) else "in the plane",
+            "about": table.get("description", ""),
+        }
         for name, table in sorted(tables.items(), key=lambda item: _is_in_space(item[1]["domain"]))
     ]
     parts = [
         {
             "name": ELEMENT + direction,
+            "kind": "parts of machines",
             "about": f"Part of a machine: push down on the right, move {direction} on the left.",
         }
         for direction in DIRECTIONS

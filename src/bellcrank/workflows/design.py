@@ -43,7 +43,7 @@ from bellcrank.storage import RunFolder, check_no_run, remove_temporaries
 from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows.figures import figures_of, model_record
 from bellcrank.workflows.part_figures import part_figures
-from bellcrank.workflows.refinement import refine_selection, refinement_data
+from bellcrank.workflows.refinement import refine_selection, refinement_data, with_refined
 from bellcrank.workflows.report import RESULTS, DesignReport
 from bellcrank.workflows.report_tables import write_report
 from bellcrank.workflows.tolerance import compute_tolerance, deviations_of
@@ -51,7 +51,7 @@ from bellcrank.workflows.validation import Validation, replace_record, validate
 
 if TYPE_CHECKING:
     import threading
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from bellcrank.refine.refinement import Progress as RefinementProgress
@@ -240,10 +240,21 @@ def conclude(
     refining: Callable[[int, RefinementProgress], None] = lambda _number, _progress: None,
     stop: threading.Event | None = None,
     workers: int | None = None,
+    refined: Sequence[Design] = (),
 ) -> DesignReport | None:
     """Select, clean, verify, refine and compare a design, and write the result files.
 
     Candidates of a frame are verified with more elements (`bellcrank.search.verification`).
+
+    Parameters
+    ----------
+    folder, settings
+        A search.
+    verifying, refining, stop, workers
+        As in `complete_design`.
+    refined
+        Designs of a refinement that was stopped, the best first; the selected design is replaced by
+        the first that meets all items.
 
     Returns
     -------
@@ -268,6 +279,8 @@ def conclude(
         selection, refinement = refine_selection(selection, spec, refining, workers, stop)
         if stop is not None and stop.is_set():
             return None
+    else:
+        selection = with_refined(selection, refined)
     elements = None if problem.section is None else ELEMENTS
     all_beams = verification_evaluator(problem, settings, elements, goals=())
     human = human_counterpart(problem)

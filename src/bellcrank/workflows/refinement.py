@@ -115,6 +115,26 @@ def refine_selection(
     return _with_finalist(selection, chosen, near), results[best]
 
 
+def with_refined(selection: Selection, designs: Sequence[Design]) -> Selection:
+    """Return a selection with the first of some refined designs that meets all items.
+
+    With the selected design if none does, by eight elements in each strut.
+
+    Parameters
+    ----------
+    selection
+        Selected design of the search.
+    designs
+        Designs of a refinement that was stopped, the best first.
+    """
+    for design in designs:
+        chosen = _verified(_finalist(selection), design)
+        assert chosen.verification is not None
+        if chosen.verification.fault is None:
+            return _with_finalist(selection, chosen)
+    return selection
+
+
 def _is_enough(results: Sequence[Refinement]) -> bool:
     """Whether no more designs are refined: unless all that meet the items miss some in the sheet.
 

@@ -229,6 +229,17 @@ def results_for(
     list of ItemResult or None
         None also for a design without a stable path to the full stroke.
     """
+    evaluator = evaluated(problem, mask, elements)
+    return None if evaluator is None else evaluator.results()
+
+
+def evaluated(
+    problem: Problem, mask: NDArray[np.bool_], elements: int | None = None
+) -> SpecificationEvaluator | None:
+    """Return the evaluator of a specification with the results of a design.
+
+    Parameters, and where there is None, are those of `results_for`.
+    """
     if not problem.is_specified:
         return None
     assert problem.specification is not None
@@ -236,7 +247,7 @@ def results_for(
     wanted = replace(problem.specification, symmetry=())
     evaluator = SpecificationEvaluator(replace(problem, specification=wanted), elements)
     response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
-    return evaluator.results() if response.is_admissible else None
+    return evaluator if response.is_admissible else None
 
 
 def binding(results: Sequence[ItemResult]) -> list[ItemResult]:

@@ -1,0 +1,140 @@
+"""Statement of tasks on the page: turns, symmetry, other sizes, errors, the best design so far."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from .driving import click, field, fill, node, section, start_search, summary, task, tool, until
+
+pytestmark = pytest.mark.slow
+
+
+def test_an_output_that_turns_needs_no_direction(page: Any) -> None:
+    tool(page, "Outputs")
+    page.get_by_label("Motion of the output").get_by_text("turns").click()
+    until(page, lambda: "rotation" in task(page)["table"]["cases"][0]["outputs"][0])
+    (output,) = task(page)["table"]["cases"][0]["outputs"]
+    assert output["rotation"] == [{"maximise": True}]
+    assert not {"direction", "gain", "off_axis"} & set(output)
+    assert page.get_by_text("counter-clockwise is positive").is_visible()
+    page.locator('.specification [data-item="maximise:case.output.rotation"]').wait_for()
+    assert page.get_by_role("button", name="Design it").is_enabled()
+    page.get_by_label("Bound of the rotation").select_option("at_most")
+    until(
+        page,
+        lambda: task(page)["table"]["cases"][0]["outputs"][0]["rotation"][0]["at_most"] == "5 deg",
+    )
+
+
+def test_supports_and_outputs_of_a_symmetric_design_get_their_images(page: Any) -> None:
+    page.get_by_role("button", name="Empty rectangle").click()
+    until(page, lambda: summary(page, "supports") == "none")
+    section(page, "limits")
+    page.get_by_label("Symmetry of the design").select_option("x")
+    tool(page, "Supports")
+    click(page, *node(page, 0.1, 0.1))
+    until(page, lambda: summary(page, "supports") == "2 nodes")
+    points = [each["point"] for each in task(page)["table"]["supports"][0]["at"]]
+    assert points[0][0] + points[1][0] == pytest.approx(82.0, abs=0.1)
+    assert points[0][1] == points[1][1]
+    tool(page, "Outputs")
+    click(page, *node(page, 0.1, 7.1))
+    until(page, lambda: summary(page, "outputs") == "1 node")
+    page.get_by_label("right", exact=True).click()
+    page.get_by_role("button", name="Add its mirror image").click()
+    until(page, lambda: len(task(page)["table"]["cases"][0]["outputs"]) == 2)
+    first, second = task(page)["table"]["cases"][0]["outputs"]
+    assert (first["direction"], second["direction"]) == ("right", "left")
+    assert first["at"][0]["point"][0] + second["at"][0]["point"][0] == pytest.approx(82, abs=0.1)
+    page.get_by_role("button", name="Add its mirror image").wait_for(state="detached")
+
+
+def test_ports_edges_and_zones_follow_the_sides_of_a_part_of_another_size(page: Any) -> None:
+    page.get_by_label("Start from").select_option("gripper")
+    until(page, lambda: task(page)["table"]["name"] == "gripper")
+    before = task(page)["table"]
+    section(page, "domain")
+    width = before["domain"]["size"][0]
+    fill(page, "Width", f"{(width + 20) / 10} cm")  # a length with a unit, too
+    until(page, lambda: task(page)["table"]["domain"]["size"][0] == width + 20)
+    after = task(page)["table"]
+
+    def places(table: dict[str, Any]) -> list[float]:
+        """Return x of all points, and ends of all ranges of horizontal edges."""
+        regions = [
+            region
+            for each in [
+                *table["supports"], *table["cases"][0]["inputs"], *table["cases"][0]["outputs"]
+            ]
+            for region in each["at"]
+        ]  # fmt: skip
+        found = [region["point"][0] for region in regions if "point" in region]
+        found += [x for region in regions for x in region.get("between", ())]
+        zones = [zone["box"] for zone in table["domain"].get("keep_out", ()) if "box" in zone]
+        return found + [box[k] for box in zones for k in (0, 2)]
+
+    moved = [new - old for old, new in zip(places(before), places(after), strict=True)]
+    assert set(moved) == {0.0, 20.0}
+    assert all(
+        (step == 20.0) == (old > width / 2) for old, step in zip(places(before), moved, strict=True)
+    )
+
+
+def test_errors_name_the_sections_of_the_page(page: Any) -> None:
+    tool(page, "Outputs")
+    page.locator('[data-key="outputs-0-off_axis-0"]').fill("10")
+    page.keyboard.press("Tab")
+    fault = page.locator(".step.outputs .fault")
+    fault.wait_for()
+    text = fault.inner_text()
+    assert text.startswith("Output 1, off axis:")
+    assert not re.search(r"cases\[|outputs\[", text)
+    assert "without errors" in page.locator(".specification").inner_text()
+
+
+def test_the_welcome_is_hidden_after_a_change_and_the_effort_is_kept(page: Any) -> None:
+    assert page.locator(".welcome").is_visible()
+    section(page, "domain")
+    fill(page, "Strut width", "1.9")
+    until(page, lambda: not page.locator(".welcome").is_visible())
+    page.locator(".search .choice label", has_text="Quick").click()
+    page.get_by_role("link", name="Gallery").click()
+    page.get_by_role("link", name="Task").first.click()
+    until(page, lambda: page.locator(".search .choice input:checked").count() == 1)
+    assert page.locator(".search .choice input:checked").get_attribute("value") == "quick"
+    section(page, "domain")
+    assert field(page, "Strut width") == "1.9"
+
+
+def test_the_best_design_so_far_is_opened_and_two_searches_have_two_names(page: Any) -> None:
+    page.get_by_label("Start from").select_option("gripper")
+    until(page, lambda: task(page)["table"]["name"] == "gripper")
+    start_search(page, "Thorough")
+    # The live design of a symmetric search is the whole one: both jaws reach the same.
+    page.locator(".items tbody tr").first.wait_for()
+    rows = page.locator(".items tbody tr")
+    reached = {
+        rows.nth(k).locator("th").inner_text().split("\n")[0]: rows.nth(k).locator("td").nth(1)
+        for k in range(rows.count())
+    }
+    jaws = [reached[f"{side} jaw: off-axis motion"].inner_text() for side in ("left", "right")]
+    assert jaws[0] == jaws[1]
+    page.get_by_role("heading", name="Objective along the search: left jaw: gain").wait_for()
+    with page.context.expect_page() as opened:
+        page.get_by_role("button", name="Open the best so far").click()
+    other = opened.value
+    other.locator('.player[data-ready="yes"]').wait_for()
+    assert other.locator("h1").inner_text() == "gripper, best so far"
+    other.close()
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Continue").wait_for()
+    page.goto(f"{page.url.split('#')[0]}#/draw")
+    page.get_by_label("Start from").select_option("gripper")
+    until(page, lambda: task(page)["table"]["name"] == "gripper")
+    start_search(page, "Quick")
+    assert page.locator("h1").inner_text() == "gripper (2)"
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Continue").wait_for()
