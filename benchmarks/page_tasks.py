@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from bellcrank.task import Task
 
 RECORD = Path(__file__).parents[1] / "docs" / "benchmarks" / "page-tasks.json"
+RESULT = '[aria-label="Result"] .verdict'
+"""The sentence on the part of a result."""
 SPATIAL = ("straight-orthogonal",)
 """Tasks in space that are stated."""
 SEARCH_LIMIT = 2400.0
@@ -125,8 +127,8 @@ def _result(page: Any, address: str, run: str) -> dict[str, Any]:
     """Check the result of a run on the page, compare and download it."""
     data = httpx.get(f"{address}/api/runs/{run}", timeout=120).json()
     body = {"problem": data["problem"], "mask": data["mask"], "part": data["part"]}
-    page.wait_for_selector(".verdict:not(:empty)", timeout=300_000)
-    row: dict[str, Any] = {"verdict_frames": page.locator(".panel .verdict").first.inner_text()}
+    page.wait_for_selector(f"{RESULT}:not(:empty)", timeout=300_000)
+    row: dict[str, Any] = {"verdict_frames": page.locator(RESULT).inner_text()}
     in_space = len(data["problem"]["positions"][0]) == 3
     if not in_space:
         check = page.get_by_role("button", name="Check with finite elements: 2D solid")
@@ -147,7 +149,7 @@ def _result(page: Any, address: str, run: str) -> dict[str, Any]:
 
 
 def _verdict(page: Any) -> str:
-    return str(page.locator(".panel .verdict").first.inner_text())
+    return str(page.locator(RESULT).inner_text())
 
 
 def _until(done: Any, seconds: float = 600.0) -> None:

@@ -83,6 +83,22 @@ def test_ports_edges_and_zones_follow_the_sides_of_a_part_of_another_size(page: 
     )
 
 
+def test_a_button_stays_under_the_pointer_when_the_panel_is_drawn_again(page: Any) -> None:
+    tool(page, "Outputs")
+    arrow = page.get_by_label("up", exact=True)
+    page.mouse.wheel(0, 300)
+    before = arrow.bounding_box()["y"]
+    for direction in ("up", "right", "down"):
+        page.get_by_label(direction, exact=True).click()
+        until(
+            page,
+            lambda name=direction: (
+                task(page)["table"]["cases"][0]["outputs"][0]["direction"] == name
+            ),
+        )
+    assert arrow.bounding_box()["y"] == pytest.approx(before, abs=2.0)
+
+
 def test_errors_name_the_sections_of_the_page(page: Any) -> None:
     tool(page, "Outputs")
     page.locator('[data-key="outputs-0-off_axis-0"]').fill("10")
@@ -90,7 +106,7 @@ def test_errors_name_the_sections_of_the_page(page: Any) -> None:
     fault = page.locator(".step.outputs .fault")
     fault.wait_for()
     text = fault.inner_text()
-    assert text.startswith("Output 1, off axis:")
+    assert text.startswith("Output 1, off axis, at most: expected at most 2")
     assert not re.search(r"cases\[|outputs\[", text)
     assert "without errors" in page.locator(".specification").inner_text()
 

@@ -6,10 +6,12 @@ import type { Settings, TaskEditor } from "./editing";
 import { sentence } from "./text";
 
 const EFFORTS: [string, string, number, number, string][] = [
-  ["quick", "Quick", 2000, 2, "Half a minute of search, then the refinement."],
-  ["usual", "Standard", 8000, 2, "A minute or two of search, then the refinement of the best designs."],
-  ["long", "Thorough", 25000, 4, "Some ten minutes; for tasks that Standard does not meet."],
+  ["quick", "Quick", 2000, 2, "Half a minute of search."],
+  ["usual", "Standard", 8000, 2, "A minute or two of search."],
+  ["long", "Thorough", 25000, 4, "Some ten minutes of search; for tasks that Standard does not meet."],
 ];
+
+const REFINED = " The refinement of the best designs takes some minutes more; it can be stopped at any time and keeps what it has reached.";
 
 export class SearchBox {
   private fault = "";
@@ -40,7 +42,7 @@ export class SearchBox {
           const found = EFFORTS.find(([key]) => key === picked)!;
           update({ steps: found[2], chains: found[3] });
         }),
-        h("p", { class: "note" }, EFFORTS.find(([key]) => key === effort)?.[4] ?? `${settings.chains} chains of ${settings.steps.toLocaleString("en")} steps.`),
+        h("p", { class: "note" }, (EFFORTS.find(([key]) => key === effort)?.[4] ?? `${settings.chains} chains of ${settings.steps.toLocaleString("en")} steps.`) + (editor.built?.problem?.specification ? REFINED : "")),
         h("details", { ...(this.expanded ? { open: true } : {}), ontoggle: (event: Event) => { this.expanded = (event.target as HTMLDetailsElement).open; } },
           h("summary", { "data-key": "more" }, "Method, steps, seed"),
           field("Method", method, "", methods.find(({ name }) => name === settings.method)?.summary ?? ""),
