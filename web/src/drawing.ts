@@ -10,7 +10,7 @@ export interface Box { x: number; y: number; w: number; h: number }
 export const BINS = 12;
 
 /** Flatten positions to x and y of each node in turn. */
-export function flatten(positions: Point[]): Float64Array {
+function flatten(positions: Point[]): Float64Array {
   const flat = new Float64Array(2 * positions.length);
   positions.forEach(([x, y], k) => { flat[2 * k] = x; flat[2 * k + 1] = y; });
   return flat;

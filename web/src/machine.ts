@@ -1,10 +1,12 @@
 // The page on which parts are placed, rotated and linked, and assembled to one design.
 
-import { bitsOf, get, modelOf, post, type Point, type Problem, type ServerError, type Collection, type GalleryEntry } from "./api";
+import { bitsOf, get, modelOf, post, type PartReport, type Point, type Problem, type ServerError, type Collection, type GalleryEntry } from "./api";
 import { arrow, Drawing, isEach, markRegions, where } from "./drawing";
 import { announce, button, choice, clear, field, figure, h, iconButton, number, s, select } from "./dom";
 import { emptyPlan, isPlan, MOST, portLabel, portsOf, readPlan, withoutPart, withPart, writePlan, type Plan, type PlanEnd, type PlanPart, type Port, type WrittenPlan } from "./plan";
 import { collectionView, thumbnail } from "./collections";
+import { partOf } from "./result";
+import { figureTable } from "./specification";
 import { History } from "./task";
 import { sentence, undoKeys } from "./text";
 
@@ -32,6 +34,8 @@ export class MachinePage {
   private readonly history: History<Plan>;
   private readonly keys = undoKeys((action) => this.step(action));
   private built: Built | null = null;
+  /** Figures of the machine as a part; a text says why there are none. */
+  private report: PartReport | string | null = null;
   private known = new Map<string, GalleryEntry>();
   private requested = 0;
 
@@ -123,6 +127,8 @@ export class MachinePage {
       const built = await post<Built>("/machines", { plan: writePlan(this.plan) });
       if (requested !== this.requested) return;
       this.built = built;
+      this.report = null;
+      void this.compute(built, requested);
       this.fault.textContent = built.efficiency === null ? sentence(built.message) : "";
       this.drawing.svg.classList.remove("stale");
     } catch (error) {
@@ -130,6 +136,20 @@ export class MachinePage {
       this.built = null;
       this.fault.textContent = sentence((error as ServerError).message);
     }
+    this.draw();
+    this.show();
+  }
+
+  /** Compute the figures of the machine as a part. */
+  private async compute({ problem, mask, provenance }: Built, requested: number): Promise<void> {
+    let found: PartReport | string;
+    try {
+      found = await post<PartReport>("/report", { problem, mask, part: partOf({ part: null, provenance }) });
+    } catch (error) {
+      found = sentence((error as ServerError).message);
+    }
+    if (requested !== this.requested) return;
+    this.report = found;
     this.draw();
     this.show();
   }
@@ -160,9 +180,13 @@ export class MachinePage {
     drawing.draw([...painted, { name: "bridge", beams: where(bits).filter((beam) => !owned.has(beam)) }]);
     markRegions(drawing, problem);
     drawing.overlay.replaceChildren(...(["input", "output"] as const).flatMap((region) => arrows(problem, region)));
-    const reversed = built.efficiency !== null && built.efficiency < 0;
-    clear(this.readout, h("strong", {}, figure(built.efficiency, 3)),
-      h("span", { class: reversed ? "alarm" : "" }, reversed ? "The output moves against its direction: drive it by an actuator with a larger payload." : `${modelOf(problem)}: output / input displacement`),
+    const part = typeof this.report === "string" ? null : this.report;
+    const value = part?.figures[0]?.efficiency ?? null;
+    const reversed = (value ?? built.efficiency ?? 0) < 0;
+    const model = part ? "frames, 8 elements in each strut: output / input motion" : typeof this.report === "string" ? this.report : "computing the part …";
+    clear(this.readout, h("strong", {}, figure(value, 2)),
+      h("span", { class: reversed ? "alarm" : "" }, reversed ? "The output moves against its direction: drive it by an actuator with a larger payload." : model),
+      h("span", {}, `${modelOf(problem)}: ${figure(built.efficiency, 2)}`),
       h("span", {}, `${problem.positions.length} nodes, ${where(bits).length} beams`));
   }
 
@@ -222,6 +246,7 @@ export class MachinePage {
         ...linkRows,
         ports.length > 2 && button("Add link", () => this.set({ ...plan, links: [...plan.links, { from: ports[1]!, to: ports[2]!, kind: "bridge" }] })),
         h("button", { type: "button", class: "primary", disabled: !this.built, "data-key": "build", onclick: () => void this.build() }, "Assemble"),
+        this.report !== null && typeof this.report !== "string" && figureTable(this.report.figures),
         !this.built && this.fault.textContent && h("p", { class: "fault" }, this.fault.textContent)));
   }
 

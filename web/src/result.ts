@@ -394,7 +394,7 @@ export class Result {
 }
 
 /** The part of a design; that of 2 mm struts if none is recorded. */
-export function partOf(subject: Subject): Part {
+export function partOf(subject: Pick<Subject, "part" | "provenance">): Part {
   return { width: 2, thickness: 5, scale: 10, material: "ninjaflex", ...(subject.part ?? subject.provenance["part"] as Partial<Part> | undefined) };
 }
 
