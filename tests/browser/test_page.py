@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import signal
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -338,7 +339,8 @@ def test_the_page_and_its_search_survive_the_end_of_the_server(page: Any, server
 def test_a_bundled_machine_is_opened_and_changed(page: Any, server: Server) -> None:
     page.goto(f"{server.address}/#/machine")
     page.locator('button.tile[data-entry="machines/amplifier"]').click()
-    page.locator(".readout strong").wait_for()
+    page.locator(".readout strong", has_text=re.compile(r"\d")).wait_for()
+    page.locator(".figures.part").wait_for()
     whole = page.locator(".readout strong").inner_text()
     page.locator(".panel section", has_text="second").get_by_label("Mirrored").check()
     page.locator(".error", has_text="second").wait_for()

@@ -13,6 +13,8 @@ import pytest
 from bellcrank.cli import main
 from bellcrank.cli.app import NOT_MET
 from bellcrank.model import human_design, read_design, write_design
+from benchmarks.task_figures import table
+from tools.draw_tasks import identity, recorded_runs
 
 README = Path(__file__).parents[2] / "README.md"
 START = "pip install '.[fem]' && bellcrank design straight-crane"
@@ -153,16 +155,15 @@ def test_the_library_has_as_many_actuators_as_the_readme_says() -> None:
     )
 
 
-def test_the_validation_table_is_that_of_the_record() -> None:
-    record = json.loads((README.parent / "docs" / "validation" / "levels.json").read_text())
+def test_the_table_of_tasks_is_that_of_the_record_of_the_recorded_designs() -> None:
+    record = json.loads((README.parent / "docs" / "tasks" / "figures.json").read_text())["rows"]
     text = README.read_text(encoding="utf-8")
-    rows = re.findall(r"^\| ([\w-]+) \| (hand|search) \| (.*?) \|$", text, re.MULTILINE)
-    assert len(rows) == sum(":" in name for name in record)
-    columns = ("discrete_model", "frame, euler-bernoulli", "plane, neo-hookean")
-    for task, by, figures in rows:
-        entry = record[f"{'human' if by == 'hand' else 'machine'}:{task}"]
-        expected = [f"{entry[column]['efficiency']:.2f}" for column in columns]
-        assert [figure.strip() for figure in figures.split("|")][:3] == expected, task
+    rows = re.findall(r"^\| `[\w-]+` \| [\d–].*$", text, re.MULTILINE)
+    assert rows == table(record)
+    runs = recorded_runs()
+    for each in record:
+        designs = {identity(run): run["met"] for run in runs if run["task"] == each["task"]}
+        assert designs[each["design"]] == each["met"]
 
 
 def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:

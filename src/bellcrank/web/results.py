@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Hashable
 
-KEPT = 64
+MOST_RESULTS = 64
 """Number of results, up to two megabytes each."""
 
 
@@ -34,7 +34,7 @@ class Results:
     ({'mass': 17.0}, {'mass': 17.0}, [1])
     """
 
-    def __init__(self, most: int = KEPT) -> None:
+    def __init__(self, most: int = MOST_RESULTS) -> None:
         self._most = most
         self._known: OrderedDict[Hashable, asyncio.Task[dict[str, Any]]] = OrderedDict()
 
