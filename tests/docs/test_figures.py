@@ -15,6 +15,7 @@ from bellcrank.machines import TwoPort
 from bellcrank.machines.bundled import find_plan
 from bellcrank.machines.bundled.contact import bundled_contact
 from bellcrank.machines.library import Library, bundled_folder, kinds
+from benchmarks.accuracy import table as accuracy_rows
 from benchmarks.competition import best_rows, step_rows, table_rows
 from benchmarks.inverters import rows_of as inverter_rows
 from benchmarks.measure import table as measure_rows
@@ -327,6 +328,7 @@ def measured_lattice() -> Rows:
 
 
 TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
+    "accuracy": (accuracy_rows,),
     "searches": (competition, cost_of_searches, sizes, move_comparison),
     "best": (best_designs,),
     "tolerance": (tolerances,),
