@@ -370,8 +370,9 @@ export class Result {
 
   /** Begin a search at this design, or its refinement. */
   private async begin(refine: boolean): Promise<void> {
-    const { problem, mask, title } = this.subject;
-    const task = refine ? null : this.subject.task ?? this.subject.provenance["task"] ?? null;
+    const { problem, mask, title, provenance } = this.subject;
+    // The struts of a refined design belong to its own nodes, not to those of its task.
+    const task = refine || "refinement" in provenance ? null : this.subject.task ?? provenance["task"] ?? null;
     try {
       const { id } = await post<{ id: string }>("/runs", {
         title: `${title.replace(/, (refined|searched on)$/, "")}, ${refine ? "refined" : "searched on"}`.slice(-120), session: session(), start: mask, refine,
