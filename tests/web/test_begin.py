@@ -163,7 +163,7 @@ def test_the_live_design_of_a_symmetric_search_has_all_images(client: TestClient
         bits = unpack_mask(mask, problem.lattice.beam_count)[problem.designable]
         assert np.array_equal(bits, bits[images])
     reached = {each["name"]: each["reached"] for each in update["moved"]["items"]}
-    assert reached["case.left jaw.off_axis"] == reached["case.right jaw.off_axis"]
+    assert reached["close.left jaw.off_axis"] == reached["close.right jaw.off_axis"]
     assert update["moved"]["objectives"][0]["label"] == "left jaw: gain"
     client.post(f"/api/runs/{name}/pause")
     wait_for(lambda: status_of(client, name) in {"paused", "finished"}, 100.0)
