@@ -136,7 +136,7 @@ export interface RunUpdate {
   speed: number | null;
   left: number | null;
   tried: [number, number] | null;
-  refined: { designs: number; geometries: number; sheets: number; objective: number | null } | null;
+  refined: { designs: number; geometries: number; sheets: number; /** Largest number of geometries. */ most: number; objective: number | null } | null;
   moved: { mask: string; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null; objectives: Objective[] } | null;
   error?: { message: string };
 }

@@ -15,8 +15,8 @@ type Bound = "at_least" | "at_most" | "value" | "target";
 interface Usual { title: string; bound: Bound; example: string; about: string }
 
 const USUAL: Record<QuantityName, Usual> = {
-  gain: { title: "gain", bound: "at_least", example: "2", about: "Motion of the output along its direction, over the stroke of the input." },
-  travel: { title: "travel", bound: "at_least", example: "5 mm", about: "Motion of the output along its direction." },
+  gain: { title: "motion gain", bound: "at_least", example: "2", about: "Motion of the output along its direction, over the stroke of the input." },
+  travel: { title: "travel, mm", bound: "at_least", example: "5 mm", about: "Motion of the output along its direction." },
   off_axis: { title: "off-axis motion", bound: "at_most", example: "10%", about: "Largest motion normal to the direction, over the travel." },
   rotation: { title: "rotation", bound: "value", example: "5 deg", about: "Rotation of the output, counter-clockwise positive." },
   payload: { title: "payload", bound: "at_least", example: "10 g", about: "Load against the direction of the output that halves its travel." },
@@ -216,7 +216,7 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
     h("div", { class: "wanted" }, ...rows, each.path ? pathRow(editor, each, target) : null,
       h("div", { class: "ask" }, h("span", {}, "Ask for"), add)),
     h("details", { ...(each.spring !== undefined ? { open: true } : {}) }, h("summary", { "data-key": `${key}-workpiece` }, "Workpiece that resists"),
-      amount(`${key}-spring`, "Stiffness", each.spring, "N/mm", (value) => set(editor, target, { spring: value }))),
+      amount(`${key}-spring`, "Stiffness", each.spring, "N/mm", (value) => set(editor, target, { spring: value }), "of an object that the output pushes from its first motion on; empty for none")),
   ];
 }
 

@@ -19,6 +19,9 @@ export class DomainPanel {
   private linked = "";
   /** What a task may start from, above the drawing. */
   readonly start = h("div", { class: "start" });
+  /** Description of the task that was opened, until it is changed. */
+  private readonly about = h("span", { class: "more", role: "status" });
+  private opened = "";
 
   constructor(
     private readonly editor: TaskEditor,
@@ -29,7 +32,8 @@ export class DomainPanel {
   }
 
   summary(): string {
-    const { built } = this.editor;
+    const { built, task } = this.editor;
+    if (JSON.stringify(task.table) !== this.opened) this.about.textContent = "";
     return built ? `${count(built.lattice.positions.length, "node")}, ${count(built.lattice.beams.length, "strut")}` : "";
   }
 
@@ -53,15 +57,15 @@ export class DomainPanel {
     const { editor } = this;
     const open = (name: string): void => this.attempt(async () => {
       editor.open(FRESH[name]?.() ?? await bundledTask(name));
-      about.textContent = this.tasks.find((each) => each.name === name)?.about ?? "";
+      this.about.textContent = this.tasks.find((each) => each.name === name)?.about ?? "";
+      this.opened = JSON.stringify(editor.task.table);
     });
-    const about = h("span", { class: "more", role: "status" });
     const pick = h("select", { "data-key": "start", id: "start", onchange: () => { if (pick.value) open(pick.value); } }, h("option", { value: "" }, "choose …"),
       h("option", { value: "example" }, "the example"), h("option", { value: "empty" }, "an empty rectangle"), h("option", { value: "empty-space" }, "an empty box in space"),
       ...[...new Set(this.tasks.map(({ kind }) => kind))].map((kind) => h("optgroup", { label: `Tasks ${kind}`.replace("Tasks parts", "Parts") },
-        ...this.tasks.filter((each) => each.kind === kind).map(({ name }) => h("option", { value: name }, name)))));
+        ...this.tasks.filter((each) => each.kind === kind).map(({ name, about: text }) => h("option", { value: name }, kind.startsWith("parts") || !text ? name : `${name}: ${short(text)}`)))));
     clear(this.start, button("Empty rectangle", () => open("empty")), button("Empty box in space", () => open("empty-space")),
-      h("label", { for: "start" }, "or start from"), pick, about);
+      h("label", { for: "start" }, "or start from"), pick, this.about);
   }
 
   /** How much of the domain the lattice fills, if that is not all of it. */
@@ -235,4 +239,9 @@ function shapeText({ circle, sphere, cylinder, box, polygon }: Shape): string {
   if (cylinder) return "upright cylinder";
   if (circle) return "circle";
   return box ? "box" : `polygon of ${polygon?.length ?? 0} corners`;
+}
+
+/** The beginning of a description, for a list. */
+function short(text: string, most = 58): string {
+  return text.length <= most ? text : `${text.slice(0, text.lastIndexOf(" ", most))} …`;
 }

@@ -9,7 +9,7 @@ import type { Fault, Settings, TaskEditor } from "./editing";
 import { Panels } from "./panels";
 import { SpaceCanvas } from "./spacecanvas";
 import {
-  assign, History, isSpatial, isTask, isTurn, nodesOf, sectionsOf, toLink, vectorInSpace, vectorOf, withImages, withSection, withSections,
+  assign, History, imagesOf, isSpatial, isTask, isTurn, nodesOf, sectionsOf, toLink, vectorInSpace, vectorOf, isSymmetric, withImages, withSection, withSections,
   type Built, type Direction, type Domain, type Hold, type Kind, type Shape, type Table, type Target, type Task, type Tool, type ZoneKind, type ZoneShape,
 } from "./task";
 import { faultText, fileName, lengthIn, sentence, suffixOf, undoKeys } from "./text";
@@ -67,6 +67,7 @@ export class Editor implements TaskEditor {
   private readonly tools = h("div", { class: "tools" });
   private readonly undoButton = iconButton("undo", "Undo (Ctrl+Z)", () => this.step("undo"));
   private readonly redoButton = iconButton("redo", "Redo (Ctrl+Shift+Z)", () => this.step("redo"));
+  private pairing = false;
   private building: AbortController | null = null;
   private verifying: AbortController | null = null;
   private timer = 0;
@@ -156,6 +157,7 @@ export class Editor implements TaskEditor {
     this.tools.querySelectorAll("label").forEach((label, k) => label.classList.add("tool", TOOLS[k]![0]));
     this.show();
     (this.tools.querySelector("input:checked") as HTMLElement | null)?.focus({ preventScroll: true });
+    this.panels.reveal(tool);
   }
 
   aimAt(target: Target): void {
@@ -200,8 +202,10 @@ export class Editor implements TaskEditor {
     if (this.target.kind === "supports") this.target = { kind: "supports", index: this.supportIndex() };
     const { kind, index } = this.target;
     let { table } = this.task;
-    // Supports of a symmetric design are symmetric.
-    if (kind === "supports" && table.limits?.symmetry && !isSpatial(table)) nodes = withImages(built, table.limits.symmetry, nodes);
+    const symmetry = isSpatial(table) ? "" : table.limits?.symmetry ?? "";
+    const before = nodesOf(built, loadCase, kind)[index] ?? [];
+    // Supports of a symmetric design are symmetric, and inputs and outputs that are so stay it.
+    if (symmetry && (kind === "supports" || isSymmetric(built, symmetry, before))) nodes = withImages(built, symmetry, nodes);
     const sections = sectionsOf(table, loadCase, kind);
     let now = built;
     if (index >= sections.length) {
@@ -220,7 +224,23 @@ export class Editor implements TaskEditor {
     }
     const known = nodesOf(built, loadCase, kind)[this.target.index] ?? [];
     this.built = withRegion(now, loadCase, this.target, add ? [...new Set([...known, ...nodes])] : known.filter((node) => !gone.has(node)));
-    this.set({ ...next, hand: null });
+    this.set({ ...next, hand: null }, this.pairing);
+    if (!this.pairing && (kind === "inputs" || kind === "outputs")) this.pickImages(symmetry, kind, index, before, nodes, add);
+  }
+
+  /** Change the mirror image of an input or output, which is another one, in the same way. */
+  private pickImages(symmetry: string, kind: Kind, index: number, before: number[], nodes: number[], add: boolean): void {
+    const { built, target } = this;
+    if (!built || (symmetry !== "x" && symmetry !== "y") || !before.length) return;
+    const [old, next] = [imagesOf(built, symmetry, before), imagesOf(built, symmetry, nodes)];
+    const other = nodesOf(built, this.loadCase, kind).findIndex((each, k) => k !== index && each.length === old.length && old.every((node) => each.includes(node)));
+    if (other < 0 || next.includes(-1)) return;
+    this.pairing = true;
+    this.target = { kind, index: other };
+    this.pick(next, add);
+    this.target = target;
+    this.pairing = false;
+    this.show();
   }
 
   private aim(target: Target, direction: Direction, stroke: number | null, merge: boolean): void {

@@ -16,6 +16,7 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
     const next = cleaned({ ...limits, ...changes });
     editor.change(cleaned({ ...table, limits: Object.keys(next).length ? next : undefined }));
   };
+  const limited = !editor.built?.items.length || editor.built.items.some(({ name }) => name.endsWith("strain"));
   const value = (key: "strain" | "clearance"): Amount | undefined => (typeof limits[key] === "boolean" ? undefined : limits[key]);
   const symmetry = select(isSpatial(table) ? SYMMETRIES_IN_SPACE : SYMMETRIES, limits.symmetry ?? "", (picked) => put({ symmetry: picked || undefined }));
   symmetry.dataset.key = "limit-symmetry";
@@ -26,7 +27,7 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
   over.addEventListener("change", () => editor.change(cleaned({ ...table, tolerance: over.checked ? {} : undefined })));
   return h("div", { class: "content" },
     h("div", { class: "row" },
-      amount("limit-strain", "Strain at most", value("strain"), "", (given) => put({ strain: given }), "empty: that of the material"),
+      amount("limit-strain", "Strain at most", value("strain"), "", (given) => put({ strain: given }), limited ? "empty: that of the material" : "empty: not limited, the material has no known limit"),
       amount("limit-clearance", "Gap between struts at least", value("clearance"), "mm", (given) => put({ clearance: given }), "empty: they must not touch")),
     h("div", { class: "row" }, field("mass", "Mass at most", "g"), field("stable_stroke", "Stable up to", "", "such as 1.2 or 120%")),
     h("div", { class: "row" }, field("strut_loss", "Loss of a strut costs at most", "", "such as 30%"),

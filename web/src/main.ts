@@ -83,7 +83,7 @@ async function pollServer(): Promise<void> {
     if (about.error) {
       server.textContent = sentence(about.error);
     } else if (!about.ready) {
-      server.textContent = "Loading the solver …";
+      server.textContent = "Preparing the solver, a minute or two after an installation; you can state the task meanwhile";
       wait = 500;
     } else if (about.running + about.queued) {
       server.textContent = `${count(about.running, "search", "searches")} running${about.queued ? `, ${figure(about.queued, 0)} queued` : ""}`;

@@ -42,6 +42,7 @@ export class Panels {
   private pressed = false;
   private stale = false;
   private shownTool = "";
+  private revealed = "";
   private timer = 0;
 
   constructor(private readonly editor: TaskEditor) {
@@ -67,6 +68,9 @@ export class Panels {
     addEventListener("pointerup", release);
     addEventListener("pointercancel", release);
   }
+
+  /** Scroll to the section of a tool when it is shown, if it is not visible. */
+  reveal(tool: string): void { this.revealed = tool === "zones" ? "domain" : tool; this.show(); }
 
   /** Update after the present event: a field that is left must not be replaced before the next one has the focus. */
   show(): void {
@@ -100,6 +104,13 @@ export class Panels {
     // What was unfolded stays so.
     for (const key of unfolded) this.element.querySelector(`summary[data-key="${CSS.escape(key)}"]`)?.parentElement!.setAttribute("open", "");
     this.restore(kept);
+    if (this.revealed) {
+      const head = this.element.querySelector(`[data-key="head-${this.revealed}"]`);
+      const top = head?.getBoundingClientRect().top ?? 0;
+      if (head && (top < 0 || top > innerHeight - 80)) head.scrollIntoView({ block: "nearest", behavior: "instant" });
+      this.revealed = "";
+      return;
+    }
     // The focused element stays where it is on the screen, whatever is shown above it.
     const now = kept && this.placeOf(kept.key);
     if (place != null && now != null && Math.abs(now - place) > 1) scrollBy({ top: now - place, behavior: "instant" });

@@ -50,7 +50,7 @@ export class Player {
   constructor(private readonly problem: Problem, private readonly mask: string, private readonly scale: number) {
     this.inSpace = isInSpace(problem);
     this.beams = where(bitsOf(mask, problem.beams.length));
-    this.slider.addEventListener("input", () => { this.stop(); this.part = Number(this.slider.value) / 1000; this.show(); });
+    this.slider.addEventListener("input", () => { this.stop(); if (this.colour === "stress") this.paint("energy"); this.part = Number(this.slider.value) / 1000; this.show(); });
     const times = h("input", { type: "range", min: 1, max: 8, step: 0.5, value: "1", "aria-label": "Amplification of the motion" });
     const size = h("output", {}, "× 1");
     times.addEventListener("input", () => { this.times = Number(times.value); size.textContent = `× ${this.times}`; this.show(); });
@@ -119,7 +119,8 @@ export class Player {
     if (colour === "sensitivity" && !this.sensitivity) void this.loadSensitivity();
     if (colour === "stress") {
       this.stop();
-      this.part = 1;
+      this.part = 1; // the state of the analysis
+      this.slider.value = "1000";
       if (this.inSpace) { // stress is drawn flat
         this.inSpace = false;
         const flat = this.controls.querySelector<HTMLInputElement>('input[value="flat"]');
@@ -133,11 +134,11 @@ export class Player {
   }
 
   /** Colour the struts by what the loss of each costs. */
-  showLosses({ beams, cost }: ToleranceFound["losses"]): void {
+  showLosses({ beams, cost }: ToleranceFound["losses"], paint = true): void {
     this.losses = { beams, cost };
     const bar = this.element.querySelector(".colour");
     if (bar && !bar.querySelector('input[value="loss"]')) bar.firstElementChild!.replaceWith(this.colours());
-    this.paint("loss");
+    if (paint) this.paint("loss");
   }
 
   /** Struts by the part of the efficiency that their loss costs. */

@@ -31,8 +31,17 @@ interface Fem { level: string; status: string; efficiency: number | null; von_mi
 interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[] }
 interface Print { minutes: number | null; layers: number; layer_mm: number; mass: number | null; slicer: string; profile: string }
 
+/** The level of the printed outline, in which a part with a specification is checked at once. */
+const OUTLINE = "plane";
+
+const SOLID = "2D solid";
+
 /** Effort of a search that begins with a design. */
 const CONTINUED = { steps: 8000, chains: 2 };
+
+/** What was computed of designs while the page is open. */
+interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null }
+const computed = new Map<string, Known>();
 
 export class Result {
   readonly player: Player;
@@ -45,17 +54,14 @@ export class Result {
   private readonly table = h("table", { class: "figures" });
   private readonly trouble = h("p", { class: "fault", role: "alert" });
   private readonly toleranceBox = h("div", { class: "content" });
-  private tolerance: ToleranceFound | "running" | string | null = null;
   private readonly partBox = h("div", { class: "content" });
   private readonly filesBox = h("div", { class: "content" });
   private part: Part;
   private report: PartReport | string | null = null;
   private reports = 0;
-  private fems: Record<string, Fem | "running" | string> = {};
   private registries: Registries | null = null;
   private remarks: Remarks | null = null;
   private hasSlicer = false;
-  private print: Print | "running" | string | null = null;
   private writing = "";
 
   constructor(private readonly subject: Subject) {
@@ -76,13 +82,37 @@ export class Result {
     void this.describe();
     void this.loadReport();
     void get<{ slicer: boolean }>("/about").then(({ slicer }) => { this.hasSlicer = slicer; this.showPart(); }, () => undefined);
-    if (this.isPart) void this.validate("frame", false);
+    this.resume();
+    if (this.isPart && !this.known.fems["frame"]) void this.validate("frame", false);
     void fetchRegistries().then((found) => {
       this.registries = found;
+      const outline = found.levels.find(({ name }) => name === OUTLINE);
+      if (this.subject.problem.specification && !isInSpace(this.subject.problem) && outline && !outline.missing && !this.known.fems[OUTLINE]) void this.validate(OUTLINE, false);
       this.showTable();
       this.showPart();
       this.showFiles();
     }, (error: ServerError) => { this.trouble.textContent = sentence(error.message); });
+  }
+
+  /** What is known of the part with its present size and material. */
+  private get known(): Known {
+    const { problem: { positions, widths }, mask } = this.subject;
+    const key = JSON.stringify([mask, positions, widths, this.part]);
+    let found = computed.get(key);
+    if (!found) { found = { fems: {}, tolerance: null, print: null }; computed.set(key, found); }
+    return found;
+  }
+
+  /** Show again what was computed before, and follow what is still computed: the server does not begin anew. */
+  private resume(): void {
+    const { fems, tolerance, print } = this.known;
+    for (const [level, found] of Object.entries(fems)) {
+      if (found === "running") void this.validate(level, false);
+      else if (typeof found === "string") delete fems[level]; // a failure is tried again
+    }
+    if (tolerance === "running") void this.computeTolerance();
+    else if (tolerance && typeof tolerance !== "string") this.player.showLosses(tolerance.losses, false);
+    if (print === "running") void this.slice();
   }
 
   /** Whether a level or a file is for parts of this dimension. */
@@ -112,7 +142,7 @@ export class Result {
   /** Show the figures of the part, and whether it meets its specification. */
   private showReport(): void {
     const { report } = this;
-    const frame = this.fems["frame"];
+    const frame = this.known.fems["frame"];
     const warnings = typeof frame === "object" ? [...frame.warnings, ...frame.doubts] : [];
     clear(this.warnings, ...warnings.map((text) => h("li", {}, sentence(text))));
     if (report === null || typeof report === "string") {
@@ -121,22 +151,26 @@ export class Result {
       clear(this.reportBox);
       return;
     }
+    const outline = this.known.fems[OUTLINE];
+    const solid = typeof outline === "object" ? outline : null;
     const first = report.figures[0];
     const objective = otherObjective(report.objectives);
     clear(this.headline, h("strong", {}, objective?.reached ?? figure(first?.efficiency, 2)),
       h("span", {}, h("b", { class: "model" }, "frames, 8 elements in each strut"), h("br"),
-        `${objective ? sentence(objective.label).slice(0, -1) : "Output / input motion"} of the part with ${this.part.width} mm struts`));
+        `${objective ? sentence(objective.label).slice(0, -1) : "Output / input motion"} of the part with ${this.strutText()} struts`,
+        solid?.efficiency != null && h("span", { class: "second" }, h("br"), `${figure(solid.efficiency, 2)} as output / input motion in the 2D solid, the printed outline`)));
     const columns: Column[] = [];
     if (report.items.search) columns.push({ title: "search", items: report.items.search });
     if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
-    const sheet = this.fems["plane"];
-    if (typeof sheet === "object" && sheet.items) columns.push({ title: "sheet", items: sheet.items });
+    if (solid?.items) columns.push({ title: SOLID, items: solid.items });
     const last = columns.at(-1)?.items ?? null;
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
-    const isMet = last !== null && last.every(({ met }) => met) && !unstable;
-    this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? "met" : "missed"}`;
+    const isMet = last !== null && columns.slice(report.items.search ? 1 : 0).every(({ items }) => items.every(({ met }) => met)) && !unstable;
+    this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (solid?.items || isInSpace(this.subject.problem) ? "met" : "met pending") : "missed"}`;
+    const pending = outline === "running" ? "; the 2D solid, the printed outline, is being computed …" : !solid && !isInSpace(this.subject.problem) ? "; not checked in the 2D solid, the printed outline" : "";
+    const by = solid?.items ? " by frames and in the 2D solid, the printed outline" : " by frames";
     clear(this.verdict, unstable ? "The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."
-      : last ? `${verdictOf(last)} (${columns.at(-1)!.title === "sheet" ? "in the sheet" : "by frames"}).` : "No specification: the task says nothing about straightness, rotation or load.");
+      : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : " in the 2D solid, the printed outline"}${pending}.` : "No specification: the task says nothing about straightness, rotation or load.");
     clear(this.reportBox, columns.length > 0 && itemTable(columns), figureTable(report.figures));
     const better = this.subject.comparison?.efficiency ?? null;
     const defect = unstable ? "The part has no stable path to the full stroke."
@@ -160,7 +194,7 @@ export class Result {
   }
 
   private femRow({ name, title, duration, missing }: Registries["levels"][number]): HTMLElement {
-    const known = this.fems[name];
+    const known = this.known.fems[name];
     const heading = h("th", { scope: "row" }, title);
     if (missing) return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, "not installed on the server"));
     if (known === undefined) {
@@ -177,35 +211,37 @@ export class Result {
   }
 
   private async validate(level: string, show = true): Promise<void> {
-    this.fems[level] = "running";
+    const { known } = this;
+    known.fems[level] = "running";
     this.showTable();
     try {
       const { problem, mask } = this.subject;
       const found = await post<Fem>("/validation", { problem, mask, part: this.part, level });
-      this.fems[level] = found;
+      known.fems[level] = found;
       if (show && found.picture) this.player.showStress(found.picture);
     } catch (error) {
-      this.fems[level] = sentence((error as ServerError).message);
+      known.fems[level] = sentence((error as ServerError).message);
     }
     this.showTable();
   }
 
   private async computeTolerance(): Promise<void> {
-    this.tolerance = "running";
+    const { known } = this;
+    known.tolerance = "running";
     this.showTolerance();
     const { problem, mask } = this.subject;
     try {
-      this.tolerance = await post<ToleranceFound>("/tolerance", { problem, mask, part: this.part });
-      this.player.showLosses(this.tolerance.losses);
+      known.tolerance = await post<ToleranceFound>("/tolerance", { problem, mask, part: this.part });
+      this.player.showLosses(known.tolerance.losses);
     } catch (error) {
-      this.tolerance = sentence((error as ServerError).message);
+      known.tolerance = sentence((error as ServerError).message);
     }
     this.showTolerance();
   }
 
   /** What the part does when print and drive deviate, and which struts it needs. */
   private showTolerance(): void {
-    const { tolerance } = this;
+    const { tolerance } = this.known;
     if (tolerance === null) {
       clear(this.toleranceBox, h("p", { class: "note" }, "Widths, nodes, direction and stroke deviate, and single struts are lost: some 350 scenarios."),
         button("Compute the tolerance", () => void this.computeTolerance(), "", { "data-key": "tolerance" }), h("span", { class: "more" }, " ten seconds to a minute"));
@@ -232,9 +268,6 @@ export class Result {
   private showPart(fault = ""): void {
     const change = (changes: Partial<Part>): void => {
       this.part = { ...this.part, ...changes };
-      this.fems = {};
-      this.tolerance = null;
-      this.print = null;
       this.showTolerance();
       void this.describe();
       void this.loadReport();
@@ -263,7 +296,7 @@ export class Result {
 
   /** The printing time, which the slicer takes some seconds to estimate. */
   private printTime(): HTMLElement {
-    const { print } = this;
+    const { print } = this.known;
     if (print === null) return h("p", {}, button("Compute the print time", () => void this.slice(), "quiet small", { "data-key": "print" }));
     if (print === "running") return h("p", { class: "more" }, h("span", { class: "working" }), "slicing …");
     if (typeof print === "string") return h("p", { class: "fault", role: "alert" }, print);
@@ -273,20 +306,30 @@ export class Result {
 
   private async slice(): Promise<void> {
     const { problem, mask } = this.subject;
-    this.print = "running";
+    const { known } = this;
+    known.print = "running";
     this.showPart();
     try {
-      this.print = await post<Print>("/print", { problem, mask, part: this.part });
+      known.print = await post<Print>("/print", { problem, mask, part: this.part });
     } catch (error) {
-      this.print = sentence((error as ServerError).message);
+      known.print = sentence((error as ServerError).message);
     }
     this.showPart();
   }
 
+  /** Width of the struts, as they were refined. */
+  private strutText(): string {
+    const { problem: { widths }, mask } = this.subject;
+    if (!widths) return `${this.part.width} mm`;
+    const own = bitsOf(mask, widths.length).reduce<number[]>((found, bit, k) => (bit ? [...found, widths[k]! * this.part.scale] : found), []);
+    const [low, high] = [Math.min(...own), Math.max(...own)];
+    return high - low < 0.005 ? `${figure(high, 1)} mm` : `${figure(low, 1)} to ${figure(high, 1)} mm`;
+  }
+
   private fixedPart(): HTMLElement {
-    const { width, thickness, scale, material } = this.part;
+    const { thickness, scale, material } = this.part;
     const named = typeof material === "string" ? this.registries?.materials.find(({ name }) => name === material)?.title ?? material : material.name;
-    const struts = isInSpace(this.subject.problem) ? `Round struts, diameter ${width} mm` : `Struts ${width} mm wide, ${thickness} mm thick`;
+    const struts = isInSpace(this.subject.problem) ? `Round struts, diameter ${this.strutText()}` : `Struts ${this.strutText()} wide, ${thickness} mm thick`;
     return h("p", {}, `${struts}, nodes ${scale} mm apart, ${named}. They belong to the specification; another part is another task.`);
   }
 
@@ -304,7 +347,7 @@ export class Result {
 
   private showFiles(fault = ""): void {
     // One process computes finite elements, tolerances and files, one after the other.
-    const waits = Object.values(this.fems).includes("running") || this.tolerance === "running" || this.print === "running";
+    const waits = Object.values(this.known.fems).includes("running") || this.known.tolerance === "running" || this.known.print === "running";
     clear(this.filesBox,
       h("div", { class: "files" },
         ...(this.registries?.files ?? []).filter(this.isOffered).map(({ name: suffix, title, purpose }) => h("button", {

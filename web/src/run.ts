@@ -173,7 +173,10 @@ export class RunPage {
     }
     const made = Object.values(this.update?.chains ?? {}).reduce((sum, chain) => sum + chain.step, 0);
     const done = run.status === "finished" && !run.refine ? run.total : Math.max(run.done, made);
-    const share = run.status === "finished" ? 1 : Math.min(1, done / run.total);
+    const refinedShare = this.update?.refined ? this.update.refined.geometries / this.update.refined.most : 0;
+    const triedShare = this.update?.tried ? this.update.tried[0] / this.update.tried[1] : 0;
+    // Phases after the search have a bar of their own; both may end before it is full.
+    const share = run.status === "finished" ? 1 : Math.min(1, run.refine ? done / run.total : refinedShare || triedShare || done / run.total);
     const running = run.status === "running";
     if (!running && this.asked) { this.asked = ""; this.showControls(run); }
     const specified = Boolean(this.run.problem.specification);
@@ -209,8 +212,10 @@ export class RunPage {
       const value = moved?.efficiency ?? run.efficiency ?? this.chart.best;
       if (objective) this.curveTitle.textContent = `Objective along the search: ${objective.label}`;
       else if (moved?.objectives.length) this.curveTitle.textContent = `Objective along the search: ${moved.objectives[0]!.label}`;
+      const better = this.update?.refined?.objective ?? null;
       clear(this.readout, value !== null && h("strong", {}, objective?.reached ?? figure(value, 3)),
-        h("span", {}, `${objective ? `${objective.label} of the ` : ""}${this.stateText(run, value !== null, done)}`));
+        better !== null && h("span", {}, h("b", {}, `refined so far: objective ${figure(better, 2)}`)),
+        h("span", {}, `${objective ? `${objective.label} of the ` : ""}${better === null ? "" : "drawn, before refinement: "}${this.stateText(run, value !== null, done)}`));
     }
   }
 

@@ -41,19 +41,20 @@ function mark(met: boolean): HTMLElement {
 /** Motion, off-axis motion, rotation and load of each output, always beside each other. */
 export function figureTable(figures: PartFigures[], titles: string[] | null = null): HTMLElement {
   const several = figures.length > 1;
+  const sameCase = figures.every((row) => row.case === figures[0]!.case);
   const rows: [string, (row: PartFigures) => string][] = [
     ["output / input motion", (row) => figure(row.efficiency, 2)],
     ["motion of the output", (row) => unit(row.travel_mm, 2, "mm")],
     ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)} %`)],
     ["rotation of the output", (row) => unit(row.rotation_deg, 1, "°")],
-    ["load that halves the motion", (row) => (row.payload_N == null ? "none" : `${figure((1000 * row.payload_N) / 9.80665, 0)} g`)],
+    ["payload: load that halves the motion", (row) => (row.payload_N == null ? "none" : `${figure((1000 * row.payload_N) / 9.80665, 0)} g`)],
     ["sag under own weight", (row) => unit(row.sag_mm, 2, "mm")],
     ["largest input force", (row) => unit(row.largest_input_force_N, 2, "N")],
     ["largest strain", (row) => (row.strain == null ? "–" : `${figure(100 * row.strain, 1)} %`)],
   ];
   return h("table", { class: "figures part" },
     h("caption", {}, "Figures of the part, by frames with 8 elements in each strut"),
-    several && h("thead", {}, h("tr", {}, h("td"), ...figures.map((row, k) => h("th", { scope: "col" }, titles?.[k] ?? [row.case, row.output].filter((name) => name !== "case").join(", "))))),
+    several && h("thead", {}, h("tr", {}, h("td"), ...figures.map((row, k) => h("th", { scope: "col" }, titles?.[k] ?? (sameCase ? [row.output] : [row.case, row.output]).filter((name) => name !== "case").join(", "))))),
     h("tbody", {}, ...rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), ...figures.map((row) => h("td", {}, text(row)))))));
 }
 

@@ -126,6 +126,11 @@ export function assign(task: Task, built: Built, load_case: number, target: Targ
   return { table: withSection(table, load_case, target, { at: regionsOf(next, positions, scale) }), hand: null };
 }
 
+/** Whether nodes, at least one, are their own images by the mirror symmetry of a design. */
+export function isSymmetric(built: Built, symmetry: string, nodes: number[]): boolean {
+  return nodes.length > 0 && withImages(built, symmetry, nodes).length === nodes.length;
+}
+
 /** Whether an output is to turn, whatever its motion. */
 export function isTurn({ direction, rotation, gain, travel }: OutputTable): boolean {
   return direction === undefined && rotation !== undefined && !gain && !travel;
@@ -153,10 +158,17 @@ export function withImages(built: Built, symmetry: string, nodes: number[]): num
   return [...all];
 }
 
-/** A table whose selected nodes and zones keep their distances from the nearer sides of a domain of another size. */
+/** Distance from the middle, over the size of a domain, up to which something belongs to the middle. */
+const MIDDLE = 0.15;
+
+/** A table for a domain of another size: selected nodes and zones keep their distances from the nearer side or from the middle. */
 export function resized(table: Table, size: number[]): Table {
   const old = table.domain.size!;
-  const along = (value: number, axis: number): number => (value > old[axis]! / 2 ? Math.round(100 * (value + size[axis]! - old[axis]!)) / 100 : value);
+  const along = (value: number, axis: number): number => {
+    const part = value / old[axis]! - 0.5;
+    const share = Math.abs(part) < MIDDLE ? 0.5 : part > 0 ? 1 : 0;
+    return Math.round(100 * (value + share * (size[axis]! - old[axis]!))) / 100;
+  };
   const point = (given: Point | undefined): Point | undefined => given?.map((value, axis) => along(value!, axis)) as Point | undefined;
   const shape = <T extends Shape>(given: T): T => cleaned({
     ...given, circle: point(given.circle), sphere: point(given.sphere), cylinder: point(given.cylinder),

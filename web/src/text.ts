@@ -51,6 +51,7 @@ export function faultText(message: string, place: (node: number) => string): str
 
 /** Suggestions for a search that has found no good design. */
 export const REMEDIES = [
+  "Refine the design (Next steps): nodes and widths change until the items are met in the printed outline, too.",
   "Search longer: Thorough, or more chains.",
   "Let the search decide on more struts: fewer supports, fewer struts that are kept, no symmetry.",
   "Reduce the requirement: a shorter stroke, or an output closer to the input.",

@@ -88,7 +88,8 @@ def _texts(item: Item, problem: Problem, units: ProblemUnits) -> dict[str, str]:
 def _reached(item: Item, value: float, units: ProblemUnits) -> str:
     """Return a value with its unit; a payload above the wanted one is not always determined."""
     if value == math.inf and item.at_least is not None:
-        return f"> {number_text(item, item.at_least, units)}"
+        text = number_text(item, item.at_least, units) + _grams(item, item.at_least, units)
+        return f"> {text}"
     return number_text(item, value, units) + _grams(item, value, units)
 
 

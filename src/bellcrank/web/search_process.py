@@ -83,6 +83,7 @@ class ProgressReporter:
         self._evaluator = self._specification or model_evaluator(folder.problem)
         self._part = PartSpec.from_dict(folder.provenance.get("part") or {}, "part")
         self._total = settings.chains * settings.steps
+        self._chain_count = settings.chains
         self._lock = threading.Lock()
         self._chains: dict[int, dict[str, Any]] = {}
         self._scores: dict[int, float] = {}
@@ -152,6 +153,17 @@ class ProgressReporter:
             if progress.rows.violation <= MET and is_better:
                 self._best_refined[number] = progress
 
+    def _most_geometries(self, designs: int) -> int:
+        """Return the usual number of geometries of all refinements, of the first and further ones.
+
+        A part may need some more in its better model.
+        """
+        from bellcrank.search.choice import STARTS
+        from bellcrank.workflows.refiners import EVALUATIONS, FIRST_EVALUATIONS
+
+        first = max(designs, STARTS * self._chain_count)
+        return FIRST_EVALUATIONS * first + EVALUATIONS * self._chain_count
+
     def refined_designs(self) -> list[Design]:
         """Return the best design of each refinement that meets all items, the best first."""
         with self._lock:
@@ -183,7 +195,7 @@ class ProgressReporter:
             "total": self._total,
             "left": round((self._total - done) / max(speed, 1e-9), 1),
             "tried": tried,
-            "refined": _refinement_of(refined.values()),
+            "refined": _refinement_of(refined.values(), self._most_geometries(len(refined))),
         }
         best = chains[max(scores, key=scores.__getitem__)]
         if time.monotonic() - self._moved_at > MOVED_INTERVAL and best["kept"] != self._moved_mask:
@@ -221,7 +233,7 @@ class ProgressReporter:
         }
 
 
-def _refinement_of(latest: Collection[RefinementProgress]) -> dict[str, Any] | None:
+def _refinement_of(latest: Collection[RefinementProgress], most: int) -> dict[str, Any] | None:
     """Return how far refinements are: designs, geometries, sheets, the best objective.
 
     The objective is that of designs that meet all items.
@@ -235,6 +247,7 @@ def _refinement_of(latest: Collection[RefinementProgress]) -> dict[str, Any] | N
         "designs": len(latest),
         "geometries": sum(each.evaluations for each in latest),
         "sheets": sum(each.sheets for each in latest),
+        "most": most,
         "objective": float(max(met)) if met else None,
     }
 
@@ -334,7 +347,7 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
         message = {
             "kind": "progress", "points": {}, "chains": {}, "speed": None, "left": None,
             "done": progress.evaluations, "total": total, "tried": None,
-            "refined": _refinement_of([progress]),
+            "refined": _refinement_of([progress], total),
         }  # fmt: skip
         with contextlib.suppress(OSError, BrokenPipeError):
             pipe.send(message)
