@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from bellcrank.export.slicer import has_slicer
 from bellcrank.model import (
@@ -239,6 +241,24 @@ def test_a_part_of_an_own_material_has_remarks(client: TestClient, crane: dict[s
     answer = client.post("/api/part", json=body)
     assert answer.status_code == 200
     assert answer.json()["mass"] > 0.0
+
+
+def test_a_file_has_the_plate_and_the_pad_that_are_asked_for(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    body = {
+        "problem": crane["problem"], "mask": crane["mask"], "part": PartSpec().to_dict()
+    }  # fmt: skip
+
+    def volume(**grips: Any) -> float:
+        content = client.post("/api/files/stl", json={**body, **grips}).content
+        return float(trimesh.load(io.BytesIO(content), file_type="stl").volume)
+
+    plain, plate, drilled = volume(), volume(plate=True), volume(plate=True, screws=2)
+    assert plain < volume(pad=True) < plate
+    assert plate - drilled == pytest.approx(2 * np.pi * 1.7**2 * 5.0, rel=0.05)
+    message, _ = refusal(client.post("/api/files/stl", json={**body, "screws": 2}))
+    assert "plate" in message
 
 
 @pytest.mark.skipif(not has_slicer(), reason="no slicer is installed")

@@ -186,7 +186,7 @@ export class Canvas extends Drawing implements TaskDrawing {
     const at = this.locate(event);
     this.drop();
     if (drag.kind === "zone" && drag.moved) this.actions.zone(this.zoneAt(drag.from, at));
-    if (drag.kind !== "box") return;
+    if (drag.kind !== "box" && !(drag.kind === "aim" && !drag.moved)) return; // a click on an arrow selects the node under it
     if (drag.moved) {
       const [x0, y0, x1, y1] = boxShape(drag.from, at).box as [number, number, number, number];
       const inside = range(this.rest.length / 2).filter((k) => {

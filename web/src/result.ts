@@ -63,6 +63,7 @@ export class Result {
   private remarks: Remarks | null = null;
   private hasSlicer = false;
   private writing = "";
+  private grips = { plate: false, screws: 0, pad: false };
 
   constructor(private readonly subject: Subject) {
     this.part = partOf(subject);
@@ -349,6 +350,7 @@ export class Result {
     // One process computes finite elements, tolerances and files, one after the other.
     const waits = Object.values(this.known.fems).includes("running") || this.known.tolerance === "running" || this.known.print === "running";
     clear(this.filesBox,
+      !isInSpace(this.subject.problem) && this.gripFields(),
       h("div", { class: "files" },
         ...(this.registries?.files ?? []).filter(this.isOffered).map(({ name: suffix, title, purpose }) => h("button", {
           type: "button", class: this.writing === suffix ? "file busy" : "file", disabled: this.writing !== "", "data-file": suffix,
@@ -359,12 +361,28 @@ export class Result {
       fault && h("p", { class: "fault", role: "alert" }, fault));
   }
 
+  /** How the printed part is held and pushed. */
+  private gripFields(): HTMLElement {
+    const tick = (key: "plate" | "pad", text: string): HTMLElement => {
+      const box = h("input", { type: "checkbox", checked: this.grips[key], "data-key": key });
+      box.addEventListener("change", () => {
+        this.grips = { ...this.grips, [key]: box.checked, ...(key === "plate" && !box.checked ? { screws: 0 } : {}) };
+        this.showFiles();
+      });
+      return h("label", { class: "tick" }, box, text);
+    };
+    const screws = number(this.grips.screws, { min: 0, max: 12, step: 1 }, (value) => { this.grips = { ...this.grips, screws: Math.min(12, Math.max(0, Math.round(value))) }; });
+    screws.dataset.key = "screws";
+    return h("div", { class: "grips" }, tick("plate", "Fill the supports to a plate for clamping"),
+      this.grips.plate && field("Screw holes, 3.4 mm", screws), tick("pad", "Fill the input to a pad for pushing"));
+  }
+
   private async downloadFile(suffix: string): Promise<void> {
     const { problem, mask, efficiency, provenance, title } = this.subject;
     this.writing = suffix;
     this.showFiles();
     try {
-      const content = await fetchFile(suffix, { problem, mask, part: this.part, efficiency, provenance });
+      const content = await fetchFile(suffix, { problem, mask, part: this.part, efficiency, provenance, ...(isInSpace(problem) ? {} : this.grips) });
       download(content, suffix === "json" ? "design.json" : suffix === "pdf" ? `${fileName(title)}-card.pdf` : `${fileName(title)}.${suffix}`);
       this.writing = "";
       this.showFiles();

@@ -106,10 +106,11 @@ async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
 async def make_file(suffix: FileSuffix, body: FileBody, state: State) -> Response:
     """Return a file of a design for printing, cutting, viewing or simulation."""
     about = {"efficiency": body.efficiency, "provenance": body.provenance}
+    grips = {"plate": body.plate, "screws": body.screws, "pad": body.pad}
     text = json.dumps(body.problem)
     pool = state.pools.thorough if page_files[suffix].quick else state.pools.slow
     content = await pool.call(
-        slow_calls.design_file, text, body.mask, f".{suffix}", body.part, about
+        slow_calls.design_file, text, body.mask, f".{suffix}", body.part, about, grips
     )
     return Response(content, media_type=page_files[suffix].media_type)
 

@@ -95,10 +95,16 @@ class PartBody(DesignBody):
 
 
 class FileBody(PartBody):
-    """A design to be written as a file."""
+    """A design to be written as a file.
+
+    In the plane the supports can be filled to a plate with screw holes, and the input to a pad.
+    """
 
     efficiency: float | None = None
     provenance: dict[str, Any] = Field(default_factory=dict)
+    plate: bool = False
+    screws: int = Field(default=0, ge=0, le=12)
+    pad: bool = False
 
 
 class FemBody(PartBody):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -22,8 +23,11 @@ from bellcrank.web.items import item_states
 from bellcrank.web.quick_calls import design_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from bellcrank.model import Design
     from bellcrank.part import PartSpec
+    from bellcrank.workflows.fabricate import Grips
 
 MOVIE_SECONDS = 4.0
 MOVIE_SIZE = (1280, 720)
@@ -34,7 +38,12 @@ MAX_VERTICES = 60_000
 
 
 def design_file(
-    text: str, mask: str, suffix: str, part: dict[str, Any], about: dict[str, Any]
+    text: str,
+    mask: str,
+    suffix: str,
+    part: dict[str, Any],
+    about: dict[str, Any],
+    grips: dict[str, Any],
 ) -> bytes:
     """Return the content of a file of a design.
 
@@ -46,8 +55,11 @@ def design_file(
         Dimensions and material, as `PartSpec.from_dict` reads them.
     about
         Efficiency and provenance, if known.
+    grips
+        Arguments of `bellcrank.workflows.fabricate.Grips`.
     """
     from bellcrank.part import PartSpec
+    from bellcrank.workflows.fabricate import Grips
 
     design = replace(
         design_of(text, mask),
@@ -55,17 +67,21 @@ def design_file(
         provenance=about.get("provenance") or {},
     )
     spec = PartSpec.from_dict(part)
-    makers = {".json": _json, ".mp4": _movie, ".gif": _movie, ".pdf": _card, ".zip": _archive}
+    export = partial(_export, grips=Grips(**grips))
+    archive = partial(_archive, grips=grips)
+    makers: dict[str, Callable[[Design, PartSpec, Path], None]] = {
+        ".json": _json, ".mp4": _movie, ".gif": _movie, ".pdf": _card, ".zip": archive
+    }  # fmt: skip
     with TemporaryDirectory(prefix="bellcrank-") as folder:
         path = Path(folder) / f"part{suffix}"
         try:
-            makers.get(suffix, _export)(design, spec, path)
+            makers.get(suffix, export)(design, spec, path)
         except InvalidSettings as error:
             raise InvalidSettings(str(error).removeprefix(f"{path}: ")) from None
         return path.read_bytes()
 
 
-def _archive(design: Design, spec: PartSpec, path: Path) -> None:
+def _archive(design: Design, spec: PartSpec, path: Path, grips: dict[str, Any]) -> None:
     """Write all other files into one archive."""
     from bellcrank.web.page_files import page_files
 
@@ -74,7 +90,9 @@ def _archive(design: Design, spec: PartSpec, path: Path) -> None:
     with ZipFile(path, "w", ZIP_DEFLATED) as archive:
         for suffix, file in page_files.items():
             if suffix != "zip" and (design.problem.lattice.dimension == 2 or file.in_space):
-                content = design_file(text, design.mask_hex, f".{suffix}", spec.to_dict(), about)
+                content = design_file(
+                    text, design.mask_hex, f".{suffix}", spec.to_dict(), about, grips
+                )
                 archive.writestr(f"part.{suffix}", content)
 
 
@@ -100,12 +118,12 @@ def _card(design: Design, spec: PartSpec, path: Path) -> None:
     make_card(design, spec, path)
 
 
-def _export(design: Design, spec: PartSpec, path: Path) -> None:
+def _export(design: Design, spec: PartSpec, path: Path, grips: Grips) -> None:
     from bellcrank.export import export
     from bellcrank.export.formats.base import LAYER
-    from bellcrank.workflows.fabricate import Grips, bundle_of
+    from bellcrank.workflows.fabricate import bundle_of
 
-    export(bundle_of(design, spec, Grips(), layer=LAYER), path)
+    export(bundle_of(design, spec, grips, layer=LAYER), path)
 
 
 def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
