@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import UnreadableFilm
+from bellcrank.measure.camera import transformed
 from bellcrank.measure.measurement import Measurement, MeasureSettings, measured
 from bellcrank.measure.motion import Motion, motion_of_nodes, node_motion
 
@@ -39,19 +40,23 @@ class PlaneTracks:
     height_scale
         Size of the part as seen on the sheet over its size: it is nearer to the camera. Lengths
         are divided by it already.
+    offsets : (K + S, 2) float64, mm
+        Positions of the markers on the part less the drawn ones.
     """
 
     corners: Values
     supports: Values
     height_scale: float
+    offsets: Values
 
 
-def plane_tracks(tracks: Tracks, views: Views, rest: slice, offsets: Values) -> PlaneTracks:
+def plane_tracks(tracks: Tracks, views: Views, rest: slice, errors: Values) -> PlaneTracks:
     """Return the tracks in mm.
 
     A point above the sheet is seen at the point of the sheet behind it. For a plane parallel to
-    the sheet this is a scaling about the foot of the camera. Its factor is that of the distances
-    between the markers on the part at rest.
+    the sheet this is a scaling about the foot of the camera. The similarity that fits the drawn
+    markers best to those on the part at rest has this factor; what remains is their offsets, of
+    which it hides a part.
 
     Parameters
     ----------
@@ -61,14 +66,17 @@ def plane_tracks(tracks: Tracks, views: Views, rest: slice, offsets: Values) -> 
         The camera.
     rest
         Frames at rest.
-    offsets : (K + S, 2), mm
-        Positions of the markers on the part less the drawn ones.
+    errors : (K + S, 2), mm
+        Assumed positions of the markers on the part less the drawn ones: zero for the best
+        estimate of the offsets, of the errors of placement for a sample of them.
     """
     moving, held = views.plane(tracks.corners), views.plane(tracks.support_corners)
     seen = np.concatenate([moving[rest], held[rest]], axis=1).mean(axis=(0, 2))
-    drawn = np.stack([marker.centre for marker in (*tracks.moving, *tracks.supports)]) + offsets
-    scale = float(np.hypot(*similarity(drawn, seen)[:2, 0]))
-    return PlaneTracks(moving / scale, held / scale, scale)
+    drawn = np.stack([marker.centre for marker in (*tracks.moving, *tracks.supports)])
+    onto = similarity(drawn + errors, seen)
+    scale = float(np.hypot(*onto[:2, 0]))
+    offsets = transformed(np.linalg.inv(onto), seen) - drawn
+    return PlaneTracks(moving / scale, held / scale, scale, offsets)
 
 
 def similarity(points: Values, image: Values) -> Values:
@@ -131,8 +139,8 @@ def measure_by_markers(
     Notes
     -----
     A sample of the interval gives the reference markers random weights (the Bayesian bootstrap)
-    and draws from normal distributions the positions of the markers on the part, the size of
-    the sheet, and an error in each frame, equal in frames that show the same state. That error
+    and draws from normal distributions errors of the placement of the markers on the part, the size
+    of the sheet, and an error in each frame, equal in frames that show the same state. That error
     has the spread of the frames about the fitted curve, and at least that of the centres of
     reference markers about the sheet.
 
@@ -148,13 +156,13 @@ def measure_by_markers(
     def motion_for(rng: np.random.Generator | None, rest: slice) -> Motion:
         if rng is None:
             plane = plane_tracks(tracks, tracks.views, rest, exact)
-            return _motion(part, tracks, plane, rest, exact)
+            return _motion(part, tracks, plane, rest)
         counts = count * rng.dirichlet(np.ones(count))
-        offsets = settings.placement * rng.standard_normal(exact.shape)
-        plane = plane_tracks(tracks, tracks.views.resampled(counts), rest, offsets)
+        errors = settings.placement * rng.standard_normal(exact.shape)
+        plane = plane_tracks(tracks, tracks.views.resampled(counts), rest, errors)
         stretch = 1.0 + settings.sheet * rng.standard_normal(2)
-        plane = PlaneTracks(plane.corners * stretch, plane.supports * stretch, plane.height_scale)
-        return _motion(part, tracks, plane, rest, offsets)
+        plane = replace(plane, corners=plane.corners * stretch, supports=plane.supports * stretch)
+        return _motion(part, tracks, plane, rest)
 
     scale = _pixels_per_mm(tracks)
     floor = _reference_error(tracks.views) / scale
@@ -163,7 +171,7 @@ def measure_by_markers(
     return found
 
 
-def _motion(part: Part, tracks: Tracks, plane: PlaneTracks, rest: slice, offsets: Values) -> Motion:
+def _motion(part: Part, tracks: Tracks, plane: PlaneTracks, rest: slice) -> Motion:
     problem = part.design.problem
     corners = plane.corners
     if plane.supports.shape[1]:
@@ -176,7 +184,7 @@ def _motion(part: Part, tracks: Tracks, plane: PlaneTracks, rest: slice, offsets
         moved.append(
             node_motion(
                 [tracks.moving[k] for k in own], corners[:, own], zero[own], nodes,
-                part.positions, offsets[own],
+                part.positions, plane.offsets[own],
             )
         )  # fmt: skip
     return motion_of_nodes(problem, moved[0], moved[1], part.scale)

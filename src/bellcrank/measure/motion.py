@@ -48,9 +48,9 @@ class Motion:
     path: Values
 
     @property
-    def quantities(self) -> Values:
-        """Columns (F, 6): along, across (2), rotation, path (2)."""
-        return np.column_stack([self.along, self.across, self.rotation, self.path])
+    def columns(self) -> Values:
+        """Columns (F, 7): input, along, across (2), rotation, path (2)."""
+        return np.column_stack([self.input, self.along, self.across, self.rotation, self.path])
 
 
 def motion_of_nodes(

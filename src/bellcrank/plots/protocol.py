@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bellcrank.measure.films import needed_picture, picture_scale
 from bellcrank.plots import style
 from bellcrank.plots.marker_sheet import add_drawing
 
@@ -28,8 +29,6 @@ COLUMNS = 108
 INCH = 25.4
 DISTANCE = 1.6
 """Distance of the camera over the longer side of the sheet."""
-LEAST_WIDTH = 1280
-"""Smallest width of pictures, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +61,8 @@ def protocol_steps(protocol: Protocol) -> list[tuple[str, str]]:
     layout, name = protocol.layout, protocol.name
     wide, high = layout.frame_size
     far = DISTANCE * float(layout.extent.max())
-    pixels = LEAST_WIDTH / float(layout.extent.max())
+    picture = needed_picture(layout.frame_size, protocol.stroke)
+    pixels = picture_scale(picture, layout.frame_size)
     size = layout.on_part[0].size
     return [
         ("1  Print the part and its markers",
@@ -84,7 +84,7 @@ def protocol_steps(protocol: Protocol) -> list[tuple[str, str]]:
         ("5  Camera and light",
          (f"Put the camera on a stand, at least {far:.0f} mm from the sheet, tilted by at most 20 "
          "degrees, with the whole sheet in the picture and little around it. Use the main camera, "
-         f"no wide angle, no zoom; at least {LEAST_WIDTH} x 720 pixels ({pixels:.1f} pixels per "
+         f"no wide angle, no zoom; at least {picture[0]} x {picture[1]} pixels ({pixels:.1f} in a "
          "mm), better more; fixed focus and exposure. Use even, diffuse light from two sides: no "
          "reflections on the markers, no hard shadows.")),
         ("6  Film",
