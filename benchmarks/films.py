@@ -183,6 +183,7 @@ class Renderer:
     def __init__(self, scene: Scene, look: Look, rng: np.random.Generator, samples: int = 3):
         self.scene, self.look, self.samples, self.rng = scene, look, samples, rng
         self._camera: Camera | None = None
+        self._last: tuple[Values, Any] | None = None
         ramp = np.linspace(0.0, 1.0, 2**15) ** (1 / look.gamma)
         bent = ramp + look.bend * ramp * (1 - ramp) * (2 * ramp - 1)
         self._curve = np.round(255 * bent).astype(np.uint8)
@@ -202,12 +203,15 @@ class Renderer:
         """
         if self._camera is not camera:
             self._set_camera(camera)
-        canvas = self._background.copy()
+            self._last = None
         where = positions if shift is None else positions + shift
-        self._draw_part(canvas, where)
-        if self.scene.layout is not None:
-            self._draw_cards(canvas, where)
-        return self._exposed(canvas)
+        if self._last is None or not np.array_equal(self._last[0], where):
+            canvas = self._background.copy()
+            self._draw_part(canvas, where)
+            if self.scene.layout is not None:
+                self._draw_cards(canvas, where)
+            self._last = (where, self._blurred(canvas))
+        return self._exposed(self._last[1])
 
     def _set_camera(self, camera: Camera) -> None:
         self._camera = camera
@@ -289,7 +293,8 @@ class Renderer:
                 part.section.thickness, np.ones(2), margin=marker.size / 6,
             )  # fmt: skip
 
-    def _exposed(self, canvas: Any) -> Any:
+    def _blurred(self, canvas: Any) -> Any:
+        """Return the light of a picture without noise."""
         look, (wide, high) = self.look, self._camera.size
         picture = cv2.resize(canvas, (wide, high), interpolation=cv2.INTER_AREA).astype(np.float32)
         picture /= 255.0
@@ -300,10 +305,14 @@ class Renderer:
         y = np.linspace(-1, 1, high, dtype=np.float32)[:, None]
         x = np.linspace(-1, 1, wide, dtype=np.float32)[None]
         light = 1.0 + look.light[0] * x + look.light[1] * y - look.light[2] * (x * x + y * y)
-        picture *= 0.85 * light
+        return picture * (0.85 * light)
+
+    def _exposed(self, picture: Any) -> Any:
+        """Return the grey levels of a picture with noise."""
+        look = self.look
         start = int(self.rng.integers(0, len(self._pool) - picture.size))
         noise = self._pool[start : start + picture.size].reshape(picture.shape)
-        picture += noise * np.sqrt(look.noise**2 * (0.3 + 3.0 * np.clip(picture, 0, None)))
+        picture = picture + noise * np.sqrt(look.noise**2 * (0.3 + 3.0 * np.clip(picture, 0, None)))
         level = (np.clip(picture, 0, 1) * (len(self._curve) - 1)).astype(np.uint16)
         return self._curve[level]
 

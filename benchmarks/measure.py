@@ -23,6 +23,7 @@ import numpy as np
 
 from bellcrank.errors import UnreadableFilm
 from bellcrank.measure import MeasureSettings, open_film
+from bellcrank.measure.films import needed_picture
 from bellcrank.provenance import provenance
 from bellcrank.workflows import find_design, spec_for
 from bellcrank.workflows.measure import (
@@ -56,6 +57,8 @@ DESIGNS = (
 FILMS, OUTLINES = 200, 42
 PLACEMENT, SHEET = 0.3, 0.0015
 """Standard deviations of the placement of markers, mm, and of the scales of the printed sheet."""
+LARGER = 0.15
+"""Part of the films that are at least 1920 x 1080 pixels."""
 HELD_BY_HAND = 0.15
 """Part of the films with a camera that moves."""
 
@@ -94,14 +97,17 @@ def random_camera(
 
 
 def strokes(rng: np.random.Generator, slower: int = 1) -> Values:
-    """Return the fractions of the stroke in the frames: rest, push, hold, and sometimes back."""
+    """Return the fractions of the stroke in the frames: rest, push, hold, and sometimes back.
+
+    Rest and hold last for a quarter to half of a second; the protocol asks for a second each.
+    """
     count = slower * int(rng.integers(10, 18))
     reached = rng.uniform(0.85, 1.0)
     ramp = np.linspace(0.0, 1.0, count + 1)[1:]
     ramp = reached * (ramp if rng.random() < 0.5 else 0.5 - 0.5 * np.cos(np.pi * ramp))
     # Nobody pushes evenly.
     ramp = np.sort(np.clip(ramp + rng.normal(0.0, 0.1 / count, count), 0.0, reached))
-    rest, hold = int(rng.integers(2, 5)), int(rng.integers(1, 4))
+    rest, hold = int(rng.integers(8, 16)), int(rng.integers(6, 12))
     back = reached * np.linspace(0.9, 0.0, 5) if rng.random() < 0.2 else np.empty(0)
     return np.concatenate([np.zeros(rest), ramp, np.full(hold, reached), back])
 
@@ -125,7 +131,9 @@ def marker_film(number: int, folder: Path) -> tuple[dict[str, Any], Path]:
     name = DESIGNS[number % len(DESIGNS)]
     own = computed(name)
     layout = layout_for(own)
-    size = (1920, 1080) if rng.random() < 0.15 or layout.page != "A4" else (1280, 720)
+    size = needed_picture(layout.frame_size, own.full_stroke)
+    if rng.random() < LARGER:
+        size = max(size, (1920, 1080))
     corners = np.concatenate([marker.corners for marker in layout.reference])
     camera = random_camera(corners.min(axis=0) - 3.0, corners.max(axis=0) + 3.0, size, rng)
     count = len(layout.on_part)
@@ -171,9 +179,10 @@ def outline_film(number: int, folder: Path) -> tuple[dict[str, Any], Path]:
     rng = np.random.default_rng([29, number])
     name = DESIGNS[number % len(DESIGNS)]
     own = computed(name)
-    size = (1280, 720) if name != "machine:gripper" else (1920, 1080)
     used = np.unique(own.part.struts)
     points = own.positions[:, used].reshape(-1, 2)
+    wide, high = np.ptp(points, axis=0).tolist()
+    size = needed_picture((wide, high), own.full_stroke)
     camera = random_camera(points.min(axis=0) - 5.0, points.max(axis=0) + 5.0, size, rng)
     look = random_look(rng)
     dark = rng.random() < 0.5
