@@ -19,7 +19,7 @@ PART = PartSpec().of(human_design("crane"))
 def motion_of(pushed: np.ndarray, gain: float = 3.0) -> Motion:
     zero = np.zeros_like(pushed)
     path = np.column_stack([-gain * pushed, zero])
-    return Motion(pushed, zero, gain * pushed, np.column_stack([zero, zero]), zero, path)
+    return Motion(pushed, gain * pushed, np.column_stack([zero, zero]), zero, path)
 
 
 def measure(pushed: np.ndarray, noise: float = 0.01, seed: int = 0, **settings: object):
@@ -27,7 +27,7 @@ def measure(pushed: np.ndarray, noise: float = 0.01, seed: int = 0, **settings: 
     rng = np.random.default_rng(seed)
     exact = motion_of(pushed)
     seen = Motion(
-        pushed + noise * rng.standard_normal(len(pushed)), exact.input_across,
+        pushed + noise * rng.standard_normal(len(pushed)),
         exact.along + noise * rng.standard_normal(len(pushed)), exact.across, exact.rotation,
         exact.path,
     )  # fmt: skip

@@ -10,12 +10,13 @@ import numpy as np
 from bellcrank.errors import UnreadableFilm
 from bellcrank.measure.camera import transformed
 from bellcrank.measure.measurement import Measurement, MeasureSettings, measured
-from bellcrank.measure.motion import Motion, motion_of_nodes, node_motion
+from bellcrank.measure.motion import part_motion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.measure.camera import Views
+    from bellcrank.measure.motion import Motion
     from bellcrank.measure.tracks import Tracks
     from bellcrank.part import Part
 
@@ -37,16 +38,12 @@ class PlaneTracks:
         Corners of the markers on input and output.
     supports : (F, S, 4, 2) float64, mm
         Corners of those on supports.
-    height_scale
-        Size of the part as seen on the sheet over its size: it is nearer to the camera. Lengths
-        are divided by it already.
     offsets : (K + S, 2) float64, mm
         Positions of the markers on the part less the drawn ones.
     """
 
     corners: Values
     supports: Values
-    height_scale: float
     offsets: Values
 
 
@@ -72,11 +69,11 @@ def plane_tracks(tracks: Tracks, views: Views, rest: slice, errors: Values) -> P
     """
     moving, held = views.plane(tracks.corners), views.plane(tracks.support_corners)
     seen = np.concatenate([moving[rest], held[rest]], axis=1).mean(axis=(0, 2))
-    drawn = np.stack([marker.centre for marker in (*tracks.moving, *tracks.supports)])
-    onto = similarity(drawn + errors, seen)
+    onto = similarity(tracks.drawn + errors, seen)
     scale = float(np.hypot(*onto[:2, 0]))
-    offsets = transformed(np.linalg.inv(onto), seen) - drawn
-    return PlaneTracks(moving / scale, held / scale, scale, offsets)
+    back = np.asarray(np.linalg.inv(onto), dtype=np.float64)
+    offsets = transformed(back, seen) - tracks.drawn
+    return PlaneTracks(moving / scale, held / scale, offsets)
 
 
 def similarity(points: Values, image: Values) -> Values:
@@ -103,8 +100,7 @@ def part_on_sheet(tracks: Tracks) -> Values:
     seen = np.concatenate(
         [tracks.views.plane(tracks.corners)[0], tracks.views.plane(tracks.support_corners)[0]]
     )
-    drawn = np.stack([marker.centre for marker in (*tracks.moving, *tracks.supports)])
-    return similarity(drawn, seen.mean(axis=1))
+    return similarity(tracks.drawn, seen.mean(axis=1))
 
 
 def _sides(corners: Values) -> Values:
@@ -148,7 +144,7 @@ def measure_by_markers(
     ----------
     D. B. Rubin, Ann. Stat. 9, 130 (1981), the Bayesian bootstrap.
     """
-    exact = np.zeros((len(tracks.moving) + len(tracks.supports), 2))
+    exact = np.zeros_like(tracks.drawn)
     first = plane_tracks(tracks, tracks.views, slice(0, 1), exact)
     _check_places(name, tracks, first)
     count = len(tracks.reference)
@@ -172,22 +168,11 @@ def measure_by_markers(
 
 
 def _motion(part: Part, tracks: Tracks, plane: PlaneTracks, rest: slice) -> Motion:
-    problem = part.design.problem
     corners = plane.corners
     if plane.supports.shape[1]:
         middle = plane.supports.mean(axis=(1, 2))
         corners = corners - (middle - middle[rest].mean(axis=0))[:, None, None]
-    zero = corners[rest].mean(axis=0)
-    moved = []
-    for role, nodes in (("input", problem.input.nodes), ("output", problem.output.nodes)):
-        own = [k for k, marker in enumerate(tracks.moving) if marker.role == role]
-        moved.append(
-            node_motion(
-                [tracks.moving[k] for k in own], corners[:, own], zero[own], nodes,
-                part.positions, plane.offsets[own],
-            )
-        )  # fmt: skip
-    return motion_of_nodes(problem, moved[0], moved[1], part.scale)
+    return part_motion(part, tracks.moving, corners, rest, plane.offsets)
 
 
 def _reference_error(views: Views) -> float:
@@ -204,14 +189,12 @@ def _pixels_per_mm(tracks: Tracks) -> float:
 
 def _check_places(name: str, tracks: Tracks, plane: PlaneTracks) -> None:
     """Check that the markers on the part are near their drawn positions, up to a common shift."""
-    markers = (*tracks.moving, *tracks.supports)
     seen = np.concatenate([plane.corners[0], plane.supports[0]]).mean(axis=1)
-    drawn = np.stack([marker.centre for marker in markers])
-    away = seen - drawn
+    away = seen - tracks.drawn
     away = np.linalg.norm(away - np.median(away, axis=0), axis=1)
     worst = int(np.argmax(away))
     if away[worst] > MISPLACED:
-        marker = markers[worst]
+        marker = tracks.on_part[worst]
         raise UnreadableFilm(
             f"{name}: the {marker.role} marker {marker.id} is {away[worst]:.0f} mm from its drawn "
             "position; check that each marker is on the block of its role, that the film begins "

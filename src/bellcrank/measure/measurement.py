@@ -167,7 +167,7 @@ def measured(
     held = progress >= (1.0 - HOLD) * float(progress.max())
     basis = basis_for(progress, moved[:, 0])
     weight, coefficients = _curve(basis, progress, moved)
-    top = float((basis.matrix(np.median(progress[held])[None]) @ coefficients)[0, 0])
+    top = float((basis.matrix(np.array([np.median(progress[held])])) @ coefficients)[0, 0])
     noise = _noise(basis, progress, moved, coefficients, floor)
     _check_size(name, top, float(noise[0]), pixels_per_mm)
     at = min(top, nominal) * FRACTIONS
