@@ -16,8 +16,10 @@ pytest.importorskip("av")
 
 from bellcrank.workflows.measure import layout_for  # noqa: E402
 from benchmarks import measure as benchmark  # noqa: E402
-from benchmarks.films import Look, Renderer, Scene, camera_over, write_film  # noqa: E402
-from benchmarks.measure import REFUSED, computed, measured_film, measured_outline  # noqa: E402
+from benchmarks.cameras import camera_over  # noqa: E402
+from benchmarks.films import Look, Renderer, Scene, write_film  # noqa: E402
+from benchmarks.measure import measured_film, measured_outline  # noqa: E402
+from benchmarks.random_films import REFUSED, computed  # noqa: E402
 
 if TYPE_CHECKING:
     from pathlib import Path

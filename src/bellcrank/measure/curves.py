@@ -227,7 +227,7 @@ def robust_weights(deviation: Values) -> Values:
     Examples
     --------
     >>> robust_weights(np.array([[0.01], [-0.01], [0.01], [1.0]])).round(2).tolist()
-    [0.96, 0.96, 0.96, 0.0]
+    [0.92, 0.92, 0.92, 0.0]
     """
     size = np.linalg.norm(deviation, axis=1)
     spread = 1.5 * float(np.median(size)) + 1e-3

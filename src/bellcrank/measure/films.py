@@ -53,7 +53,7 @@ def needed_picture(extent: tuple[float, float], stroke: float) -> tuple[int, int
 
     Examples
     --------
-    >>> needed_picture((270.0, 180.0), 4.0), needed_picture((270.0, 180.0), 0.9)
+    >>> needed_picture((150.0, 140.0), 4.0), needed_picture((150.0, 140.0), 0.9)
     ((1280, 720), (1920, 1080))
     """
     wanted = max(LEAST_SCALE, STROKE_PIXELS / stroke)

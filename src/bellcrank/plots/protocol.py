@@ -33,7 +33,7 @@ DISTANCE = 1.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Protocol:
-    """What the page says about a part.
+    """Content of the page.
 
     Parameters
     ----------
