@@ -1,10 +1,11 @@
 """Measurements from rendered films against what was rendered: ``python -m benchmarks.measure``.
 
 Films of bundled designs that deform as computed by frames are rendered
-(`benchmarks.random_films`), written as H.264, and measured like films of printed parts: with markers, and without markers by
-the outline. Tilt, light, focus, noise, lens, size and number of pictures, placement of the markers
-and the scale of the printed sheet are random. Films that cannot be measured must be refused. The
-record is ``docs/benchmarks/measure.json``; films that are in it are not made again.
+(`benchmarks.random_films`), written as H.264, and measured like films of printed parts: with
+markers, and without markers by the outline. Tilt, light, focus, noise, lens, size and number of
+pictures, placement of the markers and the scale of the printed sheet are random. Films that cannot
+be measured must be refused. The record is ``docs/benchmarks/measure.json``; films that are in it
+are not made again.
 """
 
 from __future__ import annotations
