@@ -7,8 +7,8 @@ import pytest
 
 from bellcrank.errors import InvalidFile, InvalidSettings, UnreadableFilm
 from bellcrank.measure import MarkerLayout, MeasureSettings, Motion, marker_layout
-from bellcrank.measure.curves import basis_for, phases_of, progress_of
-from bellcrank.measure.measurement import interval, measured
+from bellcrank.measure.curves import basis_for, phases_of
+from bellcrank.measure.measurement import Recording, interval, measured
 from bellcrank.measure.motion import node_motion, rigid_motion
 from bellcrank.model import human_design
 from bellcrank.part import PartSpec
@@ -32,9 +32,8 @@ def measure(pushed: np.ndarray, noise: float = 0.01, seed: int = 0, **settings: 
         exact.path,
     )  # fmt: skip
     chosen = MeasureSettings(samples=100, **settings)
-    return measured(
-        "film", np.arange(len(pushed)), 5.0, 4.0, lambda _rng, _rest: seen, chosen, 0.5 * noise
-    )
+    film = Recording("film", np.arange(len(pushed)), 5.0, 0.5 * noise)
+    return measured(film, 4.0, lambda _rng, _rest: seen, chosen)
 
 
 STROKE = np.concatenate([np.zeros(4), np.linspace(0.2, 4.0, 20), np.full(3, 4.0)])
@@ -59,7 +58,7 @@ def test_a_node_beside_its_marker_moves_with_its_rotation() -> None:
 
 def test_frames_at_rest_and_after_the_hold_are_recognised() -> None:
     pushed = np.concatenate([STROKE, np.linspace(3.5, 0.0, 8)])
-    phases = phases_of(pushed, progress_of(pushed, 3.0 * pushed))
+    phases = phases_of(pushed, 4.0 * pushed)
     assert (phases.rest, phases.loading) == (4, len(STROKE))
 
 
@@ -74,7 +73,7 @@ def test_a_steep_curve_is_followed_in_spite_of_noise_of_the_input() -> None:
     for seed in range(30):
         noise = 0.01 * np.random.default_rng(seed).standard_normal(40)
         moved = np.stack([exact + noise, steep(exact)], axis=1)
-        progress = progress_of(moved[:, 0], moved[:, 1])
+        progress = moved.sum(axis=1)
         basis = basis_for(progress, moved[:, 0])
         found = basis.at_strokes(basis.fitted(progress, moved, np.ones(40)), at)
         assert found[:, 0] == pytest.approx(at, abs=1e-3)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bellcrank.errors import UnreadableFilm
 from bellcrank.measure.camera import transformed
-from bellcrank.measure.measurement import Measurement, MeasureSettings, measured
+from bellcrank.measure.measurement import Measurement, MeasureSettings, Recording, measured
 from bellcrank.measure.motion import part_motion
 
 if TYPE_CHECKING:
@@ -161,8 +161,8 @@ def measure_by_markers(
         return _motion(part, tracks, plane, rest)
 
     scale = _pixels_per_mm(tracks)
-    floor = _reference_error(tracks.views) / scale
-    found = measured(name, tracks.frames, scale, nominal, motion_for, settings, floor)
+    film = Recording(name, tracks.frames, scale, _reference_error(tracks.views) / scale)
+    found = measured(film, nominal, motion_for, settings)
     _check_supports(name, first, found)
     return found
 

@@ -20,7 +20,7 @@ from bellcrank.errors import UnreadableFilm
 from bellcrank.measure.corners import opencv
 from bellcrank.measure.films import LARGEST_BLUR, LEAST_FRAMES, edge_width, grey_of
 from bellcrank.measure.layout import Marker, node_blocks
-from bellcrank.measure.measurement import Measurement, MeasureSettings, measured
+from bellcrank.measure.measurement import Measurement, MeasureSettings, Recording, measured
 from bellcrank.measure.motion import part_motion
 from bellcrank.measure.registration import contrast_of, register
 from bellcrank.measure.tracks import no_report
@@ -126,9 +126,8 @@ def measure_by_outline(
         return part_motion(part, markers, squares, rest, offsets)
 
     scale = registration.pixels_per_mm
-    found = measured(
-        film.name, np.arange(len(corners)), scale, nominal, motion_for, settings, FLOOR / scale
-    )
+    recording = Recording(film.name, np.arange(len(corners)), scale, FLOOR / scale)
+    found = measured(recording, nominal, motion_for, settings)
     _check_supports(film.name, shaken[: found.frames], float(found.stroke[-1]))
     return found, registration
 

@@ -52,7 +52,7 @@ def phases_of(pushed: Values, progress: Values) -> Phases:
     pushed : (F,), mm
         Input motion from the first frame.
     progress : (F,), mm
-        Coordinate along the stroke (`progress_of`).
+        Coordinate along the stroke (`output_sign`).
 
     Examples
     --------
@@ -72,10 +72,11 @@ def phases_of(pushed: Values, progress: Values) -> Phases:
     return Phases(max(rest, 1), loading)
 
 
-def progress_of(pushed: Values, along: Values) -> Values:
-    """Return a coordinate (F,) along the stroke, mm: the sum of both motions.
+def output_sign(pushed: Values, along: Values) -> float:
+    """Return the sign of the motion of the output, or 0 if the output turns back.
 
-    If the output turns back, it is the motion of the input alone.
+    The coordinate along the stroke is the motion of the input plus this sign times that of the
+    output.
 
     Parameters
     ----------
@@ -85,15 +86,15 @@ def progress_of(pushed: Values, along: Values) -> Values:
     Examples
     --------
     >>> pushed = np.array([0.0, 1.0, 2.0, 3.0])
-    >>> progress_of(pushed, np.array([0.0, -2.0, -4.0, -6.0])).tolist()
-    [0.0, 3.0, 6.0, 9.0]
-    >>> progress_of(pushed, np.array([0.0, 2.0, 4.0, 1.0])).tolist()
-    [0.0, 1.0, 2.0, 3.0]
+    >>> output_sign(pushed, np.array([0.0, -2.0, -4.0, -6.0]))
+    -1.0
+    >>> output_sign(pushed, np.array([0.0, 2.0, 4.0, 1.0]))
+    0.0
     """
-    travel = np.sign(along[np.argmax(np.abs(along))]) * along
-    whole = pushed + travel
-    back = -np.minimum(np.diff(travel[np.argsort(whole)]), 0.0).sum()
-    return pushed if back > TURNS_BACK * float(np.ptp(travel)) else whole
+    sign = float(np.sign(along[np.argmax(np.abs(along))]))
+    travel = sign * along
+    back = -np.minimum(np.diff(travel[np.argsort(pushed + travel)]), 0.0).sum()
+    return 0.0 if back > TURNS_BACK * float(np.ptp(travel)) else sign
 
 
 def frame_noise(values: Values) -> float:
@@ -199,7 +200,7 @@ def basis_for(progress: Values, pushed: Values) -> Basis:
     --------
     >>> pushed = np.linspace(0.0, 4.0, 30)
     >>> travel = pushed + 0.1 * pushed**2
-    >>> progress = progress_of(pushed, travel)
+    >>> progress = pushed + output_sign(pushed, travel) * travel
     >>> basis = basis_for(progress, pushed)
     >>> fitted = basis.fitted(progress, np.stack([pushed, travel], axis=1), np.ones(30))
     >>> basis.at_strokes(fitted, np.array([2.0, 4.0])).round(3).tolist()

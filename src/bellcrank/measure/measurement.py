@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings, UnreadableFilm
-from bellcrank.measure.curves import HOLD, Basis, basis_for, phases_of, progress_of, robust_weights
+from bellcrank.measure.curves import HOLD, Basis, basis_for, output_sign, phases_of, robust_weights
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -73,6 +73,28 @@ class MeasureSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """A film as far as the figures depend on it.
+
+    Parameters
+    ----------
+    name
+        Name of the film, for messages.
+    frames : (F,) int64
+        Numbers of its frames in which the part can be measured.
+    pixels_per_mm
+        Scale of the pictures.
+    noise : float, mm
+        Smallest noise of a position in a frame.
+    """
+
+    name: str
+    frames: NDArray[np.int64]
+    pixels_per_mm: float
+    noise: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
     """Measured motion at A strokes, with standard deviations.
 
@@ -124,24 +146,17 @@ def interval(value: Values) -> tuple[float, float]:
 
 
 def measured(
-    name: str,
-    frames: NDArray[np.int64],
-    pixels_per_mm: float,
+    film: Recording,
     nominal: float,
     motion_for: Callable[[np.random.Generator | None, slice], Motion],
     settings: MeasureSettings,
-    floor: float,
 ) -> Measurement:
     """Return the figures of a film.
 
     Parameters
     ----------
-    name
-        Name of the film, for messages.
-    frames : (F,)
-        Numbers of its frames in which the part can be measured.
-    pixels_per_mm
-        Scale of the pictures.
+    film
+        The film.
     nominal
         Full motion of the input, mm.
     motion_for
@@ -149,8 +164,6 @@ def measured(
         frames: with None the best estimate, else one with the systematic errors of a sample.
     settings
         Number of samples and their seed.
-    floor
-        Smallest noise of a position in a frame, mm.
 
     Raises
     ------
@@ -158,18 +171,19 @@ def measured(
         If the input does not move, moves backwards, or its motion is too small.
     """
     whole = motion_for(None, slice(0, 1))
-    _check_direction(name, whole.input, pixels_per_mm)
-    phases = phases_of(whole.input, progress_of(whole.input, whole.along))
+    _check_direction(film, whole.input)
+    sign = output_sign(whole.input, whole.along)
+    phases = phases_of(whole.input, whole.input + sign * whole.along)
     rest, count = slice(0, phases.rest), phases.loading
     best = motion_for(None, rest)
     moved = best.columns[:count]
-    progress = progress_of(moved[:, 0], moved[:, 1])
+    progress = moved[:, 0] + sign * moved[:, 1]
     held = progress >= (1.0 - HOLD) * float(progress.max())
     basis = basis_for(progress, moved[:, 0])
     weight, coefficients = _curve(basis, progress, moved)
     top = float((basis.matrix(np.array([np.median(progress[held])])) @ coefficients)[0, 0])
-    noise = _noise(basis, progress, moved, coefficients, floor)
-    _check_size(name, top, float(noise[0]), pixels_per_mm)
+    noise = _noise(basis, progress, moved, coefficients, film.noise)
+    _check_size(film, top, float(noise[0]))
     at = min(top, nominal) * FRACTIONS
     shown = _figures(basis, coefficients, at)
     rng = np.random.default_rng(settings.seed)
@@ -179,7 +193,7 @@ def measured(
         error = noise * rng.standard_normal((groups.max() + 1, len(noise)))
         sample = motion_for(rng, rest).columns[:count] + error[groups]
         sample = sample - sample[rest].mean(axis=0)
-        along = progress_of(sample[:, 0], sample[:, 1])
+        along = sample[:, 0] + sign * sample[:, 1]
         samples.append(_figures(basis, basis.fitted(along, sample, weight), at))
     spread = [np.std(each, axis=0, ddof=1) for each in zip(*samples, strict=True)]
     efficiency, off_axis, rotation, path = (
@@ -189,21 +203,13 @@ def measured(
     half = NORMAL * efficiency[-1, 1] / max(abs(float(efficiency[-1, 0])), 0.4)
     if half > WIDEST:
         raise UnreadableFilm(
-            f"{name}: motion too small for the resolution: the efficiency would be known within "
-            f"{half:.0%} only; film from nearer, in sharper pictures or over a longer stroke"
+            f"{film.name}: motion too small for the resolution: the efficiency would be known "
+            f"within {half:.0%} only; film with more pixels, in sharper pictures or over a longer stroke"
         )
     return Measurement(
-        at,
-        efficiency,
-        off_axis,
-        rotation,
-        path,
-        count,
-        float(noise[0]),
-        pixels_per_mm,
-        frames,
-        best,
-    )
+        at, efficiency, off_axis, rotation, path, count, float(noise[0]), film.pixels_per_mm,
+        film.frames, best,
+    )  # fmt: skip
 
 
 def _curve(basis: Basis, progress: Values, moved: Values) -> tuple[Values, Values]:
@@ -259,20 +265,20 @@ def _groups(held: NDArray[np.bool_], rest: int) -> NDArray[np.int64]:
     return groups
 
 
-def _check_direction(name: str, pushed: Values, pixels_per_mm: float) -> None:
+def _check_direction(film: Recording, pushed: Values) -> None:
     low, high = float(pushed.min()), float(pushed.max())
-    if -low > high and -low * pixels_per_mm > LEAST_PIXELS:
+    if -low > high and -low * film.pixels_per_mm > LEAST_PIXELS:
         raise UnreadableFilm(
-            f"{name}: the input moves {-low:.2f} mm against its direction; begin the film at rest "
-            "and push the input as in the drawing"
+            f"{film.name}: the input moves {-low:.2f} mm against its direction; begin the film at "
+            "rest and push the input as in the drawing"
         )
 
 
-def _check_size(name: str, top: float, noise: float, pixels_per_mm: float) -> None:
-    if top * pixels_per_mm < LEAST_PIXELS or top < LEAST_SIGNAL * noise:
+def _check_size(film: Recording, top: float, noise: float) -> None:
+    if top * film.pixels_per_mm < LEAST_PIXELS or top < LEAST_SIGNAL * noise:
         raise UnreadableFilm(
-            f"{name}: motion too small for the resolution: the input moves {max(top, 0.0):.2f} mm, "
-            f"{max(top * pixels_per_mm, 0.0):.1f} pixels, with a noise of {noise:.3f} mm in a "
-            f"frame; expected {LEAST_PIXELS:g} pixels and {LEAST_SIGNAL:g} times the noise: film "
-            "from nearer or over a longer stroke"
+            f"{film.name}: motion too small for the resolution: the input moves "
+            f"{max(top, 0.0):.2f} mm, {max(top * film.pixels_per_mm, 0.0):.1f} pixels, with a noise "
+            f"of {noise:.3f} mm in a frame; expected {LEAST_PIXELS:g} pixels and "
+            f"{LEAST_SIGNAL:g} times the noise: film with more pixels or over a longer stroke"
         )

@@ -10,7 +10,7 @@ import numpy as np
 
 from bellcrank.measure.films import needed_picture, picture_scale
 from bellcrank.plots import style
-from bellcrank.plots.marker_sheet import add_drawing
+from bellcrank.plots.marker_sheet import add_drawing, new_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,6 @@ LINE, GAP = 4.6, 2.2
 """Height of a line of text and space between paragraphs, mm."""
 COLUMNS = 108
 """Characters in a line."""
-INCH = 25.4
 DISTANCE = 1.6
 """Distance of the camera over the longer side of the sheet."""
 
@@ -106,11 +105,7 @@ def protocol_steps(protocol: Protocol) -> list[tuple[str, str]]:
 
 def protocol_figure(protocol: Protocol) -> Figure:
     """Return the page, A4."""
-    figure = style.new_figure(WIDTH / INCH, HEIGHT / INCH)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_xlim(0.0, WIDTH)
-    axes.set_ylim(0.0, HEIGHT)
-    axes.set_axis_off()
+    figure, axes = new_page(np.array([WIDTH, HEIGHT]), np.zeros(2))
     top = HEIGHT - MARGIN
     title = f"How to film {protocol.name}"
     _add_text(axes, top, title, size=style.TITLE_SIZE, weight="bold")
