@@ -204,7 +204,8 @@ def measured(
     if half > WIDEST:
         raise UnreadableFilm(
             f"{film.name}: motion too small for the resolution: the efficiency would be known "
-            f"within {half:.0%} only; film with more pixels, in sharper pictures or over a longer stroke"
+            f"within {half:.0%} only; film with more pixels, in sharper pictures or over a longer "
+            "stroke"
         )
     return Measurement(
         at, efficiency, off_axis, rotation, path, count, float(noise[0]), film.pixels_per_mm,
@@ -275,10 +276,11 @@ def _check_direction(film: Recording, pushed: Values) -> None:
 
 
 def _check_size(film: Recording, top: float, noise: float) -> None:
-    if top * film.pixels_per_mm < LEAST_PIXELS or top < LEAST_SIGNAL * noise:
+    pixels = top * film.pixels_per_mm
+    if pixels < LEAST_PIXELS or top < LEAST_SIGNAL * noise:
         raise UnreadableFilm(
             f"{film.name}: motion too small for the resolution: the input moves "
-            f"{max(top, 0.0):.2f} mm, {max(top * film.pixels_per_mm, 0.0):.1f} pixels, with a noise "
-            f"of {noise:.3f} mm in a frame; expected {LEAST_PIXELS:g} pixels and "
-            f"{LEAST_SIGNAL:g} times the noise: film with more pixels or over a longer stroke"
+            f"{max(top, 0.0):.2f} mm, {max(pixels, 0.0):.1f} pixels, with a noise of {noise:.3f} "
+            f"mm in a frame; expected {LEAST_PIXELS:g} pixels and {LEAST_SIGNAL:g} times the "
+            "noise: film with more pixels or over a longer stroke"
         )
