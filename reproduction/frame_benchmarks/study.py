@@ -58,7 +58,7 @@ class Settings:
 def run(settings: Settings, store: ResultStore) -> Figures:
     """Compute the benchmarks, their exact solutions and the curves."""
     chosen = {name: benchmarks[name] for name in settings.names}
-    work = {name: partial(measured, each, full=settings.full) for name, each in chosen.items()}
+    work = {name: partial(convergence, each, full=settings.full) for name, each in chosen.items()}
     figures: Figures = {"benchmarks": store.compute_all("benchmark", work)}
     curves: dict[str, Any] = {
         name: partial(path_of, name, settings.points) for name in PATHS if name in chosen
@@ -69,10 +69,11 @@ def run(settings: Settings, store: ResultStore) -> Figures:
     return figures
 
 
-def measured(benchmark: Benchmark, *, full: bool) -> dict[str, Any]:
+def convergence(benchmark: Benchmark, *, full: bool) -> dict[str, Any]:
     """Return the quantities with each number and kind of elements, and their relative errors.
 
-    The reference is the exact solution, else the first converged published figure.
+    The reference is the exact solution, else the first converged published figure. The limit of
+    many elements follows from the last two numbers, for errors of second order (Richardson).
     """
     numbers = benchmark.full if full else benchmark.quick
     exact = None if benchmark.exact is None else benchmark.exact()
