@@ -82,6 +82,20 @@ def test_a_steep_curve_is_followed_in_spite_of_noise_of_the_input() -> None:
     assert (np.sqrt(np.mean(np.square(deviations), axis=0)) < [0.02, 1.0, 0.02]).all()
 
 
+def test_a_return_on_which_the_output_is_lost_is_left_out() -> None:
+    pushed = np.concatenate([STROKE, np.linspace(3.5, 0.5, 6)])
+    moved = motion_of(pushed)
+    lost = 3.0 * pushed
+    lost[len(STROKE) :] = np.linspace(12.0, 20.0, 6)
+    seen = Motion(pushed, lost, moved.across, moved.rotation, moved.path)
+    found = measured(
+        Recording("film", np.arange(len(pushed)), 5.0, 0.005), 4.0, lambda _rng, _rest: seen,
+        MeasureSettings(samples=20),
+    )  # fmt: skip
+    assert found.frames == len(STROKE)
+    assert found.efficiency[-1, 0] == pytest.approx(3.0, rel=0.005)
+
+
 def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
     hits = []
     for seed in range(60):

@@ -21,6 +21,8 @@ HOLD = 0.02
 """Part of the largest input motion within which frames count as held at the full stroke."""
 REST = 0.01
 """Part of the largest input motion within which the first frames count as at rest."""
+RETURNED = 0.05
+"""Part of the largest input motion by which it falls when the input is on its way back."""
 TURNS_BACK = 0.2
 """Part of the motion of the output by which it moves backwards if it turns back."""
 MOST_KNOTS = 8
@@ -70,6 +72,19 @@ def phases_of(pushed: Values, progress: Values) -> Phases:
     after = np.flatnonzero(~held[first:])
     loading = first + (int(after[0]) if len(after) else len(pushed) - first)
     return Phases(max(rest, 1), loading)
+
+
+def frames_to_return(pushed: Values) -> int:
+    """Return the number of frames before the input is on its way back.
+
+    Examples
+    --------
+    >>> frames_to_return(np.array([0.0, 1.0, 2.0, 1.99, 1.8, 1.0]))
+    4
+    """
+    top = int(np.argmax(pushed))
+    back = np.flatnonzero(pushed[top:] < (1.0 - RETURNED) * pushed[top])
+    return top + int(back[0]) if len(back) else len(pushed)
 
 
 def output_sign(pushed: Values, along: Values) -> float:
@@ -180,7 +195,7 @@ class Basis:
         pushed = 0.5 * np.maximum.accumulate(values[:, 0])
         pushed += 0.5 * np.minimum.accumulate(values[::-1, 0])[::-1]
         found = np.stack([np.interp(strokes, pushed, each) for each in values.T], axis=1)
-        near = int(np.searchsorted(pushed, 0.9 * pushed[-1]))
+        near = min(int(np.searchsorted(pushed, 0.9 * pushed[-1])), GRID - 2)
         slope = (values[-1] - values[near]) / max(pushed[-1] - pushed[near], 1e-9)
         return np.asarray(found + np.maximum(strokes - pushed[-1], 0.0)[:, None] * slope)
 

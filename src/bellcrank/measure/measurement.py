@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings, UnreadableFilm
-from bellcrank.measure.curves import HOLD, Basis, basis_for, output_sign, phases_of, robust_weights
+from bellcrank.measure.curves import (
+    HOLD,
+    Basis,
+    basis_for,
+    frames_to_return,
+    output_sign,
+    phases_of,
+    robust_weights,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -172,8 +180,10 @@ def measured(
     """
     whole = motion_for(None, slice(0, 1))
     _check_direction(film, whole.input)
-    sign = output_sign(whole.input, whole.along)
-    phases = phases_of(whole.input, whole.input + sign * whole.along)
+    # On the way back, a film without markers may have lost the output.
+    pushed, along = (each[: frames_to_return(whole.input)] for each in (whole.input, whole.along))
+    sign = output_sign(pushed, along)
+    phases = phases_of(pushed, pushed + sign * along)
     rest, count = slice(0, phases.rest), phases.loading
     best = motion_for(None, rest)
     moved = best.columns[:count]
