@@ -1,10 +1,10 @@
 """Rendered films of parts that deform, for `benchmarks.measure` and the tests.
 
-The pictures do not use the code that measures them. A pinhole camera with Brown's distortion
-(radial and tangential) sees a sheet and a part of finite thickness above it. Each pixel is the mean
-of nine or sixteen points; markers are sampled exactly, by intersecting the ray of each point with
-their plane. Then follow a point spread (defocus and a streak), uneven light, vignetting, noise
-of photons and of the sensor, the gamma of the camera, and H.264.
+The pictures do not use the code that measures them. A camera (`benchmarks.cameras`) sees a sheet
+and a part of finite thickness above it. Each pixel is the mean of nine points, or of four in large
+pictures; markers are sampled exactly, by intersecting the ray of each point with their plane. Then
+follow a point spread (defocus and a streak), uneven light, vignetting, noise of photons and of the
+sensor, the gamma of the camera, and H.264.
 """
 
 from __future__ import annotations
@@ -23,89 +23,12 @@ if TYPE_CHECKING:
 
     from bellcrank.measure import MarkerLayout
     from bellcrank.part import Part
+    from benchmarks.cameras import Camera
 
     Values = NDArray[np.float64]
 
-GRID = 8
-"""Distance of the points at which rays are computed, pixels; linear between them."""
 SLICES = 5
 """Number of planes that draw the sides of the part."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Camera:
-    """A camera above the sheet.
-
-    Parameters
-    ----------
-    size
-        Width and height, pixels.
-    focal
-        Focal length, pixels.
-    principal : (2,)
-        Principal point, pixels.
-    distortion : (4,)
-        Brown's k1, k2, p1, p2.
-    rotation : (3, 3)
-        From the coordinates of the sheet to those of the camera.
-    position : (3,)
-        Position of the camera, mm.
-    """
-
-    size: tuple[int, int]
-    focal: float
-    principal: Values
-    distortion: Values
-    rotation: Values
-    position: Values
-
-    def project(self, points: Values, height: float) -> Values:
-        """Return pixels of points (..., 2), mm, at a height above the sheet."""
-        whole = np.concatenate([points, np.full((*points.shape[:-1], 1), height)], axis=-1)
-        seen = (whole - self.position) @ self.rotation.T
-        return self._distorted(seen[..., :2] / seen[..., 2:]) * self.focal + self.principal
-
-    def _distorted(self, flat: Values) -> Values:
-        k1, k2, p1, p2 = self.distortion
-        x, y = flat[..., 0], flat[..., 1]
-        square = x * x + y * y
-        factor = 1.0 + square * (k1 + k2 * square)
-        return np.stack(
-            [
-                x * factor + 2 * p1 * x * y + p2 * (square + 2 * x * x),
-                y * factor + p1 * (square + 2 * y * y) + 2 * p2 * x * y,
-            ],
-            axis=-1,
-        )
-
-    def on_sheet(self, pixels: Values) -> Values:
-        """Return the points (..., 2), mm, of the sheet that are seen at pixels."""
-        seen = (pixels - self.principal) / self.focal
-        flat = seen.copy()
-        for _ in range(25):
-            flat = flat + (seen - self._distorted(flat))
-        rays = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1) @ self.rotation
-        return self.position[:2] - rays[..., :2] * (self.position[2] / rays[..., 2:])
-
-    def fine_map(self, samples: int) -> NDArray[np.float32]:
-        """Return the point of the sheet (height, width, 2) behind each sample of each pixel."""
-        wide, high = self.size
-        x, y = np.arange(-GRID, wide + GRID + 1, GRID), np.arange(-GRID, high + GRID + 1, GRID)
-        coarse = self.on_sheet(np.stack(np.meshgrid(x, y), axis=-1).astype(float))
-        step = 1.0 / samples
-        at_x = ((np.arange(wide * samples) + 0.5) * step - 0.5 + GRID) / GRID
-        at_y = ((np.arange(high * samples) + 0.5) * step - 0.5 + GRID) / GRID
-        return _bilinear(coarse.astype(np.float32), at_x, at_y)
-
-
-def _bilinear(source: NDArray[np.float32], x: Values, y: Values) -> NDArray[np.float32]:
-    """Return bilinear values of a grid; cv2.remap rounds positions to 1/32, this does not."""
-    left, low = np.floor(x).astype(int), np.floor(y).astype(int)
-    across = (x - left).astype(np.float32)[:, None]
-    down = (y - low).astype(np.float32)[:, None, None]
-    lines = source[low] + down * (source[low + 1] - source[low])
-    first = lines[:, left]
-    return first + across * (lines[:, left + 1] - first)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -183,6 +106,7 @@ class Renderer:
     def __init__(self, scene: Scene, look: Look, rng: np.random.Generator, samples: int = 3):
         self.scene, self.look, self.samples, self.rng = scene, look, samples, rng
         self._camera: Camera | None = None
+        self._last: tuple[Values, Any] | None = None
         ramp = np.linspace(0.0, 1.0, 2**15) ** (1 / look.gamma)
         bent = ramp + look.bend * ramp * (1 - ramp) * (2 * ramp - 1)
         self._curve = np.round(255 * bent).astype(np.uint8)
@@ -202,12 +126,15 @@ class Renderer:
         """
         if self._camera is not camera:
             self._set_camera(camera)
-        canvas = self._background.copy()
+            self._last = None
         where = positions if shift is None else positions + shift
-        self._draw_part(canvas, where)
-        if self.scene.layout is not None:
-            self._draw_cards(canvas, where)
-        return self._exposed(canvas)
+        if self._last is None or not np.array_equal(self._last[0], where):
+            canvas = self._background.copy()
+            self._draw_part(canvas, where)
+            if self.scene.layout is not None:
+                self._draw_cards(canvas, where)
+            self._last = (where, self._blurred(canvas))
+        return self._exposed(self._last[1])
 
     def _set_camera(self, camera: Camera) -> None:
         self._camera = camera
@@ -289,7 +216,8 @@ class Renderer:
                 part.section.thickness, np.ones(2), margin=marker.size / 6,
             )  # fmt: skip
 
-    def _exposed(self, canvas: Any) -> Any:
+    def _blurred(self, canvas: Any) -> Any:
+        """Return the light of a picture without noise."""
         look, (wide, high) = self.look, self._camera.size
         picture = cv2.resize(canvas, (wide, high), interpolation=cv2.INTER_AREA).astype(np.float32)
         picture /= 255.0
@@ -300,10 +228,14 @@ class Renderer:
         y = np.linspace(-1, 1, high, dtype=np.float32)[:, None]
         x = np.linspace(-1, 1, wide, dtype=np.float32)[None]
         light = 1.0 + look.light[0] * x + look.light[1] * y - look.light[2] * (x * x + y * y)
-        picture *= 0.85 * light
+        return picture * (0.85 * light)
+
+    def _exposed(self, picture: Any) -> Any:
+        """Return the grey levels of a picture with noise."""
+        look = self.look
         start = int(self.rng.integers(0, len(self._pool) - picture.size))
         noise = self._pool[start : start + picture.size].reshape(picture.shape)
-        picture += noise * np.sqrt(look.noise**2 * (0.3 + 3.0 * np.clip(picture, 0, None)))
+        picture = picture + noise * np.sqrt(look.noise**2 * (0.3 + 3.0 * np.clip(picture, 0, None)))
         level = (np.clip(picture, 0, 1) * (len(self._curve) - 1)).astype(np.uint16)
         return self._curve[level]
 
@@ -383,54 +315,6 @@ def _line_kernel(streak: tuple[float, float]) -> NDArray[np.float32]:
         corner = np.array([[(1 - u) * (1 - v), (1 - u) * v], [u * (1 - v), u * v]])
         kernel[i : i + 2, j : j + 2] += corner
     return kernel / kernel.sum()
-
-
-def camera_over(
-    low: Values, high: Values, size: tuple[int, int], rng: np.random.Generator, *,
-    tilt: float, focal: float, distortion: Values, fill: float = 0.93, principal: float = 0.008,
-    roll: float = 3.0,
-) -> Camera:  # fmt: skip
-    """Return a camera that sees a rectangle of the sheet.
-
-    Parameters
-    ----------
-    low, high : (2,), mm
-        Corners of the rectangle, which fills the picture up to `fill`.
-    tilt, roll
-        Angle between the axis of the camera and the normal of the sheet, about a random axis;
-        standard deviation of the rotation about the axis; degrees.
-    focal
-        Focal length over the width of the picture.
-    principal
-        Standard deviation of the principal point over the width.
-    """
-    way = rng.uniform(0.0, 2.0 * np.pi)
-    axis = np.array([np.cos(way), np.sin(way), 0.0])
-    lean = cv2.Rodrigues(np.radians(tilt) * axis)[0]
-    spin = cv2.Rodrigues(np.radians(rng.normal(0.0, roll)) * np.array([0.0, 0.0, 1.0]))[0]
-    rotation = spin @ lean @ np.diag([1.0, -1.0, -1.0])
-    middle = 0.5 * np.array(size) - 0.5
-    point = middle + rng.normal(0.0, principal * size[0], 2)
-    edge = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-    corners = np.concatenate([edge, 0.5 * (edge + np.roll(edge, 1, axis=0))])
-    centre = np.append(0.5 * (low + high), 0.0)
-    distance = 1.2 * float(np.hypot(*(high - low)))
-    camera = None
-    for _ in range(80):
-        position = centre - distance * rotation[2]
-        camera = Camera(
-            size=size, focal=focal * size[0], principal=point, distortion=distortion,
-            rotation=rotation, position=position,
-        )  # fmt: skip
-        seen = camera.project(corners, 0.0)
-        # Aim at the middle of what is seen.
-        aim = camera.on_sheet(0.5 * (seen.min(axis=0) + seen.max(axis=0))[None])[0]
-        own = camera.on_sheet(middle[None])[0]
-        centre[:2] += 0.7 * (aim - own)
-        reach = (np.ptp(seen, axis=0) / np.array(size)).max() / fill
-        distance *= float(reach**0.7)
-    assert camera is not None
-    return camera
 
 
 def write_film(pictures: Iterator[Any], path: Path, rate: int = 30, density: float = 0.2) -> None:

@@ -1,10 +1,11 @@
 """Measurements from rendered films against what was rendered: ``python -m benchmarks.measure``.
 
-Films of bundled designs that deform as computed by frames are rendered (`benchmarks.films`),
-written as H.264, and measured like films of printed parts: with markers, and without markers by
-the outline. Tilt, light, focus, noise, lens, size and number of pictures, placement of the markers
-and the scale of the printed sheet are random. Films that cannot be measured must be refused. The
-record is ``docs/benchmarks/measure.json``; films that are in it are not made again.
+Films of bundled designs that deform as computed by frames are rendered
+(`benchmarks.random_films`), written as H.264, and measured like films of printed parts: with
+markers, and without markers by the outline. Tilt, light, focus, noise, lens, size and number of
+pictures, placement of the markers and the scale of the printed sheet are random. Films that cannot
+be measured must be refused. The record is ``docs/benchmarks/measure.json``; films that are in it
+are not made again.
 """
 
 from __future__ import annotations
@@ -12,8 +13,6 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -24,16 +23,21 @@ import numpy as np
 from bellcrank.errors import UnreadableFilm
 from bellcrank.measure import MeasureSettings, open_film
 from bellcrank.provenance import provenance
-from bellcrank.workflows import find_design, spec_for
 from bellcrank.workflows.measure import (
-    ComputedMotion,
-    computed_motion,
-    layout_for,
     measure_film,
     measure_outline,
     result_data,
 )
-from benchmarks.films import Camera, Look, Renderer, Scene, camera_over, write_film
+from benchmarks.random_films import (
+    DESIGNS,
+    PLACEMENT,
+    REFUSED,
+    SHEET,
+    computed,
+    marker_film,
+    outline_film,
+    refused_film,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -49,106 +53,7 @@ HEAD = (
 )
 RULE = "|---|---|---|---|---|---|---|"
 RECORD = Path(__file__).parents[1] / "docs" / "benchmarks" / "measure.json"
-DESIGNS = (
-    "machine:crane", "human:crane", "machine:anti-parallel", "human:anti-parallel",
-    "machine:discs", "machine:scaling-8", "machine:gripper",
-)  # fmt: skip
 FILMS, OUTLINES = 200, 42
-PLACEMENT, SHEET = 0.3, 0.0015
-"""Standard deviations of the placement of markers, mm, and of the scales of the printed sheet."""
-HELD_BY_HAND = 0.15
-"""Part of the films with a camera that moves."""
-
-
-@cache
-def computed(name: str) -> ComputedMotion:
-    design = find_design(name)
-    return computed_motion(design, spec_for(design))
-
-
-def random_look(rng: np.random.Generator) -> Look:
-    """Return a random light, focus and noise."""
-    shake = rng.uniform(0.0, 2.0)
-    way = rng.uniform(0.0, np.pi)
-    return Look(
-        blur=rng.uniform(0.5, 1.6),
-        streak=(shake * np.cos(way), shake * np.sin(way)),
-        light=(rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(0.0, 0.2)),
-        noise=rng.uniform(0.003, 0.012),
-        part=rng.uniform(0.08, 0.5),
-        table=rng.uniform(0.1, 0.6),
-        gamma=rng.uniform(1.8, 2.6),
-        bend=rng.uniform(0.0, 0.6),
-    )
-
-
-def random_camera(
-    low: Values, high: Values, size: tuple[int, int], rng: np.random.Generator
-) -> Camera:
-    """Return a random camera: up to 20 degrees of tilt, and distortion as of phones and more."""
-    distortion = [rng.uniform(-0.08, 0.06), rng.uniform(-0.02, 0.02), *rng.normal(0.0, 2e-4, 2)]
-    return camera_over(
-        low, high, size, rng, tilt=rng.uniform(0.0, 20.0), focal=rng.uniform(0.72, 1.1),
-        distortion=np.array(distortion),
-    )  # fmt: skip
-
-
-def strokes(rng: np.random.Generator, slower: int = 1) -> Values:
-    """Return the fractions of the stroke in the frames: rest, push, hold, and sometimes back."""
-    count = slower * int(rng.integers(10, 18))
-    reached = rng.uniform(0.85, 1.0)
-    ramp = np.linspace(0.0, 1.0, count + 1)[1:]
-    ramp = reached * (ramp if rng.random() < 0.5 else 0.5 - 0.5 * np.cos(np.pi * ramp))
-    # Nobody pushes evenly.
-    ramp = np.sort(np.clip(ramp + rng.normal(0.0, 0.1 / count, count), 0.0, reached))
-    rest, hold = int(rng.integers(2, 5)), int(rng.integers(1, 4))
-    back = reached * np.linspace(0.9, 0.0, 5) if rng.random() < 0.2 else np.empty(0)
-    return np.concatenate([np.zeros(rest), ramp, np.full(hold, reached), back])
-
-
-def moved_by_hand(camera: Camera, count: int, rng: np.random.Generator) -> Iterator[Camera]:
-    """Yield cameras that move by some mm and tenths of a degree."""
-    position, turn = camera.position, np.zeros(3)
-    for _ in range(count):
-        position = position + rng.normal(0.0, 0.6, 3)
-        turn = turn + rng.normal(0.0, 6e-4, 3)
-        yield Camera(
-            size=camera.size, focal=camera.focal, principal=camera.principal,
-            distortion=camera.distortion, rotation=cv2.Rodrigues(turn)[0] @ camera.rotation,
-            position=position,
-        )  # fmt: skip
-
-
-def marker_film(number: int, folder: Path) -> tuple[dict[str, Any], Path]:
-    """Render a film with markers; return what was rendered."""
-    rng = np.random.default_rng([28, number])
-    name = DESIGNS[number % len(DESIGNS)]
-    own = computed(name)
-    layout = layout_for(own)
-    size = (1920, 1080) if rng.random() < 0.15 or layout.page != "A4" else (1280, 720)
-    corners = np.concatenate([marker.corners for marker in layout.reference])
-    camera = random_camera(corners.min(axis=0) - 3.0, corners.max(axis=0) + 3.0, size, rng)
-    count = len(layout.on_part)
-    scene = Scene(
-        part=own.part, layout=layout, offsets=rng.normal(0.0, PLACEMENT, (count, 2)),
-        angles=rng.normal(0.0, 0.03, count), stretch=1.0 + rng.normal(0.0, SHEET, 2),
-        pusher=name != "machine:gripper",
-    )  # fmt: skip
-    look, fractions = random_look(rng), strokes(rng)
-    by_hand = bool(rng.random() < HELD_BY_HAND)
-    density = rng.uniform(0.1, 0.3)
-    renderer = Renderer(scene, look, rng, samples=3 if size[0] < 1500 else 2)
-    cameras = moved_by_hand(camera, len(fractions), rng) if by_hand else [camera] * len(fractions)
-    places = own.positions_at(fractions * own.full_stroke)
-    path = folder / f"{number}.mp4"
-    pictures = (renderer.draw(at, eye) for at, eye in zip(places, cameras, strict=True))
-    write_film(pictures, path, density=density)
-    tilt = float(np.degrees(np.arccos(-camera.rotation[2, 2])))
-    about = {
-        "design": name, "size": f"{size[0]}x{size[1]}", "frames": len(fractions),
-        "tilt_deg": round(tilt, 1), "blur_px": round(look.blur, 2), "by_hand": by_hand,
-    }  # fmt: skip
-    return about, path
 
 
 def measured_film(number: int) -> dict[str, Any]:
@@ -166,38 +71,6 @@ def measured_film(number: int) -> dict[str, Any]:
     return {**about, **figures(data), "seconds": round(seconds, 2)}
 
 
-def outline_film(number: int, folder: Path) -> tuple[dict[str, Any], Path]:
-    """Render a film without markers before a plain background; return what was rendered."""
-    rng = np.random.default_rng([29, number])
-    name = DESIGNS[number % len(DESIGNS)]
-    own = computed(name)
-    size = (1280, 720) if name != "machine:gripper" else (1920, 1080)
-    used = np.unique(own.part.struts)
-    points = own.positions[:, used].reshape(-1, 2)
-    camera = random_camera(points.min(axis=0) - 5.0, points.max(axis=0) + 5.0, size, rng)
-    look = random_look(rng)
-    dark = rng.random() < 0.5
-    look = replace(
-        look,
-        part=rng.uniform(0.05, 0.2) if dark else rng.uniform(0.6, 0.9),
-        table=rng.uniform(0.5, 0.9) if dark else rng.uniform(0.05, 0.2),
-    )
-    fractions = strokes(rng, 2)
-    renderer = Renderer(
-        Scene(part=own.part, pusher=name != "machine:gripper"), look, rng, samples=2
-    )
-    path = folder / f"{number}.mp4"
-    places = own.positions_at(fractions * own.full_stroke)
-    density = rng.uniform(0.1, 0.3)
-    write_film((renderer.draw(at, camera) for at in places), path, density=density)
-    tilt = float(np.degrees(np.arccos(-camera.rotation[2, 2])))
-    about = {
-        "design": name, "size": f"{size[0]}x{size[1]}", "frames": len(fractions),
-        "tilt_deg": round(tilt, 1), "blur_px": round(look.blur, 2),
-    }  # fmt: skip
-    return about, path
-
-
 def measured_outline(number: int) -> dict[str, Any]:
     """Render and measure one film without markers."""
     with TemporaryDirectory() as folder:
@@ -206,68 +79,6 @@ def measured_outline(number: int) -> dict[str, Any]:
         data = result_data(measure_outline(open_film([path]), computed(about["design"])))
     seconds = time.perf_counter() - start
     return {**about, **figures(data), "seconds": round(seconds, 2)}
-
-
-REFUSED = (
-    "no markers", "too few frames", "too blurred", "motion too small", "supports moved",
-    "reference markers hidden", "input marker hidden", "pushed at the start",
-    "another design", "no contrast", "blurred outline",
-)  # fmt: skip
-
-
-def refused_film(kind: str, folder: Path) -> tuple[str, Path, bool]:
-    """Render a film that cannot be measured.
-
-    Returns
-    -------
-    design
-        Design with which it is measured.
-    path
-        The film.
-    outline
-        Whether it is measured by the outline.
-    """
-    rng = np.random.default_rng([30, REFUSED.index(kind)])
-    name, size = "human:crane", (960, 540)
-    own = computed(name)
-    layout = layout_for(own)
-    outline = kind in {"no contrast", "blurred outline"}
-    fractions = np.concatenate([[0.0, 0.0], np.linspace(0.1, 1.0, 9), [1.0]])
-    look = Look(part=0.15, table=0.6)
-    if kind == "too few frames":
-        fractions = fractions[:4]
-    if kind == "motion too small":
-        fractions = 0.02 * fractions
-    if kind == "pushed at the start":
-        fractions = fractions[::-1]
-    if kind in {"too blurred", "blurred outline"}:
-        look = replace(look, blur=12.0)
-    if kind == "no contrast":
-        look = replace(look, part=0.55)
-    bare = outline or kind == "no markers"
-    corners = np.concatenate([marker.corners for marker in layout.reference])
-    camera = camera_over(
-        corners.min(axis=0) - 3.0, corners.max(axis=0) + 3.0, size, rng, tilt=8.0, focal=0.9,
-        distortion=np.zeros(4),
-    )  # fmt: skip
-    scene = Scene(part=own.part, layout=None if bare else layout)
-    renderer = Renderer(scene, look, rng, samples=2)
-    pictures = []
-    for k, at in enumerate(own.positions_at(fractions * own.full_stroke)):
-        moved = kind == "supports moved" and k > 4
-        picture = renderer.draw(at, camera, np.tile([1.5, 0.0], (len(at), 1)) if moved else None)
-        covered = []
-        if kind == "reference markers hidden":
-            covered = list(layout.reference[3:])
-        if kind == "input marker hidden" and k > 2:
-            covered = list(layout.of_role("input"))
-        for marker in covered:
-            x, y = np.round(camera.project(marker.centre, 0.0)).astype(int)
-            picture[max(y - 28, 0) : y + 28, max(x - 28, 0) : x + 28] = 150
-        pictures.append(picture)
-    path = folder / "film.mp4"
-    write_film(iter(pictures), path)
-    return "machine:gripper" if kind == "another design" else name, path, outline
 
 
 def refusal(kind: str) -> str:

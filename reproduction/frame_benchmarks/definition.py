@@ -111,20 +111,36 @@ def converged(frame: BenchmarkFrame) -> NDArray[np.float64]:
     return response.displacement
 
 
+def pushing_force(frame: BenchmarkFrame) -> float:
+    """Return the force down that holds the prescribed deflection of one node."""
+    assert frame.drive is not None
+    (node,) = frame.drive
+    return -float(frame.respond().force[node, 1])
+
+
 def limit_load(
-    force: Callable[[float], float], low: float, high: float, tolerance: float = 1e-6
-) -> tuple[float, float]:
-    """Return the deflection and the force at the largest force between two deflections.
+    frame: Callable[[float], BenchmarkFrame], low: float, high: float, tolerance: float = 1e-6
+) -> float:
+    """Return the largest force between two deflections.
 
     The deflection is prescribed, so that the frame is stable beyond its limit load.
+
+    Parameters
+    ----------
+    frame
+        Function of the deflection.
+    low, high
+        Deflections before and beyond the limit load.
+    tolerance
+        Tolerance of the deflection over `high`.
     """
     from scipy.optimize import minimize_scalar
 
     peak = minimize_scalar(
-        lambda deflection: -force(deflection), bounds=(low, high), method="bounded",
+        lambda deflection: -pushing_force(frame(deflection)), bounds=(low, high), method="bounded",
         options={"xatol": tolerance * high},
     )  # fmt: skip
-    return float(peak.x), float(-peak.fun)
+    return float(-peak.fun)
 
 
 def buckling_load(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from reproduction.frame_benchmarks.definition import (
     converged,
     limit_load,
     line,
+    pushing_force,
 )
 from reproduction.frame_benchmarks.exact import PlaneRod, elastica
 from reproduction.frame_benchmarks.frames import BenchmarkFrame, Rigidity
@@ -106,7 +106,7 @@ benchmarks.register("roll-up")(
 LEE_LENGTH, LEE = 120.0, Rigidity(6.0 * 720.0, 2.0 * 720.0)
 
 
-def lee_frame(count: int, deflection: float, bowed: bool) -> BenchmarkFrame:
+def lee_frame(count: int, deflection: float, bowed: bool = False) -> BenchmarkFrame:
     """Return Lee's frame with `count` elements in each bar, pushed down by a deflection."""
     corner = np.array([0.0, LEE_LENGTH])
     column = line(np.zeros(2), corner, count)
@@ -118,16 +118,10 @@ def lee_frame(count: int, deflection: float, bowed: bool) -> BenchmarkFrame:
     )  # fmt: skip
 
 
-def lee_force(count: int, deflection: float, bowed: bool = False) -> float:
-    """Return the force on Lee's frame at a deflection."""
-    return -float(lee_frame(count, deflection, bowed).respond().force[count + count // 5, 1])
-
-
-@cache
-def _exact_lee() -> float:
+def _exact_lee() -> Values:
     length, turn = LEE_LENGTH, 0.5 * math.pi
     pieces = ((length, 0.0, turn), (0.2 * length, 0.0, -turn), (0.8 * length, 0.0, 0.0))
-    return PlaneRod(LEE.axial, LEE.bending, pieces, 2, clamped=False).limit_load(60.0, 12)
+    return [PlaneRod(LEE.axial, LEE.bending, pieces, 2, clamped=False).limit_load(60.0, 12)]
 
 
 benchmarks.register("lee-frame")(
@@ -140,9 +134,9 @@ benchmarks.register("lee-frame")(
         "down on the bar at a fifth of its length from the corner. Elements in each member.",
         quantities=("limit load",),
         compute=lambda count, bowed: [
-            limit_load(lambda v: lee_force(count, v, bowed), 35.0, 58.0)[1]
+            limit_load(lambda v: lee_frame(count, v, bowed), 35.0, 58.0)
         ],
-        exact=lambda: [_exact_lee()],
+        exact=_exact_lee,
         method="shooting, extensible",
         published=(
             Published(
@@ -159,7 +153,7 @@ HALF_SPAN, RISE = 12.943, 0.386
 TOGGLE = Rigidity(1.885e6, 9.27e3)
 
 
-def toggle_frame(count: int, deflection: float, bowed: bool) -> BenchmarkFrame:
+def toggle_frame(count: int, deflection: float, bowed: bool = False) -> BenchmarkFrame:
     """Return Williams' toggle with `count` elements in each bar, pushed down by a deflection."""
     top, end = np.array([HALF_SPAN, RISE]), np.array([2.0 * HALF_SPAN, 0.0])
     nodes = np.concatenate([line(np.zeros(2), top, count), line(top, end, count)[1:]])
@@ -169,16 +163,10 @@ def toggle_frame(count: int, deflection: float, bowed: bool) -> BenchmarkFrame:
     )  # fmt: skip
 
 
-def toggle_force(count: int, deflection: float, bowed: bool = False) -> float:
-    """Return the force on Williams' toggle at a deflection, lb."""
-    return -float(toggle_frame(count, deflection, bowed).respond().force[count, 1])
-
-
-@cache
-def _exact_toggle() -> tuple[float, float]:
+def _exact_toggle() -> Values:
     piece = (math.hypot(HALF_SPAN, RISE), 0.0, math.atan2(RISE, HALF_SPAN))
     rod = PlaneRod(TOGGLE.axial, TOGGLE.bending, (piece,), 1, clamped=True, guided=True)
-    return rod.limit_load(0.4, 8), rod.loads([0.2, 0.4, 0.6])[-1]
+    return [rod.limit_load(0.4, 8), rod.loads([0.2, 0.4, 0.6])[-1]]
 
 
 benchmarks.register("toggle")(
@@ -191,10 +179,10 @@ benchmarks.register("toggle")(
         "EA = 1.885e6 lb, EI = 9.27e3 lb in²; force down on their joint. Elements in each bar.",
         quantities=("limit load, lb", "force at a deflection of 0.6 in, lb"),
         compute=lambda count, bowed: [
-            limit_load(lambda v: toggle_force(count, v, bowed), 0.1, 0.4)[1],
-            toggle_force(count, 0.6, bowed),
+            limit_load(lambda v: toggle_frame(count, v, bowed), 0.1, 0.4),
+            pushing_force(toggle_frame(count, 0.6, bowed)),
         ],
-        exact=lambda: list(_exact_toggle()),
+        exact=_exact_toggle,
         method="shooting, extensible",
         full=(8, 16, 32, 64),
         quick=(8, 16, 32),
@@ -205,7 +193,7 @@ RADIUS, OPENING = 100.0, math.radians(215.0)
 ARCH = Rigidity(1e8, 1e6)
 
 
-def arch_frame(count: int, deflection: float, bowed: bool) -> BenchmarkFrame:
+def arch_frame(count: int, deflection: float, bowed: bool = False) -> BenchmarkFrame:
     """Return the clamped and hinged arch with `count` elements, pushed down by a deflection."""
     angle = 0.5 * (math.pi + OPENING) - np.linspace(0.0, OPENING, count + 1)
     nodes = RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -216,16 +204,10 @@ def arch_frame(count: int, deflection: float, bowed: bool) -> BenchmarkFrame:
     )  # fmt: skip
 
 
-def arch_force(count: int, deflection: float, bowed: bool = False) -> float:
-    """Return the force on the arch at a deflection."""
-    return -float(arch_frame(count, deflection, bowed).respond().force[count // 2, 1])
-
-
-@cache
-def _exact_arch() -> float:
+def _exact_arch() -> Values:
     half = 0.5 * RADIUS * OPENING
     pieces = ((half, -1.0 / RADIUS, 0.5 * OPENING), (half, -1.0 / RADIUS, 0.0))
-    return PlaneRod(ARCH.axial, ARCH.bending, pieces, 1, clamped=True).limit_load(118.0, 12)
+    return [PlaneRod(ARCH.axial, ARCH.bending, pieces, 1, clamped=True).limit_load(118.0, 12)]
 
 
 benchmarks.register("arch")(
@@ -238,9 +220,9 @@ benchmarks.register("arch")(
         "1e8, EI = 1e6; force down on its top.",
         quantities=("limit load",),
         compute=lambda count, bowed: [
-            limit_load(lambda v: arch_force(count, v, bowed), 108.0, 117.5)[1]
+            limit_load(lambda v: arch_frame(count, v, bowed), 108.0, 117.5)
         ],
-        exact=lambda: [_exact_arch()],
+        exact=_exact_arch,
         method="shooting, extensible",
         published=(
             Published(

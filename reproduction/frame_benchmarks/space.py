@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import partial
 
 import numpy as np
 
@@ -52,11 +52,11 @@ def bend(count: int, bowed: bool, torsion: float) -> Values:
     return [abs(float(each)) for each in converged(frame)[-1]]
 
 
-@cache
-def _exact_bend(torsion: float) -> tuple[float, ...]:
+def _exact_bend(torsion: float) -> Values:
     forces = (150.0, 300.0, 450.0, FORCE)
     tip = bend_tip(bend_rigidity(torsion), BEND_RADIUS, BEND_ANGLE, forces)
-    return tuple(np.abs(tip).tolist())
+    found: Values = np.abs(tip).tolist()
+    return found
 
 
 for _name, _torsion, _published in (
@@ -84,8 +84,8 @@ for _name, _torsion, _published in (
             data="Arc of 45 degrees, radius 100 in, section 1 in x 1 in, E = 1e7 psi, G = 5e6 psi, "
             "clamped; force of 600 lb at the tip normal to the plane.",
             quantities=("u, in", "v, in", "w, in"),
-            compute=lambda count, bowed, torsion=_torsion: bend(count, bowed, torsion),  # type: ignore[misc]
-            exact=lambda torsion=_torsion: list(_exact_bend(torsion)),  # type: ignore[misc]
+            compute=partial(bend, torsion=_torsion),
+            exact=partial(_exact_bend, _torsion),
             method="shooting, extensible, with shear",
             published=_published,
             full=(8, 16, 32, 64),

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reproduction.formatting import count
-from reproduction.frame_benchmarks.definition import benchmarks
+from reproduction.frame_benchmarks.definition import benchmarks, pushing_force
 from reproduction.frame_benchmarks.plane import (
     HALF_SPAN,
     LEE_LENGTH,
     RADIUS,
-    arch_force,
-    lee_force,
-    toggle_force,
+    arch_frame,
+    lee_frame,
+    toggle_frame,
 )
 from reproduction.frame_benchmarks.space import RING_RADIUS, ring
 from reproduction.pictures.charts import Chart, Series
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 KINDS = {"linear": False, "bowed": True}
 """Elements: linear in their deformations; shorter when they bend, as those of searches."""
 PATHS = {
-    "lee-frame": (lee_force, 40, 58.0, LEE_LENGTH, "Lee's frame"),
-    "toggle": (toggle_force, 32, 0.6, HALF_SPAN, "Williams' toggle"),
-    "arch": (arch_force, 80, 118.0, RADIUS, "deep arch"),
+    "lee-frame": (lee_frame, 40, 58.0, LEE_LENGTH, "Lee's frame"),
+    "toggle": (toggle_frame, 32, 0.6, HALF_SPAN, "Williams' toggle"),
+    "arch": (arch_frame, 80, 118.0, RADIUS, "deep arch"),
 }
-"""Forces by deflection: function, elements, last deflection, length, name."""
+"""Curves of the force: frame, elements, last deflection, length, name."""
 RING_ELEMENTS = 96
 COLOURS = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#1a1d21", "#8f98a1",
@@ -58,7 +58,7 @@ class Settings:
 def run(settings: Settings, store: ResultStore) -> Figures:
     """Compute the benchmarks, their exact solutions and the curves."""
     chosen = {name: benchmarks[name] for name in settings.names}
-    work = {name: partial(measured, each, full=settings.full) for name, each in chosen.items()}
+    work = {name: partial(convergence, each, full=settings.full) for name, each in chosen.items()}
     figures: Figures = {"benchmarks": store.compute_all("benchmark", work)}
     curves: dict[str, Any] = {
         name: partial(path_of, name, settings.points) for name in PATHS if name in chosen
@@ -69,10 +69,11 @@ def run(settings: Settings, store: ResultStore) -> Figures:
     return figures
 
 
-def measured(benchmark: Benchmark, *, full: bool) -> dict[str, Any]:
+def convergence(benchmark: Benchmark, *, full: bool) -> dict[str, Any]:
     """Return the quantities with each number and kind of elements, and their relative errors.
 
-    The reference is the exact solution, else the first converged published figure.
+    The reference is the exact solution, else the first converged published figure. The limit of
+    many elements follows from the last two numbers, for errors of second order (Richardson).
     """
     numbers = benchmark.full if full else benchmark.quick
     exact = None if benchmark.exact is None else benchmark.exact()
@@ -109,11 +110,11 @@ def converged_figures(benchmark: Benchmark) -> list[float]:
 
 def path_of(name: str, points: int) -> dict[str, Any]:
     """Return the force along the deflection, which is prescribed."""
-    force, number, last, length, _ = PATHS[name]
+    frame, number, last, length, _ = PATHS[name]
     deflections = last * np.arange(1, points + 1) / points
     return {
         "deflection": [0.0, *(deflections / length).tolist()],
-        "force": [0.0, *(force(number, float(each)) for each in deflections)],
+        "force": [0.0, *(pushing_force(frame(number, float(each))) for each in deflections)],
     }
 
 

@@ -40,6 +40,8 @@ HINGE = 1e6
 """Stiffness of the springs that hold supports free to turn, over that of a strut."""
 SMALL = 0.01
 """Part of a force at which the response of springs is linear: to 1e-6."""
+ELEMENTS = 8
+"""Elements in each strut of nonlinear frames."""
 GRAVITY = 9.81
 """m / s^2."""
 
@@ -99,13 +101,6 @@ class Model:
     clamped: bool = True
     nonlinear: bool = False
 
-    @property
-    def title(self) -> str:
-        """Name in tables."""
-        if self.kind in {"bars", "springs"}:
-            return {"bars": "bars, hinged", "springs": "springs of the paper"}[self.kind]
-        return {"frame": "frames", "sheet": "sheet"}[self.kind]
-
 
 MODELS: dict[str, Model] = {
     "bars": Model(kind="bars"),
@@ -164,17 +159,13 @@ def problem_of(sample: Sample, force: Force, *, clamped: bool = True) -> Problem
     )
 
 
-def displacement_of(
-    model: Model, sample: Sample, force: Force, moment: float = 0.0, elements: int = 8
-) -> Floats:
+def displacement_of(model: Model, sample: Sample, force: Force, moment: float = 0.0) -> Floats:
     """Return (N, 2) the displacement of the nodes under one force, m.
 
     Parameters
     ----------
     moment
         Moment on the loaded node of a linear frame, N m.
-    elements
-        Number of elements of each strut of nonlinear frames.
 
     Raises
     ------
@@ -187,7 +178,7 @@ def displacement_of(
     problem = problem_of(sample, force, clamped=model.clamped)
     if model.kind == "sheet":
         return _by_sheet(problem, sample, nonlinear=model.nonlinear)
-    evaluator = FrameEvaluator(problem, elements=elements if model.nonlinear else None)
+    evaluator = FrameEvaluator(problem, elements=ELEMENTS if model.nonlinear else None)
     if model.nonlinear:
         response = evaluator.evaluate(problem.initial)
         if response.status is not Status.CONVERGED:

@@ -162,13 +162,19 @@ SHORT = {
 """Labels of the models in the picture."""
 
 
+TITLES = {
+    "bars": "bars, hinged", "springs": "springs of the paper", "frame": "frames", "sheet": "sheet",
+}  # fmt: skip
+"""Names of the kinds of models in tables."""
+
+
 def title_of(name: str) -> str:
     """Return the name of a model in tables."""
     model = MODELS[name]
     if model.kind in {"bars", "springs"}:
-        return model.title
+        return TITLES[model.kind]
     support = "clamped" if model.clamped else "free to turn"
-    return f"{model.title}, {support}, {'nonlinear' if model.nonlinear else 'linear'}"
+    return f"{TITLES[model.kind]}, {support}, {'nonlinear' if model.nonlinear else 'linear'}"
 
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:

@@ -14,12 +14,15 @@ from bellcrank.measure.corners import detect_markers, marker_modules  # noqa: E4
 FINE = 10
 
 
-def picture(shift: tuple[float, float], blur: float = 0.8, gamma: float = 2.2) -> np.ndarray:
-    """A marker of 48 pixels, moved by parts of a pixel, in light that rises from left to right."""
-    side = 48 * FINE
+def picture(
+    shift: tuple[float, float], blur: float = 0.8, gamma: float = 2.2, number: int = 11,
+    pixels: int = 48,
+) -> np.ndarray:  # fmt: skip
+    """A marker, moved by parts of a pixel, in light that rises from left to right."""
+    side = pixels * FINE
     canvas = np.full((120 * FINE, 140 * FINE), 0.8, dtype=np.float32)
     left, top = round((40 + shift[0]) * FINE), round((36 + shift[1]) * FINE)
-    cells = np.kron(marker_modules(11), np.ones((side // 6, side // 6)))
+    cells = np.kron(marker_modules(number), np.ones((side // 6, side // 6)))
     canvas[top : top + side, left : left + side] = np.where(cells, 0.8, 0.05)
     small = cv2.resize(canvas, (140, 120), interpolation=cv2.INTER_AREA)
     small = cv2.GaussianBlur(small, (0, 0), blur) * np.linspace(0.9, 1.0, 140)
@@ -36,6 +39,15 @@ def test_corners_are_found_within_a_tenth_of_a_pixel(
     corner = np.array([39.5, 35.5]) + shift
     square = corner + 48.0 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     assert found.corners[0] == pytest.approx(square, abs=0.1)
+
+
+@pytest.mark.parametrize("number", [30, 38, 39])
+def test_white_modules_beside_an_edge_do_not_move_it(number: int) -> None:
+    """Modules of 6 pixels and a blur of a quarter of that."""
+    found = detect_markers(picture((0.3, 0.6), 1.5, number=number, pixels=36))
+    assert found.ids.tolist() == [number]
+    square = np.array([39.8, 36.1]) + 36.0 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    assert found.corners[0] == pytest.approx(square, abs=0.5)
 
 
 def test_another_response_of_the_camera_moves_corners_but_not_the_centre() -> None:

@@ -15,7 +15,7 @@ from reproduction.frame_benchmarks.exact import PlaneRod, bend_tip, elastica
 from reproduction.frame_benchmarks.frames import BenchmarkFrame, Rigidity
 from reproduction.frame_benchmarks.plane import LOADS, MATTIASSON
 from reproduction.frame_benchmarks.space import BEND_TORSION, bend_rigidity, ring
-from reproduction.frame_benchmarks.study import converged_figures, largest, measured
+from reproduction.frame_benchmarks.study import converged_figures, convergence, largest
 
 RECORD = Path(__file__).parents[2] / "docs" / "studies" / "benchmarks.json"
 SHOT = {"bend": (23.56024, 13.60452, 53.47486), "bend-square": (23.8185, 13.7314, 53.6072)}
@@ -74,7 +74,7 @@ def test_the_shooting_solutions_are_those_of_the_record(name: str) -> None:
 
 
 def test_elements_with_bowing_converge_at_fourth_order_where_the_axis_is_straight() -> None:
-    row: dict[str, Any] = measured(benchmarks["roll-up"], full=False)
+    row: dict[str, Any] = convergence(benchmarks["roll-up"], full=False)
     for kind, order in (("linear", 2.0), ("bowed", 4.0)):
         errors = np.array(largest(row[kind]["errors"]))
         assert np.log2(errors[:-1] / errors[1:]) == pytest.approx(order, abs=0.05)

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import UnreadableFilm
-from bellcrank.measure.measurement import Measurement, MeasureSettings, measured
-from bellcrank.measure.motion import Motion, motion_of_nodes, node_motion
+from bellcrank.measure.camera import transformed
+from bellcrank.measure.measurement import Measurement, MeasureSettings, Recording, measured
+from bellcrank.measure.motion import part_motion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.measure.camera import Views
+    from bellcrank.measure.motion import Motion
     from bellcrank.measure.tracks import Tracks
     from bellcrank.part import Part
 
@@ -36,22 +38,22 @@ class PlaneTracks:
         Corners of the markers on input and output.
     supports : (F, S, 4, 2) float64, mm
         Corners of those on supports.
-    height_scale
-        Size of the part as seen on the sheet over its size: it is nearer to the camera. Lengths
-        are divided by it already.
+    offsets : (K + S, 2) float64, mm
+        Positions of the markers on the part less the drawn ones.
     """
 
     corners: Values
     supports: Values
-    height_scale: float
+    offsets: Values
 
 
-def plane_tracks(tracks: Tracks, views: Views, rest: slice, offsets: Values) -> PlaneTracks:
+def plane_tracks(tracks: Tracks, views: Views, rest: slice, errors: Values) -> PlaneTracks:
     """Return the tracks in mm.
 
     A point above the sheet is seen at the point of the sheet behind it. For a plane parallel to
-    the sheet this is a scaling about the foot of the camera. Its factor is that of the distances
-    between the markers on the part at rest.
+    the sheet this is a scaling about the foot of the camera. The similarity that fits the drawn
+    markers best to those on the part at rest has this factor; what remains is their offsets, of
+    which it hides a part.
 
     Parameters
     ----------
@@ -61,14 +63,17 @@ def plane_tracks(tracks: Tracks, views: Views, rest: slice, offsets: Values) -> 
         The camera.
     rest
         Frames at rest.
-    offsets : (K + S, 2), mm
-        Positions of the markers on the part less the drawn ones.
+    errors : (K + S, 2), mm
+        Assumed positions of the markers on the part less the drawn ones: zero for the best
+        estimate of the offsets, of the errors of placement for a sample of them.
     """
     moving, held = views.plane(tracks.corners), views.plane(tracks.support_corners)
     seen = np.concatenate([moving[rest], held[rest]], axis=1).mean(axis=(0, 2))
-    drawn = np.stack([marker.centre for marker in (*tracks.moving, *tracks.supports)]) + offsets
-    scale = float(np.hypot(*similarity(drawn, seen)[:2, 0]))
-    return PlaneTracks(moving / scale, held / scale, scale)
+    onto = similarity(tracks.drawn + errors, seen)
+    scale = float(np.hypot(*onto[:2, 0]))
+    back = np.asarray(np.linalg.inv(onto), dtype=np.float64)
+    offsets = transformed(back, seen) - tracks.drawn
+    return PlaneTracks(moving / scale, held / scale, offsets)
 
 
 def similarity(points: Values, image: Values) -> Values:
@@ -95,8 +100,7 @@ def part_on_sheet(tracks: Tracks) -> Values:
     seen = np.concatenate(
         [tracks.views.plane(tracks.corners)[0], tracks.views.plane(tracks.support_corners)[0]]
     )
-    drawn = np.stack([marker.centre for marker in (*tracks.moving, *tracks.supports)])
-    return similarity(drawn, seen.mean(axis=1))
+    return similarity(tracks.drawn, seen.mean(axis=1))
 
 
 def _sides(corners: Values) -> Values:
@@ -131,8 +135,8 @@ def measure_by_markers(
     Notes
     -----
     A sample of the interval gives the reference markers random weights (the Bayesian bootstrap)
-    and draws from normal distributions the positions of the markers on the part, the size of
-    the sheet, and an error in each frame, equal in frames that show the same state. That error
+    and draws from normal distributions errors of the placement of the markers on the part, the size
+    of the sheet, and an error in each frame, equal in frames that show the same state. That error
     has the spread of the frames about the fitted curve, and at least that of the centres of
     reference markers about the sheet.
 
@@ -140,7 +144,7 @@ def measure_by_markers(
     ----------
     D. B. Rubin, Ann. Stat. 9, 130 (1981), the Bayesian bootstrap.
     """
-    exact = np.zeros((len(tracks.moving) + len(tracks.supports), 2))
+    exact = np.zeros_like(tracks.drawn)
     first = plane_tracks(tracks, tracks.views, slice(0, 1), exact)
     _check_places(name, tracks, first)
     count = len(tracks.reference)
@@ -148,38 +152,27 @@ def measure_by_markers(
     def motion_for(rng: np.random.Generator | None, rest: slice) -> Motion:
         if rng is None:
             plane = plane_tracks(tracks, tracks.views, rest, exact)
-            return _motion(part, tracks, plane, rest, exact)
+            return _motion(part, tracks, plane, rest)
         counts = count * rng.dirichlet(np.ones(count))
-        offsets = settings.placement * rng.standard_normal(exact.shape)
-        plane = plane_tracks(tracks, tracks.views.resampled(counts), rest, offsets)
+        errors = settings.placement * rng.standard_normal(exact.shape)
+        plane = plane_tracks(tracks, tracks.views.resampled(counts), rest, errors)
         stretch = 1.0 + settings.sheet * rng.standard_normal(2)
-        plane = PlaneTracks(plane.corners * stretch, plane.supports * stretch, plane.height_scale)
-        return _motion(part, tracks, plane, rest, offsets)
+        plane = replace(plane, corners=plane.corners * stretch, supports=plane.supports * stretch)
+        return _motion(part, tracks, plane, rest)
 
     scale = _pixels_per_mm(tracks)
-    floor = _reference_error(tracks.views) / scale
-    found = measured(name, tracks.frames, scale, nominal, motion_for, settings, floor)
+    film = Recording(name, tracks.frames, scale, _reference_error(tracks.views) / scale)
+    found = measured(film, nominal, motion_for, settings)
     _check_supports(name, first, found)
     return found
 
 
-def _motion(part: Part, tracks: Tracks, plane: PlaneTracks, rest: slice, offsets: Values) -> Motion:
-    problem = part.design.problem
+def _motion(part: Part, tracks: Tracks, plane: PlaneTracks, rest: slice) -> Motion:
     corners = plane.corners
     if plane.supports.shape[1]:
         middle = plane.supports.mean(axis=(1, 2))
         corners = corners - (middle - middle[rest].mean(axis=0))[:, None, None]
-    zero = corners[rest].mean(axis=0)
-    moved = []
-    for role, nodes in (("input", problem.input.nodes), ("output", problem.output.nodes)):
-        own = [k for k, marker in enumerate(tracks.moving) if marker.role == role]
-        moved.append(
-            node_motion(
-                [tracks.moving[k] for k in own], corners[:, own], zero[own], nodes,
-                part.positions, offsets[own],
-            )
-        )  # fmt: skip
-    return motion_of_nodes(problem, moved[0], moved[1], part.scale)
+    return part_motion(part, tracks.moving, corners, rest, plane.offsets)
 
 
 def _reference_error(views: Views) -> float:
@@ -196,14 +189,12 @@ def _pixels_per_mm(tracks: Tracks) -> float:
 
 def _check_places(name: str, tracks: Tracks, plane: PlaneTracks) -> None:
     """Check that the markers on the part are near their drawn positions, up to a common shift."""
-    markers = (*tracks.moving, *tracks.supports)
     seen = np.concatenate([plane.corners[0], plane.supports[0]]).mean(axis=1)
-    drawn = np.stack([marker.centre for marker in markers])
-    away = seen - drawn
+    away = seen - tracks.drawn
     away = np.linalg.norm(away - np.median(away, axis=0), axis=1)
     worst = int(np.argmax(away))
     if away[worst] > MISPLACED:
-        marker = markers[worst]
+        marker = tracks.on_part[worst]
         raise UnreadableFilm(
             f"{name}: the {marker.role} marker {marker.id} is {away[worst]:.0f} mm from its drawn "
             "position; check that each marker is on the block of its role, that the film begins "

@@ -20,8 +20,8 @@ from bellcrank.errors import UnreadableFilm
 from bellcrank.measure.corners import opencv
 from bellcrank.measure.films import LARGEST_BLUR, LEAST_FRAMES, edge_width, grey_of
 from bellcrank.measure.layout import Marker, node_blocks
-from bellcrank.measure.measurement import Measurement, MeasureSettings, measured
-from bellcrank.measure.motion import Motion, motion_of_nodes, node_motion
+from bellcrank.measure.measurement import Measurement, MeasureSettings, Recording, measured
+from bellcrank.measure.motion import part_motion
 from bellcrank.measure.registration import contrast_of, register
 from bellcrank.measure.tracks import no_report
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.measure.films import Film
+    from bellcrank.measure.motion import Motion
     from bellcrank.measure.registration import Registration
     from bellcrank.part import Part
 
@@ -69,13 +70,10 @@ class Block:
         Role, nodes and centre; its size is that of the square whose corners represent the motion.
     points : (n, 2) float64, mm
         Points on and around the struts of the block, from its centre.
-    step
-        Distance of the points, mm.
     """
 
     marker: Marker
     points: Values
-    step: float
 
 
 def measure_by_outline(
@@ -125,22 +123,11 @@ def measure_by_outline(
         if rng is not None:
             offsets = walls * rng.standard_normal(offsets.shape)
             squares = squares * (1.0 + REGISTERED * rng.standard_normal(2))
-        zero = squares[rest].mean(axis=0)
-        problem, moved = part.design.problem, []
-        for role, nodes in (("input", problem.input.nodes), ("output", problem.output.nodes)):
-            own = [k for k, marker in enumerate(markers) if marker.role == role]
-            moved.append(
-                node_motion(
-                    [markers[k] for k in own], squares[:, own], zero[own], nodes,
-                    part.positions, offsets[own],
-                )
-            )  # fmt: skip
-        return motion_of_nodes(problem, moved[0], moved[1], part.scale)
+        return part_motion(part, markers, squares, rest, offsets)
 
     scale = registration.pixels_per_mm
-    found = measured(
-        film.name, np.arange(len(corners)), scale, nominal, motion_for, settings, FLOOR / scale
-    )
+    recording = Recording(film.name, np.arange(len(corners)), scale, FLOOR / scale)
+    found = measured(recording, nominal, motion_for, settings)
     _check_supports(film.name, shaken[: found.frames], float(found.stroke[-1]))
     return found, registration
 
@@ -222,7 +209,7 @@ def rigid_blocks(part: Part, step: float) -> list[Block]:
             points = _block_points(part, nodes, step)
             if len(points):
                 marker = Marker(0, role, centre, 10.0, nodes)
-                blocks.append(Block(marker, points - centre, step))
+                blocks.append(Block(marker, points - centre))
     return blocks
 
 

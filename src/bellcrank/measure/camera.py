@@ -14,7 +14,7 @@ Z. Zhang, IEEE Trans. Pattern Anal. Mach. Intell. 22, 1330 (2000), planar patter
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -189,8 +189,9 @@ class Views:
             self.lens.radial,
         )  # fmt: skip
         lens = Lens(self.lens.centre, self.lens.length, self.lens.radial + change)
-        return Views(lens, _changed(self.homographies, step, self.scaling), self.residual,
-                     self.blocks, self.scaling)  # fmt: skip
+        scaled = _normalised(self.homographies @ np.linalg.inv(self.scaling))
+        homographies = _normalised(_changed(scaled, step) @ self.scaling)
+        return replace(self, lens=lens, homographies=homographies)
 
 
 def fitted_views(seen: Values, points: Values, size: tuple[int, int]) -> Views:
@@ -235,15 +236,14 @@ def fitted_views(seen: Values, points: Values, size: tuple[int, int]) -> Views:
         weight *= size_of < OUTLIER * spread + 0.5
         normal, side = _blocks(jacobian, residual, weight)
         step, change = _solved(normal.sum(axis=1), side.sum(axis=1), lens.radial)
-        homographies = _changed(homographies, step, None)
+        homographies = _changed(homographies, step)
         lens = Lens(lens.centre, lens.length, lens.radial + change)
         if np.abs(change).max() < 1e-7 and np.abs(step).max() < 1e-8:
             break
     predicted, jacobian = linearised(homographies, lens, scaled)
     residual = flat - predicted
     blocks = _blocks(jacobian, np.where(known[..., None], residual, 0.0), weight)
-    whole = homographies @ scaling
-    whole = whole / whole[:, 2:, 2:]
+    whole = _normalised(homographies @ scaling)
     return Views(lens, whole, residual.reshape(seen.shape), blocks, scaling)
 
 
@@ -295,15 +295,13 @@ def _solved(normal: Values, side: Values, radial: Values) -> tuple[Values, Value
     return solution[..., 2] - solution[..., :2] @ change, change
 
 
-def _changed(homographies: Values, step: Values, scaling: Values | None) -> Values:
-    """Return homographies after a step of their first eight entries in scaled coordinates."""
-    if scaling is None:
-        changed = homographies.copy()
-    else:
-        changed = homographies @ np.linalg.inv(scaling)
-        changed = changed / changed[:, 2:, 2:]
+def _changed(homographies: Values, step: Values) -> Values:
+    """Return homographies after a step of their first eight entries."""
+    changed = homographies.copy()
     changed.reshape(len(changed), 9)[:, :8] += step
-    if scaling is None:
-        return changed
-    whole = changed @ scaling
-    return np.asarray(whole / whole[:, 2:, 2:])
+    return changed
+
+
+def _normalised(homographies: Values) -> Values:
+    """Return homographies with a last entry of 1."""
+    return np.asarray(homographies / homographies[:, 2:, 2:])

@@ -76,6 +76,9 @@ def _detector() -> Any:
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
     settings.adaptiveThreshWinSizeMax = 43
+    # Blurred edges between modules are not read.
+    settings.perspectiveRemovePixelPerCell = 8
+    settings.perspectiveRemoveIgnoredMarginPerCell = 0.25
     settings.adaptiveThreshWinSizeStep = 20
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARY))
     return cv2.aruco.ArucoDetector(dictionary, settings)
@@ -120,14 +123,15 @@ def detect_markers(grey: NDArray[np.uint8]) -> Detection:
     if not len(numbers):
         return Detection(numbers, np.empty((0, 4, 2)), np.empty(0))
     picture = _light[grey]
-    quads, blur = refined_corners(picture, quads)
+    quads, _ = refined_corners(picture, quads, None)
+    quads, blur = refined_corners(picture, quads, np.full(len(quads), np.inf))
     quads, blur = refined_corners(picture, quads, blur)
     good = np.isfinite(quads).all(axis=(1, 2))
     return Detection(numbers[good], quads[good], blur[good])
 
 
 def refined_corners(
-    picture: NDArray[np.float32], quads: Values, blur: Values | None = None
+    picture: NDArray[np.float32], quads: Values, blur: Values | None
 ) -> tuple[Values, Values]:
     """Return corners as intersections of the edges of squares, and the blur of the edges.
 
@@ -135,12 +139,15 @@ def refined_corners(
     its ends has the same integral; a symmetric point spread does not move it. Lines through
     the positions on each edge intersect in the corners.
 
+    Far from an edge, profiles reach into white modules inside the marker. Without `blur` the
+    position is therefore the outermost one at which the light is halved.
+
     Parameters
     ----------
     picture : (height, width) float32
         Light, from 0 to 1.
     quads : (n, 4, 2) float64, pixels
-        Corners within two pixels, clockwise in the picture.
+        Corners within two pixels, or half a module without `blur`, clockwise in the picture.
     blur : (n,) float64, pixels, optional
         Blur of the edges, which limits the length of profiles.
 
@@ -180,6 +187,8 @@ def refined_corners(
     step = (offset[:, 1] - offset[:, 0])[:, None, None]
     whole = level.sum(axis=-1) - 0.5 * (level[..., 0] + level[..., -1])
     position = reach[:, None, None] - step * whole
+    if blur is None:
+        position = _outermost(values, offset)
     position = np.where(weak, np.nan, position)
     lines = _lines(base + position[..., None] * normal[:, :, None], normal)
     corners = _intersections(np.roll(lines, 1, axis=1), lines)
@@ -189,6 +198,28 @@ def refined_corners(
     mean = (slope * middle).sum(axis=-1) / total
     variance = (slope * (middle - mean[..., None]) ** 2).sum(axis=-1) / total
     return corners, np.sqrt(np.median(variance, axis=1))
+
+
+def _outermost(values: Values, offset: Values) -> Values:
+    """Return the outermost positions (n, 4, k) at which the light on profiles is halved.
+
+    Parameters
+    ----------
+    values : (n, 4, k, s)
+        Light on profiles, from inside to outside.
+    offset : (n, s), pixels
+        Positions on the profiles.
+    """
+    black, white = np.median(values.min(axis=-1), axis=2), np.median(values[..., -1], axis=2)
+    middle = 0.5 * (black + white)[..., None, None]
+    dark = values[..., :-1] < middle
+    last = dark.shape[-1] - 1 - np.argmax(dark[..., ::-1], axis=-1)
+    inner, outer = (np.take_along_axis(values, each[..., None], axis=-1)[..., 0]
+                    for each in (last, last + 1))  # fmt: skip
+    share = (middle[..., 0] - inner) / np.maximum(outer - inner, 1e-6)
+    step = (offset[:, 1] - offset[:, 0])[:, None, None]
+    start = offset[:, 0][:, None, None] + step * last
+    return np.where(dark.any(axis=-1), start + step * np.clip(share, 0.0, 1.0), np.nan)
 
 
 def _mean(values: Values, axis: int) -> Values:

@@ -26,6 +26,40 @@ LEAST_FRAMES = 6
 LARGEST_BLUR = 7.0
 """Width of the sharpest edges of a picture above which it is too blurred, pixels."""
 
+PICTURES = ((1280, 720), (1920, 1080), (3840, 2160))
+"""Usual widths and heights of films, pixels."""
+LEAST_SCALE = 3.0
+"""Smallest number of pixels in a mm of the sheet that the protocol asks for."""
+STROKE_PIXELS = 5.0
+"""Smallest motion of the input that the protocol asks for, pixels."""
+FILLED = 0.9
+"""Part of a picture that the sheet fills."""
+
+
+def picture_scale(size: tuple[int, int], extent: tuple[float, float]) -> float:
+    """Return the pixels in a mm if a sheet (width and height, mm) fills a picture (pixels)."""
+    return FILLED * min(size[0] / extent[0], size[1] / extent[1])
+
+
+def needed_picture(extent: tuple[float, float], stroke: float) -> tuple[int, int]:
+    """Return the smallest usual picture that shows a sheet and a stroke, pixels.
+
+    Parameters
+    ----------
+    extent
+        Width and height of the sheet over its markers, mm.
+    stroke
+        Full motion of the input, mm.
+
+    Examples
+    --------
+    >>> needed_picture((150.0, 140.0), 4.0), needed_picture((150.0, 140.0), 0.9)
+    ((1280, 720), (1920, 1080))
+    """
+    wanted = max(LEAST_SCALE, STROKE_PIXELS / stroke)
+    large = [size for size in PICTURES if picture_scale(size, extent) >= wanted]
+    return large[0] if large else PICTURES[-1]
+
 
 @dataclass(frozen=True, slots=True)
 class Film:

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.errors import InvalidSettings, UnreadableFilm
-from bellcrank.measure.curves import HOLD, Basis, basis_for, fitted_curve, phases_of
+from bellcrank.measure.curves import (
+    HOLD,
+    Basis,
+    basis_for,
+    frames_to_return,
+    output_sign,
+    phases_of,
+    robust_weights,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,7 +33,9 @@ NORMAL = 1.96
 """Half width of a 95 % interval, standard deviations."""
 TURNED = 6.0
 """Distance over which an error of a position becomes one of a rotation, mm."""
-LEAST_PIXELS = 2.0
+ROBUST_STEPS = 5
+"""Number of times that the weights of frames are computed."""
+LEAST_PIXELS = 4.0
 """Smallest motion of the input, pixels."""
 LEAST_SIGNAL = 20.0
 """Smallest motion of the input over the noise of a single frame."""
@@ -68,6 +78,28 @@ class MeasureSettings:
             raise InvalidSettings(f"sheet: expected a ratio of 0 to 0.1, got {self.sheet!r}")
         if not 20 <= self.samples <= 100_000:
             raise InvalidSettings(f"samples: expected 20 to 100000, got {self.samples!r}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """A film as far as the figures depend on it.
+
+    Parameters
+    ----------
+    name
+        Name of the film, for messages.
+    frames : (F,) int64
+        Numbers of its frames in which the part can be measured.
+    pixels_per_mm
+        Scale of the pictures.
+    noise : float, mm
+        Smallest noise of a position in a frame.
+    """
+
+    name: str
+    frames: NDArray[np.int64]
+    pixels_per_mm: float
+    noise: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,24 +154,17 @@ def interval(value: Values) -> tuple[float, float]:
 
 
 def measured(
-    name: str,
-    frames: NDArray[np.int64],
-    pixels_per_mm: float,
+    film: Recording,
     nominal: float,
     motion_for: Callable[[np.random.Generator | None, slice], Motion],
     settings: MeasureSettings,
-    floor: float,
 ) -> Measurement:
     """Return the figures of a film.
 
     Parameters
     ----------
-    name
-        Name of the film, for messages.
-    frames : (F,)
-        Numbers of its frames in which the part can be measured.
-    pixels_per_mm
-        Scale of the pictures.
+    film
+        The film.
     nominal
         Full motion of the input, mm.
     motion_for
@@ -147,8 +172,6 @@ def measured(
         frames: with None the best estimate, else one with the systematic errors of a sample.
     settings
         Number of samples and their seed.
-    floor
-        Smallest noise of a position in a frame, mm.
 
     Raises
     ------
@@ -156,26 +179,32 @@ def measured(
         If the input does not move, moves backwards, or its motion is too small.
     """
     whole = motion_for(None, slice(0, 1))
-    _check_direction(name, whole.input, pixels_per_mm)
-    phases = phases_of(whole.input)
+    _check_direction(film, whole.input)
+    # On the way back, a film without markers may have lost the output.
+    pushed, along = (each[: frames_to_return(whole.input)] for each in (whole.input, whole.along))
+    sign = output_sign(pushed, along)
+    phases = phases_of(pushed, pushed + sign * along)
     rest, count = slice(0, phases.rest), phases.loading
     best = motion_for(None, rest)
-    pushed, values = best.input[:count], best.quantities[:count]
-    top = float(np.median(pushed[pushed >= 0.98 * pushed.max()]))
-    basis = basis_for(pushed, values[:, 0])
-    noise = _noise(basis, pushed, values, floor)
-    _check_size(name, top, float(noise[0]), pixels_per_mm)
+    moved = best.columns[:count]
+    progress = moved[:, 0] + sign * moved[:, 1]
+    held = progress >= (1.0 - HOLD) * float(progress.max())
+    basis = basis_for(progress, moved[:, 0])
+    weight, coefficients = _curve(basis, progress, moved)
+    top = float((basis.matrix(np.array([np.median(progress[held])])) @ coefficients)[0, 0])
+    noise = _noise(basis, progress, moved, coefficients, film.noise)
+    _check_size(film, top, float(noise[0]))
     at = min(top, nominal) * FRACTIONS
-    shown = _fitted(basis, pushed, values, at)
+    shown = _figures(basis, coefficients, at)
     rng = np.random.default_rng(settings.seed)
-    groups = _groups(pushed, phases.rest)
+    groups = _groups(held, phases.rest)
     samples = []
     for _ in range(settings.samples):
-        motion = motion_for(rng, rest)
         error = noise * rng.standard_normal((groups.max() + 1, len(noise)))
-        moved = np.column_stack([motion.input, motion.quantities])[:count] + error[groups]
-        moved = moved - moved[rest].mean(axis=0)
-        samples.append(_fitted(basis, moved[:, 0], moved[:, 1:], at))
+        sample = motion_for(rng, rest).columns[:count] + error[groups]
+        sample = sample - sample[rest].mean(axis=0)
+        along = sample[:, 0] + sign * sample[:, 1]
+        samples.append(_figures(basis, basis.fitted(along, sample, weight), at))
     spread = [np.std(each, axis=0, ddof=1) for each in zip(*samples, strict=True)]
     efficiency, off_axis, rotation, path = (
         np.stack([value, deviation], axis=-1)
@@ -184,87 +213,84 @@ def measured(
     half = NORMAL * efficiency[-1, 1] / max(abs(float(efficiency[-1, 0])), 0.4)
     if half > WIDEST:
         raise UnreadableFilm(
-            f"{name}: motion too small for the resolution: the efficiency would be known within "
-            f"{half:.0%} only; film from nearer, in sharper pictures or over a longer stroke"
+            f"{film.name}: motion too small for the resolution: the efficiency would be known "
+            f"within {half:.0%} only; film with more pixels, in sharper pictures or over a longer "
+            "stroke"
         )
     return Measurement(
-        at,
-        efficiency,
-        off_axis,
-        rotation,
-        path,
-        count,
-        float(noise[0]),
-        pixels_per_mm,
-        frames,
-        best,
-    )
-
-
-def _fitted(
-    basis: Basis, pushed: Values, values: Values, at: Values
-) -> tuple[Values, Values, Values, Values]:
-    """Return efficiency, off-axis motion, rotation and path at strokes."""
-    found = fitted_curve(basis, pushed, values, at)
-    along = found[:, 0]
-    return (
-        along / at, np.linalg.norm(found[:, 1:3], axis=1) / np.maximum(np.abs(along), 1e-9),
-        found[:, 3], found[:, 4:],
+        at, efficiency, off_axis, rotation, path, count, float(noise[0]), film.pixels_per_mm,
+        film.frames, best,
     )  # fmt: skip
 
 
-def _noise(basis: Basis, pushed: Values, values: Values, floor: float) -> Values:
+def _curve(basis: Basis, progress: Values, moved: Values) -> tuple[Values, Values]:
+    """Return the weights (F,) of frames and the coefficients (b, 7) of the fitted curve."""
+    weight = np.ones(len(moved))
+    coefficients = basis.fitted(progress, moved, weight)
+    for _ in range(ROBUST_STEPS):
+        weight = robust_weights((moved - basis.matrix(progress) @ coefficients)[:, :4])
+        coefficients = basis.fitted(progress, moved, weight)
+    return weight, coefficients
+
+
+def _figures(
+    basis: Basis, coefficients: Values, at: Values
+) -> tuple[Values, Values, Values, Values]:
+    """Return efficiency, off-axis motion, rotation and path at strokes."""
+    found = basis.at_strokes(coefficients, at)
+    along = found[:, 1]
+    return (
+        along / at, np.linalg.norm(found[:, 2:4], axis=1) / np.maximum(np.abs(along), 1e-9),
+        found[:, 4], found[:, 5:],
+    )  # fmt: skip
+
+
+def _noise(
+    basis: Basis, progress: Values, moved: Values, coefficients: Values, floor: float
+) -> Values:
     """Return the noise (7,) of a frame: of the input, and of each quantity.
 
-    It follows from the deviations of frames from the curve. Those of positions contain the noise
-    of the input times the slope of the curve; input and output have the same noise.
+    It follows from the deviations of frames from the curve; input and output have the same noise.
     """
-    found = fitted_curve(basis, pushed, values, pushed)
-    free = len(pushed) - basis.count
-    step = 0.01 * max(float(np.ptp(pushed)), 1e-9)
-    slope = (
-        fitted_curve(basis, pushed, values, pushed + step)
-        - fitted_curve(basis, pushed, values, pushed - step)
-    ) / (2.0 * step)
-    deviation = values - found
-    slope[:, 3] *= np.radians(1.0) * TURNED
-    scaled = deviation / np.sqrt(1.0 + slope**2)
+    deviation = moved - basis.matrix(progress) @ coefficients
+    free = len(moved) - basis.count
     if free < 3:
-        size = np.zeros(values.shape[1])
+        size = np.zeros(moved.shape[1])
     else:
-        # The median, because single frames may be wrong, and steep parts of the curve not followed.
-        size = np.median(np.abs(scaled), axis=0) / 0.6745 * np.sqrt(len(pushed) / free)
-    position = max(float(np.nanmax(size[[0, 1, 2]])), floor)
-    turn = max(float(size[3]), float(np.degrees(floor / TURNED)))
+        # The median, because single frames may be wrong.
+        size = np.median(np.abs(deviation), axis=0) / 0.6745 * np.sqrt(len(moved) / free)
+    # The coordinate has the errors of input and output, so that a curve that rises with both at
+    # the same rate has half of their variance.
+    position = max(np.sqrt(2.0) * float(np.nanmax(size[:2])), float(np.nanmax(size[2:4])), floor)
+    turn = max(float(size[4]), float(np.degrees(floor / TURNED)))
     return np.array([position, position, position, position, turn, position, position])
 
 
-def _groups(pushed: Values, rest: int) -> NDArray[np.int64]:
+def _groups(held: NDArray[np.bool_], rest: int) -> NDArray[np.int64]:
     """Return groups (F,) of frames that show the same state: at rest, held, and each other frame.
 
     Films repeat errors in pictures that do not change, so that such frames are one observation.
     """
-    top = float(pushed.max())
-    held = pushed >= (1.0 - HOLD) * top
-    groups = np.arange(2, len(pushed) + 2)
+    groups = np.arange(2, len(held) + 2)
     groups[held], groups[:rest] = 1, 0
     return groups
 
 
-def _check_direction(name: str, pushed: Values, pixels_per_mm: float) -> None:
+def _check_direction(film: Recording, pushed: Values) -> None:
     low, high = float(pushed.min()), float(pushed.max())
-    if -low > high and -low * pixels_per_mm > LEAST_PIXELS:
+    if -low > high and -low * film.pixels_per_mm > LEAST_PIXELS:
         raise UnreadableFilm(
-            f"{name}: the input moves {-low:.2f} mm against its direction; begin the film at rest "
-            "and push the input as in the drawing"
+            f"{film.name}: the input moves {-low:.2f} mm against its direction; begin the film at "
+            "rest and push the input as in the drawing"
         )
 
 
-def _check_size(name: str, top: float, noise: float, pixels_per_mm: float) -> None:
-    if top * pixels_per_mm < LEAST_PIXELS or top < LEAST_SIGNAL * noise:
+def _check_size(film: Recording, top: float, noise: float) -> None:
+    pixels = top * film.pixels_per_mm
+    if pixels < LEAST_PIXELS or top < LEAST_SIGNAL * noise:
         raise UnreadableFilm(
-            f"{name}: motion too small for the resolution: the input moves {max(top, 0.0):.2f} mm, "
-            f"{max(top * pixels_per_mm, 0.0):.1f} pixels, with a noise of {noise:.3f} mm in a "
-            f"frame; expected {LEAST_PIXELS:g} pixels and {LEAST_SIGNAL:g} times the noise: film "
-            "from nearer or over a longer stroke"
+            f"{film.name}: motion too small for the resolution: the input moves "
+            f"{max(top, 0.0):.2f} mm, {max(pixels, 0.0):.1f} pixels, with a noise of {noise:.3f} "
+            f"mm in a frame; expected {LEAST_PIXELS:g} pixels and {LEAST_SIGNAL:g} times the "
+            "noise: film with more pixels or over a longer stroke"
         )

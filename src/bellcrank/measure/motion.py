@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from bellcrank.measure.layout import Marker
     from bellcrank.model import Problem
+    from bellcrank.part import Part
 
     Values = NDArray[np.float64]
 
@@ -28,8 +29,6 @@ class Motion:
     ----------
     input : (F,) float64, mm
         Mean over the input nodes of the displacement along the direction of each.
-    input_across : (F,) float64, mm
-        Size of the mean of the input displacements normal to these directions.
     along : (F,) float64, mm
         Mean over the output nodes of the displacement along the wanted direction of each.
     across : (F, 2) float64, mm
@@ -41,16 +40,15 @@ class Motion:
     """
 
     input: Values
-    input_across: Values
     along: Values
     across: Values
     rotation: Values
     path: Values
 
     @property
-    def quantities(self) -> Values:
-        """Columns (F, 6): along, across (2), rotation, path (2)."""
-        return np.column_stack([self.along, self.across, self.rotation, self.path])
+    def columns(self) -> Values:
+        """Columns (F, 7): input, along, across (2), rotation, path (2)."""
+        return np.column_stack([self.input, self.along, self.across, self.rotation, self.path])
 
 
 def motion_of_nodes(
@@ -78,12 +76,6 @@ def motion_of_nodes(
     ([2.0], [6.0], [0.0, 1.5])
     """
     pushed = np.einsum("na,fna->f", problem.input.direction, input_moved) / input_moved.shape[1]
-    mean = input_moved.mean(axis=1)
-    normal = (
-        input_moved
-        - problem.input.direction
-        * np.einsum("na,fna->fn", problem.input.direction, input_moved)[..., None]
-    )
     means = np.einsum("kna,fna->fk", motion_weights(problem), output_moved)
     before = scale * problem.lattice.positions[problem.output.nodes]
     before = before - before.mean(axis=0)
@@ -92,11 +84,8 @@ def motion_of_nodes(
         turned = np.einsum("fni,nj->fij", after - after.mean(axis=1, keepdims=True), before)
         rotation = np.degrees(np.unwrap(np.radians(rotation_of(turned))))
     else:
-        rotation = np.full(len(mean), np.nan)
-    return Motion(
-        pushed, np.linalg.norm(normal.mean(axis=1), axis=1), means[:, 0], means[:, 1:], rotation,
-        output_moved.mean(axis=1),
-    )  # fmt: skip
+        rotation = np.full(len(pushed), np.nan)
+    return Motion(pushed, means[:, 0], means[:, 1:], rotation, output_moved.mean(axis=1))
 
 
 def rigid_motion(corners: Values, rest: Values) -> tuple[Values, Values]:
@@ -172,3 +161,34 @@ def node_motion(
     bare = np.isnan(moved[0, :, 0]) if len(moved) else np.zeros(len(nodes), dtype=np.bool_)
     moved[:, bare] = moved[:, ~bare].mean(axis=1, keepdims=True)
     return moved
+
+
+def part_motion(
+    part: Part, markers: Sequence[Marker], corners: Values, rest: slice, offsets: Values
+) -> Motion:
+    """Return the motion of input and output of a part.
+
+    Parameters
+    ----------
+    part
+        The part.
+    markers
+        K markers on input and output.
+    corners : (F, K, 4, 2), mm
+        Their corners.
+    rest
+        Frames at rest.
+    offsets : (K, 2), mm
+        Position of each marker on the part less that in the drawing.
+    """
+    problem, zero = part.design.problem, corners[rest].mean(axis=0)
+    moved = []
+    for role, nodes in (("input", problem.input.nodes), ("output", problem.output.nodes)):
+        own = [k for k, marker in enumerate(markers) if marker.role == role]
+        moved.append(
+            node_motion(
+                [markers[k] for k in own], corners[:, own], zero[own], nodes, part.positions,
+                offsets[own],
+            )
+        )  # fmt: skip
+    return motion_of_nodes(problem, moved[0], moved[1], part.scale)

@@ -52,8 +52,6 @@ class Tracks:
         Markers on input and output, K of them.
     supports : tuple of Marker
         Markers on supports that are seen in all frames, S of them.
-    reference_corners : (F, M, 4, 2) float64, pixels
-        Corners of `reference`; nan where a marker is not seen.
     corners : (F, K, 4, 2) float64, pixels
         Corners of `moving`.
     support_corners : (F, S, 4, 2) float64, pixels
@@ -65,9 +63,18 @@ class Tracks:
     reference: tuple[Marker, ...]
     moving: tuple[Marker, ...]
     supports: tuple[Marker, ...]
-    reference_corners: Values
     corners: Values
     support_corners: Values
+
+    @property
+    def on_part(self) -> tuple[Marker, ...]:
+        """The K + S markers on the part."""
+        return (*self.moving, *self.supports)
+
+    @property
+    def drawn(self) -> Values:
+        """Drawn centres (K + S, 2) of the markers on the part, mm."""
+        return np.stack([marker.centre for marker in self.on_part])
 
 
 def no_report(_done: int, _total: int) -> None:
@@ -146,7 +153,7 @@ def track_markers(
     return Tracks(
         frames, views, tuple(layout.markers[k] for k in reference),
         tuple(layout.markers[k] for k in moving), tuple(layout.markers[k] for k in held),
-        seen[frames][:, reference], seen[frames][:, moving], seen[frames][:, held],
+        seen[frames][:, moving], seen[frames][:, held],
     )  # fmt: skip
 
 

@@ -39,7 +39,7 @@ def sheet_figure(layout: MarkerLayout, part: Part, positions: Values) -> Figure:
     positions : (K, N, 2) float64, mm
         Nodes along the stroke, for the paths of the markers.
     """
-    figure, axes = _page(layout.extent, layout.corner)
+    figure, axes = new_page(layout.extent, layout.corner)
     for marker in layout.reference:
         _add_marker(axes, marker.id, marker.centre, marker.size)
     _add_part(axes, part)
@@ -64,7 +64,7 @@ def sheet_figure(layout: MarkerLayout, part: Part, positions: Values) -> Figure:
 
 def cards_figure(layout: MarkerLayout, part: Part) -> Figure:
     """Return a page of the same size with the markers of the part to cut out, and where they go."""
-    figure, axes = _page(layout.extent, np.zeros(2))
+    figure, axes = new_page(layout.extent, np.zeros(2))
     wide, high = layout.extent.tolist()
     left, top = 12.0, high - 12.0
     _add_text(
@@ -101,7 +101,7 @@ def page_bytes(figures: list[Figure], suffix: str) -> bytes:
     return content.getvalue()
 
 
-def _page(extent: Values, corner: Values) -> tuple[Figure, Axes]:
+def new_page(extent: Values, corner: Values) -> tuple[Figure, Axes]:
     """Return a page with axes in mm at true size."""
     figure = style.new_figure(*(extent / INCH).tolist())
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bellcrank.measure.films import needed_picture, picture_scale
 from bellcrank.plots import style
-from bellcrank.plots.marker_sheet import add_drawing
+from bellcrank.plots.marker_sheet import add_drawing, new_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,16 +26,13 @@ LINE, GAP = 4.6, 2.2
 """Height of a line of text and space between paragraphs, mm."""
 COLUMNS = 108
 """Characters in a line."""
-INCH = 25.4
 DISTANCE = 1.6
 """Distance of the camera over the longer side of the sheet."""
-LEAST_WIDTH = 1280
-"""Smallest width of pictures, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Protocol:
-    """What the page says about a part.
+    """Content of the page.
 
     Parameters
     ----------
@@ -62,7 +60,8 @@ def protocol_steps(protocol: Protocol) -> list[tuple[str, str]]:
     layout, name = protocol.layout, protocol.name
     wide, high = layout.frame_size
     far = DISTANCE * float(layout.extent.max())
-    pixels = LEAST_WIDTH / float(layout.extent.max())
+    picture = needed_picture(layout.frame_size, protocol.stroke)
+    pixels = picture_scale(picture, layout.frame_size)
     size = layout.on_part[0].size
     return [
         ("1  Print the part and its markers",
@@ -84,7 +83,7 @@ def protocol_steps(protocol: Protocol) -> list[tuple[str, str]]:
         ("5  Camera and light",
          (f"Put the camera on a stand, at least {far:.0f} mm from the sheet, tilted by at most 20 "
          "degrees, with the whole sheet in the picture and little around it. Use the main camera, "
-         f"no wide angle, no zoom; at least {LEAST_WIDTH} x 720 pixels ({pixels:.1f} pixels per "
+         f"no wide angle, no zoom; at least {picture[0]} x {picture[1]} pixels ({pixels:.1f} in a "
          "mm), better more; fixed focus and exposure. Use even, diffuse light from two sides: no "
          "reflections on the markers, no hard shadows.")),
         ("6  Film",
@@ -106,11 +105,7 @@ def protocol_steps(protocol: Protocol) -> list[tuple[str, str]]:
 
 def protocol_figure(protocol: Protocol) -> Figure:
     """Return the page, A4."""
-    figure = style.new_figure(WIDTH / INCH, HEIGHT / INCH)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_xlim(0.0, WIDTH)
-    axes.set_ylim(0.0, HEIGHT)
-    axes.set_axis_off()
+    figure, axes = new_page(np.array([WIDTH, HEIGHT]), np.zeros(2))
     top = HEIGHT - MARGIN
     title = f"How to film {protocol.name}"
     _add_text(axes, top, title, size=style.TITLE_SIZE, weight="bold")

@@ -74,8 +74,8 @@ class ComputedMotion:
         return float(self.motion.input[-1])
 
     def at(self, stroke: Values) -> Values:
-        """Return the quantities (A, 6) of `bellcrank.measure.Motion` at input motions in mm."""
-        return np.asarray(self._spline(self.motion.quantities)(stroke))
+        """Return along, across (2), rotation and path (2), (A, 6), at input motions in mm."""
+        return np.asarray(self._spline(self.motion.columns[:, 1:])(stroke))
 
     def positions_at(self, stroke: Values) -> Values:
         """Return the positions of the nodes (A, N, 2), mm, at input motions in mm."""
