@@ -22,7 +22,9 @@ USUAL = {
     "payload": "at_least", "stiffness": "at_least", "blocked_force": "at_least", "sag": "at_most",
     "input_force": "at_most",
 }  # fmt: skip
-"""Bound of a quantity that has the field beside its name."""
+"""Bound with which a quantity begins."""
+BOUNDS = ("at_least", "at_most", "target")
+"""Other bounds that the field beside its name may have."""
 TOOLS = {"supports": "Supports", "inputs": "Inputs", "outputs": "Outputs", "loads": "Loads"}
 SCAN = 20
 """Distance of the points, in pixels, at which a drawing in space is searched for nodes."""
@@ -342,20 +344,21 @@ def _state_bounds(state: State, key: str, name: str, bounds: Mapping[str, Any]) 
     """Fill the bounds of a quantity, which begin with an example."""
     given = dict(bounds)
     usual = USUAL[name]
-    wanted = given.pop("value", None)
-    maximised = bool(given.pop("maximise", False)) or wanted == "maximise"
-    if wanted == "maximise":
-        wanted = None
-    if wanted is not None and usual != "value":
-        given.setdefault(usual, wanted)
+    maximised = bool(given.pop("maximise", False)) or given.get("value") == "maximise"
+    if given.get("value") == "maximise":
+        del given["value"]
+    elif "value" in given and usual != "value":
+        given.setdefault(usual, given.pop("value"))
     box = state.page.locator(f'[data-key="{key}-maximise"]')
     if not maximised and box.is_visible() and box.is_checked():
         state.press(f'[data-key="{key}-maximise"]')
-    first = wanted if usual == "value" else given.pop(usual, None)
-    state.fill(key, "" if first is None else first)
+    first = next((each for each in (usual, *BOUNDS) if each in given), None)
+    if first not in {None, usual}:
+        state.choose(f"{key}-bound", str(first))
+    state.fill(key, "" if first is None else given.pop(first))
     if given or (maximised and not box.is_visible()):
         state.unfold(f"{key}-more")
-    if maximised and not state.page.locator(f'[data-key="{key}-maximise"]').is_checked():
+    if maximised and not box.is_checked():
         state.press(f'[data-key="{key}-maximise"]')
     for other, value in given.items():
         if other == "of":
