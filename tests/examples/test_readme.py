@@ -13,6 +13,7 @@ import pytest
 from bellcrank.cli import main
 from bellcrank.cli.app import NOT_MET
 from bellcrank.model import human_design, read_design, write_design
+from bellcrank.part.units import GRAVITY
 from benchmarks.task_figures import table
 from tools.draw_tasks import identity, recorded_runs
 
@@ -97,17 +98,21 @@ def test_the_part_of_the_readme_is_that_of_its_record() -> None:
     part = record["as_part"]
     assert f"efficiency {record['efficiency']:.2f} by frames of 8 elements" in text
     assert f"{record['search_efficiency']:.2f} in the search" in text
-    eight = record["figures"][1]
-    assert f"sideways by {eight['off_axis']:.0%}".replace("%", " %") in text
-    assert f"turns by {abs(eight['output_rotation_deg']):.0f} degrees" in text
-    assert (part["status"], part["contacts"], part["part"]["width"]) == ("converged", [], 2.0)
-    assert f"4 mm down, output {4.0 * part['efficiency']:.1f} mm up" in text
     (figures,) = record["part_figures"]
+    assert f"at most {100.0 * figures['off_axis']:.1f} % of its travel" in text
+    assert f"turns by at most {figures['rotation_deg']:.1f} degrees" in text
+    assert (part["status"], part["contacts"], part["part"]["width"]) == ("converged", [], 2.0)
+    assert f"4 mm down, output {figures['travel_mm']:.1f} mm up" in text
     assert f"{figures['efficiency_half']:.2f} at half of the stroke" in text
     assert f"sags by {figures['sag_mm']:.1f} mm" in text
+    assert f"a load of {1000.0 * figures['payload_N'] / GRAVITY:.0f} g halves" in text
     sheet = json.loads((README.parent / "docs" / "start" / "validation.json").read_text())
     (plane,) = [each for each in sheet["results"] if each["level"] == "plane"]
     assert f"it moves {plane['mean_output_displacement_mm'][1]:.1f} mm up" in text
+    reached = {each["quantity"]: each["reached"]["sheet"] for each in sheet["specification"]}
+    assert f"leaves its direction by {100.0 * reached['off_axis']['value']:.1f} %" in text
+    assert f"turns by {abs(reached['rotation']['value']):.1f} degrees" in text
+    assert all(each["met"] for each in reached.values())
 
 
 def test_every_command_is_known_with_all_its_options(
