@@ -161,12 +161,13 @@ export class Result {
         `${objective ? sentence(objective.label).slice(0, -1) : "Output / input motion"} of the part with ${this.strutText()} struts`,
         solid?.efficiency != null && h("span", { class: "second" }, h("br"), `${figure(solid.efficiency, 2)} as output / input motion in the 2D solid, the printed outline`)));
     const columns: Column[] = [];
-    if (report.items.search) columns.push({ title: "search", items: report.items.search });
+    // The model of the search is that of the frames, with fewer elements.
     if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
+    else if (report.items.search) columns.push({ title: "search", items: report.items.search });
     if (solid?.items) columns.push({ title: SOLID, items: solid.items });
     const last = columns.at(-1)?.items ?? null;
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
-    const isMet = last !== null && columns.slice(report.items.search ? 1 : 0).every(({ items }) => items.every(({ met }) => met)) && !unstable;
+    const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
     this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (solid?.items || isInSpace(this.subject.problem) ? "met" : "met pending") : "missed"}`;
     const pending = outline === "running" ? "; the 2D solid, the printed outline, is being computed …" : !solid && !isInSpace(this.subject.problem) ? "; not checked in the 2D solid, the printed outline" : "";
     const by = solid?.items ? " by frames and in the 2D solid, the printed outline" : " by frames";

@@ -88,8 +88,7 @@ def _texts(item: Item, problem: Problem, units: ProblemUnits) -> dict[str, str]:
 def _reached(item: Item, value: float, units: ProblemUnits) -> str:
     """Return a value with its unit; a payload above the wanted one is not always determined."""
     if value == math.inf and item.at_least is not None:
-        text = number_text(item, item.at_least, units) + _grams(item, item.at_least, units)
-        return f"> {text}"
+        return f"> {number_text(item, item.at_least, units)}"
     return number_text(item, value, units) + _grams(item, value, units)
 
 
