@@ -13,6 +13,7 @@ from bellcrank.export.gcode import read_gcode
 from bellcrank.export.profiles import profiles
 from bellcrank.model import Design, find_problem, human_design, write_design
 from bellcrank.part import PartSpec, materials
+from bellcrank.task import find_task
 
 from .helpers import call, files, refusal, write
 
@@ -89,6 +90,15 @@ def test_struts_are_drawn_wider_where_the_printer_makes_them_thin(here: Path) ->
 )
 def test_bad_input_is_refused_in_one_line(words: tuple[str, ...], word: str) -> None:
     assert word in refusal("export", *words)
+
+
+def test_a_plate_or_pad_without_a_hole_to_fill_is_refused(here: Path) -> None:
+    task = find_task("slider")  # supports in one row, an input of two nodes
+    assert task is not None
+    write_design(task.problem.full_design(), here / "slider.json")
+    for option, word in (("--plate", "plate: no hole"), ("--pad", "pad: no hole")):
+        assert word in refusal("export", "slider.json", "part.stl", option)
+    assert not (here / "part.stl").exists()
 
 
 @pytest.mark.parametrize("suffix", ["stl", "3mf", "dxf", "svg"])

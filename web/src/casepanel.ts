@@ -234,8 +234,10 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
   const kind = select(offered.map(([each, text]): [string, string] => [each, text]), bound, (picked) => change({ [bound]: undefined, [picked]: value ?? example }));
   kind.dataset.key = `${key}-bound`;
   kind.setAttribute("aria-label", `Bound of the ${title}`);
+  // Of an output that moves, a large rotation is not wanted.
+  const isOffered = MAXIMISED.includes(name) && (name !== "rotation" || isMaximised);
   const maximise = h("input", { type: "checkbox", checked: isMaximised, "data-key": `${key}-maximise` });
-  maximise.addEventListener("change", () => change({ maximise: maximise.checked || undefined }));
+  maximise.addEventListener("change", () => change({ maximise: maximise.checked || undefined, ...(maximise.checked || value !== undefined ? {} : { [bound]: example }) }));
   const extra: (keyof Bounds)[] = ["at_least", "at_most", "target", "tolerance", "from", "to", "scale"];
   const labels: Record<string, string> = { at_least: "at least", at_most: "at most", target: "equal to", tolerance: "tolerance", from: "from (stroke)", to: "to (stroke)", scale: "scale" };
   const hasMore = extra.some((other) => other !== bound && known[other] !== undefined) || known.of !== undefined || known.minimise;
@@ -248,10 +250,10 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
     h("div", { class: "ask-line" },
       h("span", { class: "quantity", title: about }, title), kind, input,
       button("✕", () => put(null), "quiet small", { "data-key": `${key}-drop`, "aria-label": `Remove ${title}`, title: "Remove" })),
-    MAXIMISED.includes(name) && h("label", { class: "tick" }, maximise, "as large as possible"),
+    isOffered && h("label", { class: "tick" }, maximise, "as large as possible"),
     h("details", { ...(hasMore ? { open: true } : {}) }, h("summary", { "data-key": `${key}-more` }, "Other bounds"),
       h("p", { class: "note" }, about),
-      MAXIMISED.includes(name) ? null : h("label", { class: "tick" }, maximise, "as large as possible"),
+      isOffered ? null : h("label", { class: "tick" }, maximise, "as large as possible"),
       h("div", { class: "row" }, ...extra.filter((other) => other !== bound).map((other) =>
         amount(`${key}-${other}`, labels[other]!, known[other] as Amount | undefined, "", (next) => change({ [other]: next } as Bounds))),
       field("In the range, bounds", of))));

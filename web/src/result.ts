@@ -290,10 +290,19 @@ export class Result {
       fault && h("p", { class: "fault", role: "alert" }, fault),
       remarks && h("p", { class: "more" }, `${remarks.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ")} mm`,
         remarks.mass === null ? "" : `, ${figure(remarks.mass, 1)} g`, remarks.stroke === null ? "" : `, stroke ${figure(remarks.stroke, 2)} mm`),
+      remarks && this.exceeds(remarks.size) && h("p", { class: "note" }, this.exceeds(remarks.size)),
       remarks && this.hasSlicer && this.printTime(),
       remarks && remarks.remarks.length > 0 && h("details", { class: "remarks" },
         h("summary", {}, `${remarks.remarks.length} ${remarks.remarks.length === 1 ? "remark" : "remarks"} on printing`),
         h("ul", {}, ...remarks.remarks.map((text) => h("li", {}, sentence(text))))));
+  }
+
+  /** Whether the part is larger than the domain of its task, in a sentence. */
+  private exceeds(size: [number, number, number]): string {
+    const task = (this.subject.task ?? this.subject.provenance["task"]) as Table | null | undefined;
+    const domain = task?.domain?.size;
+    if (!domain || !domain.some((length, axis) => typeof length === "number" && size[axis]! > length + 0.05)) return "";
+    return `Larger than the domain of ${domain.join(" × ")} mm: the refinement moves nodes, and struts are wider than a line. State a smaller domain if the part has to fit.`;
   }
 
   /** The printing time, which the slicer takes some seconds to estimate. */

@@ -72,7 +72,7 @@ export class RunPage {
     if (!search) return;
     this.method = search;
     const curve = search.running_best ? "The best design of each chain so far." : "The current design of each chain.";
-    const missed = this.run.problem.specification ? " Designs that miss items have no point." : "";
+    const missed = this.run.problem.specification ? " Designs that miss more than the refinement can mend have no point." : "";
     this.curveNote.textContent = `${curve}${missed}${this.run.settings.replicas === undefined ? " Shaded: phases of higher temperature." : ""}`;
     this.show(this.run);
   }
@@ -182,7 +182,7 @@ export class RunPage {
     const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
     const refined = this.update?.refined;
-    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.sheets ? `, ${count(refined.sheets, "check")} in the better model` : ""}${refined.objective === null ? "" : `, best ${figure(refined.objective, 2)}`}`;
+    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.sheets ? `, ${count(refined.sheets, "check")} in the better model` : ""}${refined.objective === null ? "" : `, best ${figure(refined.objective * this.unit, 2)}`}`;
     const phase = refined ? "refinement" : tried ? "verification" : "search";
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
     const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${done.toLocaleString("en")} geometries`)]] : [
@@ -214,13 +214,19 @@ export class RunPage {
       else if (moved?.objectives.length) this.curveTitle.textContent = `Objective along the search: ${moved.objectives[0]!.label}`;
       const better = this.update?.refined?.objective ?? null;
       clear(this.readout, value !== null && h("strong", {}, objective?.reached ?? figure(value, 3)),
-        better !== null && h("span", {}, h("b", {}, `refined so far: objective ${figure(better, 2)}`)),
-        h("span", {}, `${objective ? `${objective.label} of the ` : ""}${better === null ? "" : "drawn, before refinement: "}${this.stateText(run, value !== null, done)}`));
+        better !== null && h("span", {}, h("b", {}, `refined so far: objective ${figure(better * this.unit, 2)}`)),
+        h("span", {}, `${better === null ? "" : "drawn, before refinement: "}${objective ? `${objective.label} of the ` : ""}${this.stateText(run, value !== null || better !== null, done)}`));
     }
+  }
+
+  /** Size of a unit of the objective: mm for a travel. */
+  private get unit(): number {
+    return this.update?.moved?.objectives[0]?.quantity === "travel" ? this.run.part?.scale ?? 1 : 1;
   }
 
   private bestText(run: Run): string {
     const best = run.efficiency ?? this.chart.best;
+    if (run.efficiency === null && best !== null) return figure(best * this.unit, 3);
     return best === null && this.run.problem.specification && this.chart.curves.size ? "no design meets all items yet" : figure(best, 3);
   }
 

@@ -9,7 +9,8 @@ export interface Column { title: string; items: ItemState[] }
 /** What is maximised, unless it is the motion of the output over that of the input, which a headline shows anyway. */
 export function otherObjective(objectives: Objective[]): Objective | null {
   const first = objectives[0];
-  return first && first.quantity !== "gain" ? first : null;
+  // A payload beyond the wanted one is not always determined.
+  return first && first.quantity !== "gain" && /\d/.test(first.reached) ? first : null;
 }
 
 /** One sentence on a list of items: whether all are met, and which one is farthest from it. */

@@ -148,7 +148,7 @@ def export(
     size = None if marker_size is None else read_length("marker size", marker_size)
     if markers:
         check_markers(out, size, overwrite)
-        grips = replace(grips, plate=True, pad=True, output_pad=True)
+        grips = replace(grips, plate=True, pad=True, output_pad=True, strict=False)
     elif size is not None:
         raise InvalidSettings("marker-size: expected --markers as well")
     height = read_length("layer", layer)

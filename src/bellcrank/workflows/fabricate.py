@@ -50,6 +50,8 @@ class Grips:
         Length of an additional strut at the output, mm; 0 for none.
     output_pad
         Whether to fill the holes between output nodes to a pad, for a marker.
+    strict
+        Whether a part without holes between these nodes is refused.
     """
 
     plate: bool = False
@@ -59,6 +61,7 @@ class Grips:
     pad: bool = False
     pointer: float = 0.0
     output_pad: bool = False
+    strict: bool = True
 
     def __post_init__(self) -> None:
         if self.screws < 0:
@@ -76,7 +79,7 @@ class Grips:
         InvalidProblem
             If there are some for a part in space.
         InvalidSettings
-            If there is no room for them or the output has no beam.
+            If there is nothing to fill, no room for screws, or the output has no beam.
         """
         problem = part.design.problem
         if part.dimension == 3:
@@ -92,12 +95,18 @@ class Grips:
             shown, drawn = with_pointer(positions, beams, node, direction, self.pointer)
             width = np.append(width, part.section.width)
         outline = strut_outline(shown, drawn, width, fillet)
-        if self.plate:
-            outline = filled(outline, shown, drawn, problem.supports.nodes, width)
-        if self.pad:
-            outline = filled(outline, shown, drawn, problem.input.nodes, width)
-        if self.output_pad:
-            outline = filled(outline, shown, drawn, problem.output.nodes, width)
+        for name, nodes in (
+            *((("plate", problem.supports.nodes),) if self.plate else ()),
+            *((("pad", problem.input.nodes),) if self.pad else ()),
+            *((("output pad", problem.output.nodes),) if self.output_pad else ()),
+        ):
+            solid = filled(outline, shown, drawn, nodes, width)
+            if self.strict and solid.hole_count == outline.hole_count:
+                raise InvalidSettings(
+                    f"{name}: no hole lies between struts that join its nodes only, so that there "
+                    "is nothing to fill; select nodes of two rows, which enclose triangles"
+                )
+            outline = solid
         if self.screws:
             points = screw_positions(
                 outline, shown, problem.supports.nodes, self.screws, self.screw_diameter, self.wall
