@@ -95,8 +95,9 @@ export class DomainPanel {
     const { table } = editor.task;
     const part = table.part ?? {};
     const put = (changes: NonNullable<Table["part"]>): void => {
-      const next = cleaned({ ...part, ...changes });
-      editor.change(cleaned({ ...table, part: Object.keys(next).length ? next : undefined }));
+      const now = editor.task.table;
+      const next = cleaned({ ...now.part, ...changes });
+      editor.change(cleaned({ ...now, part: Object.keys(next).length ? next : undefined }));
     };
     const size = (key: "width" | "thickness" | "spacing", label: string, usual: number): HTMLElement =>
       amount(`part-${key}`, label, part[key] ?? usual, "mm", (value) => put({ [key]: value }));
@@ -130,13 +131,15 @@ export class DomainPanel {
       else if (picked === "outline") put({ outline: [[0, 0], [80, 0], [80, 40], [40, 40], [40, 70], [0, 70]], ...zones });
       else if (picked === "problem") editor.change({ ...table, domain: { problem: "crane" }, supports: [], cases: table.cases.map((each) => ({ ...each, inputs: [], outputs: (each.outputs?.length ? each.outputs : [{ gain: [{ maximise: true }] }]).map((output: OutputTable) => cleaned({ ...output, at: undefined, direction: undefined })) })) });
     };
+    // A field may be left after the panel is drawn again: the present task counts, not that of the drawing.
     const side = (index: 0 | 1 | 2) => (value: Amount | undefined): void => {
-      const size = [...domain.size!] as number[];
+      const now = editor.task.table;
+      const size = [...now.domain.size!] as number[];
       const length = value === undefined ? size[index]! : lengthIn(value);
       (size as Amount[])[index] = Number.isNaN(length) ? value! : length;
       // The server says what is wrong with a text that is no length.
-      if (Number.isNaN(length)) put({ ...domain, size });
-      else editor.change(resized(table, size));
+      if (Number.isNaN(length)) editor.change({ ...now, domain: { ...now.domain, size } });
+      else editor.change(resized(now, size));
     };
     const lattice = select(LATTICES.map((name): [string, string] => [name, name]), domain.problem ?? "crane", (picked) => put({ problem: picked }));
     lattice.dataset.key = "domain-problem";

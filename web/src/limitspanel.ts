@@ -13,8 +13,9 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
   const { table } = editor.task;
   const limits = table.limits ?? {};
   const put = (changes: Limits): void => {
-    const next = cleaned({ ...limits, ...changes });
-    editor.change(cleaned({ ...table, limits: Object.keys(next).length ? next : undefined }));
+    const now = editor.task.table;
+    const next = cleaned({ ...now.limits, ...changes });
+    editor.change(cleaned({ ...now, limits: Object.keys(next).length ? next : undefined }));
   };
   const limited = !editor.built?.items.length || editor.built.items.some(({ name }) => name.endsWith("strain"));
   const value = (key: "strain" | "clearance"): Amount | undefined => (typeof limits[key] === "boolean" ? undefined : limits[key]);
