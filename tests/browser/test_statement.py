@@ -94,7 +94,8 @@ def test_ports_edges_and_zones_follow_the_sides_of_a_part_of_another_size(page: 
 def test_a_button_stays_under_the_pointer_when_the_panel_is_drawn_again(page: Any) -> None:
     tool(page, "Outputs")
     arrow = page.get_by_label("up", exact=True)
-    page.mouse.wheel(0, 300)
+    arrow.wait_for()
+    page.evaluate("scrollTo({ top: 200, behavior: 'instant' })")
     before = arrow.bounding_box()["y"]
     for direction in ("up", "right", "down"):
         page.get_by_label(direction, exact=True).click()
@@ -104,7 +105,9 @@ def test_a_button_stays_under_the_pointer_when_the_panel_is_drawn_again(page: An
                 task(page)["table"]["cases"][0]["outputs"][0]["direction"] == name
             ),
         )
-    assert arrow.bounding_box()["y"] == pytest.approx(before, abs=2.0)
+        page.wait_for_timeout(300)  # the task is built meanwhile
+        arrow.wait_for()
+        assert arrow.bounding_box()["y"] == pytest.approx(before, abs=2.0)
 
 
 def test_errors_name_the_sections_of_the_page(page: Any) -> None:

@@ -143,7 +143,7 @@ export class Editor implements TaskEditor {
       h("div", { class: "intro" },
         h("h1", {}, "Design a compliant mechanism"),
         h("p", {}, "State where the part is held, where it is pushed, and what its outputs must do. The search determines which struts to keep; the result is one piece that prints."),
-        this.panels.start, this.welcome, this.notice),
+        this.panels.start, !this.welcome.hidden && this.welcome, this.notice),
       stage, this.panels.element);
   }
 
