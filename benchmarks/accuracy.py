@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 DOCS = Path(__file__).parents[1] / "docs"
 FRAMES, SHEET = "frames, 8 elements", "sheet"
+FILM_ERROR = 0.02
+"""Largest relative error of an efficiency from a film that is counted."""
+SETS = ("main", "supplement")
+"""The two measurements of the lattice."""
 
 
 def read(name: str) -> Any:
@@ -171,12 +175,6 @@ def _measurements() -> Iterator[tuple[str, str, str, str]]:
         ),
         "[measuring a print](measure.md)",
     )
-
-
-FILM_ERROR = 0.02
-"""Largest relative error of an efficiency from a film that is counted."""
-SETS = ("main", "supplement")
-"""The two measurements of the lattice."""
 
 
 def table() -> Iterator[str]:

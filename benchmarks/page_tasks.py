@@ -13,6 +13,7 @@ import json
 import shutil
 import time
 from pathlib import Path
+from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 import httpx2 as httpx
@@ -91,6 +92,7 @@ def run_task(page: Any, address: str, name: str) -> dict[str, Any]:
     built = state.built()
     row: dict[str, Any] = {
         "task": name,
+        "commit": provenance()["commit"],
         "stated_s": round(time.perf_counter() - start, 1),
         "clicks": state.clicks,
         "fields": state.fields,
@@ -185,7 +187,7 @@ def main() -> None:
                 row = run_task(page, address, name)
             except Exception as error:  # the record says what failed
                 row = {"task": name, "error": f"{type(error).__name__}: {str(error)[:300]}"}
-                page.screenshot(path=f"{name}.png")
+                page.screenshot(path=Path(gettempdir()) / f"{name}.png")
             finally:
                 page.context.close()
             print(json.dumps(row), flush=True)

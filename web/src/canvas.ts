@@ -4,7 +4,7 @@ import type { Point } from "./api";
 import { angleOf, arrow, Drawing, range, turnArrow, where } from "./drawing";
 import { announce, s } from "./dom";
 import { describeTarget, mirrorAxes, nextInDirection, rollerLines, shapePath } from "./marks";
-import { directionAt, rowOf, type Direction, type Shape, type Target, type Tool, type ZoneShape } from "./task";
+import { directionAt, middleOf, rowOf, type Direction, type Shape, type Target, type Tool, type ZoneShape } from "./task";
 import type { Arrow, TaskDrawing, View } from "./view";
 
 /** Length of the arrow of an input, in strokes. */
@@ -84,9 +84,7 @@ export class Canvas extends Drawing implements TaskDrawing {
     this.markArrows(bits && this.movedTo?.length === this.rest.length ? this.movedTo : this.rest);
     this.arrowGroup.replaceChildren(...view.arrows.flatMap((each) => this.arrowMarks(each)));
     this.zoneGroup.replaceChildren(...view.zones.map(({ kind, shape }) => s("path", { class: `zone ${kind}`, d: shapePath(shape, view.built.part.scale) })));
-    const beams = where(designable);
-    this.axes.setAttribute("d", mirrorAxes(this.rest, (beams.length ? beams : range(this.beams.length)).map((k) => this.beams[k]!), this.box,
-      { x: view.symmetry.includes("x"), y: view.symmetry.includes("y") }));
+    this.axes.setAttribute("d", mirrorAxes(middleOf(view.built), this.box, { x: view.symmetry.includes("x"), y: view.symmetry.includes("y") }));
     this.faults.replaceChildren(...view.faults.filter((node) => 2 * node < this.rest.length).map((node) =>
       s("circle", { cx: this.rest[2 * node]!, cy: -this.rest[2 * node + 1]!, r: 0.4 })));
   }

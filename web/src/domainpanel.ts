@@ -42,7 +42,7 @@ export class DomainPanel {
     const { table } = editor.task;
     const file = this.file("File to open", ".toml,.json", (picked) => this.attempt(() => editor.load(picked)));
     const name = h("input", { type: "text", value: table.name, maxlength: 100, "data-key": "name" });
-    name.addEventListener("change", () => { if (name.value.trim()) editor.change({ ...table, name: name.value.trim() }); });
+    name.addEventListener("change", () => { if (name.value.trim()) editor.change({ ...editor.task.table, name: name.value.trim() }); });
     return h("div", { class: "content" },
       field("Name", name),
       this.part(), this.domain(), this.zones(),

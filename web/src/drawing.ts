@@ -85,17 +85,6 @@ export class Drawing implements LatticeDrawing {
     this.setView(this.box);
   }
 
-  /** Displace the nodes; `null` returns them to rest. */
-  move(displacement: ArrayLike<number> | null, times = 1): void {
-    if (!displacement) {
-      this.at = this.rest;
-      return;
-    }
-    const at = new Float64Array(this.rest.length);
-    for (let k = 0; k < at.length; k++) at[k] = this.rest[k]! + times * displacement[k]!;
-    this.at = at;
-  }
-
   /** Enlarge the view, if necessary, so that displaced beams are inside. */
   makeRoom(beams: ArrayLike<number>, displacement: ArrayLike<number>, margin = 0.6): void {
     const { x, y, w, h } = this.view;

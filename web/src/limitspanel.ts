@@ -40,7 +40,7 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
 function toleranceFields(editor: TaskEditor, tolerance: Tolerance): HTMLElement {
   const field = (key: keyof Tolerance, label: string, unit: string, help: string): HTMLElement =>
     amount(`tolerance-${key}`, label, tolerance[key], unit, (given) =>
-      editor.change({ ...editor.task.table, tolerance: cleaned({ ...tolerance, [key]: given }) }), help);
+      editor.change({ ...editor.task.table, tolerance: cleaned({ ...editor.task.table.tolerance, [key]: given }) }), help);
   return h("div", {},
     h("div", { class: "row" }, field("width", "All widths", "", "such as 20%"), field("each_width", "Each width", "", "standard deviation, 5%")),
     h("div", { class: "row" }, field("node", "Nodes", "mm", "0.1 mm"), field("angle", "Direction of the input", "°", "5 degrees")),

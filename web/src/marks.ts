@@ -17,16 +17,9 @@ export function rollerLines(rest: Float64Array, along_y: number[], along_x: numb
   return d;
 }
 
-/** Mirror axes, through the middle of the designable beams. */
-export function mirrorAxes(
-  rest: Float64Array, beams: [number, number][], box: Box, mirror: { x: boolean; y: boolean },
-): string {
-  let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
-  for (const node of beams.flat()) {
-    x0 = Math.min(x0, rest[2 * node]!); x1 = Math.max(x1, rest[2 * node]!);
-    y0 = Math.min(y0, -rest[2 * node + 1]!); y1 = Math.max(y1, -rest[2 * node + 1]!);
-  }
-  return (mirror.x ? `M${(x0 + x1) / 2} ${box.y}V${box.y + box.h}` : "") + (mirror.y ? `M${box.x} ${(y0 + y1) / 2}H${box.x + box.w}` : "");
+/** Mirror axes through the middle of a design. */
+export function mirrorAxes([x, y]: [number, number], box: Box, mirror: { x: boolean; y: boolean }): string {
+  return (mirror.x ? `M${x} ${box.y}V${box.y + box.h}` : "") + (mirror.y ? `M${box.x} ${-y}H${box.x + box.w}` : "");
 }
 
 /** Find the nearest node or beam in a direction, starting from a corner if `at` is negative. */

@@ -4,6 +4,7 @@ import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, se
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
+import { where } from "./drawing";
 import { Player, type Picture } from "./player";
 import { figureTable, itemTable, otherObjective, verdictOf, type Column } from "./specification";
 import type { Table } from "./task";
@@ -159,7 +160,7 @@ export class Result {
     clear(this.headline, h("strong", {}, objective?.reached ?? figure(first?.efficiency, 2)),
       h("span", {}, h("b", { class: "model" }, "frames, 8 elements in each strut"), h("br"),
         `${objective ? sentence(objective.label).slice(0, -1) : "Output / input motion"} of the part with ${this.strutText()} struts`,
-        solid?.efficiency != null && h("span", { class: "second" }, h("br"), `${figure(solid.efficiency, 2)} as output / input motion in the 2D solid, the printed outline`)));
+        solid?.efficiency != null && h("span", {}, h("br"), `${figure(solid.efficiency, 2)} as output / input motion in the 2D solid, the printed outline`)));
     const columns: Column[] = [];
     // The model of the search is that of the frames, with fewer elements.
     if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
@@ -290,15 +291,15 @@ export class Result {
       fault && h("p", { class: "fault", role: "alert" }, fault),
       remarks && h("p", { class: "more" }, `${remarks.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ")} mm`,
         remarks.mass === null ? "" : `, ${figure(remarks.mass, 1)} g`, remarks.stroke === null ? "" : `, stroke ${figure(remarks.stroke, 2)} mm`),
-      remarks && this.exceeds(remarks.size) && h("p", { class: "note" }, this.exceeds(remarks.size)),
+      remarks && h("p", { class: "note" }, this.excessText(remarks.size)),
       remarks && this.hasSlicer && this.printTime(),
       remarks && remarks.remarks.length > 0 && h("details", { class: "remarks" },
         h("summary", {}, `${remarks.remarks.length} ${remarks.remarks.length === 1 ? "remark" : "remarks"} on printing`),
         h("ul", {}, ...remarks.remarks.map((text) => h("li", {}, sentence(text))))));
   }
 
-  /** Whether the part is larger than the domain of its task, in a sentence. */
-  private exceeds(size: [number, number, number]): string {
+  /** That the part is larger than the domain of its task; empty if it is not. */
+  private excessText(size: [number, number, number]): string {
     const task = (this.subject.task ?? this.subject.provenance["task"]) as Table | null | undefined;
     const domain = task?.domain?.size;
     if (!domain || !domain.some((length, axis) => typeof length === "number" && size[axis]! > length + 0.05)) return "";
@@ -332,7 +333,7 @@ export class Result {
   private strutText(): string {
     const { problem: { widths }, mask } = this.subject;
     if (!widths) return `${this.part.width} mm`;
-    const own = bitsOf(mask, widths.length).reduce<number[]>((found, bit, k) => (bit ? [...found, widths[k]! * this.part.scale] : found), []);
+    const own = where(bitsOf(mask, widths.length)).map((beam) => widths[beam]! * this.part.scale);
     const [low, high] = [Math.min(...own), Math.max(...own)];
     return high - low < 0.005 ? `${figure(high, 1)} mm` : `${figure(low, 1)} to ${figure(high, 1)} mm`;
   }

@@ -136,15 +136,23 @@ export function isTurn({ direction, rotation, gain, travel }: OutputTable): bool
   return direction === undefined && rotation !== undefined && !gain && !travel;
 }
 
+/** The middle of the designable struts of a lattice in the plane, about which designs are symmetric. */
+export function middleOf({ lattice: { positions, beams }, problem }: Built): [number, number] {
+  const designable = problem?.designable.length ? problem.designable.map((beam) => beams[beam]!) : beams;
+  const along = (axis: 0 | 1): number => {
+    const values = designable.flat().map((node) => positions[node]![axis]);
+    return 0.5 * (Math.min(...values) + Math.max(...values));
+  };
+  return [along(0), along(1)];
+}
+
 /** Mirror images of nodes in a plane lattice, about the middle of its designable struts; -1 for none. */
 export function imagesOf(built: Built, axis: "x" | "y", nodes: number[]): number[] {
-  const { positions, beams } = built.lattice;
+  const { positions } = built.lattice;
   const index = axis === "x" ? 0 : 1;
-  const designable = built.problem?.designable.map((beam) => beams[beam]!) ?? beams;
-  const values = designable.flat().map((node) => positions[node]![index]);
-  const sum = Math.min(...values) + Math.max(...values);
+  const middle = middleOf(built)[index];
   return nodes.map((node) => {
-    const wanted = positions[node]!.map((value, k) => (k === index ? sum - value! : value!));
+    const wanted = positions[node]!.map((value, k) => (k === index ? 2 * middle - value! : value!));
     return positions.findIndex(([x, y]) => Math.hypot(x - wanted[0]!, y - wanted[1]!) < 0.05);
   });
 }

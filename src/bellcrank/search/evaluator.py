@@ -16,7 +16,12 @@ from bellcrank.mechanics import (
     check_memory,
     model_evaluator,
 )
-from bellcrank.search.constraints import ConstrainedEvaluator, at_strokes, parse_goal
+from bellcrank.search.constraints import (
+    ConstrainedEvaluator,
+    at_strokes,
+    mirror_axes,
+    parse_goal,
+)
 from bellcrank.search.relaxation import relaxed
 from bellcrank.search.specification import RESERVE, SpecificationEvaluator
 from bellcrank.search.symmetry import SymmetryGroups
@@ -115,8 +120,7 @@ def symmetry_groups(problem: Problem, settings: SearchSettings) -> SymmetryGroup
     """
     if problem.specification is not None:
         return SymmetryGroups(problem, problem.specification.symmetry)
-    goals = [parse_goal(goal) for goal in settings.goals]
-    return SymmetryGroups(problem, [goal.value for goal in goals if goal.name == "mirror"])
+    return SymmetryGroups(problem, mirror_axes(map(parse_goal, settings.goals)))
 
 
 def verification_evaluator(

@@ -95,11 +95,13 @@ class Grips:
             shown, drawn = with_pointer(positions, beams, node, direction, self.pointer)
             width = np.append(width, part.section.width)
         outline = strut_outline(shown, drawn, width, fillet)
-        for name, nodes in (
-            *((("plate", problem.supports.nodes),) if self.plate else ()),
-            *((("pad", problem.input.nodes),) if self.pad else ()),
-            *((("output pad", problem.output.nodes),) if self.output_pad else ()),
+        for name, wanted, nodes in (
+            ("plate", self.plate, problem.supports.nodes),
+            ("pad", self.pad, problem.input.nodes),
+            ("output pad", self.output_pad, problem.output.nodes),
         ):
+            if not wanted:
+                continue
             solid = filled(outline, shown, drawn, nodes, width)
             if self.strict and solid.hole_count == outline.hole_count:
                 raise InvalidSettings(

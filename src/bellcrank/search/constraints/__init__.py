@@ -18,6 +18,7 @@ from bellcrank.search.constraints.constraint import (
     DeformedDesign,
     Goal,
     constraints,
+    mirror_axes,
     parse_goal,
 )
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator, penalty_of
@@ -34,6 +35,7 @@ __all__ = [
     "at_strokes",
     "constraints",
     "mass_of",
+    "mirror_axes",
     "no_contact",
     "parse_goal",
     "penalty_of",

@@ -27,7 +27,7 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.registry import Registry
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     import numpy as np
     from numpy.typing import NDArray
@@ -139,6 +139,15 @@ class Goal:
 
 
 constraints: Registry[ConstraintType] = Registry("goal")
+
+
+def mirror_axes(goals: Iterable[Goal]) -> list[str]:
+    """Return the axes along which goals demand mirror symmetry.
+
+    >>> mirror_axes([parse_goal("mirror x"), parse_goal("no-contact 0.2")])
+    ['x']
+    """
+    return [goal.value for goal in goals if goal.name == "mirror"]
 
 
 def parse_goal(text: object) -> Goal:

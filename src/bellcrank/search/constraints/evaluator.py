@@ -17,7 +17,12 @@ from bellcrank.mechanics import (
     model_evaluator,
 )
 from bellcrank.search.constraints.cases import LoadCase, check_compatible
-from bellcrank.search.constraints.constraint import TOLERANCE, DeformedDesign, parse_goal
+from bellcrank.search.constraints.constraint import (
+    TOLERANCE,
+    DeformedDesign,
+    mirror_axes,
+    parse_goal,
+)
 from bellcrank.search.symmetry import SymmetryGroups
 from bellcrank.search.verdict import Verdict
 
@@ -120,8 +125,7 @@ class ConstrainedEvaluator:
         self._limits_structure = any(
             each.structure_violation is not None for _, made in self._constraints for each in made
         )
-        axes = [goal.value for goal in parsed if goal.name == "mirror"]
-        self.groups = SymmetryGroups(original, axes)
+        self.groups = SymmetryGroups(original, mirror_axes(parsed))
         self.problem = self.groups.problem
         self._violation = self._reference_violation = math.inf
         self._efficiencies = [math.nan] * len(cases)
