@@ -63,9 +63,13 @@ class Server:
         self.process.stderr.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    """The browser, which can reach this machine only."""
+    """The browser, which can reach this machine only.
+
+    Playwright keeps an event loop running in this thread, where other modules run theirs: it ends
+    with the module.
+    """
     if CHROMIUM is None:
         pytest.skip("Chromium is not installed")
     arguments = [
