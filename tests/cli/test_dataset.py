@@ -39,6 +39,13 @@ def test_the_same_command_goes_on_and_leaves_the_same_bytes(built: Path, tmp_pat
     assert "another spec" in refusal(*words, folder=folder)
 
 
+def test_a_sample_of_the_runs_can_be_stored(built: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(built, tmp_path / "sample", symlinks=True)
+    words = ("dataset", "build", PROBLEM, *SETTINGS, "--every", "10", "--out", folder)
+    assert call(*words).out.startswith("50 designs of scaling-8 (219 beams) from 2 runs")
+    assert set(read_dataset(folder).step % 10) == {0}
+
+
 def test_info_says_what_is_in_it(built: Path) -> None:
     told = call("dataset", "info", built, "--json").data
     data = read_dataset(built)
@@ -56,6 +63,7 @@ def test_invalid_input_is_refused_in_one_line(here: Path) -> None:
     assert "not a Parquet file" in refusal("dataset", "info", "text")
     assert "runs: expected at least 1" in refusal("dataset", "build", PROBLEM, "--runs", 0)
     assert "workers: expected at least 1" in refusal("dataset", "build", PROBLEM, "--workers", 0)
+    assert "every: expected at least 1" in refusal("dataset", "build", PROBLEM, "--every", 0)
     words = ("dataset", "build", PROBLEM, "--set", "unloaded_beams=prune_dead_ends")
     assert "unloaded_beams" in refusal(*words)
     assert "expected KEY=VALUE" in refusal("dataset", "build", PROBLEM, "--set", "x")

@@ -17,7 +17,7 @@ import pytest
 from bellcrank.model import pack_mask, write_problem
 from bellcrank.storage.description import read_description, write_description
 from bellcrank.surrogate.trained_model import read_model
-from bellcrank.surrogate.training_setup import DESCRIPTION, TRAINING_SCHEMA
+from bellcrank.surrogate.training_setup import DESCRIPTION, KEYS, TRAINING_SCHEMA
 from tests.surrogate.helpers import same_weights
 from tests.surrogate.tiny import tiny_dataset, tiny_problem
 
@@ -137,9 +137,7 @@ def test_a_killed_training_resumes(data: Path, tmp_path: Path) -> None:
         process.send_signal(signal.SIGKILL)
         process.wait()
     path = folder / DESCRIPTION
-    description = read_description(
-        path, TRAINING_SCHEMA, "training", ("recipe", "precision", "data")
-    )
+    description = read_description(path, TRAINING_SCHEMA, "training", KEYS)
     assert description.content["recipe"]["epochs"] == 4000
     description.content["recipe"]["epochs"] = 1  # so that the rest is short
     write_description(path, TRAINING_SCHEMA, description, overwrite=True)
@@ -179,6 +177,34 @@ def test_existing_and_missing_trainings_are_refused(
     assert "training.json" in refusal("train", data, "--resume", tmp_path)
     tiny_dataset().take(np.arange(1000)).write(tmp_path / "other.parquet")
     assert "other data" in refusal("train", tmp_path / "other.parquet", "--resume", trained)
+
+
+def test_a_training_on_several_datasets_starts_from_a_trained_network(
+    data: Path, trained: Path, tmp_path: Path
+) -> None:
+    folder, start = tmp_path / "tuned", read_model(trained / "model.safetensors")
+    words = (*TRAINING, "--set", "learning_rate=1e-5", "--start", trained, "--out", folder)
+    outcome = call("train", data, data, *words)
+    assert outcome.code == 0, outcome.err
+    model = read_model(folder / "model.safetensors")
+    assert model.record["start"] == start.record
+    assert model.record["data"]["designs"] == 2 * start.record["data"]["designs"]
+    assert model.record["data"]["runs"] == 2 * start.record["data"]["runs"]
+    assert not same_weights(model, start)
+    packed = tiny_dataset().packed[::100]
+    change = model.predict(packed, device="cpu") - start.predict(packed, device="cpu")
+    assert abs(change).max() < 0.2 * start.deviation
+    assert "other data" in refusal("train", data, "--resume", folder)
+    assert call("train", data, data, "--resume", folder, "--device", "cpu").code == 0
+
+
+def test_a_start_that_does_not_fit_is_refused(data: Path, trained: Path, tmp_path: Path) -> None:
+    words = ("train", data, "--out", tmp_path / "new")
+    assert "'mlp'" in refusal(*words, "--start", trained)  # the recipe has resnet18-w16
+    assert "no bundled network for 'tiny'" in refusal(*words, "--start", "bundled")
+    assert "cannot be read" in refusal(*words, "--start", tmp_path / "absent")
+    assert "--resume" in refusal("train", data, "--resume", trained, "--start", trained)
+    assert not (tmp_path / "new").exists()
 
 
 def test_models_that_cannot_predict_are_refused(

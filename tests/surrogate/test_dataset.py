@@ -17,13 +17,15 @@ from bellcrank.errors import (
     InvalidFile,
     OutputExists,
 )
-from bellcrank.surrogate.dataset import Dataset, read_dataset
+from bellcrank.surrogate.dataset import Dataset, join, read_dataset
 from bellcrank.surrogate.splitting import split_by_run
 
-from .helpers import equal
+from .helpers import equal, random_dataset
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from bellcrank.model import Problem
 
 
 def test_a_dataset_comes_back_to_the_last_bit(data: Dataset, tmp_path: Path) -> None:
@@ -147,3 +149,25 @@ def test_no_bit_of_a_file_can_change_what_is_read_without_a_word(
         path.write_bytes(whole[:cut])
         with pytest.raises((InvalidFile, CorruptRun)):
             read_dataset(path)
+
+
+def test_joined_datasets_keep_their_rows_and_get_runs_of_their_own(
+    data: Dataset, problem: Problem
+) -> None:
+    other = random_dataset(problem, runs=3, seed=6)
+    joined = join([data, other, other])
+    assert joined.run_count == data.run_count + 6
+    parts = np.split(np.arange(len(joined)), [len(data), len(data) + len(other)])
+    for part, source, first in zip(parts, (data, other, other), (0, 8, 11), strict=True):
+        found = joined.take(part)
+        assert np.array_equal(found.run, source.run + first)
+        for name in ("packed", "efficiency", "step", "accepted"):
+            assert np.array_equal(getattr(found, name), getattr(source, name))
+    assert join([data]) is data
+
+
+def test_datasets_of_different_problems_are_not_joined(data: Dataset, crane: Problem) -> None:
+    with pytest.raises(InvalidDataset, match=r"dataset 2 has another problem \('crane'\)"):
+        join([data, random_dataset(crane)])
+    with pytest.raises(InvalidDataset, match="no dataset is given"):
+        join([])

@@ -116,6 +116,21 @@ def test_designs_without_a_unique_response_are_left_out_and_counted(
     assert gone == {3, 5}
 
 
+def test_a_sample_has_every_nth_proposal_of_each_run(
+    built: Path, spec: DatasetSpec, tmp_path: Path
+) -> None:
+    folder = shutil.copytree(built, tmp_path / "sample", symlinks=True)
+    sample = build_dataset(replace(spec, every=7), folder, engine="serial")
+    assert sample is not None
+    whole = read_dataset(built)
+    assert equal(replace(sample, origin={}), replace(whole.take(whole.step % 7 == 0), origin={}))
+    assert sample.origin["every"] == 7
+    assert len(sample) + sample.origin["left_out"] == 4 * 43  # steps 0, 7, ..., 294
+    again = build_dataset(spec, folder, engine="serial")  # the campaign kept all proposals
+    assert again is not None
+    assert equal(again, whole)
+
+
 def test_another_dataset_in_the_folder_is_never_written_over(
     built: Path, spec: DatasetSpec, tmp_path: Path
 ) -> None:
@@ -140,6 +155,7 @@ def test_another_dataset_in_the_folder_is_never_written_over(
         ({"runs": 0}, "runs: expected at least 1, got 0"),
         ({"steps": 0}, "steps: expected at least 1, got 0"),
         ({"seed": -1}, "seed: expected at least 0, got -1"),
+        ({"every": 0}, "every: expected at least 1, got 0"),
         (
             {"search": {"unloaded_beams": "prune_dead_ends"}},
             "unloaded_beams: .*prune_dead_ends.*'keep'",

@@ -30,9 +30,15 @@ from bellcrank.surrogate.metrics import accuracy
 from bellcrank.surrogate.recipes import Recipe, recipe_of
 from bellcrank.surrogate.splitting import rows_of_epoch, split_by_run
 from bellcrank.surrogate.trained_model import MODEL, read_model
-from bellcrank.surrogate.training_setup import DESCRIPTION, begin, resume
+from bellcrank.surrogate.training_setup import (
+    DESCRIPTION,
+    START,
+    TRAINING_SCHEMA,
+    begin,
+    resume,
+)
 
-from .helpers import TINY, random_dataset, same_weights
+from .helpers import TINY, random_dataset, same_weights, untrained
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -275,7 +281,7 @@ def test_a_folder_without_a_training_cannot_be_gone_on_with(data: Dataset, tmp_p
             resume(folder, data)
 
 
-@pytest.mark.parametrize("name", [DESCRIPTION, CHECKPOINT, MODEL])
+@pytest.mark.parametrize("name", [DESCRIPTION, CHECKPOINT, MODEL, START])
 def test_a_folder_that_holds_anything_of_a_training_is_left_alone(
     data: Dataset, tmp_path: Path, name: str
 ) -> None:
@@ -317,7 +323,7 @@ def test_a_checkpoint_of_another_network_is_refused(data: Dataset, tmp_path: Pat
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"schema": "other"}', '{"schema": "S"}'])
 def test_a_damaged_description_is_refused(data: Dataset, tmp_path: Path, text: str) -> None:
-    (tmp_path / DESCRIPTION).write_text(text.replace("S", "bellcrank/training/3"))
+    (tmp_path / DESCRIPTION).write_text(text.replace("S", TRAINING_SCHEMA))
     with pytest.raises((InvalidFile, CorruptRun), match=r"training\.json"):
         resume(tmp_path, data, device="cpu")
 
@@ -392,3 +398,60 @@ def test_a_network_that_says_the_same_of_all_has_no_correlation() -> None:
     assert found.to_dict()["r_squared"] is None
     constant = accuracy(np.arange(3.0), np.full(3, 0.1))
     assert math.isnan(constant.determination)
+
+
+def test_a_training_starts_from_the_weights_and_the_normalisation_of_another(
+    data: Dataset, problem: Problem
+) -> None:
+    start = untrained(problem, seed=4)
+    before = start.predict(data.packed[:9], device="cpu")
+    training = begin(data, AVERAGED, start=start, device="cpu")
+    assert np.array_equal(training.model.predict(data.packed[:9], device="cpu"), before)
+    assert (training.model.mean, training.model.deviation) == (0.25, 0.5)
+    model = to_the_end(training)
+    assert model.record["start"] == {"note": "untrained"}
+    assert not same_weights(model, start)
+    assert np.array_equal(start.predict(data.packed[:9], device="cpu"), before)
+    assert begin(data, AVERAGED, device="cpu").start is None
+
+
+def test_a_training_with_a_start_resumes_to_the_same_weights_even_without_its_checkpoint(
+    data: Dataset, problem: Problem, tmp_path: Path
+) -> None:
+    start = untrained(problem, seed=4)
+    whole = to_the_end(begin(data, AVERAGED, start=start, device="cpu"))
+    list(begin(data, AVERAGED, tmp_path, start=start, device="cpu").run(after(7)))
+    resumed = resume(tmp_path, data, device="cpu")
+    assert resumed.step == 7
+    assert same_weights(to_the_end(resumed), whole)
+    (tmp_path / CHECKPOINT).unlink()
+    again = resume(tmp_path, data, device="cpu")
+    assert again.step == 0
+    assert same_weights(to_the_end(again), whole)
+
+
+def test_a_short_training_from_a_trained_network_is_better_than_from_random_weights(
+    problem: Problem,
+) -> None:
+    data = random_dataset(problem, runs=20, steps=50)
+    recipe = replace(AVERAGED, epochs=8, batch=50, epoch_size=None)
+    trained = to_the_end(begin(data, recipe, device="cpu"))
+    short = replace(recipe, epochs=1, learning_rate=1e-4)
+    fresh = random_dataset(problem, runs=20, steps=50, seed=9)
+    errors = [
+        to_the_end(begin(fresh, short, start=each, device="cpu")).record["held_out"]["rms_error"]
+        for each in (trained, None)
+    ]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_a_start_of_another_architecture_or_problem_is_refused(
+    data: Dataset, problem: Problem, crane: Problem, tmp_path: Path
+) -> None:
+    with pytest.raises(
+        InvalidModel, match=r"starts from a 'resnet18-w16', .* 'mlp'; .*--model resnet18-w16"
+    ):
+        begin(data, TINY, tmp_path / "t", start=untrained(problem, "resnet18-w16"), device="cpu")
+    with pytest.raises(InvalidModel, match=r"trained on 'crane' with .* 'scaling-8' has"):
+        begin(data, TINY, tmp_path / "t", start=untrained(crane), device="cpu")
+    assert not (tmp_path / "t").exists()

@@ -1,4 +1,4 @@
-"""Datasets from campaigns of short searches, half of them with the reversed output."""
+"""Datasets from campaigns of searches, half of them with the reversed output."""
 
 from __future__ import annotations
 
@@ -57,6 +57,9 @@ class DatasetSpec:
         Proposals of a run.
     seed
         Seed of the first run; each further run has the next.
+    every
+        Store every n-th proposal of a run only. Consecutive proposals of a long run are similar;
+        the campaign keeps all of them.
     search
         Settings that differ from those of the search ``paper``.
 
@@ -72,10 +75,11 @@ class DatasetSpec:
     runs: int = PAPER_RUNS
     steps: int = PAPER_STEPS
     seed: int = 0
+    every: int = 1
     search: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
-        for name, least in (("runs", 1), ("steps", 1), ("seed", 0)):
+        for name, least in (("runs", 1), ("steps", 1), ("seed", 0), ("every", 1)):
             if getattr(self, name) < least:
                 raise InvalidSettings(
                     f"{name}: expected at least {least}, got {getattr(self, name)}"
@@ -140,7 +144,8 @@ def build_dataset(
 ) -> Dataset | None:
     """Run the campaign, or the rest of it, and write its proposals as a dataset.
 
-    Call it again to resume after a stop or a kill. A call after the end writes the same bytes.
+    Call it again to resume after a stop or a kill. A call after the end writes the same bytes, or
+    with another `every` another sample of the same runs.
 
     Parameters
     ----------
@@ -180,13 +185,13 @@ def build_dataset(
     store = Store.create(root / CAMPAIGN, spec.campaign())
     if not complete(store, engine, options, report=report, stop=stop):
         return None
-    data = gather(store, spec.problem)
+    data = gather(store, spec.problem, spec.every)
     data.write(root / DATASET_FILE, overwrite=True)
     return data
 
 
-def gather(store: Store, problem: Problem) -> Dataset:
-    """Return all proposals of a campaign that have a unique, stable response.
+def gather(store: Store, problem: Problem, every: int = 1) -> Dataset:
+    """Return the proposals of a campaign that have a unique, stable response.
 
     Parameters
     ----------
@@ -194,6 +199,8 @@ def gather(store: Store, problem: Problem) -> Dataset:
         Store of the campaign.
     problem
         The problem with the output as given.
+    every
+        Return those whose step is a multiple of it.
 
     Raises
     ------
@@ -205,8 +212,9 @@ def gather(store: Store, problem: Problem) -> Dataset:
     forward = store.spec.tasks[0]
     parts: list[dict[str, NDArray[Any]]] = []
     for part in _tables(store):
-        converged = part["status"] == int(Status.CONVERGED)
-        parts.append({**{name: part[name][converged] for name in COLUMNS}, "left": ~converged})
+        sampled = part["step"] % every == 0
+        stored = sampled & (part["status"] == int(Status.CONVERGED))
+        parts.append({**{name: part[name][stored] for name in COLUMNS}, "left": sampled & ~stored})
     if not parts:
         raise InvalidDataset(f"{store.path}: the campaign has no results yet")
     found = {name: np.concatenate([part[name] for part in parts]) for name in (*COLUMNS, "left")}
@@ -216,6 +224,7 @@ def gather(store: Store, problem: Problem) -> Dataset:
         "forward": forward.run_count,
         "first_seed": forward.first_seed,
         "left_out": int(found["left"].sum()),
+        "every": every,
         "settings": forward.settings,
         "provenance": store.provenance,
     }

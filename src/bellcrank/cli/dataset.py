@@ -43,12 +43,13 @@ def build(
     ] = 2000,
     steps: Annotated[int, typer.Option(help="Proposals of each search.")] = 582,
     seed: Annotated[int, typer.Option(help="Seed of the first run.")] = 0,
+    every: Annotated[int, typer.Option(help="Store every n-th proposal of a search only.")] = 1,
     workers: Annotated[int | None, typer.Option(help="Number of processes. \\[all cores]")] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE: a setting of the search.")
     ] = None,
 ) -> None:
-    """Run many short searches, and store all their proposals."""
+    """Run many searches, and store their proposals."""
     from bellcrank.campaign.dataset import DatasetSpec, build_dataset
     from bellcrank.cli.campaign_view import CampaignProgress
     from bellcrank.cli.stopping import stopping_on_interrupt
@@ -56,8 +57,9 @@ def build(
 
     found = find_problem(problem)
     spec = DatasetSpec(
-        problem=found, runs=runs, steps=steps, seed=seed, search=settings_of("--set", settings)
-    )
+        problem=found, runs=runs, steps=steps, seed=seed, every=every,
+        search=settings_of("--set", settings),
+    )  # fmt: skip
     folder = out or Path(f"{found.name}-dataset")
     announce_compilation()
     with stopping_on_interrupt() as stop, CampaignProgress() as progress:

@@ -21,12 +21,17 @@ from bellcrank.errors import InvalidSettings
 if TYPE_CHECKING:
     from bellcrank.surrogate.training import Progress
 
+BUNDLED_NETWORK = "bundled"
+"""Value of --start for the network that the package contains."""
 FIGURES = {"R²": "r_squared", "determination": "determination", "rms error": "rms_error"}
 
 
 @app.command()
 def train(
-    dataset: Annotated[Path, typer.Argument(help="Dataset, or the folder it was built in.")],
+    datasets: Annotated[
+        list[Path],
+        typer.Argument(help="Datasets of one problem, or the folders they were built in."),
+    ],
     model: Annotated[
         str | None, typer.Option(help="resnet50, resnet18-w16 or mlp. \\[that of the recipe]")
     ] = None,
@@ -41,6 +46,13 @@ def train(
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE: another setting of the recipe.")
     ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            help="Start from the weights of a trained network: a file, the folder of a training, "
+            "or bundled. \\[random weights]"
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder. \\[PROBLEM-MODEL]")] = None,
     resume: Annotated[Path | None, typer.Option(help="Resume the training in this folder.")] = None,
     device: Device = "auto",
@@ -48,31 +60,35 @@ def train(
 ) -> None:
     """Train a network, and test it on runs that are held out."""
     from bellcrank.cli.stopping import stopping_on_interrupt
-    from bellcrank.surrogate.dataset import read_dataset
+    from bellcrank.surrogate.dataset import join, read_dataset
+    from bellcrank.surrogate.predictor import load_model
     from bellcrank.surrogate.recipes import recipe_of
     from bellcrank.surrogate.training_setup import begin
     from bellcrank.surrogate.training_setup import resume as resume_training
 
-    given = [model, recipe, epochs, seed, settings, out]
+    given = [model, recipe, epochs, seed, settings, start, out]
     if resume is not None:
         if any(value not in (None, []) for value in given):
             raise InvalidSettings(
                 "--resume continues with the settings of the training; leave out the other options"
             )
         folder = resume
-        training = resume_training(folder, read_dataset(dataset), device=device)
+        training = resume_training(folder, join(list(map(read_dataset, datasets))), device=device)
     else:
         changes = {"model": model, "epochs": epochs, "seed": seed, **settings_of("--set", settings)}
         chosen = recipe_of(recipe or "own", **changes)
-        data = read_dataset(dataset)
+        data = join(list(map(read_dataset, datasets)))
         folder = out or Path(f"{data.problem.name}-{chosen.model}")
-        training = begin(data, chosen, folder, device=device)
+        first = None
+        if start is not None:
+            first = load_model(data.problem, None if start == BUNDLED_NETWORK else start)
+        training = begin(data, chosen, folder, start=first, device=device)
     with stopping_on_interrupt() as stop, TrainingLive() as live:
         for progress in training.run(stop.is_set):
             live(progress)
         trained = training.finish(live) if training.is_done else None
     if trained is None:
-        command = f"bellcrank train {shlex.quote(str(dataset))} --resume {shlex.quote(str(folder))}"
+        command = shlex.join(["bellcrank", "train", *map(str, datasets), "--resume", str(folder)])
         notes.print(f"Stopped; the training is saved. Resume it with: {plain(command)}")
         sys.exit(INTERRUPTED)
     if as_json:

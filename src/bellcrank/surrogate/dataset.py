@@ -40,6 +40,7 @@ from bellcrank.storage.parquet import arrays_of, parquet_file, parquet_writer
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -163,6 +164,44 @@ class Dataset:
         with parquet_writer(buffer, table.schema, header, **WRITER) as writer:
             writer.write_table(table, row_group_size=ROW_GROUP)
         write_bytes(path, buffer.getvalue(), overwrite=overwrite)
+
+
+def join(datasets: Sequence[Dataset]) -> Dataset:
+    """Return the rows of several datasets of one problem; later runs get higher numbers.
+
+    Raises
+    ------
+    InvalidDataset
+        If there is none, or their problems differ.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> crane = find_problem("crane")
+    >>> data = Dataset(crane, np.packbits([crane.initial] * 2, axis=1), [-0.064] * 2, [0, 4])
+    >>> join([data, data]).run.tolist()
+    [0, 4, 5, 9]
+    """
+    if not datasets:
+        raise InvalidDataset("no dataset is given; expected at least one")
+    first, *others = datasets
+    if not others:
+        return first
+    known = problem_to_dict(first.problem)
+    for number, other in enumerate(others, 2):
+        if problem_to_dict(other.problem) != known:
+            raise InvalidDataset(
+                f"dataset {number} has another problem ({other.problem.name!r}) than the first "
+                f"({first.problem.name!r}); a network is trained on one problem"
+            )
+    starts = np.cumsum([0, *(int(each.run.max()) + 1 for each in datasets[:-1])])
+    runs = [each.run + start for each, start in zip(datasets, starts, strict=True)]
+    packed, efficiency, step, accepted = (
+        np.concatenate([getattr(each, name) for each in datasets])
+        for name in ("packed", "efficiency", "step", "accepted")
+    )
+    origin = {"joined": [each.origin for each in datasets]}
+    return Dataset(first.problem, packed, efficiency, np.concatenate(runs), step, accepted, origin)
 
 
 def _check(data: Dataset) -> None:

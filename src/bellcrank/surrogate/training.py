@@ -58,7 +58,7 @@ class EpochRecord:
         Duration of the training so far, in all sessions.
     loss
         Mean squared error over the batches of the epoch, each before its step, in units of the
-        variance.
+        variance (of the data of the first training, if the weights are those of another one).
     r_squared, determination, rms_error
         Accuracy on held-out runs; see `bellcrank.surrogate.metrics.Accuracy`.
     """
@@ -117,6 +117,8 @@ class Training:
         Sum of the losses of the batches of the current epoch, and their number.
     log
         Records of finished epochs.
+    start
+        Record of the network whose weights the training started from; None for random weights.
     """
 
     data: Dataset
@@ -132,6 +134,7 @@ class Training:
     loss_sum: float = 0.0
     loss_count: int = 0
     log: list[EpochRecord] = field(default_factory=list)
+    start: dict[str, Any] | None = None
 
     @property
     def steps_per_epoch(self) -> int:
@@ -233,6 +236,7 @@ class Training:
             "recipe": self.recipe.to_dict(),
             "precision": self.precision,
             "device": name_of(self.device),
+            "start": self.start,
             "designs": self.step * self.recipe.batch,
             "seconds": round(self.seconds, 1),
             "data": {**overlap(self.data, self.split), "runs": self.data.run_count},
