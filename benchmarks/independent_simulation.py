@@ -6,7 +6,8 @@ efficiencies of all proposed designs. The implementation in this module uses the
 problem, and no other code of bellcrank: it has its own energy, equilibrium, chain and random
 numbers. Newton steps with dense matrices evaluate about 25 designs per second. Half of the runs
 search for the most negative efficiency. The accuracy is written to
-``docs/surrogate/independent-simulation.json``.
+``docs/surrogate/independent-simulation.json``. With ``--dataset FILE`` the designs are written, so
+that other networks can be tested on them (``python -m benchmarks.surrogate_long_runs``).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from bellcrank.model import find_problem
 from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
+from bellcrank.surrogate.dataset import Dataset
 from bellcrank.surrogate.metrics import accuracy
 from bellcrank.surrogate.predictor import load_predictor
 
@@ -187,20 +189,26 @@ def _block_diagonal(blocks: NDArray[np.float64]) -> csr_array:
 
 
 def search(
-    simulation: Simulation, problem: Problem, steps: int, sign: int, rng: np.random.Generator
+    simulation: Simulation,
+    problem: Problem,
+    options: argparse.Namespace,
+    run: int,
+    rng: np.random.Generator,
 ) -> tuple[list[NDArray[np.bool_]], list[float]]:
-    """Run the paper's search once; return masks and efficiencies of the proposed designs."""
+    """Run the paper's search once; return masks and efficiencies of every n-th proposed design."""
+    sign = 1 - 2 * (run % 2)
     mask = np.asarray(problem.initial).copy()
     cost = math.exp(-sign * simulation.efficiency(mask))
     masks, efficiencies, accepted = [], [], 0
-    for _ in range(steps):
+    for step in range(options.steps):
         proposed = mask.copy()
         proposed[rng.choice(problem.designable)] ^= True
         efficiency = simulation.efficiency(proposed)
         if math.isnan(efficiency):
             continue
-        masks.append(proposed)
-        efficiencies.append(efficiency)
+        if step % options.every == 0:
+            masks.append(proposed)
+            efficiencies.append(efficiency)
         increase = math.exp(-sign * efficiency) - cost
         temperature = max(0.06 - (0.06 - 1e-3) * accepted / 100, 1e-3)
         if increase <= 0 or rng.random() < math.exp(-increase / temperature):
@@ -217,17 +225,24 @@ def main() -> None:
     rng = np.random.Generator(np.random.MT19937(options.seed))
     masks: list[NDArray[np.bool_]] = []
     efficiencies: list[float] = []
+    runs: list[int] = []
     for run in range(options.runs):
-        new_masks, values = search(simulation, problem, options.steps, 1 - 2 * (run % 2), rng)
+        new_masks, values = search(simulation, problem, options, run, rng)
         masks += new_masks
         efficiencies += values
+        runs += [run] * len(values)
         print(
             f"run {run + 1} of {options.runs}: efficiency of the last design {values[-1]:.3f}",
             flush=True,
         )
-    predicted = predictor.predict(np.array(masks)).efficiency
+    if options.dataset:
+        packed = np.packbits(np.array(masks), axis=1)
+        Dataset(problem, packed, np.array(efficiencies), np.array(runs)).write(
+            options.dataset, overwrite=True
+        )
+    predicted = predictor.predict(np.array(masks))
     result = accuracy(predicted, np.array(efficiencies)).to_dict()
-    settings = {"runs": options.runs, "steps": options.steps, "seed": options.seed}
+    settings = {name: getattr(options, name) for name in ("runs", "steps", "every", "seed")}
     print(f"R2 {result['r_squared']:.4f}, determination {result['determination']:.4f}, "
           f"{result['count']} designs")  # fmt: skip
     record = {"provenance": provenance(), **settings, **result}
@@ -241,9 +256,9 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--runs", type=int, default=12, help="number of runs")
     parser.add_argument("--steps", type=int, default=582, help="steps of each run")
     parser.add_argument("--seed", type=int, default=0, help="seed of the random numbers")
-    parser.add_argument(
-        "--model", nargs="*", default=[], help="files of trained models; default: the bundled one"
-    )
+    parser.add_argument("--every", type=int, default=1, help="test every n-th proposal")
+    parser.add_argument("--model", type=Path, help="file of a trained network [the bundled one]")
+    parser.add_argument("--dataset", type=Path, help="Parquet file for the designs")
     parser.add_argument("--out", type=Path, default=RECORD, help="JSON file")
     return parser.parse_args()
 
