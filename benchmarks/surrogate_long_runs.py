@@ -92,7 +92,7 @@ def main() -> None:
             }  # fmt: skip
             options.record.parent.mkdir(parents=True, exist_ok=True)
             write_text(options.record, json.dumps(record, indent=1) + "\n", overwrite=True)
-            print(f"{network}: {table_row(row)}", flush=True)
+            print(table_row(row), flush=True)
 
 
 def key_of(row: dict[str, Any]) -> tuple[str, str]:
@@ -106,14 +106,22 @@ def table_row(row: dict[str, Any]) -> str:
     Examples
     --------
     >>> end = {"count": 12, "bias": -0.25}
-    >>> table_row({"set": "long", "runs": 3, "count": 4000, "r_squared": 0.98, "rms_error": 0.4,
-    ...            "determination": 0.97, "below": {"count": 0, "bias": None}, "above": end})
-    '| long | 3 | 4,000 | 0.980 | 0.970 | 0.40 | - | -0.25 |'
+    >>> table_row({"network": "first", "set": "long", "runs": 3, "count": 4000, "r_squared": 0.98,
+    ...            "determination": 0.97, "rms_error": 0.4, "below": {"count": 0, "bias": None},
+    ...            "above": end})
+    '| long | first | 3 | 4,000 | 0.980 | 0.970 | 0.40 | - | -0.25 |'
     """
     ends = ["-" if row[end]["bias"] is None else f"{row[end]['bias']:+.2f}" for end in
             ("below", "above")]  # fmt: skip
     figures = [f"{row[name]:.3f}" for name in ("r_squared", "determination")]
-    cells = [row["set"], row["runs"], f"{row['count']:,}", *figures, f"{row['rms_error']:.2f}"]
+    cells = [
+        row["set"],
+        row["network"],
+        row["runs"],
+        f"{row['count']:,}",
+        *figures,
+        f"{row['rms_error']:.2f}",
+    ]
     return "| " + " | ".join(map(str, [*cells, *ends])) + " |"
 
 

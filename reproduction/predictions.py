@@ -76,11 +76,7 @@ def bundled(settings: Settings) -> dict[str, Any]:
     model: Any = load_model(data.problem)
     with one_thread():
         predicted = model.predict(data.packed)
-    before = model.record.get("before", {}).get("designs", 0)
-    return {
-        **_network(model, before),
-        **_comparison(predicted, data.efficiency),
-    }
+    return {**_network(model), **_comparison(predicted, data.efficiency)}
 
 
 def trained(settings: Settings) -> dict[str, Any]:
@@ -100,11 +96,15 @@ def trained(settings: Settings) -> dict[str, Any]:
     return {**_network(model), **_comparison(predicted, data.efficiency[held_out])}
 
 
-def _network(model: Any, before: int = 0) -> dict[str, Any]:
-    """Return architecture, number of training samples and accuracy per epoch."""
+def _network(model: Any) -> dict[str, Any]:
+    """Return architecture, number of training samples and accuracy per epoch.
+
+    The samples of the network that a training started from count, too.
+    """
+    before = (model.record.get("start") or {}).get("designs", 0)
     return {
         "network": model.architecture,
-        "looks": model.record["designs"],
+        "looks": model.record["designs"] + before,
         "epochs": [
             {"designs": each["designs"] + before, "r_squared": each["r_squared"]}
             for each in model.record["epochs"]

@@ -33,7 +33,7 @@ def test_the_bias_is_that_of_the_designs_beyond_the_bound() -> None:
     assert (found["runs"], found["count"], found["range"]) == (2, 6, [-4.0, 5.0])
     inner = benchmark.measure(model, Dataset(crane, packed, actual / 2.0, np.arange(6)))
     assert inner["below"] == {"count": 0, "bias": None}
-    assert benchmark.table_row({"set": "inner", **inner}).endswith("| - | - |")
+    assert benchmark.table_row({"set": "inner", "network": "a", **inner}).endswith("| - | - |")
 
 
 def test_a_row_replaces_that_of_the_same_network_and_set_only(
